@@ -26,8 +26,8 @@ _X3P = b"PK\x03\x04"
 MAX_POINTS = 1_000_000  # of a filtered profile
 ROW_CHOICES = ("row", "mean_rows", "at")
 _NAMES = (
-    "choose other names with --columns Y,Z or, in a scenario, profile_columns = [Y, Z];"
-    " a minus sign before Z makes it a depth"
+    "choose other names with --columns Y,Z or, in a scenario, profile_columns"
+    ' = ["Y", "Z"]; a minus sign before Z makes it a depth'
 )
 _CLEARLY = 3.0  # heights above the ends of a profile over those below
 _INSTALL = "pip install 'wearsim[surfaces]'"

@@ -111,6 +111,20 @@ def test_plot_prints_the_residual_of_measurements(command: Command, finished: Pa
     assert "far: no point on the strips, no residual" in result.stderr
 
 
+def test_plot_suggests_and_applies_levelling(command: Command, finished: Path) -> None:
+    found = open_results(finished)
+    y = found.y * 1.5
+    height = 1e-5 + 1e-3 * y - np.interp(y, found.y, found.profiles[-1], 0.0, 0.0)
+    rows = [f"{1e3 * a:.6f},{1e6 * b:.6f}" for a, b in zip(y + 2e-4, height, strict=True)]
+    Path("trace.csv").write_text("\n".join(["y [mm],height [um]", *rows]))
+    assert "with --level" in command("plot", finished, "--measured", "trace.csv").stderr
+    text = command("plot", finished, "--measured", "trace.csv", "--level", "--force").stderr
+    assert "with --level" not in text
+    rms = float(text.split("residual rms ")[1].split(" um")[0])
+    assert rms < 0.05 * 1e6 * found.depth[-1]
+    assert command("plot", finished, "--level", "--force").exit_code == 2
+
+
 def test_export_overwrites_and_writes_decimal_commas(command: Command, finished: Path) -> None:
     assert command("export", finished, "-o", "out").exit_code == 0
     again = command("export", finished, "-o", "out")
@@ -175,3 +189,5 @@ def test_export_writes_csv_with_units(command: Command, finished: Path) -> None:
     header = Path("out/history.csv").read_text().splitlines()[0]
     assert "depth [um]" in header
     assert command("export", finished, "-o", "out").exit_code == 2
+    assert command("export", finished).exit_code == 0
+    assert Path("short/history.csv").read_text() == Path("out/history.csv").read_text()

@@ -13,10 +13,10 @@ from made_up_ensembles import made_up
 
 import wearsim
 from wearsim.errors import WearsimError
+from wearsim.report.measured import Measured
 from wearsim.report.page.page import _part, page_of, save_report
 from wearsim.report.page.run_plots import run_plots
 from wearsim.report.page.study_plots import comparison_plots, ensemble_plots
-from wearsim.report.parts import Measured
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.ensemble.compare import compare
 

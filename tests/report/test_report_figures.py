@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from wearsim.errors import PluginError, ResultsFileError
 from wearsim.report.figures.contact import contact_figure
 from wearsim.report.figures.run import run_figure
-from wearsim.report.parts import Measured, save_figure
+from wearsim.report.measured import Measured
+from wearsim.report.parts import save_figure
 from wearsim.results import Result
 from wearsim.scenario import load_scenario
 from wearsim.studies.contact.single import ContactStudy, study_contact

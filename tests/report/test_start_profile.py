@@ -7,7 +7,7 @@ import wearsim
 from tests.evolution import SCENARIOS
 from wearsim.report.figures.ensemble import ensemble_figure
 from wearsim.report.figures.run import _draw_profiles, run_figure
-from wearsim.report.parts import Measured
+from wearsim.report.measured import Measured
 from wearsim.report.text import shown
 from wearsim.scenario import parse_scenario
 

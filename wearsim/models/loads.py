@@ -193,11 +193,14 @@ def _read_log(
 ) -> tuple[PiecewiseLinear, FloatArray, FloatArray]:
     """Return the log, its pauses and its gaps [s]."""
     first, second = names or ("time", "load")
-    choice = "choose other names with load.columns = [TIME, LOAD]"
+    choice = 'choose other names with load.columns = ["TIME", "LOAD"]'
+    other_names = (
+        {} if names else {"time": ["t"], "load": ["force", "normal force", "normal_force"]}
+    )
     if first == second:
         raise ScenarioError(path, [Mistake("", "", "time and load need two columns", first)])
     units = {first: "s", second: "N"}
-    columns = read_columns(text, path, units, rising=first, choice=choice)
+    columns = read_columns(text, path, units, aliases=other_names, rising=first, choice=choice)
     time, load = columns[first], columns[second]
     load = np.where((load < 0.0) & (load >= -ZERO_DRIFT * load.max()), 0.0, load)
     steps = np.diff(time)

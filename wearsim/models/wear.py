@@ -33,8 +33,10 @@ class ArchardOptions(Options):
     factor: float = Field(
         1.0, gt=0.0, description="factor of both wear factors, such as a scatter that they share"
     )
-    cylinder: BodyWear = Field(description="wear factor of the cylinder")
-    roller: BodyWear = Field(description="wear factor of each roller; '0 1/Pa' for no wear")
+    cylinder: BodyWear = Field(description="wear factor of the cylinder, cylinder.k_over_h")
+    roller: BodyWear = Field(
+        description="wear factor of each roller, roller.k_over_h; '0 1/Pa' for no wear"
+    )
 
 
 class ArchardDissipation(WearLaw):

@@ -1,13 +1,12 @@
-"""Parts that figures share: style, saving, contact patches, convergence and measured profiles."""
+"""Parts that figures share: style, saving, contact patches, convergence."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -15,9 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from wearsim.errors import WearsimError
-from wearsim.report.text import PER_SI, count, pass_unit, shown, sufficient_for
-from wearsim.results import EnsembleResult, Result
+from wearsim.report.measured import Measured
+from wearsim.report.text import PER_SI, count, pass_unit
 from wearsim.results.io.atomic_write import replacement
 from wearsim.types import BoolArray, FloatArray, IntArray
 
@@ -259,110 +257,6 @@ def draw_convergence(
         axes.set_ylim(least - margin, greatest + margin)
         axes.axhline(value[-1], color=GREY, lw=0.8, ls="--")
     axes.set_xlim(0.5 * _SCALED_FROM if last > _LINEAR_UP_TO else 1.0, max(2.0, 1.05 * last))
-
-
-@dataclass(frozen=True)
-class Measured:
-    """A measured profile.
-
-    Parameters
-    ----------
-    label : str
-        Label in the figure.
-    y : ndarray, shape (points,)
-        Axial position [m].
-    height : ndarray, shape (points,)
-        Height above the nominal surface [m]; worn material is negative.
-    """
-
-    label: str
-    y: FloatArray
-    height: FloatArray
-
-
-class ComputedProfile(NamedTuple):
-    """Profile of the cylinder at the end of a run or an ensemble.
-
-    Parameters
-    ----------
-    y : ndarray, shape (strips,)
-        Axial position [m].
-    height : ndarray, shape (strips,)
-        Height above the nominal surface, of an ensemble that of the mean [m].
-    low, high : ndarray, shape (strips,)
-        Ends of the band of an ensemble, which are equal for a run [m].
-    start : ndarray, shape (strips,)
-        Height at the start of the test [m].
-    label : str
-        Description of the band; empty if there is none.
-    kept : int
-        Number of profiles.
-    """
-
-    y: FloatArray
-    height: FloatArray
-    low: FloatArray
-    high: FloatArray
-    start: FloatArray
-    label: str = ""
-    kept: int = 1
-
-
-_BAND = 0.025  # probability below the band of an ensemble
-
-
-def computed_profile(result: Result | EnsembleResult) -> ComputedProfile:
-    """Return the profile at the end of a run or an ensemble."""
-    if isinstance(result, Result):
-        start = result.start_height
-        height = start - np.asarray(result.profiles[-1])
-        return ComputedProfile(result.y, height, height, height, start)
-    band, start = result.band(), _start_height(result)
-    low, high, label = band.low, band.high, ""
-    if band.kept > 1:
-        label = "2.5 % to 97.5 %"
-        if not sufficient_for(band.kept, _BAND):
-            kept = result.profiles
-            low, high, label = kept.min(axis=0), kept.max(axis=0), "least to greatest"
-    height = start - band.mean
-    return ComputedProfile(band.y, height, start - high, start - low, start, label, band.kept)
-
-
-def _start_height(result: EnsembleResult) -> FloatArray:
-    """Return the height at the start of the tests, which the scenario gives [m]."""
-    y = result.raw.variables["y"]
-    try:
-        profile = result.scenario.cylinder.profile
-    except WearsimError:  # a plugin of the scenario is not installed
-        profile = None
-    return np.zeros_like(y) if profile is None else np.interp(y, profile.y, profile.height)
-
-
-def residual_text(measured: Measured, computed: ComputedProfile) -> str:
-    """Return the root mean square of measured minus computed heights, and their mean.
-
-    Points beyond the strips are not compared. With a band, the part of the points within it is
-    added.
-
-    Parameters
-    ----------
-    measured : Measured
-    computed : ComputedProfile
-    """
-    y = measured.y
-    inside = (y >= computed.y[0]) & (y <= computed.y[-1])
-    if not inside.any():
-        return "no point on the strips, no residual"
-    y, height = y[inside], measured.height[inside]
-    residual = height - np.interp(y, computed.y, computed.height)
-    rms, mean = float(np.sqrt(np.mean(residual**2))), float(residual.mean())
-    text = (
-        f"residual rms {shown(rms, 'um', 3)}, mean {shown(mean, 'um', 3)}, {count(len(y))} points"
-    )
-    if computed.label:
-        low, high = (np.interp(y, computed.y, end) for end in (computed.low, computed.high))
-        text += f", {shown(float(((height >= low) & (height <= high)).mean()), '%', 3)} in the band"
-    return text
 
 
 def draw_measured(axes: Axes, measured: Sequence[Measured]) -> None:

@@ -93,6 +93,7 @@ def dry_run(scenario: Scenario) -> Data:
             "length_m": 2.0 * patch.a,
             "width_m": 2.0 * patch.b,
             "peak_pressure_Pa": patch.peak_pressure,
+            "load_N": high,
         },
     }
     if "friction.coefficient" in random:
@@ -230,10 +231,8 @@ def _test(scenario: Scenario) -> Data:
 def plan(data: Data) -> TableRows:
     """Return the description from `dry_run` as rows of name and value, in engineering units."""
     roller, patch = data["roller"], data["initial_patch"]
-    radii = (
-        f"radius {roller['radius_m'] * 1e3:.6g} mm,"
-        f" crown radius {roller['crown_radius_m'] * 1e3:.6g} mm"
-    )
+    radii = f"radius {roller['radius_m'] * 1e3:.6g} mm"
+    radii += f", crown radius {roller['crown_radius_m'] * 1e3:.6g} mm"
     if roller["width_m"] is not None:
         radii += f", width {roller['width_m'] * 1e3:.6g} mm"
     for key, name in (("edge_radius_m", "edge radius"), ("chamfer_m", "chamfer")):
@@ -247,7 +246,7 @@ def plan(data: Data) -> TableRows:
     )
     size = (
         f"{1e3 * patch['length_m']:.4g} x {1e3 * patch['width_m']:.4g} mm,"
-        f" peak pressure {patch['peak_pressure_Pa'] / 1e6:.4g} MPa"
+        f" peak pressure {patch['peak_pressure_Pa'] / 1e6:.4g} MPa at {patch['load_N']:.4g} N"
     )
     return [
         ("roller", radii),

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wearsim.cli.commands.results import MeasuredFiles, measured_profiles
+from wearsim.cli.commands.results import Level, MeasuredFiles, measured_profiles
 from wearsim.cli.shared import (
     At,
     Columns,
@@ -44,6 +44,7 @@ def report(
     files: Files,
     output: Page = None,
     measured: MeasuredFiles = None,
+    level: Level = False,
     columns: Columns = None,
     units: Units = None,
     row: Row = None,
@@ -63,6 +64,7 @@ def report(
     refuse_inputs(path, files, "the page")
     refuse_inputs(path, measured or [], "a measured profile")
     results = [open_results(file) for file in files]
-    profiles = measured_profiles(measured or [], profile_choice(columns, units, row, mean_rows, at))
+    choice = profile_choice(columns, units, row, mean_rows, at)
+    profiles = measured_profiles(measured or [], choice, results, level)
     save_report(results, path, profiles)
     note(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")

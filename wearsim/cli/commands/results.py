@@ -28,7 +28,7 @@ from wearsim.cli.shared import (
 
 if TYPE_CHECKING:
     from wearsim.profiles import ProfileChoice
-    from wearsim.report.parts import Measured
+    from wearsim.report.measured import Measured
     from wearsim.results import (
         DissipationResult,
         EnsembleResult,
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     )
     from wearsim.results.content import StudyData
 
+
+_MISALIGNED = 0.5  # ratio of residuals below which levelling is suggested
 
 MeasuredFiles = Annotated[
     list[Path] | None,
@@ -48,12 +50,21 @@ MeasuredFiles = Annotated[
         show_default=False,
     ),
 ]
+Level = Annotated[
+    bool,
+    typer.Option(
+        "--level",
+        help="Remove offset, inclination and axial shift of measured profiles, found on the surface"
+        " outside the computed groove.",
+    ),
+]
 
 
 def plot(
     file: ResultsFile,
     figure: Figure = None,
     measured: MeasuredFiles = None,
+    level: Level = False,
     columns: Columns = None,
     units: Units = None,
     row: Row = None,
@@ -78,26 +89,57 @@ def plot(
         raise typer.BadParameter(
             f"requires wear tests; {file} holds {result.raw.schema.holds}", param_hint="--measured"
         )
-    profiles = measured_profiles(measured or [], profile_choice(columns, units, row, mean_rows, at))
-    draw(result, path, profiles)
-    for profile in profiles:
-        from wearsim.report.parts import computed_profile, residual_text
-
-        assert not isinstance(result, DissipationResult | IdentificationResult)
-        note(f"{profile.label}: {residual_text(profile, computed_profile(result))}")
+    choice = profile_choice(columns, units, row, mean_rows, at)
+    draw(result, path, measured_profiles(measured or [], choice, [result], level))
     note(f"figure: {path}")
 
 
-def measured_profiles(files: Sequence[Path], choice: ProfileChoice) -> list[Measured]:
-    """Return the profiles of measured files; how their signs were read goes to stderr."""
+def measured_profiles(
+    files: Sequence[Path], choice: ProfileChoice, results: Sequence[object], level: bool
+) -> list[Measured]:
+    """Return the profiles of measured files, levelled against the first result if required.
+
+    How signs were read and the residuals go to stderr.
+    """
+    if not files:
+        if level:
+            raise typer.BadParameter("needs a measured profile, --measured", param_hint="--level")
+        return []
+    from wearsim.errors import ScenarioError
     from wearsim.profiles import load_profile, sign_note
-    from wearsim.report.parts import Measured
+    from wearsim.report.measured import Measured, computed_profile, levelled, residual_text, rms
+    from wearsim.report.text import shown
+    from wearsim.results import EnsembleResult, Result
+    from wearsim.results.ensemble.life import LifeResult
 
     read = [load_profile(file, choice) for file in files]
     each = zip(files, read, strict=True)
     write_notes(filter(None, [sign_note(one, choice, str(file)) for file, one in each]))
     each = zip(files, read, strict=True)
-    return [Measured(file.stem, one.y, one.height) for file, one in each]
+    profiles = [Measured(file.stem, one.y, one.height) for file, one in each]
+    tests = (
+        one
+        for one in results
+        if isinstance(one, Result | EnsembleResult) and not isinstance(one, LifeResult)
+    )
+    test = next(tests, None)
+    if test is None:
+        return profiles
+    computed = computed_profile(test)
+    for place, profile in enumerate(profiles):
+        try:
+            corrected = levelled(profile, computed)
+        except ScenarioError:
+            if level:
+                raise
+            corrected = profile
+        text = f"{profile.label}: {residual_text(corrected if level else profile, computed)}"
+        if level:
+            profiles[place] = corrected
+        elif rms(corrected, computed) < _MISALIGNED * rms(profile, computed):
+            text += f"; rms {shown(rms(corrected, computed), 'um', 3)} with --level"
+        note(text)
+    return profiles
 
 
 def draw(
@@ -286,9 +328,13 @@ def _labels(files: list[Path]) -> list[str]:
 
 
 Folder = Annotated[
-    Path,
+    Path | None,
     typer.Option(
-        "--output", "-o", metavar="DIR", help="Folder for the CSV files.", show_default=False
+        "--output",
+        "-o",
+        metavar="DIR",
+        help="Folder for the CSV files, by default the name of the results file.",
+        show_default=False,
     ),
 ]
 
@@ -301,12 +347,15 @@ Decimal = Annotated[
 ]
 
 
-def export(file: ResultsFile, output: Folder, decimal: Decimal = ".", force: Force = False) -> None:
+def export(
+    file: ResultsFile, output: Folder = None, decimal: Decimal = ".", force: Force = False
+) -> None:
     """Write a results file as CSV, with units in the headers."""
     if decimal not in {".", ","}:
         raise typer.BadParameter(f"'{decimal}' is neither '.' nor ','", param_hint="--decimal")
     from wearsim.results import export_csv, open_results
 
     sign: Literal[".", ","] = "," if decimal == "," else "."
-    for path in export_csv(open_results(file), output, force=force, decimal=sign):
+    folder = output if output is not None else Path(file.stem)
+    for path in export_csv(open_results(file), folder, force=force, decimal=sign):
         typer.echo(str(path))

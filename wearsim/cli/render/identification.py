@@ -157,7 +157,10 @@ def _scatter(summary: Mapping[str, Any], tests: int) -> Rows:
             )
             + " 1e-12 1/Pa",
         ),
-        ("what would decide", deciding(summary["to_decide"], tests)),
+        (
+            "what would decide" if summary["to_decide"]["needed"] else "power of the tests",
+            deciding(summary["to_decide"], tests),
+        ),
     ]
     return rows
 
@@ -180,7 +183,7 @@ def deciding(found: Mapping[str, Any], tests: int) -> str:
         + (f"{many}" if many else "no number of")
         + " such tests"
     ]
-    if found["tests_if_measured"]:
+    if found["tests_if_measured"] and found["power_if_measured"] > found["power"]:
         lines.append(
             f"with {measure} measured, so that inputs leave 0.1: {found['power_if_measured']:.2f},"
             f" and 0.8 by {found['tests_if_measured']} tests"

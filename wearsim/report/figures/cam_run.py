@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from wearsim.mechanics.cam import Stations, surface_points
 from wearsim.report.figures.cam import between_flanks, name_segments
 from wearsim.report.figures.run import Colours, caption, draw_depth
+from wearsim.report.measured import Measured
 from wearsim.report.parts import (
     BLUE,
     GREY,
     ORANGE,
-    Measured,
     draw_measured,
     evenly_spaced,
     name_axes,

@@ -9,14 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from wearsim.report.measured import ComputedProfile, Measured, computed_profile
 from wearsim.report.parts import (
     BLUE,
     GREEN,
     GREY,
     ORANGE,
-    ComputedProfile,
-    Measured,
-    computed_profile,
     draw_convergence,
     draw_measured,
     name_axes,

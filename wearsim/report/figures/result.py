@@ -13,7 +13,7 @@ from wearsim.report.figures.ensemble import draw_course, ensemble_figure
 from wearsim.report.figures.identification import draw_factors, identification_figure
 from wearsim.report.figures.life import draw_survival, life_figure
 from wearsim.report.figures.run import draw_worn_profiles, run_figure
-from wearsim.report.parts import Measured
+from wearsim.report.measured import Measured
 from wearsim.results import DissipationResult, EnsembleResult, IdentificationResult, Result
 from wearsim.results.ensemble.life import LifeResult
 

@@ -12,6 +12,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from wearsim.errors import WearsimError
+from wearsim.report.measured import Measured
 from wearsim.report.parts import (
     BLUE,
     GREEN,
@@ -19,7 +20,6 @@ from wearsim.report.parts import (
     ORANGE,
     RECORDS,
     RED,
-    Measured,
     draw_measured,
     evenly_spaced,
     name_axes,

@@ -9,6 +9,7 @@ import numpy as np
 
 from wearsim.errors import PluginError, WearsimError
 from wearsim.report import summary
+from wearsim.report.measured import Measured
 from wearsim.report.page.part import (
     NO_STEPPING_ERROR,
     NOT_MODEL,
@@ -19,7 +20,7 @@ from wearsim.report.page.part import (
     files_of,
     tables_of,
 )
-from wearsim.report.parts import Measured, save_text
+from wearsim.report.parts import save_text
 from wearsim.report.text import (
     against,
     count,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from wearsim.report import summary
-from wearsim.report.parts import Measured, computed_profile, residual_text
+from wearsim.report.measured import Measured, computed_profile, residual_text
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.results.identification import IdentificationResult
 

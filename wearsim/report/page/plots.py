@@ -15,7 +15,8 @@ from bokeh.models.tickers import SingleIntervalTicker
 from bokeh.models.tools import HoverTool
 from bokeh.plotting import figure
 
-from wearsim.report.parts import BLUE, GREEN, ORANGE, RED, Measured, depth_scales, evenly_spaced
+from wearsim.report.measured import Measured
+from wearsim.report.parts import BLUE, GREEN, ORANGE, RED, depth_scales, evenly_spaced
 from wearsim.report.text import PER_SI
 from wearsim.types import BoolArray, FloatArray
 

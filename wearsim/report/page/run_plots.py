@@ -12,6 +12,7 @@ from bokeh.models.ranges import Range1d
 from bokeh.palettes import Viridis256
 
 from wearsim.mechanics.cam import Stations
+from wearsim.report.measured import Measured
 from wearsim.report.page.plots import (
     COLOURS,
     DEG,
@@ -30,7 +31,7 @@ from wearsim.report.page.plots import (
     pass_axes,
     worn_range,
 )
-from wearsim.report.parts import BLUE, ORANGE, Measured, evenly_spaced
+from wearsim.report.parts import BLUE, ORANGE, evenly_spaced
 from wearsim.report.text import PER_SI, count, shown
 from wearsim.results import Result
 from wearsim.studies.cam.turn import CamTurn

@@ -11,6 +11,7 @@ from bokeh.models.annotations import Whisker
 from bokeh.models.ranges import Range1d
 from bokeh.models.tickers import BasicTicker
 
+from wearsim.report.measured import Measured, computed_profile
 from wearsim.report.page.plots import (
     COLOURS,
     MM,
@@ -26,7 +27,7 @@ from wearsim.report.page.plots import (
     pass_axes,
     worn_range,
 )
-from wearsim.report.parts import BLUE, GREY, Measured, computed_profile, evenly_spaced
+from wearsim.report.parts import BLUE, GREY, evenly_spaced
 from wearsim.report.text import count, shown, sufficient_for
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.results.ensemble.data import Effect

@@ -242,6 +242,8 @@ def _translate(
         here += other_keys.model_fields if other_keys and len(loc) == 1 else []
         mistakes.add(place, key, f"unknown key{mistakes.hint(key, here)}")
     elif kind == "missing":
+        if field and field.description and expected == "a table":
+            expected += f": {field.description}"
         mistakes.add(place, key, "is missing", None, expected)
     else:
         what = _WHAT.get(kind, "is out of range" if kind in _BOUNDS else "cannot be used")

@@ -77,7 +77,8 @@ class CreepageTable(Options):
         " free roller, whose creepage follows from the torque balance.",
     )
     longitudinal: float | None = Field(
-        default=None, description="Mean longitudinal creepage; for drive = creepage."
+        default=None,
+        description="Mean longitudinal creepage, 1e-3 for 0.1 %; for drive = creepage.",
     )
     bearing_torque: NonNegativeTorque | None = Field(
         default=None, description="Torque of a roller's bearing; for drive = free."

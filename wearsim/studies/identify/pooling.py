@@ -289,7 +289,7 @@ def _to_decide(specimens: Sequence[Specimen], variance: float, verdict: str) -> 
 
 
 def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list[str]:
-    """Return remarks on fits and on the number of draws."""
+    """Return remarks on fits, on the number of draws and on missing random inputs."""
     found = [row.fit.warning for row in rows if row.fit is not None and row.fit.warning]
     few = [
         specimen.name
@@ -302,6 +302,12 @@ def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list
         found.append(
             f"{', '.join(few)}: fewer than {FEW_DRAWS:.0f} draws describe the shape of the groove;"
             " give more with --draws"
+        )
+    if len(specimens) > 1 and all(len(row.likelihood.mean) == 1 for row in rows):
+        found.append(
+            "no input of the scenario is random: differences of load, friction, creepage or slack"
+            " between the tests count as scatter of K/H; give their distributions in the scenario,"
+            " or measured values with std in a tests file"
         )
     return found
 

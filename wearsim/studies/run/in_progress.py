@@ -144,25 +144,29 @@ class RunInProgress:
         return Result(self.data(finished=True), self.path)
 
     def _check_errors(self) -> None:
-        """Warn if an estimated error exceeds the tolerance."""
+        """Warn if estimated errors exceed the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
         sizes = greatest_depth(state.depths), volume_of(self.problem, state.depths)
         errors = state.depth_error, state.volume_error
+        beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]
             size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
             relative, quadrature, scatter = (float((part / size).max()) for part in parts)
             if relative <= tolerance:
                 continue
-            remedy = "lower evolution.tolerance or evolution.step"
+            remedy = "a lower evolution.tolerance or evolution.step decreases it"
             if max(quadrature, scatter) > 0.5 * relative:
-                remedy = "raise evolution.nodes"
+                remedy = "more evolution.nodes decrease it"
                 if scatter > quadrature:
                     part = scatter / relative
                     remedy = f"{part:.0%} of it is sampling scatter of the small number of passes"
+            beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
+        for remedy, found in beyond.items():
+            names, errors_text = map(" and ".join, zip(*found, strict=True))
             self._warn(
-                f"estimated error of {name}: {100.0 * relative:.2g} % exceeds the tolerance"
-                f" of {100.0 * tolerance:.2g} %; {remedy}"
+                f"estimated error of {names}: {errors_text}, above the tolerance of"
+                f" {100.0 * tolerance:.2g} %; {remedy}"
             )
 
     def _step_to_end(self) -> None:
