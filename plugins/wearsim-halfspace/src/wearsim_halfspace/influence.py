@@ -2,46 +2,38 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy import fft
 
 from wearsim.types import FloatArray
 
-WORKERS = 1  # one thread: results do not depend on the number of processors
 
-
-def _log_sum(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return ln(a + sqrt(a^2 + b^2)), without cancellation for negative a."""
-    radius = np.hypot(a, b)
-    small = np.log(b * b) - np.log(radius - a)
-    return np.asarray(np.where(a > 0.0, np.log(radius + a), small))
-
-
-def _integrals(x: FloatArray, y: FloatArray, dx: float, dy: float) -> tuple[FloatArray, ...]:
-    """Return the integrals of x^2/r^3, y^2/r^3 and xy/r^3 over elements about points.
+def _integrals(columns: int, rows: int, dx: float, dy: float) -> FloatArray:
+    """Return the integrals of x^2/r^3, y^2/r^3 and xy/r^3 over elements.
 
     Parameters
     ----------
-    x, y : ndarray, shapes (columns,) and (rows,)
-        Distances from the centre of the elements [m].
+    columns, rows : int
+        Numbers of distances along and across, from 0 in steps of an element.
     dx, dy : float
         Sizes of an element [m].
 
     Returns
     -------
-    tuple of ndarray, shape (rows, columns)
+    ndarray, shape (3, rows, columns)
 
     References
     ----------
     .. [1] A.E.H. Love, Phil. Trans. R. Soc. A 228 (1929), DOI 10.1098/rsta.1929.0009.
     """
-    sums = [np.zeros((len(y), len(x))) for _ in range(3)]
-    for side_x, side_y in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-        a, b = np.meshgrid(x + 0.5 * side_x * dx, y + 0.5 * side_y * dy)
-        parts = b * _log_sum(a, b), a * _log_sum(b, a), -np.hypot(a, b)
-        for number, part in enumerate(parts):
-            sums[number] += side_x * side_y * part
-    return tuple(sums)
+    # corners of the elements; the antiderivatives differ from Love's by terms that cancel
+    a = ((np.arange(columns + 1) - 0.5) * dx)[None, :]
+    b = ((np.arange(rows + 1) - 0.5) * dy)[:, None]
+    corners = np.stack([b * np.arcsinh(a / np.abs(b)), a * np.arcsinh(b / np.abs(a)),
+                        -np.hypot(a, b)])  # fmt: skip
+    return np.asarray(np.diff(np.diff(corners, axis=1), axis=2))
 
 
 class Convolution:
@@ -51,39 +43,54 @@ class Convolution:
     ----------
     coefficients : ndarray, shape (kernels, 2 rows - 1, 2 columns - 1)
         For all distances of two elements, zero in the middle.
+
+    Attributes
+    ----------
+    middle : ndarray, shape (kernels, 2 columns - 1)
+        Coefficients of elements in one row.
+    quarter : ndarray, shape (rows, columns)
+        Those of the first kernel for distances that are not negative.
     """
 
     def __init__(self, coefficients: FloatArray) -> None:
-        _, high, wide = coefficients.shape
+        kernels, high, wide = coefficients.shape
         self.rows, self.columns = (high + 1) // 2, (wide + 1) // 2
-        self.padded = (fft.next_fast_len(high, real=True), fft.next_fast_len(wide, real=True))
-        kernels = np.zeros((len(coefficients), *self.padded))
-        rows = np.arange(1 - self.rows, self.rows) % self.padded[0]
-        columns = np.arange(1 - self.columns, self.columns) % self.padded[1]
-        kernels[:, rows[:, None], columns] = coefficients
-        self.transforms = fft.rfft2(kernels)
         self.middle = coefficients[:, self.rows - 1, :]
+        self.quarter = coefficients[0, self.rows - 1 :, self.columns - 1 :]
+        self._high = fft.next_fast_len(high)
+        self._wide = fft.next_fast_len(wide, real=True)
+        periodic = np.zeros((kernels, self._high, self._wide))
+        rows = np.arange(1 - self.rows, self.rows) % self._high
+        columns = np.arange(1 - self.columns, self.columns) % self._wide
+        periodic[:, rows[:, None], columns] = coefficients
+        self._transforms = fft.rfft2(periodic)
 
     def __call__(self, field: FloatArray) -> FloatArray:
         """Return the convolution of a field, shape (rows, columns), with the first kernel."""
-        return self._back(self.transforms[0] * self._forward(field))
+        return self._back(self._transforms[0] * self._forward(field))
 
     def of_vector(self, field: FloatArray) -> FloatArray:
         """Return that of a vector field, shape (2, rows, columns), with the kernels xx, yy, xy."""
-        along, across = self._forward(field)
-        xx, yy, xy = self.transforms
-        return self._back(np.stack([xx * along + xy * across, xy * along + yy * across]))
-
-    def divided(self, field: FloatArray, spectrum: FloatArray) -> FloatArray:
-        """Return a field whose transform is divided by a spectrum."""
-        return self._back(self._forward(field) / spectrum)
+        transform = self._forward(field)
+        xx, yy, xy = self._transforms
+        along, across = transform
+        found = np.empty_like(transform)
+        np.multiply(xx, along, out=found[0])
+        np.multiply(yy, across, out=found[1])
+        across *= xy
+        along *= xy
+        found[0] += across
+        found[1] += along
+        return self._back(found)
 
     def _forward(self, field: FloatArray) -> FloatArray:
-        return np.asarray(fft.rfft2(field, s=self.padded, workers=WORKERS))
+        # the rows of the padding are not transformed
+        along = fft.rfft(field, n=self._wide, axis=-1)
+        return np.asarray(fft.fft(along, n=self._high, axis=-2))
 
     def _back(self, transform: FloatArray) -> FloatArray:
-        found = fft.irfft2(transform, s=self.padded, workers=WORKERS)
-        return np.asarray(found[..., : self.rows, : self.columns])
+        across = fft.ifft(transform, axis=-2, overwrite_x=True)[..., : self.rows, :]
+        return np.asarray(fft.irfft(across, n=self._wide, axis=-1)[..., : self.columns])
 
 
 class Elements:
@@ -105,25 +112,51 @@ class Elements:
     ----------
     normal : Convolution
         Approach of the surfaces by pressure [m/Pa].
-    rolling : Convolution
-        Slip by traction in steady rolling, per distance rolled: the decrease of the displacement
-        along x over one element [1/Pa].
     """
 
     def __init__(
-        self, rows: int, columns: int, dx: float, dy: float, shear_modulus: float, poisson: float
+        self,
+        rows: int,
+        columns: int,
+        dx: float,
+        dy: float,
+        shear_modulus: float,
+        poisson_ratio: float,
     ) -> None:
         self.rows, self.columns, self.dx, self.dy = rows, columns, dx, dy
-        x = np.asarray(np.arange(1 - columns, columns) * dx, dtype=np.float64)
-        y = np.asarray(np.arange(1 - rows, rows) * dy, dtype=np.float64)
-        scale = 1.0 / (np.pi * shear_modulus)
+        scale, self._poisson_ratio = 1.0 / (np.pi * shear_modulus), poisson_ratio
+        # for distances from 0 to one element more than there are columns
+        self._integrals = scale * _integrals(columns + 1, rows, dx, dy)
+        normal = (1.0 - poisson_ratio) * (self._integrals[0] + self._integrals[1])
+        self.normal = Convolution(_mirrored(normal[None, :, :-1]))
 
-        def displacements(shift: float) -> FloatArray:
-            along, across, mixed = _integrals(x + shift, y, dx, dy)
-            every = (1.0 - poisson) * (along + across)
-            return scale * np.stack([every + poisson * along, every + poisson * across,
-                                     poisson * mixed])  # fmt: skip
+    @cached_property
+    def shift(self) -> Convolution:
+        """Relative displacement by traction [m/Pa]."""
+        return Convolution(self._displacements()[..., 1:-1])
 
-        along, across, _ = _integrals(x, y, dx, dy)
-        self.normal = Convolution(scale * (1.0 - poisson) * (along + across)[None])
-        self.rolling = Convolution((displacements(0.0) - displacements(dx)) / dx)
+    @cached_property
+    def rolling(self) -> Convolution:
+        """Slip by traction in steady rolling, per distance rolled [1/Pa].
+
+        It is the decrease of the displacement along x over one element.
+        """
+        found = self._displacements()
+        return Convolution((found[..., 1:-1] - found[..., 2:]) / self.dx)
+
+    def _displacements(self) -> FloatArray:
+        """Return displacements by traction, kernels xx, yy and xy (Cerruti) [m/Pa]."""
+        along, across, mixed = self._integrals
+        every = (1.0 - self._poisson_ratio) * (along + across)
+        found = _mirrored(np.stack([every + self._poisson_ratio * along,
+                                    every + self._poisson_ratio * across,
+                                    self._poisson_ratio * mixed]))  # fmt: skip
+        found[2, :, : self.columns] *= -1.0  # odd along and across
+        found[2, : self.rows - 1] *= -1.0
+        return found
+
+
+def _mirrored(quarter: FloatArray) -> FloatArray:
+    """Return coefficients for all distances from those for distances that are not negative."""
+    half = np.concatenate([quarter[..., :0:-1], quarter], axis=-1)
+    return np.concatenate([half[:, :0:-1], half], axis=-2)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -12,20 +12,22 @@ import wearsim.plugins as ws
 from wearsim.types import (
     ContactFields,
     ContactSolution,
+    Creepage,
     FloatArray,
     Grid,
     Material,
     OperatingPoint,
 )
-from wearsim_halfspace.influence import Elements
+from wearsim_halfspace.grids import Problem, Solution, densities, solve
 from wearsim_halfspace.normal import NormalSolution, solve_normal
-from wearsim_halfspace.rolling import RollingSolution, solve_rolling
+from wearsim_halfspace.strips import combined, half_width
 
-LADDER = 1.05  # ratio of successive element lengths, so that coefficients are used again
-ROW_BLOCK = 8  # numbers of rows are multiples of it, for the same reason
-MARGIN = 1.3  # columns over the elements across the longest strip
+LADDER = 1.05  # ratio of successive element lengths, so that nearby contacts have the same
+MARGIN = 1.1  # columns over the elements across the longest strip
 FEWEST = 0.8  # elements across the longest strip, relative to the requested number
-MAX_GRIDS = 12
+LEAST, MOST = 16, 200  # elements across the longest strip
+SPARE = 3  # rows and columns around the contact
+FREE_GRIDS, MAX_GRIDS = 3, 12  # tried until elements and solution agree; at most
 
 Elements_ = Annotated[int, ws.Field(ge=8, le=400)]
 
@@ -33,28 +35,30 @@ Elements_ = Annotated[int, ws.Field(ge=8, le=400)]
 class HalfspaceOptions(ws.Options):
     """Options of the contact model `halfspace`, validated with their units."""
 
-    mx: Elements_ = ws.Field(50, description="elements across the longest strip along rolling")
+    mx: Elements_ | None = ws.Field(
+        None,
+        description="elements across the longest strip along rolling; by default as many as strips"
+        " are in contact",
+    )
+    my: Elements_ = ws.Field(
+        100, description="strips across a fresh contact, if neither their number nor width is given"
+    )
+    extrapolate: bool = ws.Field(
+        True, description="extrapolate forces and powers from the grid and one of twice the size"
+    )
     tolerance: float = ws.Field(1e-6, gt=0.0, le=1e-2, description="of pressure and traction")
 
 
-@lru_cache(maxsize=32)
-def elements_of(
-    rows: int, columns: int, dx: float, dy: float, shear_modulus: float, poisson_ratio: float
-) -> Elements:
-    """Return elements; their influence coefficients are computed once for each grid."""
-    return Elements(rows, columns, dx, dy, shear_modulus, poisson_ratio)
-
-
 class Patch(NamedTuple):
-    """Normal solution, elements, strips of their rows, positions along rolling [m].
+    """Problem and normal solution of a contact.
 
-    `load` and `half_length` are the line load and the half-length of all strips of the grid.
+    `strips` are those of the rows of elements; `load` and `half_length` are the line load and the
+    half-length of all strips.
     """
 
+    problem: Problem
     normal: NormalSolution
-    elements: Elements
     strips: slice
-    x: FloatArray
     load: FloatArray
     half_length: FloatArray
 
@@ -78,13 +82,8 @@ class Halfspace(ws.SingleContactModel):
     def __init__(
         self, options: HalfspaceOptions, grid: Grid, materials: Sequence[Material]
     ) -> None:
-        moduli = [m.youngs_modulus / (2.0 * (1.0 + m.poisson_ratio)) for m in materials]
-        softness = [0.5 / modulus for modulus in moduli]
         self.options, self.grid = options, grid
-        self.shear_modulus = 1.0 / sum(softness)
-        self.poisson_ratio = self.shear_modulus * sum(
-            part * m.poisson_ratio for part, m in zip(softness, materials, strict=True)
-        )
+        self.shear_modulus, self.poisson_ratio = combined(materials)
         #: contact modulus E* of both bodies [Pa]
         self.contact_modulus = self.shear_modulus / (1.0 - self.poisson_ratio)
 
@@ -98,7 +97,7 @@ class Halfspace(ws.SingleContactModel):
     ) -> ContactSolution:
         """Solve one contact; see `SingleContactModel.solve_contact`."""
         patch = self._patch(gap, longitudinal_curvature, point, wear_compliance, warm)
-        return self._solution(patch, point, *self._rolled(patch, point))
+        return self._solution(patch, point, self._rolled(patch))
 
     def fields(
         self,
@@ -110,14 +109,14 @@ class Halfspace(ws.SingleContactModel):
     ) -> ContactFields:
         """Return pressure, traction and slip, those of the element at each point."""
         patch = self._patch(gap, longitudinal_curvature, point, None, solution)
-        _, rolling = self._rolled(patch, point)
-        length, columns = patch.half_length, len(patch.x)
+        rolling, problem = self._rolled(patch).rolling, patch.problem
+        length, columns = patch.half_length, len(problem.x)
         x = np.linspace(-1.0, 1.0, points_along)[:, None] * length
-        place = np.rint((x - patch.x[0]) / patch.elements.dx).astype(np.int64)
+        place = np.rint((x - problem.x[0]) / problem.dx).astype(np.int64)
         place = np.clip(place, 0, columns - 1)
-        density = np.where(patch.normal.pressure > 0.0, _densities(rolling), 0.0)
+        density = np.where(patch.normal.pressure > 0.0, densities(rolling), 0.0)
         # what is dissipated as particles leave the contact belongs to its strips
-        inside = density.sum(axis=1) * patch.elements.dx
+        inside = density.sum(axis=1) * problem.dx
         shares = solution.dissipation[patch.strips] / np.where(inside > 0.0, inside, 1.0)
         density *= shares[:, None]
 
@@ -158,19 +157,39 @@ class Halfspace(ws.SingleContactModel):
                 f"no contact: load {force:.4g} N, or a gap, creepage or friction that is not finite"
             )
         compliance = np.zeros_like(gap) if wear_compliance is None else wear_compliance
-        # the elements must not depend on the warm start
+        friction = np.broadcast_to(np.asarray(point.friction, dtype=np.float64), gap.shape)
+        # the elements must not depend on the warm start; those of a solution that determines
+        # them again do not depend on the estimate either
         load, half_length = self._estimate(gap, longitudinal_curvature, force, compliance)
-        for _ in range(MAX_GRIDS):
-            strips, elements, x = self._elements(load, half_length)
+        for number in range(MAX_GRIDS):
+            strips, x = self._elements(load, half_length)
             near = (load, half_length) if warm is None else (warm.line_load, warm.half_length)
-            start = _elliptic(near[0][strips], near[1][strips], x)
-            whole = 0.5 * longitudinal_curvature * x**2 + gap[strips, None]
+            problem = Problem(
+                dx=self._length(load, half_length),
+                dy=self.grid.spacing,
+                shear_modulus=self.shear_modulus,
+                poisson_ratio=self.poisson_ratio,
+                gap=0.5 * longitudinal_curvature * x**2 + gap[strips, None],
+                force=force,
+                compliance=compliance[strips],
+                friction=friction[strips],
+                rigid_slip=np.zeros((2, strips.stop - strips.start, len(x))),
+                spin=creepage.spin,
+                x=x,
+                y=self.grid.y[strips],
+            )
             normal = solve_normal(
-                elements, whole, force, start, self.options.tolerance, compliance[strips]
+                problem.elements,
+                problem.gap,
+                force,
+                _elliptic(near[0][strips], near[1][strips], x),
+                self.options.tolerance,
+                problem.compliance,
             )
             load, half_length, suits = self._extent(normal, strips, x)
-            if suits:
-                return Patch(normal, elements, strips, x, load, half_length)
+            if suits and (number >= FREE_GRIDS or self._length(load, half_length) == problem.dx):
+                problem = _with_slip(problem, creepage, self.grid.y, load, strips)
+                return Patch(problem, normal, strips, load, half_length)
             warm = None
         raise ws.ContactError("no grid suits the contact; its strips differ too much in length")
 
@@ -195,23 +214,26 @@ class Halfspace(ws.SingleContactModel):
             slenderness = max(width / float(half_length.max()), 1.0)
         return load, half_length
 
-    def _elements(
-        self, load: FloatArray, half_length: FloatArray
-    ) -> tuple[slice, Elements, FloatArray]:
-        """Return the strips near the contact, their elements, and positions along rolling [m]."""
+    def _across(self, load: FloatArray) -> int:
+        """Return the number of elements across the longest strip."""
+        if self.options.mx is not None:
+            return self.options.mx
+        return int(np.clip(np.count_nonzero(load), LEAST, MOST))
+
+    def _elements(self, load: FloatArray, half_length: FloatArray) -> tuple[slice, FloatArray]:
+        """Return the strips of the rows of elements, and the positions of the columns [m]."""
         touching = np.flatnonzero(load > 0.0)
-        strips = len(load)
-        wanted = int(touching[-1] - touching[0]) + 1 + ROW_BLOCK
-        rows = min(-(-wanted // ROW_BLOCK) * ROW_BLOCK, strips)
-        first = int(np.clip((touching[0] + touching[-1] + 1 - rows) // 2, 0, strips - rows))
-        exact = 2.0 * float(half_length.max()) / self.options.mx
-        dx = float(LADDER ** np.ceil(np.log(exact) / np.log(LADDER)))
-        columns = 2 * int(np.ceil(0.5 * MARGIN * self.options.mx)) + 4
-        elements = elements_of(
-            rows, columns, dx, self.grid.spacing, self.shear_modulus, self.poisson_ratio
-        )
-        x = np.asarray((np.arange(columns) - 0.5 * (columns - 1)) * dx, dtype=np.float64)
-        return slice(first, first + rows), elements, x
+        first = max(int(touching[0]) - SPARE, 0)
+        last = min(int(touching[-1]) + SPARE, len(load) - 1)
+        across = self._across(load)
+        columns = 2 * (int(np.ceil(0.5 * MARGIN * across)) + SPARE)
+        places = np.arange(columns) - 0.5 * (columns - 1)
+        return slice(first, last + 1), np.asarray(places * self._length(load, half_length))
+
+    def _length(self, load: FloatArray, half_length: FloatArray) -> float:
+        """Return the length of the elements along rolling [m]."""
+        exact = 2.0 * float(half_length.max()) / self._across(load)
+        return float(LADDER ** np.round(np.log(exact) / np.log(LADDER)))
 
     def _extent(
         self, normal: NormalSolution, strips: slice, x: FloatArray
@@ -225,56 +247,51 @@ class Halfspace(ws.SingleContactModel):
             raise ws.ContactError("the contact reaches the edge of its strips; raise contact.width")
         inside = not pressure[[0, -1]].any() or len(pressure) == self.grid.strips
         across = int((pressure > 0.0).sum(axis=1).max())
-        fits = FEWEST * self.options.mx <= across <= pressure.shape[1] - 3
+        fits = FEWEST * self._across(load) <= across <= pressure.shape[1] - 2
         return load, half_length, inside and fits
 
-    def _rolled(self, patch: Patch, point: OperatingPoint) -> tuple[FloatArray, RollingSolution]:
-        """Return the rigid slip, shape (2, rows, columns), and the tangential solution."""
-        creepage, load = point.creepage, patch.load
-        varies = -creepage.spin * self.grid.y
-        if creepage.variation is not None:
-            varies = creepage.variation
-        along = creepage.longitudinal + varies - float(load @ varies) / float(load.sum())
-        rigid = np.empty((2, *patch.normal.pressure.shape))
-        rigid[0] = along[patch.strips, None]
-        rigid[1] = creepage.lateral + creepage.spin * patch.x
-        friction = np.broadcast_to(np.asarray(point.friction, dtype=np.float64), load.shape)
-        bound = friction[patch.strips, None] * patch.normal.pressure
-        if not bound.any() or not rigid.any():
-            nothing = np.zeros_like(rigid)
-            return rigid, RollingSolution(nothing, nothing, patch.normal.pressure > 0.0)
-        return rigid, solve_rolling(patch.elements, bound, rigid, self.options.tolerance)
+    def _rolled(self, patch: Patch) -> Solution:
+        """Return the tangential solution."""
+        return solve(patch.problem, patch.normal, self.options.tolerance)
 
-    def _solution(
-        self, patch: Patch, point: OperatingPoint, rigid: FloatArray, rolling: RollingSolution
-    ) -> ContactSolution:
+    def _solution(self, patch: Patch, point: OperatingPoint, solution: Solution) -> ContactSolution:
         """Return forces, powers and lengths of a solved contact."""
-        y, load, strips = self.grid.y, patch.load, patch.strips
-        area, pressure = patch.elements.dx * patch.elements.dy, patch.normal.pressure
-        power = -float((rolling.traction * rigid).sum()) * area * point.rolling_speed
-        force_x, force_y = (float(part.sum()) * area for part in rolling.traction)
-        arms = y[strips, None] - float(load @ y) / float(load.sum())
-        moment = (patch.x * rolling.traction[1] - arms * rolling.traction[0]).sum() * area
-        dissipation = np.zeros_like(y)
-        dissipation[strips] = _row_powers(rolling, patch.elements.dx) * point.rolling_speed
-        total = float(dissipation.sum()) * patch.elements.dy
+        work = solution.extrapolated() if self.options.extrapolate else solution.work()
+        speed, load, pressure = point.rolling_speed, patch.load, patch.normal.pressure
+        power, dissipation = max(work.power, 0.0) * speed, np.zeros_like(load)
+        dissipation[patch.strips] = np.maximum(work.rows, 0.0)
+        dissipation[load == 0.0] = 0.0
+        total = float(dissipation.sum()) * self.grid.spacing
         if total > 0.0:  # the elastic energy returns: the total is the work of the rigid slip
-            dissipation *= max(power, 0.0) / total
+            dissipation *= power / total
         return ContactSolution(
-            y=y,
+            y=self.grid.y,
             half_length=patch.half_length,
             line_load=load,
             dissipation=dissipation,
-            force_x=force_x,
-            force_y=force_y,
-            spin_moment=float(moment),
+            force_x=work.force_x,
+            force_y=work.force_y,
+            spin_moment=work.moment,
             approach=patch.normal.approach,
             peak_pressure=float(pressure.max()),
-            adhesion_fraction=float(rolling.sticks[pressure > 0.0].mean()),
-            power=max(power, 0.0),
+            adhesion_fraction=float(solution.rolling.sticks[pressure > 0.0].mean()),
+            power=power,
             longitudinal_creepage=point.creepage.longitudinal,
             iterations=patch.normal.iterations,
         )
+
+
+def _with_slip(
+    problem: Problem, creepage: Creepage, y: FloatArray, load: FloatArray, strips: slice
+) -> Problem:
+    """Return a problem with its rigid slip, whose centre is that of the line load."""
+    varies = -creepage.spin * y if creepage.variation is None else creepage.variation
+    along = creepage.longitudinal + varies - float(load @ varies) / float(load.sum())
+    rigid = problem.rigid_slip
+    rigid[0] = along[strips, None]
+    rigid[1] = creepage.lateral + creepage.spin * problem.x
+    centre = float(load @ y) / float(load.sum())
+    return replace(problem, rigid_slip=rigid, y=y[strips] - centre)
 
 
 def _elliptic(load: FloatArray, half_length: FloatArray, x: FloatArray) -> FloatArray:
@@ -303,25 +320,27 @@ def _half_lengths(pressure: FloatArray, x: FloatArray) -> FloatArray:
     return found
 
 
-def _row_powers(rolling: RollingSolution, dx: float) -> FloatArray:
-    """Return the power that each row dissipates per rolling velocity [N/m].
-
-    While a particle moves over an element, its traction is the mean of those before and after.
-    """
-    return np.asarray(_densities(rolling).sum(axis=1) * dx)
-
-
-def _densities(rolling: RollingSolution) -> FloatArray:
-    """Return the power that each element dissipates per area and rolling velocity [Pa]."""
-    before = np.zeros_like(rolling.traction)
-    before[..., :-1] = rolling.traction[..., 1:]
-    return np.asarray(-(0.5 * (rolling.traction + before) * rolling.slip).sum(axis=0))
+def suggest_grid(
+    options: HalfspaceOptions,
+    gap_curvature: float,
+    longitudinal_curvature: float,
+    normal_force: float,
+    materials: Sequence[Material],
+) -> Grid:
+    """Return `options.my` strips across a fresh contact, and a fifth more around it."""
+    shear_modulus, poisson_ratio = combined(materials)
+    modulus = shear_modulus / (1.0 - poisson_ratio)
+    half = half_width(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus)
+    spare = int(np.ceil(0.1 * options.my)) + 1
+    outer = half * (1.0 + 2.0 * spare / options.my)
+    return Grid.spanning(-outer, outer, options.my + 2 * spare)
 
 
 SPEC = ws.ContactModelSpec(
     *("halfspace", HalfspaceOptions, "exact theory of elastic half-spaces in steady rolling"),
     factory=Halfspace,
     capabilities=Halfspace.capabilities,
+    suggest_grid=suggest_grid,
     reference=True,
     protocol=2,
 )

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy import fft
 
 from wearsim.plugins import ContactError
 from wearsim.types import FloatArray
-from wearsim_halfspace.influence import Elements
+from wearsim_halfspace.influence import Convolution, Elements
 
 MAX_ITERATIONS = 400
+LEAST = 1e-3  # eigenvalue, relative to the influence of an element on itself
 
 
 class NormalSolution(NamedTuple):
@@ -60,45 +62,57 @@ def solve_normal(
     .. [2] E.A.H. Vollebregt, J. Comput. Phys. 257 (2014), DOI 10.1016/j.jcp.2013.10.005.
     """
     convolve, area = elements.normal, elements.dx * elements.dy
-    # of the periodic convolution; its smallest eigenvalues are those of the shortest waves
-    spectrum = np.maximum(np.abs(convolve.transforms[0]), 1e-3 * np.abs(convolve.middle[0]).max())
+    smoothed = _ApproximateInverse(convolve)
 
     def opened(pressure: FloatArray) -> FloatArray:
         found = convolve(pressure)
         if wear_compliance is not None:
-            found = found + (wear_compliance * pressure.sum(axis=1) * elements.dx)[:, None]
+            found += (wear_compliance * pressure.sum(axis=1) * elements.dx)[:, None]
         return found
 
-    def smoothed(field: FloatArray) -> FloatArray:
-        return convolve.divided(field, spectrum)
-
     pressure = start * (force / (start.sum() * area))
-    inside, direction, last, product = pressure > 0.0, np.zeros_like(pressure), None, 0.0
+    inside = pressure > 0.0
+    closed, unit = -gap - opened(pressure), None
+    direction, last, product = pressure, None, 1.0
     for iteration in range(1, MAX_ITERATIONS + 1):
-        excess = -(opened(pressure) + gap)
-        residual = np.where(inside, excess, 0.0)
-        each, unit = smoothed(residual) * inside, smoothed(inside * 1.0) * inside
-        approach = -float(each.sum()) / float(unit.sum())
-        overlap = ~inside & (excess + approach > 0.0)
+        if unit is None:  # after a change of the contact
+            unit = smoothed(inside) * inside
+            total = float(unit.sum())
+        each = smoothed(closed * inside) * inside
+        approach = -float(each.sum()) / total
+        residual = closed + approach
+        overlap = (residual > 0.0) & ~inside
         if overlap.any():
             inside |= overlap
-            residual = np.where(inside, excess, 0.0)
-            each, unit = smoothed(residual) * inside, smoothed(inside * 1.0) * inside
-            approach, last = -float(each.sum()) / float(unit.sum()), None
+            unit = smoothed(inside) * inside
+            total = float(unit.sum())
+            each = smoothed(closed * inside) * inside
+            approach, last = -float(each.sum()) / total, None
+            residual = closed + approach
+        residual *= inside
         each += approach * unit
-        residual = np.where(inside, residual + approach, 0.0)
-        new = float((each * residual).sum())
-        factor = 0.0
-        if last is not None:
-            factor = max(float((each * (residual - last)).sum()) / product, 0.0)
-        direction = np.where(inside, each + factor * direction, 0.0)
+        new = float(np.vdot(each, residual))
+        if last is None:
+            direction = each
+        else:
+            factor = max((new - float(np.vdot(each, last))) / product, 0.0)
+            direction *= inside
+            # directions carry no force
+            direction = each + factor * (direction - (float(direction.sum()) / total) * unit)
         along = opened(direction)
-        step = float((residual * direction).sum()) / float((direction * along).sum())
-        moved = pressure + step * direction
-        inside &= moved > 0.0
-        moved = np.where(inside, moved, 0.0)
-        moved *= force / (moved.sum() * area)
+        curvature = float(np.vdot(direction, along))
+        # no direction is left if a single element is in contact
+        step = float(np.vdot(residual, direction)) / curvature if curvature > 0.0 else 0.0
         last, product = residual, new
+        moved = pressure + step * direction
+        leaves = moved < 0.0
+        if leaves.any():
+            moved[leaves] = 0.0
+            moved *= force / (moved.sum() * area)
+            inside, unit = moved > 0.0, None
+            closed = -gap - opened(moved)
+        else:
+            closed -= step * along
         change = float(np.abs(moved - pressure).max())
         pressure = moved
         if change <= tolerance * float(pressure.max()) and not overlap.any():
@@ -107,3 +121,22 @@ def solve_normal(
         f"the normal contact of half-spaces has not converged in {MAX_ITERATIONS} iterations"
         f" (last relative change {change / float(pressure.max()):.1e})"
     )
+
+
+class _ApproximateInverse:
+    """Inverse of the convolution on a grid without padding, as if the grid were periodic."""
+
+    def __init__(self, convolve: Convolution) -> None:
+        high = fft.next_fast_len(convolve.rows)
+        wide = fft.next_fast_len(convolve.columns, real=True)
+        rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in (high, wide))
+        kernel = convolve.quarter[rows[:, None], columns]
+        spectrum = fft.rfft2(kernel).real
+        # the smallest eigenvalues are those of the shortest waves
+        self._inverse = 1.0 / np.maximum(spectrum, LEAST * kernel[0, 0])
+        self._shape = high, wide
+
+    def __call__(self, field: FloatArray) -> FloatArray:
+        transform = self._inverse * fft.rfft2(field, s=self._shape)
+        found = fft.irfft2(transform, s=self._shape)
+        return np.asarray(found[: field.shape[0], : field.shape[1]])

@@ -1,0 +1,56 @@
+"""Elastic constants of two bodies, and the width of their fresh contact."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from wearsim.types import Material
+
+
+def combined(materials: Sequence[Material]) -> tuple[float, float]:
+    """Return shear modulus [Pa] and Poisson's ratio of two bodies combined.
+
+    1/G = (1/G_1 + 1/G_2)/2 and nu/G = (nu_1/G_1 + nu_2/G_2)/2 (Kalker 1990, section 1.7).
+    """
+    softness = [(1.0 + m.poisson_ratio) / m.youngs_modulus for m in materials]
+    shear_modulus = 1.0 / sum(softness)
+    ratios = (part * m.poisson_ratio for part, m in zip(softness, materials, strict=True))
+    return shear_modulus, shear_modulus * sum(ratios)
+
+
+def half_width(along: float, across: float, force: float, modulus: float) -> float:
+    """Return the half-width of the contact of Hertz across rolling [m].
+
+    Parameters
+    ----------
+    along, across : float
+        A and B of the gap ``A x^2 + B y^2`` [1/m], both positive.
+    force : float
+        Normal force [N].
+    modulus : float
+        Contact modulus E* [Pa].
+
+    References
+    ----------
+    .. [1] K.L. Johnson, Contact Mechanics (1985), section 4.2.
+    """
+    # both are slow to load
+    from scipy.optimize import brentq  # noqa: PLC0415
+    from scipy.special import elliprd  # noqa: PLC0415
+
+    def integrals(logarithm: float) -> tuple[float, float]:
+        """Return the shares of A and B for b/a, up to a common factor."""
+        square = np.exp(2.0 * logarithm)
+        return float(elliprd(0.0, square, 1.0)), float(elliprd(0.0, 1.0, square))
+
+    def excess(logarithm: float) -> float:
+        one, other = integrals(logarithm)
+        return float(np.log(one / other) - np.log(along / across))
+
+    logarithm = float(brentq(excess, -12.0, 12.0))
+    # A = p0 a b/(2 E*) times the integral of ds/((a^2 + s) sqrt((a^2 + s)(b^2 + s) s))
+    ratio = float(np.exp(logarithm))
+    cube = force * integrals(logarithm)[0] / (2.0 * np.pi * modulus * along)
+    return float(ratio * np.cbrt(cube))

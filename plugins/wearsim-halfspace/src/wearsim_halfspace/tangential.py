@@ -1,0 +1,188 @@
+"""Tangential contact of half-spaces in rolling or in a shift: stick, slip and traction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.plugins import ContactError
+from wearsim.types import BoolArray, FloatArray
+from wearsim_halfspace.influence import Convolution
+
+MAX_ITERATIONS = 60  # of Newton's method
+MOST_PRODUCTS = 80  # in the solution of a linear system
+REUSED_UP_TO = 8  # products for which the preconditioner is kept
+FIRST_RATE, SLOWER, PATIENCE = 0.3, 0.3, 15  # rate r, its ratio, and iterations between changes
+TINY = 1e-300  # against division by zero
+LOOSEST, TIGHTEST = 0.1, 1e-4  # relative residual of the linear systems
+
+
+class TangentialSolution(NamedTuple):
+    """Traction on body 1 [Pa] and slip, shape (2, rows, columns).
+
+    The slip is also that of elements outside the contact; `sticks` is true in adhesion.
+    """
+
+    traction: FloatArray
+    slip: FloatArray
+    sticks: BoolArray
+
+
+def solve_tangential(
+    kernel: Convolution,
+    bound: FloatArray,
+    rigid_slip: FloatArray,
+    tolerance: float,
+    start: FloatArray | None = None,
+) -> TangentialSolution:
+    """Return traction and slip of half-spaces in steady rolling, or after a shift.
+
+    With the traction p, the slip s = w + B p and the traction bound g, the law of Coulomb is
+    p = projection of (p - r s) on the disc of radius g, for any r > 0. Newton's method for this
+    equation (semi-smooth), with its iterates projected on the discs, determines the elements in
+    adhesion as it converges; each linear system is solved by GMRES, with the blocks of the rows
+    along rolling as preconditioner.
+
+    Parameters
+    ----------
+    kernel : Convolution
+        B: `Elements.rolling` or `Elements.shift`.
+    bound : ndarray, shape (rows, columns)
+        Friction coefficient times pressure, zero outside the contact [Pa].
+    rigid_slip : ndarray, shape (2, rows, columns)
+        w: rigid slip of body 1 on body 2 per distance rolled, or the shift [m].
+    tolerance : float
+        Greatest residual of the equation relative to the greatest bound.
+    start : ndarray, shape (2, rows, columns), optional
+        Initial guess of the traction [Pa]; by default that of full slip.
+
+    Raises
+    ------
+    ContactError
+        If Newton's method does not converge.
+
+    References
+    ----------
+    .. [1] J.J. Kalker, Three-Dimensional Elastic Bodies in Rolling Contact (1990),
+       DOI 10.1007/978-94-015-7889-9.
+    .. [2] P. Alart, A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991),
+       DOI 10.1016/0045-7825(91)90022-X.
+    """
+    columns = kernel.columns
+    own = float(kernel.middle[:2, columns - 1].max())  # of an element on itself
+    distance = np.arange(columns)[:, None] - np.arange(columns) + columns - 1
+    within = kernel.middle[:2, distance]  # influence within a row of both components
+    touches, most = bound > 0.0, float(bound.max())
+    if start is None:
+        start = -rigid_slip / np.maximum(np.hypot(*rigid_slip), TINY) * bound
+    traction, preconditioner, products = _projected(start, bound), None, 0
+    for iteration in range(MAX_ITERATIONS):
+        # a smaller rate keeps tractions from changing their direction back and forth
+        rate = FIRST_RATE * SLOWER ** (iteration // PATIENCE) / own
+        slip = rigid_slip + kernel.of_vector(traction)
+        trial = traction - rate * slip
+        size = np.maximum(np.hypot(*trial), TINY)
+        sticks = (size <= bound) & touches
+        unit, part = trial / size, np.where(sticks, 1.0, bound / size)
+        residual = part * trial - traction
+        error = float(np.abs(residual).max()) / most
+        if error <= tolerance:
+            return TangentialSolution(traction, np.where(sticks, 0.0, slip), sticks)
+        if preconditioner is None or products > REUSED_UP_TO or iteration % PATIENCE == 0:
+            # the components of a row are decoupled, and the rows are
+            diagonal = np.where(sticks, 1.0, part * (1.0 - unit**2))
+            preconditioner = _Rows(diagonal, rate * within)
+        removed = np.where(sticks, 0.0, part)
+
+        def product(
+            given: FloatArray,
+            rate: float = rate,
+            unit: FloatArray = unit,
+            part: FloatArray = part,
+            removed: FloatArray = removed,
+        ) -> FloatArray:
+            change = given - rate * kernel.of_vector(given)
+            along = removed * (unit * change).sum(axis=0)
+            return np.asarray(given - part * change + unit * along)
+
+        change, products = _gmres(
+            product, preconditioner, residual, max(min(LOOSEST, error), TIGHTEST)
+        )
+        traction = _projected(traction + change, bound)
+    raise ContactError(
+        f"the tangential contact of half-spaces has not converged in {MAX_ITERATIONS} iterations"
+        f" (last relative residual {error:.1e})"
+    )
+
+
+def _projected(traction: FloatArray, bound: FloatArray) -> FloatArray:
+    """Return tractions with their sizes limited by the bound."""
+    size = np.maximum(np.hypot(*traction), TINY)
+    return np.asarray(traction * np.minimum(1.0, bound / size))
+
+
+class _Rows:
+    """Approximate inverse of a linear system: that of each row and component alone.
+
+    Parameters
+    ----------
+    diagonal : ndarray, shape (2, rows, columns)
+        D in the system ``I - D (I - r B)``.
+    influence : ndarray, shape (2, columns, columns)
+        r B within a row.
+    """
+
+    def __init__(self, diagonal: FloatArray, influence: FloatArray) -> None:
+        size = diagonal.shape[2]
+        self._touching = np.flatnonzero(diagonal.any(axis=(0, 2)))
+        # single precision suffices for a preconditioner
+        influence = (np.eye(size) - influence).astype(np.float32)
+        self._inverses = np.empty((2, len(self._touching), size, size), dtype=np.float32)
+        for place, row in enumerate(self._touching):
+            systems = diagonal[:, row, :, None].astype(np.float32) * influence
+            self._inverses[:, place] = np.linalg.inv(np.eye(size, dtype=np.float32) - systems)
+
+    def __call__(self, field: FloatArray) -> FloatArray:
+        found = field.copy()
+        given = field[:, self._touching, :, None].astype(np.float32)
+        found[:, self._touching] = (self._inverses @ given)[..., 0]
+        return found
+
+
+def _gmres(
+    product: Callable[[FloatArray], FloatArray],
+    preconditioner: _Rows,
+    right: FloatArray,
+    tolerance: float,
+) -> tuple[FloatArray, int]:
+    """Return an approximate solution of a linear system, and the number of products.
+
+    Generalised minimal residuals with the preconditioner on the right; the tolerance is that of
+    the residual relative to the right-hand side.
+    """
+    length = float(np.linalg.norm(right))
+    basis = np.empty((MOST_PRODUCTS + 1, right.size))
+    basis[0] = right.ravel() / length
+    hessenberg = np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS))
+    # vector normal to the columns of the Hessenberg matrix; its length gives the residual
+    normal = np.zeros(MOST_PRODUCTS + 1)
+    normal[0], tried = 1.0, []
+    for count in range(1, MOST_PRODUCTS + 1):
+        tried.append(preconditioner(basis[count - 1].reshape(right.shape)))
+        new, known = product(tried[-1]).ravel(), basis[:count]
+        for _ in range(2):  # once more, against rounding
+            parts = known @ new
+            new -= parts @ known
+            hessenberg[:count, count - 1] += parts
+        rest = float(np.linalg.norm(new))
+        hessenberg[count, count - 1] = rest
+        normal[count] = -float(normal[:count] @ hessenberg[:count, count - 1]) / max(rest, TINY)
+        basis[count] = new / max(rest, TINY)
+        if tolerance * float(np.linalg.norm(normal)) >= 1.0:
+            break
+    right_side = np.zeros(count + 1)
+    right_side[0] = length
+    weights = np.linalg.lstsq(hessenberg[: count + 1, :count], right_side, rcond=None)[0]
+    return np.tensordot(weights, np.stack(tried), axes=1), count

@@ -1,0 +1,125 @@
+"""Half-spaces against CONTACT, Hertz, Cattaneo and Mindlin, Kalker's coefficients."""
+
+import numpy as np
+import pytest
+from halfspace_cases import HARD, RANDOM, middles, normal_of, problem_of, rows, solved
+
+from wearsim_halfspace.grids import FURTHER
+from wearsim_halfspace.influence import Elements
+from wearsim_halfspace.normal import solve_normal
+from wearsim_halfspace.tangential import solve_tangential
+
+
+def names(cases):
+    return [f"{number} {case['kind']}" for number, case in enumerate(cases)]
+
+
+@pytest.mark.parametrize("case", RANDOM, ids=names(RANDOM))
+def test_power_of_random_contacts_is_that_of_contact(case):
+    found = solved(case, 60)
+    assert found.work().power == pytest.approx(case["power_60_N"], rel=1e-5)
+    assert found.normal.approach == pytest.approx(case["approach_60_m"], rel=1e-6)
+    touching = found.normal.pressure > 0.0
+    adhesion = found.rolling.sticks[touching].mean()
+    assert adhesion == pytest.approx(case["adhesion_60"], abs=1e-3)
+
+
+@pytest.mark.parametrize("case", HARD, ids=names(HARD))
+def test_power_of_hard_contacts_is_that_of_contact(case):
+    assert solved(case, 60).work().power == pytest.approx(case["power_60_N"], rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [*RANDOM[::8], *HARD[::3]], ids=names([*RANDOM[::8], *HARD[::3]]))
+def test_extrapolated_power_agrees_within_its_stated_error(case):
+    found = solved(case, 120)
+    assert found.work().power == pytest.approx(case["power_120_N"], rel=1e-5)
+    power = case["power_120_N"]
+    power += FURTHER * (power - case["power_60_N"])
+    assert found.extrapolated().power == pytest.approx(power, rel=3e-3)
+    # half the number of elements, against the finer grids
+    coarse = solved(case, 60)
+    further = coarse.extrapolated().power
+    stated = abs(further - coarse.work().power)
+    assert abs(further - power) <= stated + 1e-4 * power
+
+
+def test_pressure_and_approach_converge_to_those_of_hertz():
+    case, errors = RANDOM[0], []
+    across = case["b_m"] / case["a_m"]
+    assert across == pytest.approx(11.3, rel=0.01)
+    peak = 1.5 * case["N_N"] / (np.pi * case["a_m"] * case["b_m"])
+    exact = 3.353074391547019e-06  # closed form
+    for n in (20, 40, 80):
+        found = normal_of(problem_of(case, n), case)
+        errors.append([abs(found.approach / exact - 1.0), abs(found.pressure.max() / peak - 1.0)])
+    assert errors[-1][0] < 1e-4
+    assert errors[-1][1] < 5e-4
+    order = np.log2(errors[0][0] / errors[2][0]) / 2.0
+    assert order > 1.5
+
+
+def test_shift_is_that_of_cattaneo_and_mindlin():
+    # exact for nu = 0: lateral tractions vanish
+    shear, force, friction, radius, n = 8e10, 300.0, 0.2, 0.1, 64
+    modulus = shear  # E* of two bodies of this shear modulus, without lateral contraction
+    a = np.cbrt(0.75 * force * radius / modulus)
+    size = 2.0 * a / n
+    x = middles(n + 4) * size
+    elements = Elements(n + 4, n + 4, size, size, shear, 0.0)
+    gap = 0.5 * (x**2 + x[:, None] ** 2) / radius
+    start = np.sqrt(np.maximum(1.0 - (x / a) ** 2 - (x[:, None] / a) ** 2, 0.0))
+    normal = solve_normal(elements, gap, force, start, 1e-8)
+    for part in (0.3, 0.7):  # tangential force over the friction
+        shift = 0.75 * friction * force / (a * shear) * (1.0 - (1.0 - part) ** (2.0 / 3.0))
+        slip = np.zeros((2, *gap.shape))
+        slip[0] = shift
+        found = solve_tangential(elements.shift, friction * normal.pressure, slip, 1e-8)
+        tangential = -found.traction[0].sum() * size**2
+        assert tangential == pytest.approx(part * friction * force, rel=2e-3)
+        stick = np.sqrt(found.sticks.sum() * size**2 / np.pi)
+        assert stick == pytest.approx(a * np.cbrt(1.0 - part), rel=0.01)
+
+
+def creepage_coefficients(a_over_b, poisson_ratio, n):
+    """Return C11, C22, C23 and C33 of full adhesion in an ellipse with a b = 1.
+
+    The elements within the ellipse do not have its area, by which the coefficients are corrected.
+    """
+    a, b = np.sqrt(a_over_b), 1.0 / np.sqrt(a_over_b)
+    dx, dy = 2.0 * a / n, 2.0 * b / n
+    x, y = middles(n + 2) * dx, middles(n + 2)[:, None] * dy
+    elements = Elements(n + 2, n + 2, dx, dy, 1.0, poisson_ratio)
+    inside = (x / a) ** 2 + (y / b) ** 2 < 1.0
+    bound, cell = np.where(inside, 1e4, 0.0), dx * dy
+    size = np.sqrt(inside.sum() * cell / np.pi)
+
+    def tractions(along, across):
+        slip = np.zeros((2, *inside.shape))
+        slip[0], slip[1] = along, across
+        return solve_tangential(elements.rolling, bound, slip, 1e-10).traction * cell
+
+    # the moment by spin is the only one for which half an element ahead is best
+    spin, turning = tractions(-y, x + dx / 6.0), tractions(-y, x + 0.5 * dx)
+    return {
+        "C11": -tractions(1.0, 0.0)[0].sum() / size**2,
+        "C22": -tractions(0.0, 1.0)[1].sum() / size**2,
+        "C23": -spin[1].sum() / size**3,
+        "C33": -(x * turning[1] - y * turning[0]).sum() / size**4,
+    }
+
+
+KALKER = [row for row in rows("kalker") if row["a_over_b"] <= 5.0]
+#: one of each ratio, with a Poisson's ratio that changes from one to the next
+VARIED = [row for number, row in enumerate(KALKER) if number // 19 == number % 3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", VARIED, ids=lambda row: f"{row['a_over_b']:.3g}, {row['nu']}")
+def test_linear_theory_has_the_coefficients_of_kalker(row):
+    coarse, fine = (creepage_coefficients(row["a_over_b"], row["nu"], n) for n in (30, 60))
+    for name, value in fine.items():
+        known = row["rel_err"][name]  # of the reference
+        assert value == pytest.approx(row[name], rel=0.02 + known), name
+        further = 2.0 * value - coarse[name]
+        assert further == pytest.approx(row[name], rel=0.005 if known <= 0.003 else 0.01), name
