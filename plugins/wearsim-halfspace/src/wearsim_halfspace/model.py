@@ -25,7 +25,6 @@ from wearsim_halfspace.strips import combined, half_width
 LADDER = 1.05  # ratio of successive element lengths, so that nearby contacts have the same
 MARGIN = 1.1  # columns over the elements across the longest strip
 FEWEST = 0.8  # elements across the longest strip, relative to the requested number
-LEAST, MOST = 16, 200  # elements across the longest strip
 SPARE = 3  # rows and columns around the contact
 FREE_GRIDS, MAX_GRIDS = 3, 12  # tried until elements and solution agree; at most
 
@@ -35,11 +34,7 @@ Elements_ = Annotated[int, ws.Field(ge=8, le=400)]
 class HalfspaceOptions(ws.Options):
     """Options of the contact model `halfspace`, validated with their units."""
 
-    mx: Elements_ | None = ws.Field(
-        None,
-        description="elements across the longest strip along rolling; by default as many as strips"
-        " are in contact",
-    )
+    mx: Elements_ = ws.Field(50, description="elements across the longest strip along rolling")
     my: Elements_ = ws.Field(
         100, description="strips across a fresh contact, if neither their number nor width is given"
     )
@@ -165,7 +160,7 @@ class Halfspace(ws.SingleContactModel):
             strips, x = self._elements(load, half_length)
             near = (load, half_length) if warm is None else (warm.line_load, warm.half_length)
             problem = Problem(
-                dx=self._length(load, half_length),
+                dx=self._length(half_length),
                 dy=self.grid.spacing,
                 shear_modulus=self.shear_modulus,
                 poisson_ratio=self.poisson_ratio,
@@ -187,7 +182,7 @@ class Halfspace(ws.SingleContactModel):
                 problem.compliance,
             )
             load, half_length, suits = self._extent(normal, strips, x)
-            if suits and (number >= FREE_GRIDS or self._length(load, half_length) == problem.dx):
+            if suits and (number >= FREE_GRIDS or self._length(half_length) == problem.dx):
                 problem = _with_slip(problem, creepage, self.grid.y, load, strips)
                 return Patch(problem, normal, strips, load, half_length)
             warm = None
@@ -214,25 +209,18 @@ class Halfspace(ws.SingleContactModel):
             slenderness = max(width / float(half_length.max()), 1.0)
         return load, half_length
 
-    def _across(self, load: FloatArray) -> int:
-        """Return the number of elements across the longest strip."""
-        if self.options.mx is not None:
-            return self.options.mx
-        return int(np.clip(np.count_nonzero(load), LEAST, MOST))
-
     def _elements(self, load: FloatArray, half_length: FloatArray) -> tuple[slice, FloatArray]:
         """Return the strips of the rows of elements, and the positions of the columns [m]."""
         touching = np.flatnonzero(load > 0.0)
         first = max(int(touching[0]) - SPARE, 0)
         last = min(int(touching[-1]) + SPARE, len(load) - 1)
-        across = self._across(load)
-        columns = 2 * (int(np.ceil(0.5 * MARGIN * across)) + SPARE)
+        columns = 2 * (int(np.ceil(0.5 * MARGIN * self.options.mx)) + SPARE)
         places = np.arange(columns) - 0.5 * (columns - 1)
-        return slice(first, last + 1), np.asarray(places * self._length(load, half_length))
+        return slice(first, last + 1), np.asarray(places * self._length(half_length))
 
-    def _length(self, load: FloatArray, half_length: FloatArray) -> float:
+    def _length(self, half_length: FloatArray) -> float:
         """Return the length of the elements along rolling [m]."""
-        exact = 2.0 * float(half_length.max()) / self._across(load)
+        exact = 2.0 * float(half_length.max()) / self.options.mx
         return float(LADDER ** np.round(np.log(exact) / np.log(LADDER)))
 
     def _extent(
@@ -247,7 +235,7 @@ class Halfspace(ws.SingleContactModel):
             raise ws.ContactError("the contact reaches the edge of its strips; raise contact.width")
         inside = not pressure[[0, -1]].any() or len(pressure) == self.grid.strips
         across = int((pressure > 0.0).sum(axis=1).max())
-        fits = FEWEST * self._across(load) <= across <= pressure.shape[1] - 2
+        fits = FEWEST * self.options.mx <= across <= pressure.shape[1] - 2
         return load, half_length, inside and fits
 
     def _rolled(self, patch: Patch) -> Solution:
