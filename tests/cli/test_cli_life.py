@@ -63,6 +63,9 @@ def test_two_designs_are_compared(command: Command, slim: Path, wide: Path) -> N
     assert found["b10_ratio"]["value"] == pytest.approx((6.0 / 5.0) ** 0.5, rel=0.02)
     again = life_of(command, "wide-life.h5", "slim-life.h5")
     assert again["b10_ratio"] == found["b10_ratio"]
+    refused = command("compare", "wide-life.h5", "slim-life.h5")
+    assert refused.exit_code == 2
+    assert "`wearsim life A.h5 B.h5` compares them" in refused.stderr
     text = command("life", "wide-life.h5", "slim-life.h5", *HERE).stdout
     assert "wide outlives slim on 100.0 %" in " ".join(text.split())
     assert "a specimen of wide outlives a specimen of slim" in " ".join(text.split())

@@ -95,7 +95,7 @@ _CAM_ANGLES = (
 
 def draws(result: Result) -> Rows:
     """Return rows on the random inputs of a run: drawn values and inputs that vary in time."""
-    rows = []
+    rows = [("random inputs", "one realisation, not the means")] if result.raw.drawn else []
     for key, drawn in result.raw.drawn.items():
         unit, size = engineers_unit(drawn["unit"])
         text = " / ".join(f"{value / size:.6g}" for value in drawn["values"])

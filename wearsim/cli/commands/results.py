@@ -304,12 +304,15 @@ def _open(file: Path) -> Result | EnsembleResult:
         IdentificationResult,
         open_results,
     )
+    from wearsim.results.ensemble.life import LifeResult
 
     result = open_results(file)
     if isinstance(result, DissipationResult | IdentificationResult):
         raise ResultsFileError(
             f"{file}: holds {result.raw.schema.holds}; only runs and ensembles can be compared"
         )
+    if isinstance(result, LifeResult):
+        raise ResultsFileError(f"{file}: holds lives; `wearsim life A.h5 B.h5` compares them")
     if isinstance(result, EnsembleResult) and result.count == 0:
         raise ResultsFileError(f"{file}: has no completed realisation; nothing to compare")
     return result

@@ -82,17 +82,20 @@ def ensemble_warnings(
     -------
     list of str
     """
-    beyond = 0
+    beyond, worst = 0, 0.0
     if result.count:
         deepest = np.maximum(result.at_end("depth"), result.at_end("roller_depth"))
-        beyond = int((result.values("depth_error") > result.raw.tolerance * deepest).sum())
+        error = result.values("depth_error")
+        beyond = int((error > result.raw.tolerance * deepest).sum())
+        worst = float(np.divide(error, deepest, out=np.zeros_like(error), where=deepest > 0).max())
     processes = [item["name"] for item in result.raw.groups if item["role"] == "process"]
     warnings = (
         (
             beyond > 0,
             (
                 f"the estimated error of depth exceeds the tolerance in {beyond} of {result.count}"
-                " realisations; lower evolution.tolerance"
+                f" realisations, by {100.0 * worst:.2g} % of the depth at most; a lower"
+                " evolution.tolerance decreases it"
             ),
         ),
         (
