@@ -22,10 +22,11 @@ from wearsim_halfspace.grids import Problem, Solution, densities, solve
 from wearsim_halfspace.normal import NormalSolution, solve_normal
 from wearsim_halfspace.strips import combined, half_width
 
-LADDER = 1.05  # ratio of successive element lengths, so that nearby contacts have the same
-MARGIN = 1.1  # columns over the elements across the longest strip
+SAME = 1e-3  # relative difference of element lengths that are not corrected
+MARGIN = 0.05  # columns ahead of and behind the longest strip, over those across it
 FEWEST = 0.8  # elements across the longest strip, relative to the requested number
 SPARE = 3  # rows and columns around the contact
+COARSER = 4  # elements across an element of the second coarser grid
 FREE_GRIDS, MAX_GRIDS = 3, 12  # tried until elements and solution agree; at most
 
 Elements_ = Annotated[int, ws.Field(ge=8, le=400)]
@@ -182,7 +183,9 @@ class Halfspace(ws.SingleContactModel):
                 problem.compliance,
             )
             load, half_length, suits = self._extent(normal, strips, x)
-            if suits and (number >= FREE_GRIDS or self._length(half_length) == problem.dx):
+            if suits and (
+                number >= FREE_GRIDS or abs(self._length(half_length) / problem.dx - 1.0) < SAME
+            ):
                 problem = _with_slip(problem, creepage, self.grid.y, load, strips)
                 return Patch(problem, normal, strips, load, half_length)
             warm = None
@@ -214,14 +217,15 @@ class Halfspace(ws.SingleContactModel):
         touching = np.flatnonzero(load > 0.0)
         first = max(int(touching[0]) - SPARE, 0)
         last = min(int(touching[-1]) + SPARE, len(load) - 1)
-        columns = 2 * (int(np.ceil(0.5 * MARGIN * self.options.mx)) + SPARE)
+        # the ends of the longest strip are ends of elements on the coarser grids too
+        spare = COARSER * int(np.ceil((MARGIN * self.options.mx + SPARE) / COARSER))
+        columns = self.options.mx + 2 * spare
         places = np.arange(columns) - 0.5 * (columns - 1)
         return slice(first, last + 1), np.asarray(places * self._length(half_length))
 
     def _length(self, half_length: FloatArray) -> float:
         """Return the length of the elements along rolling [m]."""
-        exact = 2.0 * float(half_length.max()) / self.options.mx
-        return float(LADDER ** np.round(np.log(exact) / np.log(LADDER)))
+        return 2.0 * float(half_length.max()) / self.options.mx
 
     def _extent(
         self, normal: NormalSolution, strips: slice, x: FloatArray
