@@ -280,11 +280,11 @@ def run_line(result: Result) -> str:
 
 
 def contact_line(study: ContactStudy) -> str:
-    """Return the footer of one contact, with the error estimated from half as many strips."""
+    """Return the footer of one contact, with the error estimated from a grid half as fine."""
     error = ""
     if study.grid_error is not None:
         percent = _percent(study.grid_error)
-        error = f"dissipated power within {percent} (estimated numerical error of the strips)"
+        error = f"dissipated power within {percent} (estimated numerical error of the grid)"
     time = NOTHING if study.seconds is None else brief(study.seconds)
     return _line([study.described_model, f"{study.grid.strips} strips"], error, time)
 

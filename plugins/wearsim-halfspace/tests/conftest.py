@@ -9,6 +9,8 @@ import pytest
 
 FOLDER = Path(__file__).parent
 collect_ignore_glob = [] if find_spec("wearsim_halfspace") else ["*"]
+if find_spec("wearsim_bench") is None:  # has the worn profiles
+    collect_ignore_glob.append("test_reference_solutions.py")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -2,12 +2,29 @@
 
 import numpy as np
 import pytest
-from halfspace_cases import HARD, RANDOM, middles, normal_of, problem_of, rows, solved
+from halfspace_cases import (
+    HARD,
+    RANDOM,
+    SHEAR,
+    STEEL,
+    middles,
+    normal_of,
+    problem_of,
+    rows,
+    solved,
+)
 
+from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim_bench.contact.accuracy import choose_model, worn_errors
+from wearsim_bench.exact_solutions import WORN
+from wearsim_halfspace import Halfspace, HalfspaceOptions
 from wearsim_halfspace.grids import FURTHER
 from wearsim_halfspace.influence import Elements
 from wearsim_halfspace.normal import solve_normal
+from wearsim_halfspace.strips import half_width
 from wearsim_halfspace.tangential import solve_tangential
+
+CONTACT_MODULUS = SHEAR / (1.0 - STEEL.poisson_ratio)
 
 
 def names(cases):
@@ -79,6 +96,37 @@ def test_shift_is_that_of_cattaneo_and_mindlin():
         assert tangential == pytest.approx(part * friction * force, rel=2e-3)
         stick = np.sqrt(found.sticks.sum() * size**2 / np.pi)
         assert stick == pytest.approx(a * np.cbrt(1.0 - part), rel=0.01)
+
+
+@pytest.mark.parametrize(("mx", "extrapolate"), [(60, False), (60, True)])
+@pytest.mark.parametrize("slip", [0.3, 0.6])  # length of the slip zone over the half-length
+def test_middle_of_a_long_contact_is_that_of_carter(mx, extrapolate, slip):
+    along, across, force, friction = 45.0, 0.189865872, 300.0, 0.1
+    half = half_width(along, across, force, CONTACT_MODULUS)
+    a = half_width(across, along, force, CONTACT_MODULUS)
+    assert half / a == pytest.approx(30.0, rel=1e-6)
+    grid = Grid.spanning(-1.2 * half, 1.2 * half, 61)
+    options = HalfspaceOptions(mx=mx, extrapolate=extrapolate)
+    load = 0.75 * force / half  # of the middle
+    creepage = 4.0 * friction * load * slip / (np.pi * a * CONTACT_MODULUS)
+    point = OperatingPoint(force, 1.0, Creepage(creepage), friction)
+    model = Halfspace(options, grid, (STEEL, STEEL))
+    found = model.solve_one(across * grid.y**2, 2.0 * along, point)
+    middle = grid.strips // 2
+    assert found.line_load[middle] == pytest.approx(load, rel=1e-3)
+    exact = creepage * friction * load * (1.0 - (1.0 - slip) ** 2)
+    assert found.dissipation[middle] == pytest.approx(exact, rel=0.002 if extrapolate else 0.01)
+
+
+@pytest.mark.parametrize(
+    "name", ["flat", *(pytest.param(name, marks=pytest.mark.slow) for name in WORN[2:])]
+)
+def test_worn_profiles_are_those_of_contact(name):
+    errors = worn_errors(choose_model("halfspace", mx=60), name)
+    assert errors.line_load < 1e-3
+    assert abs(errors.approach) < 2e-5
+    assert max(abs(error) for error in errors.power.values()) < 1e-3
+    assert max(errors.dissipation.values()) < 8e-3
 
 
 def creepage_coefficients(a_over_b, poisson_ratio, n):

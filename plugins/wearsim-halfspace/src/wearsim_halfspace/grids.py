@@ -76,21 +76,22 @@ class Problem:
         slip[1] += AHEAD * self.spin * self.dx
         return slip
 
-    def coarser(self) -> Problem:
-        """Return the problem on elements of twice the size along and across."""
+    def coarser(self, across: bool) -> Problem:
+        """Return the problem on elements of twice the length along, and also across if asked."""
+        rows = (0,) if across else ()
         return Problem(
             2.0 * self.dx,
-            2.0 * self.dy,
+            2.0 * self.dy if across else self.dy,
             self.shear_modulus,
             self.poisson_ratio,
-            halved(self.gap, (0, 1)),
+            halved(self.gap, (*rows, 1)),
             self.force,
-            halved(self.compliance, (0,)),
-            halved(self.friction, (0,)),
-            halved(self.rigid_slip, (1, 2)),
+            halved(self.compliance, rows),
+            halved(self.friction, rows),
+            halved(self.rigid_slip, (1, 2) if across else (2,)),
             self.spin,
             halved(self.x, (0,)),
-            halved(self.y, (0,)),
+            halved(self.y, rows),
         )
 
 
@@ -108,7 +109,7 @@ class Work(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Solution on a grid, and that on elements of twice the size, if there is one."""
+    """Solution on a grid, and that on a coarser one, if there is one."""
 
     problem: Problem
     normal: NormalSolution
@@ -131,13 +132,12 @@ class Solution(NamedTuple):
         if self.coarser is None:
             return fine
         coarse = self.coarser.work()
-        change = doubled(halved(fine.rows, (0,)) - coarse.rows, 0, len(fine.rows))
         return Work(
             power=_further(fine.power, coarse.power),
             force_x=_further(fine.force_x, coarse.force_x),
             force_y=_further(fine.force_y, coarse.force_y),
             moment=_further(fine.moment, coarse.moment),
-            rows=fine.rows + FURTHER * change,
+            rows=fine.rows + FURTHER * (fine.rows - coarse.rows),
         )
 
 
@@ -156,7 +156,9 @@ def densities(rolling: TangentialSolution) -> FloatArray:
     return np.asarray(-(0.5 * (rolling.traction + before) * rolling.slip).sum(axis=0))
 
 
-def solve(problem: Problem, normal: NormalSolution, tolerance: float) -> Solution:
+def solve(
+    problem: Problem, normal: NormalSolution, tolerance: float, *, below: bool = False
+) -> Solution:
     """Return tractions and slip of a contact whose normal problem is solved.
 
     The grids are made coarser until they are small; the tractions of each are the initial guess on
@@ -169,6 +171,8 @@ def solve(problem: Problem, normal: NormalSolution, tolerance: float) -> Solutio
         Solution of its normal problem.
     tolerance : float
         Of the tractions, see `solve_tangential`.
+    below : bool
+        Whether this is a coarser grid itself.
 
     Raises
     ------
@@ -183,14 +187,16 @@ def solve(problem: Problem, normal: NormalSolution, tolerance: float) -> Solutio
         )
     coarser, start = None, None
     if min(finest) >= FEWEST:
-        coarse, loose = problem.coarser(), max(LOOSE, tolerance)
-        pressure = halved(normal.pressure, (0, 1))
-        below = solve_normal(
+        # the first coarser grid has the same rows, for the extrapolation
+        coarse, loose = problem.coarser(across=below), max(LOOSE, tolerance)
+        pressure = halved(normal.pressure, (0, 1) if below else (1,))
+        found = solve_normal(
             coarse.elements, coarse.gap, coarse.force, pressure, loose, coarse.compliance
         )
-        coarser = solve(coarse, below, loose)
+        coarser = solve(coarse, found, loose, below=True)
         rows, columns = finest
-        start = doubled(doubled(coarser.rolling.traction, 1, rows), 2, columns)
+        start = doubled(coarser.rolling.traction, 2, columns)
+        start = doubled(start, 1, rows) if below else start
     rolling = solve_tangential(
         problem.elements.rolling, bound, problem.slip_ahead, tolerance, start
     )
