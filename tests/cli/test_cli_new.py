@@ -15,6 +15,7 @@ from wearsim.plugins import template
 from wearsim.scenario import parse_scenario
 from wearsim.scenario.examples import starter_scenario
 from wearsim.scenario.parse.toml import TABLES
+from wearsim.studies.cam.turn import turn_of
 
 ROOT = Path(__file__).parents[2]
 PROFILE = "y [mm], height [um]\n" + "".join(
@@ -40,14 +41,22 @@ def alternatives() -> list[tuple[str, str, str, str]]:
 
 
 def alternatives_of(name: str) -> list[tuple[str, str, str]]:
-    """Return table, line and remark of every alternative in a starter scenario."""
-    found, table = [], ""
+    """Return table, lines and remark of every alternative in a starter scenario.
+
+    Lines below a text that ends with a colon are one alternative, with the text as the remark.
+    """
+    found, table, head = [], "", ""
     for line in starter_scenario(name).splitlines():
         if line.startswith("["):
             table = line[1 : line.index("]")]
         parts = re.fullmatch(r"# (\w+ = [^#]*?)\s*(#.*)?", line)
-        if parts:
-            found.append((table, parts[1], parts[2] or ""))
+        if parts and head == "joined":
+            found[-1] = table, f"{found[-1][1]}\n{parts[1]}", found[-1][2]
+        elif parts:
+            found.append((table, parts[1], f"{head} {parts[2] or ''}".strip()))
+            head = "joined" if head else ""
+        else:
+            head = line.lower() if line.startswith("# ") and line.endswith(":") else ""
     return found
 
 
@@ -55,7 +64,7 @@ def with_alternative(name: str, table: str, line: str, remark: str) -> str:
     """Return a starter scenario with one alternative applied according to its remark."""
     replaced = re.findall(r"instead of (\w+)", remark)
     companions = re.findall(r'with (\w+ = (?:"[^"]+"|[0-9.]*[0-9]))', remark)
-    added = [line, *companions]
+    added = [*line.splitlines(), *companions]
     removed = {*replaced, *(item.split(" = ")[0] for item in added)}
     lines, here = [], ""
     multiline = re.sub(r"\[\n(.*?)\n\]", _on_one_line, starter_scenario(name), flags=re.DOTALL)
@@ -138,9 +147,11 @@ def test_every_alternative_of_the_starter_scenario_is_valid(
     name: str, table: str, line: str, remark: str
 ) -> None:
     text = with_alternative(name, table, line, remark)
-    key, value = next(iter(tomllib.loads(line).items()))
-    assert tomllib.loads(text)[table][key] == value
-    parse_scenario(text, "new.toml", FILES.__getitem__)
+    for key, value in tomllib.loads(line).items():
+        assert tomllib.loads(text)[table][key] == value
+    scenario = parse_scenario(text, "new.toml", FILES.__getitem__)
+    if scenario.cam is not None:
+        assert turn_of(scenario).stations.count > 0
 
 
 def test_new_plugin_is_the_renamed_template(command: Command) -> None:
