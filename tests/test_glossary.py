@@ -12,13 +12,13 @@ from wearsim import load_scenario, run
 from wearsim.report.text import OBSERVABLES as LABELS
 from wearsim.report.text import si_key
 from wearsim.results.dissipation import VARIABLES as DISSIPATION
-from wearsim.results.ensemble.schema import ENSEMBLE, LIFE, STATISTICS
+from wearsim.results.ensemble.schema import ANGLE, CAM_OBSERVABLES, ENSEMBLE, LIFE, STATISTICS
 from wearsim.results.run_schema import ALL_VARIABLES as RUN
 from wearsim.scenario.examples import scenario_schema
 
 ROOT = Path(__file__).parents[1]
 HEAD = ["quantity", "symbol", "scenario key", "name in code", "file variable", "label"]
-UNITS = r"_(m|m2|m3|N|Nm|Pa|W|J|s|um)$"
+UNITS = r"_(m|m2|m3|N|Nm|Pa|W|J|s|um|rad)$"
 
 
 def rows() -> list[list[str]]:
@@ -71,6 +71,7 @@ def test_scenario_keys_of_the_glossary_exist():
 
 def test_file_variables_and_glossary_agree():
     stored = {*RUN, *DISSIPATION, *ENSEMBLE.variables, *LIFE, "control"} - set(STATISTICS)
+    stored |= {*CAM_OBSERVABLES, ANGLE.name}
     stored -= {name for name in DISSIPATION if name.startswith("dissipation_")}
     assert stored == set(names("file variable"))
 

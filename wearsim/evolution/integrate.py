@@ -11,6 +11,7 @@ import numpy as np
 from wearsim.errors import ContactError, SolverError, StepError
 from wearsim.evolution.pauses import at_rest, next_boundaries
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.relocation import located, relocated
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
 from wearsim.types import BoolArray, FloatArray, IntArray
@@ -116,7 +117,8 @@ class Evolution:
         max_steps: int,
         next_record: Callable[[float], float],
     ) -> None:
-        self.problem, self.state, self.stepper = problem, stepper.started(problem, state), stepper
+        self.problem = located(problem, state)
+        self.state, self.stepper = stepper.started(self.problem, state), stepper
         self.stop, self.max_steps, self._next_record = stop, max_steps, next_record
         self.numbers = np.arange(problem.shape[2])
         self.failures: dict[int, Exception] = {}
@@ -155,6 +157,7 @@ class Evolution:
 
     def _try_steps(self) -> Advance | None:
         """Try one step of every test in progress; return the accepted ones, if any."""
+        self._relocate()
         lengths = self._lengths()
         if not len(self.numbers):
             return None
@@ -182,6 +185,15 @@ class Evolution:
         advance = self._continued(accepted, warning) if accepted else None
         self.fail(failures)
         return advance
+
+    def _relocate(self) -> None:
+        """Place the stations of a cam again if wear has moved its skids; the stepper restarts."""
+        if self._trials:
+            return  # the state is that before a rejected step
+        problem, state = relocated(self.problem, self.state)
+        restarted = problem is not self.problem
+        self.problem = problem
+        self.state = self.stepper.started(problem, state) if restarted else state
 
     def _lengths(self) -> FloatArray:
         """Return the length of each test's next trial step [passes]; end tests without one."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
 
+from wearsim.mechanics.cam import Stations
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.types import FloatArray, IntArray
 
@@ -132,6 +133,15 @@ class CamStations:
         solved once.
     whole : CamStations, optional
         All stations along the angle, where equal ones have been joined.
+    panels : Stations, optional
+        Panels and number of stations on each.
+    skids : ndarray, shape (arcs, 2)
+        Ends of the arcs in which a free roller skids [rad].
+    relocated : callable, optional
+        Returns the stations for changes of the normal force at the stations of the unworn cam,
+        shape (all stations,) [N], where wear moves the skids.
+    recorded : ndarray, shape (stations of the unworn cam, all stations), optional
+        Matrix to values at the stations of the unworn cam, where skids have moved.
     """
 
     angle: FloatArray
@@ -151,11 +161,20 @@ class CamStations:
     inertia: FloatArray
     places: IntArray
     whole: CamStations | None = None
+    panels: Stations | None = None
+    skids: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    relocated: Callable[[FloatArray], CamStations] | None = None
+    recorded: FloatArray | None = None
 
     @property
     def along(self) -> CamStations:
         """All stations along the angle."""
         return self.whole or self
+
+    def at_unworn(self, values: FloatArray) -> FloatArray:
+        """Return values of the stations, first axis, at all stations of the unworn cam."""
+        found = values[self.places]
+        return found if self.recorded is None else np.tensordot(self.recorded, found, axes=1)
 
     def at(self, realisations: IntArray) -> CamStations:
         """Return the stations of some realisations, by number and in that order."""
@@ -188,18 +207,24 @@ class CamStations:
         return sum_in_order(share * values, axis=0)[None]
 
     def matches(self, other: CamStations) -> bool:
-        """Return whether tests with both stations can be joined: they are at the same angles."""
-        return self.inertia.size == other.inertia.size == 0 and all(
-            np.array_equal(getattr(one, name), getattr(two, name))
-            for one, two in ((self, other), (self.along, other.along))
-            for name in ("angle", "segment", "time_share", "length", "between", "places")
+        """Return whether tests with both stations can be joined: they stay at the same angles."""
+        fixed = self.relocated is None and other.relocated is None
+        return (
+            fixed
+            and self.inertia.size == other.inertia.size == 0
+            and all(
+                np.array_equal(getattr(one, name), getattr(two, name))
+                for one, two in ((self, other), (self.along, other.along))
+                for name in ("angle", "segment", "time_share", "length", "between", "places")
+            )
         )
 
     @classmethod
     def joined(cls, stations: Sequence[CamStations]) -> CamStations:
         """Return the stations of several tests, of which each `matches` the first."""
-        first, differing = stations[0], {}
-        names = [item.name for item in fields(first) if item.name != "whole"]
+        first, differing = stations[0], dict[str, Any]()
+        others = {"whole", "panels", "relocated", "recorded"}
+        names = [item.name for item in fields(first) if item.name not in others]
         for name in names:
             values = [getattr(one, name) for one in stations]
             if not all(np.array_equal(one, values[0], equal_nan=True) for one in values[1:]):

@@ -51,6 +51,7 @@ _AXES = {
     "past_feedback": 3,
     "past_spans": 1,
     "order": 0,
+    "skid_loads": 2,
 }
 
 
@@ -122,6 +123,9 @@ class WearState:
         Exposure from the past points to the present one; infinite where there is none.
     order : ndarray of int, shape (realisations,), optional
         Order of the next implicit step.
+    skid_loads : ndarray, shape (2, stations of the unworn cam, realisations), optional
+        Changes of the normal force of a cam with which its stations were placed, and with which
+        the skids were last located, see `relocation` [N]; none before wear has changed them.
     """
 
     passes: FloatArray
@@ -152,6 +156,7 @@ class WearState:
     past_feedback: FloatArray | None = None
     past_spans: FloatArray | None = None
     order: IntArray | None = None
+    skid_loads: FloatArray | None = None
 
     @property
     def depths(self) -> Depths:

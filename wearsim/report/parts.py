@@ -16,6 +16,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from wearsim.report.measured import Measured
 from wearsim.report.text import PER_SI, count, pass_unit
+from wearsim.results import EnsembleResult
 from wearsim.results.io.atomic_write import replacement
 from wearsim.types import BoolArray, FloatArray, IntArray
 
@@ -257,6 +258,13 @@ def draw_convergence(
         axes.set_ylim(least - margin, greatest + margin)
         axes.axhline(value[-1], color=GREY, lw=0.8, ls="--")
     axes.set_xlim(0.5 * _SCALED_FROM if last > _LINEAR_UP_TO else 1.0, max(2.0, 1.05 * last))
+
+
+def lift_curves(result: EnsembleResult) -> tuple[FloatArray, FloatArray]:
+    """Return angles [deg], and lift errors of cams less their means over a turn, (kept, angles)."""
+    curves = result.kept_values("lift_error_curve")
+    means = curves[:, :-1].mean(axis=1, keepdims=True)  # the last angle is the first one
+    return np.degrees(np.asarray(result.raw.variables["angle"])), curves - means
 
 
 def draw_measured(axes: Axes, measured: Sequence[Measured]) -> None:

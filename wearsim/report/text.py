@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from wearsim.results.ensemble.schema import OBSERVABLES as STORED
+from wearsim.results.ensemble.schema import ALL_OBSERVABLES as STORED
 
 if TYPE_CHECKING:
     from wearsim.results import EnsembleResult
@@ -144,7 +144,7 @@ class Named(NamedTuple):
         return PER_SI[self.unit]
 
 
-#: observables of an ensemble by name
+#: observables of an ensemble by name; the last four are those of cams
 OBSERVABLES: Mapping[str, Named] = {
     "depth": Named("depth", "um"),
     "width": Named("width", "mm"),
@@ -156,6 +156,10 @@ OBSERVABLES: Mapping[str, Named] = {
     "power": Named("dissipated power", "W"),
     "normal_force": Named("normal force", "N"),
     "peak_pressure": Named("peak pressure", "MPa"),
+    "lift_error": Named("lift error, peak to peak", "um"),
+    "lift_error_angle": Named("angle of the lift error", "deg"),
+    "depth_angle": Named("angle of the depth", "deg"),
+    "peak_pressure_angle": Named("angle of the peak pressure", "deg"),
 }
 
 

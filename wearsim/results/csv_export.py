@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
@@ -16,9 +17,9 @@ import numpy as np
 from wearsim.errors import ResultsFileError
 from wearsim.results.content import ERRORS, Array
 from wearsim.results.dissipation import DissipationData, DissipationResult
-from wearsim.results.ensemble.data import EnsembleData
+from wearsim.results.ensemble.data import Band, EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
-from wearsim.results.ensemble.schema import FAILED, LIFE, OBSERVABLES, PENDING
+from wearsim.results.ensemble.schema import ALL_OBSERVABLES, FAILED, LIFE, PENDING
 from wearsim.results.identification import IdentificationResult
 from wearsim.results.io.atomic_write import replacement
 from wearsim.results.run import Result, RunData
@@ -30,8 +31,13 @@ Column: TypeAlias = tuple[str, FloatArray]  # title and values
 Unit: TypeAlias = tuple[str, float]  # name and size in SI
 
 # engineering units by SI unit
-_UNITS = {"m": ("um", 1e-6), "m^3": ("mm^3", 1e-9), "s": ("min", 60.0), "Pa": ("MPa", 1e6)} | {
-    "N/m": ("N/mm", 1e3)
+_UNITS = {
+    "m": ("um", 1e-6),
+    "m^3": ("mm^3", 1e-9),
+    "s": ("min", 60.0),
+    "Pa": ("MPa", 1e6),
+    "N/m": ("N/mm", 1e3),
+    "rad": ("deg", math.radians(1.0)),
 }
 _IN_MM = {"y", "width", "half_length"}  # other lengths are written in um
 _SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")
@@ -92,8 +98,8 @@ def export_csv(
     ----------
     result : Result, DissipationResult, EnsembleResult or IdentificationResult
         Of a run, its history and records are written; of a dissipation study, its realisations
-        and strips; of an ensemble, its realisations, the estimates at all records and the profile
-        at the end; of an identification, its tests and traces.
+        and strips; of an ensemble, its realisations, the estimates at all records, and the profile
+        and lift error at the end; of an identification, its tests and traces.
     folder : str or Path
         Target folder, which is created if it does not exist.
     force : bool
@@ -175,6 +181,8 @@ def _ensemble_tables(result: EnsembleResult) -> dict[str, Iterable[str]]:
     if result.count:
         tables["courses.csv"] = [_table(_courses(result))]
         tables["profile.csv"] = [_table(_profile(result))]
+    if result.count and result.raw.cam:
+        tables["lift_error.csv"] = [_table(_lift_error(result))]
     if result.failed:
         errors = [(str(number), text) for number, text in result.errors.items()]
         tables["failures.csv"] = [_csv([("realisation", "error"), *errors])]
@@ -202,7 +210,7 @@ def _block(raw: EnsembleData, start: int, stop: int) -> Iterator[Column]:
         else:
             for number, column in enumerate(values.T, 1):
                 yield _column(f"{key} roller {number}", column, _drawn_unit(item["unit"]))
-    for name in (*OBSERVABLES, *_SCALARS, *LIFE):
+    for name in (*ALL_OBSERVABLES, *_SCALARS, *LIFE):
         if name in raw.schema.variables:
             values = raw.rows(name, start, stop)
             final = np.where(failed, np.nan, values[:, -1] if values.ndim > 1 else values)
@@ -213,8 +221,8 @@ def _courses(result: EnsembleResult) -> Iterator[Column]:
     """Yield the estimates of each observable at every record."""
     yield "passes", result.record_passes
     yield _column("time", result.record_time, _UNITS["s"])
-    for name, variable in OBSERVABLES.items():
-        course = result.course(name)
+    for name in result.observables:
+        course, variable = result.course(name), ALL_OBSERVABLES[name]
         columns = {
             "mean": course.mean,
             "mean low": course.mean_low,
@@ -230,8 +238,19 @@ def _profile(result: EnsembleResult) -> Iterator[Column]:
     """Yield mean and band of the worn depth at the end over the strips."""
     band = result.band()
     yield _column("y", band.y, _unit("y", "m"))
+    yield from _band("depth", band)
+
+
+def _lift_error(result: EnsembleResult) -> Iterator[Column]:
+    """Yield mean and band of the lift error at the end over the angle."""
+    band = result.band("lift_error_curve")
+    yield _column("angle", band.y, _UNITS["rad"])
+    yield from _band("lift error", band)
+
+
+def _band(what: str, band: Band) -> Iterator[Column]:
     for name in ("mean", "std", "low", "high"):
-        yield _column(f"depth {name}", getattr(band, name), _UNITS["m"])
+        yield _column(f"{what} {name}", getattr(band, name), _UNITS["m"])
 
 
 def _run_tables(raw: RunData) -> dict[str, Iterable[str]]:

@@ -95,7 +95,10 @@ def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
         value, _ = cells(found.mean, named.unit)
         return [(named.label, value, CONSTANT, *[NOTHING] * len(QUANTILES))]
     items = [found.mean, found.std, *(interval for _, interval in found.quantiles)]
-    values, intervals = zip(*(cells(item, named.unit) for item in items), strict=True)
+    shown_cells = [cells(item, named.unit) for item in items]
+    if named.unit == "deg":  # the mean of 359 and 1 deg is not 180 deg
+        shown_cells[:2] = [(NOTHING, "")] * 2
+    values, intervals = zip(*shown_cells, strict=True)
     if result.count == 1:
         return [(named.label, values[0], *[NOTHING] * (len(items) - 1))]
     return [(named.label, *values), (INTERVAL, *intervals)]

@@ -16,8 +16,8 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
-from wearsim.evolution.steppers.loads import mean_force, smooth_loads
-from wearsim.evolution.steppers.single_step import WearIncrement
+from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
+from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.multistep import (
     MAX_ORDER,
@@ -135,15 +135,20 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     """Return a state without past points, and with the rates of wear and energy of its contacts."""
     times = problem.time(state.passes)
     here = problem.at_time(times, times)
-    exposure = _exposure(here, problem, problem.force(times))
+    force = problem.force(times)
+    exposure = _exposure(here, problem, force)
     spans = np.full((ROWS - 1, len(state.passes)), np.inf)
     spans[0] = 0.0
     feedback = problem.has_spring or bool(problem.terms)
+    past_feedback = np.zeros((ROWS, *problem.shape)) if feedback else None
+    if past_feedback is not None and state.skid_loads is not None:  # a worn cam
+        loads = carried_loads(here, state.contacts)
+        past_feedback[0] = loads - with_feedback(here, force, np.zeros(()), ())
     wear, energy = _wear_per_pass(here, state.contacts)
     return state.replaced(
         past_wear=_starting(wear, exposure),
         past_energy=_starting(energy, exposure),
-        past_feedback=np.zeros((ROWS, *problem.shape)) if feedback else None,
+        past_feedback=past_feedback,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
         wear_exponents=np.ones((*problem.shape, problem.grid.strips)),

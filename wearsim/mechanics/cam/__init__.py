@@ -11,7 +11,7 @@ from wearsim.mechanics.cam.shapes import (
     three_arc_cam,
 )
 from wearsim.mechanics.cam.skid import Rolling, SkidArc, skid_arcs
-from wearsim.mechanics.cam.stations import Stations, choose_stations, extreme
+from wearsim.mechanics.cam.stations import Stations, choose_stations, extreme, moved_stations
 from wearsim.mechanics.cam.surface import surface_points
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "eccentric_cam",
     "extreme",
     "motion_mistakes",
+    "moved_stations",
     "shape_motion",
     "skid_arcs",
     "surface_points",

@@ -122,6 +122,17 @@ class Stations:
         angles = [panel.start + (panel.stop - panel.start) * places for panel in self.panels]
         return np.concatenate(angles), self.values_between(values, places)
 
+    def values_at_angles(self, values: FloatArray, angles: FloatArray) -> FloatArray:
+        """Return values at increasing angles from 0 to 2 pi [rad], shape (angles, ...)."""
+        found = np.empty((len(angles), *values.shape[1:]))
+        for panel, number, first in zip(self.panels, self.numbers, self.first, strict=True):
+            low, high = np.searchsorted(angles, (panel.start, panel.stop)).tolist()
+            high = len(angles) if panel is self.panels[-1] else high
+            places = (angles[low:high] - panel.start) / (panel.stop - panel.start)
+            matrix = interpolation(number, np.clip(places, 0.0, 1.0))
+            found[low:high] = np.tensordot(matrix, values[first : first + number], axes=1)
+        return found
+
     def values_between(self, values: FloatArray, places: FloatArray) -> FloatArray:
         """Return values at positions of every panel, from 0 to 1, (points, ...)."""
         each = zip(self.numbers, self.first, strict=True)
@@ -130,6 +141,50 @@ class Stations:
             for number, first in each
         ]
         return np.concatenate(parts)
+
+
+def moved_stations(old: Stations, new: Stations) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the matrix from values at stations to those at other stations of the same turn.
+
+    Parameters
+    ----------
+    old, new : Stations
+
+    Returns
+    -------
+    matrix : ndarray, shape (new stations, old stations)
+        Interpolates within the panels of `old`; equal panels keep their values.
+    old_part, new_part : ndarray of int, shape (old stations,), (new stations,)
+        Number of the part of the turn of each station: parts lie between edges that both have; -1
+        where both have the same panel.
+    """
+    panels = {
+        (panel.start, panel.stop, number): int(first)
+        for panel, number, first in zip(old.panels, old.numbers, old.first, strict=True)
+    }
+    starts = np.array([panel.start for panel in old.panels])
+    common = sorted({panel.start for panel in old.panels} & {panel.start for panel in new.panels})
+    matrix, parts = np.zeros((new.count, old.count)), []
+    kept = np.zeros(old.count, dtype=np.bool_)
+    for panel, number, first in zip(new.panels, new.numbers, new.first, strict=True):
+        same = panels.get((panel.start, panel.stop, number))
+        if same is not None:
+            matrix[first : first + number, same : same + number] = np.eye(number)
+            kept[same : same + number] = True
+            parts += [-1] * number
+            continue
+        middle = 0.5 * (panel.start + panel.stop)
+        angles = panel.start + (panel.stop - panel.start) * lobatto(number)[0]
+        inside = angles + 1e-9 * (middle - angles)  # on this side of an edge
+        within = np.searchsorted(starts, inside, side="right") - 1
+        for row, place in enumerate(within.tolist()):
+            other, count, begin = old.panels[place], old.numbers[place], int(old.first[place])
+            part = np.clip((angles[row] - other.start) / (other.stop - other.start), 0.0, 1.0)
+            matrix[first + row, begin : begin + count] = interpolation(count, np.array([part]))[0]
+        parts += [int(np.searchsorted(common, middle))] * number
+    middles = np.array([0.5 * (panel.start + panel.stop) for panel in old.panels])[old.panel]
+    old_part = np.where(kept, -1, np.searchsorted(common, middles))
+    return matrix, old_part, np.array(parts)
 
 
 def choose_stations(

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from wearsim.mechanics.cam import Motion, Stations, surface_points
 from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, RED, name_axes, titled_figure
 from wearsim.report.text import PER_SI
+from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
-from wearsim.studies.cam.turn import CamTurn, Point
+from wearsim.studies.cam.turn import CamTurn
 from wearsim.types import FloatArray
 
 MM, DEG, MPA = PER_SI["mm"], PER_SI["deg"], PER_SI["MPa"]

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from wearsim.report.figures.cam import name_segments
 from wearsim.report.measured import ComputedProfile, Measured, computed_profile
 from wearsim.report.parts import (
     BLUE,
@@ -17,6 +18,7 @@ from wearsim.report.parts import (
     ORANGE,
     draw_convergence,
     draw_measured,
+    lift_curves,
     name_axes,
     set_depth_axes,
     titled_figure,
@@ -38,6 +40,7 @@ from wearsim.report.text import (
 from wearsim.results import EnsembleResult
 from wearsim.results.ensemble.data import Effect
 from wearsim.results.ensemble.schema import PENDING
+from wearsim.studies.cam.turn import CamTurn
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
@@ -66,8 +69,8 @@ def ensemble_figure(result: EnsembleResult, measured: Sequence[Measured] = ()) -
     -------
     Figure
         Five panels: depth against roller passes, density of the depth at the end, convergence of
-        the estimate, mean worn profile, and Sobol indices of the depth; a message if no realisation
-        is completed.
+        the estimate, mean worn profile, and Sobol indices of the depth; of a cam a sixth, the lift
+        error over the angle; a message if no realisation is completed.
     """
     found = computed_profile(result)
     with titled_figure(13.0, 7.5, f"{result.title}\n{_caption(result, found)}") as figure:
@@ -77,12 +80,14 @@ def ensemble_figure(result: EnsembleResult, measured: Sequence[Measured] = ()) -
         # subfigures, since the rows have different columns
         upper, lower = np.ravel(np.array(figure.subfigures(2, 1)))
         course, density, convergence = upper.subplots(1, 3)
-        profile, effects = lower.subplots(1, 2)
+        profile, *angle, effects = lower.subplots(1, 3 if result.raw.cam and found.kept else 2)
         draw_course(course, result)
         _draw_density(density, result)
         _draw_convergence(convergence, result)
         _draw_profile(profile, result, found, measured)
         _draw_effects(effects, result)
+        for axes in angle:
+            _draw_lift_error(axes, result)
     return figure
 
 
@@ -233,10 +238,25 @@ def _draw_profile(
             min([worn[0] - margin, *(float(ends.min()) for ends in points)]),
             max([worn[-1] + margin, *(float(ends.max()) for ends in points)]),
         )
-    title = "Worn profile of the cylinder at the end"
+    title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
     title += "" if found.kept == result.count else f", of the first {count(found.kept)}"
     name_axes(axes, title, "y [mm]", "height above nominal [um]")
     axes.legend(loc="lower right")
+
+
+def _draw_lift_error(axes: Axes, result: EnsembleResult) -> None:
+    """Draw the lift error at the end over the angle, relative to its mean over a turn."""
+    angle, curves = lift_curves(result)
+    lines = axes.plot(angle, curves[:LINES].T * UM, color=GREY, lw=0.6, alpha=0.6)
+    lines[0].set_label(number_of_realisations(len(lines)))
+    if len(curves) > 1:
+        low, high = np.quantile(curves, NINETY_PERCENT, axis=0) * UM
+        if sufficient_for(len(curves), NINETY_PERCENT[0]):
+            axes.fill_between(angle, low, high, color=BLUE, alpha=0.25, lw=0, label="5 % to 95 %")
+        axes.plot(angle, curves.mean(axis=0) * UM, color="black", label="mean")
+    name_segments(axes, CamTurn(result.scenario).cam.motion, names=False)
+    name_axes(axes, "Lift error at the end", "angle [deg]", "difference from its mean [um]")
+    axes.legend(loc="best")
 
 
 def _draw_effects(axes: Axes, result: EnsembleResult) -> None:

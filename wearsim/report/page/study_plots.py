@@ -23,11 +23,12 @@ from wearsim.report.page.plots import (
     axes,
     columns,
     hover,
+    in_degrees,
     legend,
     pass_axes,
     worn_range,
 )
-from wearsim.report.parts import BLUE, GREY, evenly_spaced
+from wearsim.report.parts import BLUE, GREY, evenly_spaced, lift_curves
 from wearsim.report.text import count, shown, sufficient_for
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.results.ensemble.data import Effect
@@ -48,6 +49,7 @@ def ensemble_plots(result: EnsembleResult, measured: Sequence[Measured]) -> list
     if result.count == 0:
         return []
     plots = [_course(result), _band(result, measured)]
+    plots += [_lift_error(result)] if result.raw.cam and len(result.profiles) else []
     if result.count > 1 and not result.is_constant("depth"):
         plots = [
             _density(result),
@@ -145,6 +147,26 @@ def _band(result: EnsembleResult, measured: Sequence[Measured]) -> Plot:
     deepest = shown(float((found.start - found.height).max()), "um")
     text = f"Mean of {count(found.kept)} profiles, {deepest} deep, and the band of the tests."
     return Plot("Worn profile at the end", text, plot)
+
+
+def _lift_error(result: EnsembleResult) -> Plot:
+    """Return the mean lift error of cams over the angle, with its band."""
+    angle, curves = lift_curves(result)
+    low, high = np.quantile(curves, (0.05, 0.95), axis=0)
+    values = {"mean": curves.mean(axis=0) * UM, "low": low * UM, "high": high * UM}
+    data = columns(angle=angle, **values)
+    plot = axes("angle of the cam [deg]", "difference from its mean [um]")
+    in_degrees(plot)
+    tips = [("angle", "@angle{0.0} deg"), ("mean", "@mean{0.000} um")]
+    if sufficient_for(len(curves), 0.05):
+        _area(plot, "angle", data, BLUE, "5 % to 95 %")
+        tips.append(("5 % to 95 %", "@low{0.000} to @high{0.000} um"))
+    line = plot.line("angle", "mean", source=data, color=BLUE, width=2, legend_label="mean")
+    hover(plot, [line], *tips)
+    legend(plot)
+    found = result.estimate("lift_error", -1, ())
+    text = f"Change of the lift by wear. Peak to peak it is {shown(found.mean.value, 'um')} in the"
+    return Plot("Lift error at the end", f"{text} mean of {count(result.count)} tests.", plot)
 
 
 def effect_plots(result: EnsembleResult, name: str, values: FloatArray) -> list[Plot]:

@@ -104,8 +104,8 @@ class Outcome:
         Numbers by variable. Always: drawn values by dotted key, a number or shape (rollers,). On
         success also: every variable of `schema.OBSERVABLES`, shape (records,); steps, solves,
         depth_error, volume_error, and control if the plan has a control variate; depth_profile,
-        the worn depth of the cylinder at the end, shape (strips,) [m], which is not needed for
-        realisations whose profile is not stored.
+        the worn depth of the cylinder at the end, shape (strips,) [m], and lift_error_curve of a
+        cam, shape (angles,) [m], which are not needed for realisations whose profile is not stored.
     """
 
     number: int
@@ -144,6 +144,8 @@ class EnsembleData(StudyData):
         Mean, std and number of draws of the control variate; empty if the plan has none.
     life : dict
         Settings of tests that end at a limit, see `LifeSettings`; empty for others.
+    cam : bool
+        Whether the tests are those of a cam.
     variables : mapping of str to ndarray
         Variables of `wearsim.results.ensemble.schema`, and the drawn values by dotted key; those
         of a file are read on access. Rows of pending realisations are undefined, those of failed
@@ -163,7 +165,7 @@ class EnsembleData(StudyData):
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(
         ("variables", "status", "errors")
     )
-    optional: ClassVar[frozenset[str]] = frozenset({"life"})
+    optional: ClassVar[frozenset[str]] = frozenset({"life", "cam"})
 
     stepper: str
     tolerance: float
@@ -178,6 +180,7 @@ class EnsembleData(StudyData):
     groups: list[dict[str, str]]
     control: dict[str, float] = field(default_factory=dict)
     life: dict[str, Any] = field(default_factory=dict)
+    cam: bool = False
     variables: Mapping[str, Array] = field(default_factory=dict)
     status: Array = field(default_factory=lambda: np.zeros(0, np.uint8))
     errors: dict[int, str] = field(default_factory=dict)
@@ -188,7 +191,7 @@ class EnsembleData(StudyData):
     @property
     def schema(self) -> Schema:
         """Schema of the results file."""
-        return ensemble_schema(self.inputs, self.control, self.life)
+        return ensemble_schema(self.inputs, self.control, self.life, self.cam)
 
     @property
     def done(self) -> IntArray:
@@ -241,6 +244,7 @@ class EnsembleData(StudyData):
             "y": strips,
             "kept": kept_profiles(self.requested, strips),
             "quantile": len(QUANTILES),
+            "angle": len(self.variables["angle"]) if self.cam else 0,
         }
         return {
             name: tuple(lengths[dim] for dim in variable.dims)
@@ -282,14 +286,14 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Worn profile at the end of the test, over the realisations with a stored profile.
+    """Worn profile or lift error at the end, over the realisations whose profile is stored.
 
     Parameters
     ----------
-    y : ndarray, shape (strips,)
-        Axial position [m].
-    mean, std, low, high : ndarray, shape (strips,)
-        Mean and standard deviation of the worn depth, and its 2.5 and 97.5 % quantiles [m].
+    y : ndarray, shape (strips,) or (angles,)
+        Axial position [m], or angle of the cam [rad].
+    mean, std, low, high : ndarray, shape as `y`
+        Mean and standard deviation of worn depth or lift error, and 2.5 and 97.5 % quantiles [m].
     kept : int
         Number of profiles.
     """

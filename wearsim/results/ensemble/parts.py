@@ -24,6 +24,7 @@ from wearsim.results.ensemble.schema import (
     ENSEMBLE,
     ERROR_BYTES,
     FAILED,
+    KEPT,
     PENDING,
     ensemble_schema,
     is_row,
@@ -251,8 +252,8 @@ def rows_of(outcomes: Sequence[Outcome], data: EnsembleData) -> Arrays:
         values = outcome.values
         unknown = sorted(values.keys() - names)
         missing = [] if outcome.error else sorted(names - values.keys())
-        if place >= len(rows["depth_profile"]) and "depth_profile" in missing:
-            missing.remove("depth_profile")
+        if place >= len(rows["depth_profile"]):
+            missing = [name for name in missing if name not in KEPT]
         if unknown or missing:
             raise ValueError(
                 f"realisation {outcome.number}: missing values {missing}, unknown values {unknown}"
@@ -330,7 +331,10 @@ def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
     """Return the content of the file of an ensemble without its parts."""
     attributes = read_attributes(path, file, ENSEMBLE, EnsembleData)
     schema = ensemble_schema(
-        attributes["inputs"], attributes["control"], attributes.get("life", {})
+        attributes["inputs"],
+        attributes["control"],
+        attributes.get("life", {}),
+        attributes.get("cam", False),
     )
     check_complete(path, file, schema.variables)
     datasets = {name: file[name] for name in schema.variables}

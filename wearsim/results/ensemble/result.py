@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.errors import unknown_name
 from wearsim.results.ensemble.data import Band, Course, Effect
-from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES
+from wearsim.results.ensemble.schema import DONE, KEPT, QUANTILES
 from wearsim.results.ensemble.values import EnsembleValues
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Design, Estimate, Target, estimate
@@ -155,15 +155,20 @@ class EnsembleResult(EnsembleValues):
 
     def _by_record(self, name: str) -> Iterator[FloatArray]:
         """Yield an observable of the independent realisations, record by record."""
-        if name not in OBSERVABLES:
-            raise unknown_name(name, "an observable", OBSERVABLES)
+        if name not in self.observables:
+            raise unknown_name(name, "an observable", self.observables)
         records, block = len(self.record_passes), max(_READ_SIZE // max(self.requested, 1), 1)
         for first in range(0, records, block):
             some = self.raw.rows(name, 0, None, slice(first, min(first + block, records)))
             yield from map(np.ascontiguousarray, some[self.numbers][self._independent].T)
 
-    def band(self) -> Band:
-        """Return mean and 95 % band of the worn profiles at the end.
+    def band(self, name: str = "depth_profile") -> Band:
+        """Return mean and 95 % band of the worn profiles, or the lift errors, at the end.
+
+        Parameters
+        ----------
+        name : str
+            "depth_profile", or "lift_error_curve" of a cam, over the angle.
 
         Examples
         --------
@@ -172,12 +177,14 @@ class EnsembleResult(EnsembleValues):
         >>> band.kept, bool((band.low <= band.high).all())
         (16, True)
         """
-        kept, unknown = self.profiles, np.full_like(self.y, np.nan)
+        kept = self.kept_values(name)
+        y = self.y if name == "depth_profile" else np.asarray(self.raw.variables["angle"])
+        unknown = np.full_like(y, np.nan)
         if len(kept) == 0:
-            return Band(self.y, unknown, unknown, unknown, unknown, 0)
+            return Band(y, unknown, unknown, unknown, unknown, 0)
         std = kept.std(axis=0, ddof=1) if len(kept) > 1 else unknown
         low, high = np.quantile(kept, (0.025, 0.975), axis=0)
-        return Band(self.y, kept.mean(axis=0), std, low, high, len(kept))
+        return Band(y, kept.mean(axis=0), std, low, high, len(kept))
 
     def sensitivity(self, name: str = "depth") -> list[Effect]:
         """Return the effect of each random input on an observable at the end, largest first.
@@ -256,9 +263,12 @@ class EnsembleResult(EnsembleValues):
             course = self.course(name)
             found[f"{name}_mean"], found[f"{name}_std"] = course.mean, course.std
             found[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
-        band = self.band()
-        parts = ("mean", "std", "low", "high")
-        return found | {f"depth_profile_{part}": getattr(band, part) for part in parts}
+        for name in KEPT:
+            if name in self.raw.schema.variables:
+                band = self.band(name)
+                parts = ("mean", "std", "low", "high")
+                found |= {f"{name}_{part}": getattr(band, part) for part in parts}
+        return found
 
     def is_constant(self, name: str) -> bool:
         """Return whether an observable is equal in all realisations, within rounding.

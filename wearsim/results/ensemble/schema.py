@@ -10,6 +10,8 @@ import numpy as np
 
 from wearsim.results.content import Axis, Schema, Variable, by_name, with_random_inputs
 
+#: Variables that are stored for the first realisations only.
+KEPT = ("depth_profile", "lift_error_curve")
 #: Values of the status of a realisation.
 PENDING, DONE, FAILED = 0, 1, 2
 #: Length of the stored error message of a failed realisation, with its final zero.
@@ -40,6 +42,18 @@ OBSERVABLES: Mapping[str, Variable] = by_name(
     )
 )
 
+#: Further variables of every record of an ensemble of cams, by name.
+CAM_OBSERVABLES: Mapping[str, Variable] = by_name(
+    Variable(name, _HISTORY, unit, long_name, "record")
+    for name, unit, long_name in (
+        ("lift_error", "m", "greatest less smallest change of the lift by wear over the angle"),
+        ("lift_error_angle", "rad", "angle of the greatest change of the lift by wear"),
+        ("depth_angle", "rad", "angle of the greatest depth of the cam"),
+        ("peak_pressure_angle", "rad", "angle of the greatest normal pressure"),
+    )
+)
+ALL_OBSERVABLES: Mapping[str, Variable] = {**OBSERVABLES, **CAM_OBSERVABLES}
+
 #: Variables common to all realisations.
 STATIC: Mapping[str, Variable] = by_name(
     (
@@ -52,6 +66,9 @@ STATIC: Mapping[str, Variable] = by_name(
     )
 )
 
+#: Variable of an ensemble of cams that is common to all realisations.
+ANGLE = Variable("angle", ("angle",), "rad", "angle of the cam", "static")
+
 _QUANTILE = Variable("quantile", ("quantile",), "1", "probability of a quantile", "static")
 
 _DEPTH_PROFILE = Variable(
@@ -59,6 +76,14 @@ _DEPTH_PROFILE = Variable(
     ("kept", "y"),
     "m",
     "worn depth of the cylinder at the end, positive down",
+    "record",
+)
+
+_LIFT_ERROR = Variable(
+    "lift_error_curve",
+    ("kept", "angle"),
+    "m",
+    "change of the lift by wear at the end",
     "record",
 )
 
@@ -102,39 +127,47 @@ LIFE = by_name(
     )
 )
 
+
+def _statistics(observables: Mapping[str, Variable], kept: Variable) -> Mapping[str, Variable]:
+    """Return the estimates of some observables and of a curve that is kept."""
+    return by_name(
+        [
+            Variable(
+                f"{of.name}_{ending}",
+                dims,
+                of.unit,
+                f"{words} over realisations: {of.long_name}",
+                "statistic",
+            )
+            for of in observables.values()
+            for ending, dims, words in (
+                ("mean", _RECORDS, "mean"),
+                ("std", _RECORDS, "standard deviation"),
+                ("quantiles", ("quantile", "record"), "quantiles"),
+            )
+        ]
+        + [
+            Variable(
+                f"{kept.name}_{ending}",
+                kept.dims[1:],
+                kept.unit,
+                f"{words} over kept realisations: {kept.long_name}",
+                "statistic",
+            )
+            for ending, words in (
+                ("mean", "mean"),
+                ("std", "standard deviation"),
+                ("low", "2.5 % quantile"),
+                ("high", "97.5 % quantile"),
+            )
+        ]
+    )
+
+
 #: Estimates over the realisations; nan until the ensemble is finished.
-STATISTICS: Mapping[str, Variable] = by_name(
-    [
-        Variable(
-            f"{of.name}_{ending}",
-            dims,
-            of.unit,
-            f"{words} over realisations: {of.long_name}",
-            "statistic",
-        )
-        for of in OBSERVABLES.values()
-        for ending, dims, words in (
-            ("mean", _RECORDS, "mean"),
-            ("std", _RECORDS, "standard deviation"),
-            ("quantiles", ("quantile", "record"), "quantiles"),
-        )
-    ]
-    + [
-        Variable(
-            f"depth_profile_{ending}",
-            _STRIPS,
-            "m",
-            f"{words} over kept realisations: {_DEPTH_PROFILE.long_name}",
-            "statistic",
-        )
-        for ending, words in (
-            ("mean", "mean"),
-            ("std", "standard deviation"),
-            ("low", "2.5 % quantile"),
-            ("high", "97.5 % quantile"),
-        )
-    ]
-)
+STATISTICS: Mapping[str, Variable] = _statistics(OBSERVABLES, _DEPTH_PROFILE)
+#: Further estimates of an ensemble of cams.
+CAM_STATISTICS: Mapping[str, Variable] = _statistics(CAM_OBSERVABLES, _LIFT_ERROR)
 
 #: Schema without the random inputs, which differ between studies, and the control variate.
 ENSEMBLE = Schema(
@@ -154,7 +187,10 @@ ENSEMBLE = Schema(
 
 
 def ensemble_schema(
-    inputs: Sequence[Mapping[str, str]], control: Mapping[str, Any], life: Mapping[str, Any]
+    inputs: Sequence[Mapping[str, str]],
+    control: Mapping[str, Any],
+    life: Mapping[str, Any],
+    cam: bool = False,
 ) -> Schema:
     """Return the schema of an ensemble, with its drawn values.
 
@@ -166,6 +202,8 @@ def ensemble_schema(
         Mean, std and number of draws of the control variate; empty if the plan has none.
     life : mapping
         Settings of tests that end at a limit; empty for others.
+    cam : bool
+        Whether the tests are those of a cam.
 
     Returns
     -------
@@ -173,6 +211,9 @@ def ensemble_schema(
     """
     schema = with_random_inputs(ENSEMBLE, inputs)
     last = {**({"control": _CONTROL} if control else {}), **(LIFE if life else {})}
+    if cam:
+        last |= {"angle": ANGLE, "lift_error_curve": _LIFT_ERROR}
+        last |= {**CAM_OBSERVABLES, **CAM_STATISTICS}
     return replace(schema, variables={**schema.variables, **last})
 
 

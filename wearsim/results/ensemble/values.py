@@ -12,7 +12,7 @@ import numpy as np
 from wearsim.errors import unknown_name
 from wearsim.results.content import StudyResult
 from wearsim.results.ensemble.data import EnsembleData
-from wearsim.results.ensemble.schema import DONE, OBSERVABLES, kept_profiles
+from wearsim.results.ensemble.schema import CAM_OBSERVABLES, DONE, KEPT, OBSERVABLES, kept_profiles
 from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design
@@ -64,7 +64,7 @@ class EnsembleValues(StudyResult[EnsembleData]):
     @property
     def observables(self) -> tuple[str, ...]:
         """Names of the observables."""
-        return tuple(OBSERVABLES)
+        return (*OBSERVABLES, *(CAM_OBSERVABLES if self.raw.cam else ()))
 
     @property
     def y(self) -> FloatArray:
@@ -142,7 +142,7 @@ class EnsembleValues(StudyResult[EnsembleData]):
         True
         """
         columns = [
-            (name, item.unit, self.at_end(name) if name in OBSERVABLES else self.values(name))
+            (name, item.unit, self.at_end(name) if name in self.observables else self.values(name))
             for name, item in self.raw.schema.variables.items()
             if item.dims[0] == "realisation" and name not in {"status", "error"}
         ]
@@ -162,8 +162,8 @@ class EnsembleValues(StudyResult[EnsembleData]):
         >>> print(f"{tests.at_end('depth').max() * 1e6:.0f} um")
         54 um
         """
-        if name not in OBSERVABLES:
-            raise unknown_name(name, "an observable", OBSERVABLES)
+        if name not in self.observables:
+            raise unknown_name(name, "an observable", self.observables)
         return self.raw.column(name, record)[self.numbers]
 
     def independent(self, name: str, record: int = -1) -> tuple[IntArray, FloatArray]:
@@ -216,5 +216,17 @@ class EnsembleValues(StudyResult[EnsembleData]):
     @cached_property
     def profiles(self) -> FloatArray:
         """Worn depth of the cylinder at the end, shape (kept, strips) [m], without failed ones."""
-        kept = self.raw.variables["depth_profile"]
+        return self.kept_values("depth_profile")
+
+    def kept_values(self, name: str) -> FloatArray:
+        """Return a variable that is stored for the first realisations, without failed ones.
+
+        Parameters
+        ----------
+        name : str
+            "depth_profile", or "lift_error_curve" of a cam.
+        """
+        if name not in self.raw.schema.variables or name not in KEPT:
+            raise unknown_name(name, "a curve", KEPT[: 1 + self.raw.cam])
+        kept = self.raw.variables[name]
         return np.asarray(kept[self.raw.status[: len(kept)] == DONE])

@@ -24,7 +24,15 @@ from wearsim.results.ensemble.parts import (
     rows_of,
     write_part,
 )
-from wearsim.results.ensemble.schema import ENSEMBLE, PENDING, QUANTILES, STATIC, STATISTICS, is_row
+from wearsim.results.ensemble.schema import (
+    CAM_STATISTICS,
+    ENSEMBLE,
+    PENDING,
+    QUANTILES,
+    STATIC,
+    STATISTICS,
+    is_row,
+)
 from wearsim.results.io.atomic_write import (
     DISK,
     TEMPORARY,
@@ -99,7 +107,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
             What is known before the first realisation; its variables, status and errors are
             ignored.
         static : mapping of str to ndarray
-            The variables `schema.STATIC`.
+            The variables `schema.STATIC`, and the angles of a cam.
         storage : Storage
             File operations.
 
@@ -112,8 +120,9 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         """
         from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
-        if static.keys() != STATIC.keys():
-            raise ValueError(f"static arrays are {sorted(STATIC)}, got {sorted(static)}")
+        names = {*STATIC, *(("angle",) if header.cam else ())}
+        if static.keys() != names:
+            raise ValueError(f"static arrays are {sorted(names)}, got {sorted(static)}")
         path = Path(path)
         refuse_if_locked(path)
         folder = parts_folder(path)
@@ -276,7 +285,9 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         """Replace the file by one that contains the rows of all parts."""
         from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
-        known = {name: self._stored[name] for name in (*STATIC, "quantile")}
+        schema = self.data.schema.variables
+        static = [name for name, variable in schema.items() if variable.kind == "static"]
+        known = {name: self._stored[name] for name in static}
         header = replace(header, **self._state, variables=known, merged=self._number)
         with hdf5_write.new_file(self.path, self._storage) as (file, check):
             hdf5_write.put_variables(file, header.schema, known, header.reserved)
@@ -304,7 +315,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
 
 
 def _put_statistic(dataset: h5py.Dataset, name: str, array: Array) -> None:
-    if name not in STATISTICS:
+    if name not in STATISTICS and name not in CAM_STATISTICS:
         raise ValueError(f"{name} is not a statistic of an ensemble")
     if np.shape(array) != dataset.shape:
         raise ValueError(f"{name} has the shape {np.shape(array)}, expected {dataset.shape}")

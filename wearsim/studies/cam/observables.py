@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from wearsim.evolution.observables import lift_errors, peak_to_peak
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
+from wearsim.mechanics.cam import Stations
 from wearsim.types import FloatArray
+
+CURVE_ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)  # rad, of the lift error of an ensemble
 
 
 def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
@@ -20,23 +25,79 @@ def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]
     pressure = problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
     return {
         "turns": state.passes / problem.kinematics.physical_rollers,
-        "station_depth": depth[cam.places],
+        "station_depth": at_every_station(problem, depth),
         "depth_angle": angle[depth.argmax(axis=0)],
         "peak_pressure_angle": angle[pressure.argmax(axis=0)],
         "lift_error": peak_to_peak(cam, lift_errors(problem, state)),
     }
 
 
+def cam_observables(
+    problem: WearProblem, state: WearState, row: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """Return the observables of cams of an ensemble, shape (realisations,).
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    row : mapping of str to ndarray
+        Observables of the run, with those of `cam_history`.
+    """
+    cam = problem.kinematics.cam
+    if cam is None:
+        return {}
+    pressure, errors = row["peak_pressure"], np.abs(lift_errors(problem, state))
+    first = pressure.argmax(axis=0)[None]
+    return {
+        "lift_error": row["lift_error"].max(axis=0),
+        "lift_error_angle": cam.angle.ravel()[errors.max(axis=1).argmax(axis=0)],
+        "depth_angle": row["depth_angle"],
+        "peak_pressure_angle": np.take_along_axis(row["peak_pressure_angle"], first, axis=0)[0],
+    }
+
+
+def lift_curves(
+    problem: WearProblem, state: WearState, stations: Sequence[Stations]
+) -> list[FloatArray]:
+    """Return the lift error of each realisation at `CURVE_ANGLES` [m].
+
+    Of several rollers it is that of the one whose lift error varies most.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    stations : sequence of Stations
+        Stations of each realisation.
+    """
+    cam = problem.kinematics.cam
+    assert cam is not None
+    errors = lift_errors(problem, state)
+    roller = peak_to_peak(cam, errors).argmax(axis=0)
+    curves = cam.at_unworn(errors)
+    return [
+        each.values_at_angles(curves[:, roller[place], place], CURVE_ANGLES)
+        for place, each in enumerate(stations)
+    ]
+
+
 def cam_record(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
     """Return the curve of the lift error; nothing of a cylinder."""
     cam = problem.kinematics.cam
-    return {} if cam is None else {"lift_error_curve": lift_errors(problem, state)[cam.places]}
+    return {} if cam is None else {"lift_error_curve": cam.at_unworn(lift_errors(problem, state))}
 
 
 def at_every_station(problem: WearProblem, values: FloatArray) -> FloatArray:
-    """Return values of the stations, first axis, along the angle of a cam."""
+    """Return values of the stations, first axis, along the angle of the unworn cam.
+
+    They are not negative where they have been interpolated to its stations.
+    """
     cam = problem.kinematics.cam
-    return values if cam is None else values[cam.places]
+    if cam is None:
+        return values
+    found = cam.at_unworn(values)
+    return found if cam.recorded is None else np.maximum(found, 0.0)
 
 
 def station_columns(problem: WearProblem) -> dict[str, FloatArray]:

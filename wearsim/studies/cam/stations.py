@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.quantities import CamStations
+from wearsim.mechanics.cam import moved_stations
 from wearsim.studies.cam.checks import harmonic_depth, harmonic_limit
-from wearsim.studies.cam.turn import CamTurn, Point
+from wearsim.studies.cam.point import Point
+from wearsim.studies.cam.turn import CamTurn
 from wearsim.types import FloatArray
 
 FEWEST_HARMONICS = 3
+FOLLOWED = 0.8  # demand of friction on the unworn cam from which skids are followed through a run
 GRIP = 0.98  # greatest traction of a rolling roller, of friction: at the ends of a skid
 _BETWEEN = 49  # points of a panel between its stations, for the lift error
 
@@ -39,8 +43,31 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
     numbers = np.array([float(panel.segment) for panel in stations.panels])
     segments = numbers[stations.panel]
     within = middles[stations.panel]
-    found = _values(turn, point, stations.weight, segments, within, between)
+    found = replace(
+        _values(turn, point, stations.weight, segments, within, between),
+        panels=stations,
+        skids=np.array([(arc.theta[0], arc.theta[-1]) for arc in turn.arcs]).reshape(-1, 2),
+    )
+    if turn.is_worn:
+        return found
+    if moves(turn, found):
+        found = replace(found, relocated=partial(_relocated, turn))
     return found if found.inertia.size else joined(found)
+
+
+def moves(turn: CamTurn, stations: CamStations) -> bool:
+    """Return whether wear may move skids of the roller, so that they are located again in a run."""
+    fed_back = stations.stiffness.any() or stations.inertia.size > 0
+    free = turn.free and turn.scenario.roller.inertia > 0.0
+    return bool(free and fed_back and (turn.arcs or turn.greatest_demand > FOLLOWED))
+
+
+def _relocated(turn: CamTurn, change: FloatArray) -> CamStations:
+    """Return the stations for changes of the normal force; see `CamStations.relocated`."""
+    found = cam_stations(turn.worn(change))
+    assert found.panels is not None
+    matrix, _, _ = moved_stations(found.panels, turn.stations)
+    return replace(found, relocated=partial(_relocated, turn), recorded=matrix)
 
 
 _COMPARED = (
@@ -92,7 +119,7 @@ def _values(
     feedback = turn.load is not None and turn.load.feedback != "none"
     side = np.sign(found.spin)
     bearing = turn.scenario.creepage.bearing_torque or 0.0
-    most = GRIP * turn.scenario.friction.coefficient * point.normal_force * roller.radius
+    most = GRIP * turn.scenario.friction.coefficient * turn.carried(point) * roller.radius
     torque = np.clip(side * turn.torque(point), -most, most) if turn.free else np.zeros(count)
     columns = {
         "angle": point.angle,

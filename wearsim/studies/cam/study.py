@@ -24,7 +24,8 @@ from wearsim.studies.cam.checks import (
     harmonic_limit,
     skids_of,
 )
-from wearsim.studies.cam.turn import CamTurn, Point, turn_of
+from wearsim.studies.cam.point import Point
+from wearsim.studies.cam.turn import CamTurn, turn_of
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid
 from wearsim.studies.run.groove import fresh_patch

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.cam import (
     Panel,
-    RollerKinematics,
     Rolling,
     SkidArc,
     Stations,
@@ -23,6 +21,7 @@ from wearsim.mechanics.cam import (
 )
 from wearsim.models.loads import FollowerLoad
 from wearsim.scenario import Scenario
+from wearsim.studies.cam.point import Point
 from wearsim.types import BoolArray, FloatArray
 
 STEEP = {"translating": math.radians(30.0), "swinging": math.radians(45.0)}
@@ -30,34 +29,6 @@ SHARP = 2.0  # radius of the pitch curve over that of the roller, below which th
 PART_OF_TOLERANCE = 0.25  # for the stations
 LEAST_LOAD = 1e-4  # of the greatest, where the flank of a groove changes
 _FINE = 1e-10  # tolerance of integrals over a turn
-
-
-@dataclass(frozen=True)
-class Point:
-    """State of follower and roller at some angles, arrays of one shape.
-
-    Parameters
-    ----------
-    angle : ndarray
-        Angle of the cam [rad].
-    kinematics : RollerKinematics
-        Motion and rolling.
-    inner : ndarray of bool
-        Whether the roller touches the inner flank of a groove.
-    normal_force : ndarray
-        Normal force N on the flank in contact; not positive where an outer roller loses it [N].
-    drive_torque : ndarray
-        Torque on the cam without losses [N m].
-    stiffness : ndarray
-        Decrease of N per displacement of the roller along the normal [N/m].
-    """
-
-    angle: FloatArray
-    kinematics: RollerKinematics
-    inner: BoolArray
-    normal_force: FloatArray
-    drive_torque: FloatArray
-    stiffness: FloatArray
 
 
 class CamTurn:
@@ -83,6 +54,32 @@ class CamTurn:
         load = scenario.load.build()
         self.load = load if isinstance(load, FollowerLoad) else None
         self._constant = 0.0 if self.load else float(load.force(np.zeros(1))[0])
+        self._worn: tuple[Stations, FloatArray] | None = None
+
+    def worn(self, change: FloatArray) -> CamTurn:
+        """Return the turn with the friction on the roller of a worn cam.
+
+        Parameters
+        ----------
+        change : ndarray, shape (stations,)
+            Change of the normal force by wear at the stations [N].
+        """
+        turn = CamTurn(self.scenario)
+        turn._worn = self.stations, change
+        return turn
+
+    @property
+    def is_worn(self) -> bool:
+        """Whether the friction is that on a worn cam."""
+        return self._worn is not None
+
+    def carried(self, point: Point) -> FloatArray:
+        """Return the normal force of the worn cam, not negative, at increasing angles [N]."""
+        force = point.normal_force
+        if self._worn is not None:
+            stations, change = self._worn
+            force = force + stations.values_at_angles(change, point.angle)
+        return np.asarray(np.maximum(force, 0.0))
 
     def effort(self, lift: FloatArray, theta: FloatArray) -> FloatArray:
         """Return the force [N] or torque [N m] on the follower, positive on the outer flank."""
@@ -204,7 +201,7 @@ class CamTurn:
     def _greatest_torque(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the greatest torque that friction transmits to the roller [N m]."""
         friction = self.scenario.friction.coefficient
-        force = np.maximum(self.at(panel, theta).normal_force, 0.0)
+        force = self.carried(self.at(panel, theta))
         return np.asarray(friction * force * self.scenario.roller.radius)
 
     @cached_property
@@ -286,8 +283,7 @@ class CamTurn:
         """Return the torque of the bearing, against the roller's rotation [N m]."""
         creepage = self.scenario.creepage
         arm = 0.5 * creepage.bearing_friction * (creepage.bearing_diameter or 0.0)
-        force = np.maximum(point.normal_force, 0.0)
-        return np.asarray((creepage.bearing_torque or 0.0) + arm * force)
+        return np.asarray((creepage.bearing_torque or 0.0) + arm * self.carried(point))
 
     def torque(self, point: Point) -> FloatArray:
         """Return the torque that the traction gives the rolling roller [N m]."""

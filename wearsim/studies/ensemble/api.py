@@ -22,8 +22,9 @@ from wearsim.results import (
     open_ensemble,
     read_ensemble,
 )
-from wearsim.results.ensemble.schema import OBSERVABLES
+from wearsim.results.ensemble.schema import ALL_OBSERVABLES, OBSERVABLES
 from wearsim.scenario import Scenario, as_scenario, parse_scenario, require_run
+from wearsim.studies.cam.observables import CURVE_ANGLES
 from wearsim.studies.ensemble.designs import (
     BASE_PLANS,
     EnsemblePlan,
@@ -179,7 +180,7 @@ def checked_request(
     checked_count(scenario, realisations)
     require_run(scenario)
     chosen = parse_plan(plan or scenario.sampling.plan)
-    target = None if precision is None else parse_target(precision)
+    target = None if precision is None else parse_target(precision, cam=scenario.cam is not None)
     check_plan(scenario, chosen, "a target" if precision else "")
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.is_redrawn for item in scenario.random)
@@ -211,13 +212,15 @@ def named_precision(precision: str | None, until: str | None) -> str | None:
     return until
 
 
-def parse_target(text: str) -> Target:
+def parse_target(text: str, *, cam: bool = True) -> Target:
     """Return the target of a text.
 
     Parameters
     ----------
     text : str
         In the form of `Target.parse`.
+    cam : bool
+        Whether tests are of a cam.
 
     Raises
     ------
@@ -225,10 +228,11 @@ def parse_target(text: str) -> Target:
         If it cannot be read, or names no observable of an ensemble.
     """
     target = Target.parse(text)
-    if target.observable not in OBSERVABLES:
+    known = ALL_OBSERVABLES if cam else OBSERVABLES
+    if target.observable not in known:
         raise ValueError(
             f"'{text}' names '{target.observable}', which is not an observable, expected one of"
-            f" {', '.join(OBSERVABLES)}"
+            f" {', '.join(known)}"
         )
     return target
 
@@ -326,9 +330,7 @@ def resume_ensemble(
 def ensemble_content(
     scenario: Scenario, request: EnsembleRequest, grid: Grid
 ) -> tuple[EnsembleData, dict[str, FloatArray]]:
-    """Return the content of an ensemble's file before its first realisation.
-
-    It is the header, and the arrays that are common to all realisations.
+    """Return header and common arrays of an ensemble's file before its first realisation.
 
     Raises
     ------
@@ -386,8 +388,10 @@ def ensemble_content(
             for item in drawn
         ],
         control=control,
+        cam=scenario.cam is not None,
     )
     return header, {
+        **({"angle": CURVE_ANGLES} if header.cam else {}),
         "y": grid.y,
         "multiplicity": np.ones(scenario.operation.rollers),
         "record_passes": passes,

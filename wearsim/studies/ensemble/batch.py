@@ -14,6 +14,9 @@ from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.plugins import BODIES
+from wearsim.scenario import Scenario
+from wearsim.studies.cam.observables import cam_observables, lift_curves
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import Due, due_records, history_row, states_at
 from wearsim.studies.run.schedule import RecordSchedule
@@ -149,13 +152,14 @@ class RunObservations:
         Observables at every record.
     scalars : dict of str to float
         Error estimates, and numbers of steps and contact solutions.
-    profile : ndarray, shape (strips,)
-        Worn depth of the cylinder at the end [m].
+    curves : dict of str to ndarray
+        At the end: "depth_profile", the worn depth of the cylinder or of the deepest station of a
+        cam, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
     """
 
     rows: list[Observables]
     scalars: dict[str, float]
-    profile: FloatArray
+    curves: dict[str, FloatArray]
 
 
 def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
@@ -192,11 +196,34 @@ def observables_of(
         "power": row["power"],
         "normal_force": sum_in_order(row["normal_force"] * count, axis=0) / count.sum(),
         "peak_pressure": row["peak_pressure"].max(axis=0),
+        **cam_observables(problem, state, row),
     }
     return [
         {name: float(column[v]) for name, column in columns.items()}
         for v in range(problem.shape[2])
     ]
+
+
+def curves_at_end(
+    problem: WearProblem, state: WearState, scenarios: Sequence[Scenario]
+) -> list[dict[str, FloatArray]]:
+    """Return the curves of `RunObservations` of every realisation of a state.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    scenarios : sequence of Scenario
+        Scenario of each realisation.
+    """
+    depths = state.cylinder_depth[:, 0]  # of a cam, the groove at the deepest station is stored
+    deepest = depths.max(axis=-1).argmax(axis=0)
+    found = [{"depth_profile": depths[station, v]} for v, station in enumerate(deepest)]
+    if problem.kinematics.cam is not None:
+        stations = [turn_of(scenario).stations for scenario in scenarios]
+        for curves, curve in zip(found, lift_curves(problem, state, stations), strict=True):
+            curves["lift_error_curve"] = curve
+    return found
 
 
 def observe(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]:
@@ -226,10 +253,13 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         for part in [due] if runs[0].can_be_batched else [[one] for one in due]:
             tests.fail(_record(stepper, advance, part, threshold, rows))
         end = advance.end
-        for place in np.flatnonzero(end.passes >= stop).tolist():
-            number, profile = int(advance.numbers[place]), end.cylinder_depth[:, 0, place]
+        over = np.flatnonzero(end.passes >= stop)
+        numbers = advance.numbers[over].tolist()
+        scenarios = [runs[number].draws.scenario for number in numbers]
+        curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
+        for place, number, found in zip(over.tolist(), numbers, curves, strict=True):
             scalars = {name: float(getattr(end, name)[place]) for name in SCALARS}
-            results[number] = RunObservations(rows[number], scalars, profile.mean(axis=0))
+            results[number] = RunObservations(rows[number], scalars, found)
     results |= tests.failures
     return [results[number] for number in range(len(runs))]
 

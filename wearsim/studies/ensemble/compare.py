@@ -170,7 +170,8 @@ def observables_of(result: Comparable) -> tuple[str, ...]:
     """Return the observables of a run or an ensemble that can be compared."""
     if isinstance(result, EnsembleResult):
         return result.observables
-    return ("depth", "width", "worn_volume", "roller_depth", "dissipated_energy", "power")
+    names = ("depth", "width", "worn_volume", "roller_depth", "dissipated_energy", "power")
+    return (*names, "lift_error") if "lift_error" in result.raw.history else names
 
 
 def _values(result: Comparable, observable: str) -> tuple[IntArray, FloatArray]:

@@ -305,9 +305,10 @@ class RealisationRunner:
         if self.plan == "control-variate":
             columns = {key: value[None] for key, value in run.draws.values.items()}
             scalars["control"] = float(closed_form_depths(self.scenario, columns, 1)[0])
-        profile, grid = observations.profile, run.problem.grid
+        curves, grid = dict(observations.curves), run.problem.grid
         if grid is not self.grid:
-            profile = np.interp(self.grid.y, grid.y, profile, left=0.0, right=0.0)
+            profile = curves["depth_profile"]
+            curves["depth_profile"] = np.interp(self.grid.y, grid.y, profile, left=0.0, right=0.0)
         courses = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-        values = {**drawn, **courses, **scalars, "depth_profile": profile}
+        values = {**drawn, **courses, **scalars, **curves}
         return Outcome(number=run.number, values=values)

@@ -19,6 +19,7 @@ from wearsim.studies.ensemble.batch import (
     Observables,
     RealisationRun,
     RunObservations,
+    curves_at_end,
     joined_problem,
     observables_of,
 )
@@ -223,7 +224,8 @@ class _Group:
             "first_limit": float(test.limit),
             "limit_angle": self._angle(test.limit, problem, state),
         }
-        test.found = LifeRun(rows, scalars, state.cylinder_depth[:, 0, 0].mean(axis=0))
+        (curves,) = curves_at_end(problem, state, [self.runs[number].draws.scenario])
+        test.found = LifeRun(rows, scalars, curves)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:
         """Return the angle of a cam at which the limited quantity is greatest [rad]."""

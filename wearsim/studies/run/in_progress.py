@@ -13,6 +13,7 @@ from wearsim.errors import Interrupted, ResultsFileError, failure_text
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
+from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
 from wearsim.results import (
     Result,
@@ -146,7 +147,8 @@ class RunInProgress:
     def _check_errors(self) -> None:
         """Warn if estimated errors exceed the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        sizes = greatest_depth(state.depths), volume_of(self.problem, state.depths)
+        problem = located(self.problem, state)
+        sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
         errors = state.depth_error, state.volume_error
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, name in enumerate(("depth", "worn volume")):

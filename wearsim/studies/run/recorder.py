@@ -232,7 +232,7 @@ class Recorder:
         stepper, end = self.stepper, advance.end
         for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
             self._records.append(_single(record_row(stepper, *states_at(stepper, advance, [one]))))
-        row = history_row(stepper, self.problem, end, advance.path[0], self.threshold)
+        row = history_row(stepper, advance.problem, end, advance.path[0], self.threshold)
         self._history.append(_single(row))
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end
@@ -254,8 +254,8 @@ class Recorder:
             if one[2] < state.passes[0]:
                 row = record_row(stepper, *states_at(stepper, advance, [one]))
                 self._records.append(_single(row))
-        self._records.append(_single(record_row(stepper, self.problem, state)))
-        row = history_row(stepper, self.problem, state, start, self.threshold)
+        self._records.append(_single(record_row(stepper, advance.problem, state)))
+        row = history_row(stepper, advance.problem, state, start, self.threshold)
         self._history.append(_single(row))
         self._kept = len(self._history), len(self._records), start
 

@@ -1,0 +1,133 @@
+"""Skids that move with wear: stations placed again where the roller starts and ends to slip."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cam_text import SCENARIOS
+
+import wearsim
+from wearsim.errors import Interrupted
+from wearsim.evolution import relocation
+from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.run.assemble import assemble_problem
+from wearsim.studies.run.draws import draw
+
+
+def scenario(
+    inertia: str = "3e-3 kg m^2", turns: str = "60000", feedback: str = "static"
+) -> wearsim.Scenario:
+    """Return the cycloidal cam with a heavy roller, which skids, and a stiff spring."""
+    values = {
+        "cam.stations": 7,
+        "roller.inertia": inertia,
+        "operation.turns": int(turns),
+        "load.preload": "200 N",
+        "load.stiffness": "60 N/mm",
+        "load.feedback": feedback,
+        "contact.strips": 31,
+        "evolution.tolerance": 5e-3,
+    }
+    return wearsim.load_scenario(SCENARIOS / "cam-cycloidal.toml", values)
+
+
+@pytest.fixture
+def moves(monkeypatch):
+    """Return a list that receives stations before and after, and the states, of each movement."""
+    found, original = [], relocation._moved
+
+    def watched(problem, state, old, new):
+        end = original(problem, state, old, new)
+        found.append((old, new, state, end))
+        return end
+
+    monkeypatch.setattr(relocation, "_moved", watched)
+    return found
+
+
+def test_ends_of_skids_follow_the_load_and_keep_volume_and_energy(moves):
+    test = scenario()
+    result = wearsim.run(test)
+    assert len(moves) >= 4
+    for old, new, before, after in moves:
+        lengths = [one.along.length.ravel()[:, None] for one in (old, new)]
+        volumes = [
+            (length * depth).sum(axis=0)
+            for length, depth in zip(
+                lengths,
+                (before.cylinder_depth[old.places][:, 0, 0], after.cylinder_depth[:, 0, 0]),
+                strict=True,
+            )
+        ]
+        scale = volumes[0].max()
+        np.testing.assert_allclose(volumes[1], volumes[0], rtol=1e-12, atol=1e-15 * scale)
+        assert (after.roller_depth == before.roller_depth).all()
+        assert (after.energy == before.energy).all()
+        assert (after.cylinder_depth >= 0.0).all()
+    first, last = moves[0][0].skids, moves[-1][1].skids
+    assert np.degrees(np.abs(first - last).max()) > 1.0
+    final, factor = result.final, 1.1e-11
+    for name in ("worn_volume_m3", "roller_worn_volume_m3"):
+        assert final[name] == pytest.approx(factor * final["dissipated_energy_J"], rel=1e-12)
+    # the ends are those of the roller on the cam as it is worn
+    turn = CamTurn(test)
+    change = moves[-1][3].skid_loads[0, :, 0]
+    arcs = turn.worn(change).arcs
+    assert np.degrees(np.abs(last[0] - (arcs[0].theta[0], arcs[0].theta[-1])).max()) == 0.0
+    assert change.max() < 0.0
+    records = np.asarray(result.raw.records["cylinder_depth_profile"])
+    assert records.shape[1] == len(result.raw.static["station_angle"]) == turn.stations.count
+
+
+def test_small_changes_leave_the_stations_alone(moves):
+    wearsim.run(scenario(turns="200"))
+    assert not moves
+
+
+def test_resumed_run_with_moved_skids_is_bit_for_bit(tmp_path, moves):
+    whole = wearsim.run(scenario(), tmp_path / "whole.h5")
+    count = [0]
+
+    def stop() -> bool:
+        count[0] += 1
+        return count[0] % 9 == 0
+
+    with pytest.raises(Interrupted):
+        wearsim.run(scenario(), tmp_path / "parts.h5", stop_requested=stop)
+    moved = len(moves)
+    for _ in range(50):
+        try:
+            parts = wearsim.resume(tmp_path / "parts.h5", stop_requested=stop)
+        except Interrupted:
+            continue
+        break
+    assert len(moves) > moved > 0
+    for of in ("history", "records", "checkpoint"):
+        ours, theirs = getattr(parts.raw, of), getattr(whole.raw, of)
+        assert ours.keys() == theirs.keys()
+        for name, values in theirs.items():
+            np.testing.assert_array_equal(ours[name], values, err_msg=name)
+
+
+def test_only_cams_whose_skids_may_move_are_followed():
+    followed = [
+        assemble_problem(draw(scenario(**change)))[0].kinematics.cam
+        for change in ({}, {"feedback": "none"}, {"inertia": "2.94e-5 kg m^2"})
+    ]
+    assert [cam.relocated is not None for cam in followed] == [True, False, False]
+    # their stations differ from test to test, so that they are stepped alone
+    assert not followed[0].matches(followed[0])
+    assert followed[2].matches(followed[2])
+
+
+def test_depth_at_moved_stations_is_that_of_the_worn_cam():
+    test = scenario()
+    cam = assemble_problem(draw(test))[0].kinematics.cam.along
+    change = np.full(cam.panels.count, -20.0)
+    new = cam.relocated(change)
+    lift = test.cam.motion.lift  # smooth, and constant on the dwells
+    smooth, expected = (1e-5 + 1e-3 * lift(one.angle.ravel())[0] for one in (cam, new))
+    moved = relocation.moved_depth(smooth[:, None], cam, new)[:, 0]
+    np.testing.assert_allclose(moved, expected, rtol=2e-3)
+    same = relocation.moved_depth(smooth[:, None], cam, cam)[:, 0]
+    assert (same == smooth).all()

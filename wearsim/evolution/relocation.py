@@ -1,0 +1,159 @@
+"""Skids of a cam's roller that move with wear: stations placed again at their ends.
+
+Feedback of wear changes the normal force, and with it the arcs in which a free roller skids. The
+stepper restarts where an end has moved: stations are placed at the new ends, and the worn depth is
+interpolated to them. The worn volume of every strip between two stations that stay is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import CamStations
+from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.steppers.loads import displacement_at
+from wearsim.evolution.steppers.single_step import recovery_at, solve_at_record
+from wearsim.mechanics.cam import moved_stations
+from wearsim.types import FloatArray
+
+MOVED = math.radians(0.25)  # movement of an end of a skid at which stations are placed again
+LOOK = 1e-3  # change of the normal force, relative to it, after which skids are located again
+FALLEN = 0.01  # the same, after which stations are placed again: beside a skid the traction of a
+# rolling roller is 2 % below friction
+_SMALL = 0.05  # of the greatest normal force, which smaller ones are compared with
+
+
+def located(problem: WearProblem, state: WearState) -> WearProblem:
+    """Return the problem at the stations of a state, from that of the unworn cam."""
+    cam = problem.kinematics.cam
+    if cam is None or cam.relocated is None or state.skid_loads is None:
+        return problem
+    changes = state.skid_loads[0, :, 0]
+    return _at_stations(problem, cam.relocated(changes)) if changes.any() else problem
+
+
+def relocated(problem: WearProblem, state: WearState) -> tuple[WearProblem, WearState]:
+    """Return problem and state with the stations at the ends of the present skids.
+
+    Parameters
+    ----------
+    problem : WearProblem
+        At the stations of the state.
+    state : WearState
+
+    Returns
+    -------
+    problem : WearProblem
+        The given one unless an end has moved by more than `MOVED`, a skid of more than that has
+        begun or ended, or a normal force has changed by more than `FALLEN`.
+    state : WearState
+        Without past points if the stations have moved.
+    """
+    cam = problem.kinematics.cam
+    if cam is None or cam.relocated is None or cam.panels is None or not problem.has_spring:
+        return problem, state
+    change, last = _changes(problem, state, cam), state.skid_loads
+    if last is None:
+        last = np.zeros((2, len(change), 1))
+    force = cam.at_unworn(problem.at_stations(_preload(problem))[:, 0])
+    force = np.maximum(np.abs(force), _SMALL * np.abs(force).max())
+    if (np.abs(change - last[1]) <= LOOK * force).all():
+        return problem, state
+    new = cam.relocated(change[:, 0])
+    slips = (np.abs(change - last[0]) > FALLEN * force).any()
+    if not slips and not _differ(cam.skids, new.skids):
+        return problem, state.replaced(skid_loads=np.stack([last[0], change]))
+    moved = _at_stations(problem, new)
+    return moved, _moved(moved, state.replaced(skid_loads=np.stack([change, change])), cam, new)
+
+
+def _preload(problem: WearProblem) -> FloatArray:
+    return np.array([load.force(np.zeros(1))[0] for load in problem.loads])
+
+
+def _changes(problem: WearProblem, state: WearState, cam: CamStations) -> FloatArray:
+    """Return the changes of the normal force by wear at the stations of the unworn cam [N].
+
+    They are the mean over the rollers, shape (stations, 1).
+    """
+    recovered = recovery_at(problem, state)[1]
+    feedback = problem.feedback(displacement_at(problem, [state.depths], recovered))
+    return -cam.at_unworn(problem.per_roller(feedback).mean(axis=1))
+
+
+def _differ(one: FloatArray, other: FloatArray) -> bool:
+    """Return whether the roller rolls in one and skids in the other, over more than `MOVED`."""
+    edges = np.unique(np.concatenate([one.ravel(), other.ravel()]))
+    middles = 0.5 * (edges[:-1] + edges[1:])
+    inside = [
+        ((skids[:, :1] <= middles) & (middles <= skids[:, 1:])).any(axis=0)
+        for skids in (one, other)
+    ]
+    return bool((np.diff(edges)[inside[0] != inside[1]] > MOVED).any())
+
+
+def _at_stations(problem: WearProblem, cam: CamStations) -> WearProblem:
+    """Return the problem at other stations of its cam."""
+    flat_gap = np.broadcast_to(problem.flat_gap[:1], (len(cam.angle), *problem.flat_gap.shape[1:]))
+    return replace(problem, kinematics=replace(problem.kinematics, cam=cam), flat_gap=flat_gap)
+
+
+def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamStations) -> WearState:
+    """Return a state at new stations, with the contacts solved on its profiles.
+
+    Parameters
+    ----------
+    problem : WearProblem
+        At the new stations.
+    state : WearState
+    old, new : CamStations
+    """
+    fresh = fresh_state(problem)
+    cleared = dict.fromkeys(
+        ("past_wear", "past_energy", "past_feedback", "past_spans", "order", "wear_exponents")
+    )
+    depth = moved_depth(state.cylinder_depth[old.places], old.along, new.along)
+    found = state.replaced(
+        cylinder_depth=depth,
+        contacts=fresh.contacts,
+        approach_factor=fresh.approach_factor,
+        solves=state.solves + 2 * problem.contacts_each,
+        **cleared,
+        **{
+            name: _moved(problem, part.replaced(skid_loads=state.skid_loads), old, new)
+            for name, part in state.auxiliary.items()
+        },
+    )
+    contacts, _ = solve_at_record(problem, found, on_profile=False, cold=True)
+    return found.replaced(contacts=contacts)
+
+
+def moved_depth(depth: FloatArray, old: CamStations, new: CamStations) -> FloatArray:
+    """Return the worn depth at new stations, which keeps the volume of every strip.
+
+    Parameters
+    ----------
+    depth : ndarray, shape (old stations, ...)
+        Depth at the old stations [m].
+    old, new : CamStations
+        With `panels`.
+    """
+    assert old.panels is not None
+    assert new.panels is not None
+    matrix, old_part, new_part = moved_stations(old.panels, new.panels)
+    found = np.maximum(np.tensordot(matrix, depth, axes=1), 0.0)
+    lengths = [one.length.reshape(-1, *(1,) * (depth.ndim - 1)) for one in (old, new)]
+    for part in np.unique(new_part[new_part >= 0]):
+        before, after = old_part == part, new_part == part
+        worn = (lengths[0][before] * depth[before]).sum(axis=0)
+        now = (lengths[1][after] * found[after]).sum(axis=0)
+        scaled = now > 0.5 * worn
+        factor = np.where(scaled, worn / np.where(now > 0.0, now, 1.0), 0.0)
+        # at the edge of the groove all depth may lie between two stations
+        added = np.where(scaled, 0.0, worn / lengths[1][after].sum())
+        found[after] = found[after] * factor + added
+    return found
