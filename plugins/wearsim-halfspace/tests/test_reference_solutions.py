@@ -46,6 +46,14 @@ def test_power_of_hard_contacts_is_that_of_contact(case):
     assert solved(case, 60).work().power == pytest.approx(case["power_60_N"], rel=1e-5)
 
 
+def test_power_converges_with_the_order_of_the_extrapolation():
+    cases = RANDOM[::8]
+    powers = np.array([[solved(case, n).work().power for n in (20, 40, 80)] for case in cases])
+    steps = np.abs(np.diff(powers, axis=1))
+    order = np.median(np.log2(steps[:, 0] / steps[:, 1]))
+    assert order == pytest.approx(np.log2(1.0 + 1.0 / FURTHER), abs=0.3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("case", [*RANDOM[::8], *HARD[::3]], ids=names([*RANDOM[::8], *HARD[::3]]))
 def test_extrapolated_power_agrees_within_its_stated_error(case):
