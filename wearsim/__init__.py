@@ -23,9 +23,11 @@ Ensembles
 
 Identification
     identify(scenario, profiles)        wear factor K/H of measured tests, and its scatter
+
 Lives
     life(scenario, n, output)           run n tests to the first limit that they reach
     resume_life(file)                   continue or extend a study of lives from its file
+    sweep_life(scenario, key, values)   lives for several values of one key
 
 Results
     open_results(file)                  open a results file of any kind
@@ -170,6 +172,7 @@ _NAMES = {
     "wearsim.studies.ensemble.sweep": ["sweep"],
     "wearsim.studies.identify.api": ["identify"],
     "wearsim.studies.life.api": ["life", "resume_life"],
+    "wearsim.studies.life.sweep": ["sweep_life"],
     "wearsim.studies.run.run": ["resume", "run"],
     "wearsim.types": ["ContactSolution", "Profile"],
 }
@@ -204,6 +207,7 @@ __all__ = [
     "study_cam",
     "study_contact",
     "sweep",
+    "sweep_life",
 ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -28,6 +28,10 @@ ROW_CHOICES = ("row", "mean_rows", "at")
 _NAMES = (
     "choose other names with --columns Y,Z or, in a scenario, profile_columns"
     ' = ["Y", "Z"]; a minus sign before Z makes it a depth'
+)
+_UNITS = (
+    "its unit in the header, as in height [um], or by --units mm,um or, in a scenario,"
+    ' profile_units = ["mm", "um"]'
 )
 _CLEARLY = 3.0  # heights above the ends of a profile over those below
 _INSTALL = "pip install 'wearsim[surfaces]'"
@@ -162,7 +166,27 @@ def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None =
         either_way=True,
         choice=_NAMES,
     )
-    return Profile(columns[y], (-1.0 if downwards else 1.0) * columns[height])
+    heights = (-1.0 if downwards else 1.0) * columns[height]
+    return _profile_of(columns[y], heights, file, (y, height), _UNITS)
+
+
+def _profile_of(
+    y: FloatArray,
+    height: FloatArray,
+    file: str,
+    names: tuple[str, str] = ("y", "height"),
+    remedy: str = "the unit that the file states to be right",
+) -> Profile:
+    """Return the profile of a file; a mistake names the file and the column."""
+    try:
+        return Profile(y, height)
+    except ScenarioError as error:
+        columns = dict(zip(("y", "height"), names, strict=True))
+        mistakes = [
+            replace(item, key=f"column {columns.get(item.key, item.key)}", expected=remedy)
+            for item in error.mistakes
+        ]
+        raise ScenarioError(file, mistakes) from error
 
 
 def load_lines(path: str | Path) -> list[Profile]:
@@ -197,7 +221,7 @@ def load_lines(path: str | Path) -> list[Profile]:
     if not whole.any():
         raise _error(str(path), "no line was measured at all of its points")
     y = surface.along - 0.5 * (surface.along[0] + surface.along[-1])
-    return [Profile(y, line) for line in surface.height[whole]]
+    return [_profile_of(y, line, str(path)) for line in surface.height[whole]]
 
 
 def sign_note(profile: Profile, choice: ProfileChoice, file: str) -> str | None:
@@ -301,7 +325,7 @@ def _chosen_row(surface: _Surface, file: str, choice: ProfileChoice) -> Profile:
         )
     total = np.where(known, chosen, 0.0).sum(axis=0)[measured]
     y = surface.along - 0.5 * (surface.along[0] + surface.along[-1])
-    return Profile(y[measured], total / known.sum(axis=0)[measured])
+    return _profile_of(y[measured], total / known.sum(axis=0)[measured], file)
 
 
 _ALPHA = math.sqrt(math.log(2.0) / math.pi)

@@ -88,6 +88,30 @@ def test_sweep_compares_with_the_first_value(command: Command, slim: Path) -> No
     ]
 
 
+def test_sweep_states_lives_against_the_design(command: Command, slim: Path) -> None:
+    radii = "roller.crown_radius=600mm,500mm"
+    found = life_of(command, slim, "-n", 6, "--sweep", radii, "--figure", "sweep.svg")
+    against = found["against"]
+    assert (against["key"], against["unit"]) == ("roller.crown_radius", "m")
+    assert against["values"] == [0.6, 0.5]
+    lives = [one["b"]["10"] for one in found["designs"]]
+    assert [life["value"] for life in against["b"]["10"]] == [life["value"] for life in lives]
+    figure = Path("sweep.svg").read_text()
+    assert "roller.crown_radius [mm]" in figure
+    files = [f"slim-life-{value}mm.h5" for value in (600, 500)]
+    again = life_of(command, *files)
+    assert again["against"] == against
+    assert again["labels"] == ["600 mm", "500 mm"]
+    command("report", *files, "-o", "sweep.html")
+    assert "against roller.crown_radius" in Path("sweep.html").read_text()
+
+
+def test_sweep_of_words_has_no_lives_against_the_design(command: Command, slim: Path) -> None:
+    found = life_of(command, slim, "-n", 4, "--sweep", "contact.model=slender,winkler")
+    assert "against" not in found
+    assert found["designs"][0]["variable"] is None
+
+
 def test_file_answers_another_target(command: Command, slim: Path) -> None:
     command("life", slim, "-n", 6, "-o", "one.h5", *HERE)
     one, other = (

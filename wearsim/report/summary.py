@@ -217,6 +217,13 @@ def limits_of(limits: Mapping[str, float]) -> list[str]:
     return [f"{name.replace('_', ' ')} {shown(value, unit)}" for name, unit, value in each]
 
 
+def with_range(value: float, low: float, high: float, scale: float) -> str:
+    """Return a value with its 95 % interval, with the digits that the interval leaves."""
+    digits = 3 if (high - low) > 0.02 * value else 4
+    texts = (in_unit(scale * one, "1", digits) for one in (value, low, high))
+    return "{} ({} to {})".format(*texts)
+
+
 def sources(raw: StudyData) -> list[tuple[str, str]]:
     """Return rows on scenario, input files, plugins and software of a study."""
     plugins = [

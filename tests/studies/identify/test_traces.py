@@ -90,7 +90,8 @@ def test_reversed_sign_is_refused(tmp_path: Path):
 
 def test_wrong_units_are_refused(tmp_path: Path):
     y, height = groove(np.random.default_rng(1))
-    with pytest.raises(ScenarioError, match="range that cannot be"):
+    message = r"t\.csv: column height: has a range that cannot be, got .* m, expected its unit"
+    with pytest.raises(ScenarioError, match=message):
         trace(write(tmp_path / "t.csv", y, height, "y [mm],height [mm]"))
 
 

@@ -13,6 +13,7 @@ from scipy.special import ndtr
 from tests.studies.ensemble_cases import LOGNORMAL, differences, small
 from tests.studies.random_examples import WANDERING
 from wearsim.errors import Interrupted, ResultsFileError, ScenarioError
+from wearsim.report.lives import against
 from wearsim.results import open_results, read_ensemble
 from wearsim.results.ensemble.life import LifeResult
 from wearsim.scenario import Scenario
@@ -20,7 +21,8 @@ from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.life.api import life, resume_life
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.realisation import LifeRunner
-from wearsim.studies.life.settings import parse_life
+from wearsim.studies.life.settings import design_variable, parse_life
+from wearsim.studies.life.sweep import sweep_life
 from wearsim.studies.run.run import run
 
 LOAD = {"distribution": "lognormal", "median": "300 N", "factor": 1.1}
@@ -277,6 +279,34 @@ def test_designs_are_compared_with_common_draws(exact: LifeResult, tmp_path: Pat
     assert short.b10_ratio.value == pytest.approx(1.0, rel=5e-3)
     other = lives(tmp_path / "seed.h5", design().changed({"seed": 5}))
     assert other.compare(exact).same_machine is None
+
+
+def test_sweep_has_the_lives_of_each_value(tmp_path: Path, exact: LifeResult) -> None:
+    radii = ["600 mm", "500 mm"]
+    options: dict[str, Any] = {"target": 4000, "scheduler": "serial"}
+    found = sweep_life(design(), "roller.crown_radius", radii, tmp_path / "a.h5", 12, **options)
+    assert [one.variable.value for one in found if one.variable] == [0.6, 0.5]
+    assert differences(found[1], exact) == []
+    assert against(found) == found[0].variable
+    assert against([found[0], found[0]]) is None
+    assert against([found[0], exact]) is None
+    with pytest.raises(ResultsFileError, match="exists"):
+        sweep_life(design(), "roller.crown_radius", radii, tmp_path / "a.h5", 12, **options)
+
+
+@pytest.mark.parametrize(
+    ("key", "expected"),
+    [
+        ("roller.crown_radius", (0.5, "m")),
+        ("operation.rollers", (3.0, "1")),
+        ("wear.law", None),
+        ("friction.coefficient", None),
+        ("roller.none", None),
+    ],
+)
+def test_design_variable_is_a_number(key: str, expected: tuple[float, str] | None) -> None:
+    found = design_variable(design(operation__rollers=3), key)
+    assert (found and (found.value, found.unit)) == expected
 
 
 def test_precision_ends_a_study_early(tmp_path: Path) -> None:

@@ -91,9 +91,16 @@ Rare = Annotated[
     typer.Option(
         min=0,
         metavar="N",
-        help="Number of further tests for a small probability of a life before --target, by"
-        " importance sampling.",
+        help="Number of further tests for a small probability of a life before --target.",
         show_default=False,
+    ),
+]
+RareMethod = Annotated[
+    str,
+    typer.Option(
+        metavar="METHOD",
+        help="Method of --rare: importance sampling, subset simulation, or auto, the second with"
+        " at most as many tests again where the first fails.",
     ),
 ]
 Sweep = Annotated[
@@ -117,6 +124,7 @@ def life(
     most: Most = None,
     precision: Precision = None,
     rare: Rare = 0,
+    rare_method: RareMethod = "auto",
     output: Output = None,
     figure: FigureOption = None,
     workers: Workers = None,
@@ -133,7 +141,7 @@ def life(
     with checking("--b"):
         shares = _shares(b)
     files = [path.suffix.lower() in _FILES for path in designs]
-    if len(designs) > 2:
+    if len(designs) > 2 and not all(files):
         raise typer.BadParameter("give one design, or two to compare", param_hint="SCENARIO")
     if len({path.resolve() for path in designs}) < len(designs):
         raise typer.BadParameter(f"{designs[0]} is given twice", param_hint="SCENARIO")
@@ -155,8 +163,13 @@ def life(
         for option, value in given.items():
             if value is not None:
                 raise typer.BadParameter("has no meaning for results files", param_hint=option)
+        from wearsim.report.lives import against
+
         results = [_opened(path, target, shares) for path in designs]
-        report(results, _labels(designs), json, figure)
+        labels = _labels(designs)
+        if against(results):
+            labels = [one.variable.text for one in results if one.variable]
+        report(results, labels, json, figure)
         return
     with checking("--precision"):
         if precision is not None:
@@ -164,7 +177,7 @@ def life(
 
             LifeTarget.parse(precision)
     texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
-    labels, variants = _variants(designs, sweep, texts)
+    labels, variants, key = _variants(designs, sweep, texts)
     options: dict[str, Any] = {
         "limits": limit or [],
         "target": target,
@@ -172,6 +185,8 @@ def life(
         "most": most,
         "precision": precision,
         "rare": rare,
+        "rare_method": rare_method,
+        "variable": key,
         "workers": workers,
         "scheduler": checked_scheduler(scheduler, workers),
         "force": force,
@@ -182,8 +197,8 @@ def life(
 
 def _variants(
     designs: Sequence[Path], sweep: str | None, texts: list[str]
-) -> tuple[list[str], list[Any]]:
-    """Return the labels and scenarios of the designs; all have the seed of the first."""
+) -> tuple[list[str], list[Any], str]:
+    """Return labels and scenarios of the designs, all with one seed, and the key of a sweep."""
     if sweep is not None:
         if len(designs) > 1:
             raise typer.BadParameter("goes with one scenario", param_hint="--sweep")
@@ -191,14 +206,13 @@ def _variants(
             key, values = parse_sweep(sweep)
         if any(text.partition("=")[0].strip() == key for text in texts):
             raise typer.BadParameter(f"{key} is also the key of --sweep", param_hint="--set")
-        return list(values), [
-            read_scenario(designs[0], [*texts, f"{key}={value}"]) for value in values
-        ]
+        scenarios = [read_scenario(designs[0], [*texts, f"{key}={value}"]) for value in values]
+        return list(values), scenarios, key
     scenarios = [read_scenario(path, texts) for path in designs]
     if len({scenario.seed for scenario in scenarios}) > 1:
         note(f"note: {designs[1]} is drawn with the seed of {designs[0]}, for common draws")
         scenarios[1] = scenarios[1].changed({"seed": scenarios[0].seed})
-    return _labels(designs), scenarios
+    return _labels(designs), scenarios, ""
 
 
 def _run(
@@ -243,7 +257,8 @@ def _run(
             chosen = settings.settings_of(
                 scenario, realisations, options["target"], (10.0,), options["most"]
             )
-            settings.with_rare_events(scenario, chosen, options["rare"], options["precision"])
+            rare = (options[name] for name in ("rare", "precision", "rare_method"))
+            settings.with_rare_events(scenario, chosen, *rare)
     results = []
     for label, scenario, path in zip(labels, checked, paths, strict=True):
         if several and not quiet:
@@ -327,6 +342,7 @@ def report(
     from wearsim.cli.render import life_table
     from wearsim.cli.render.ensemble_table import warn_of_failures
     from wearsim.errors import ResultsFileError, SolverError
+    from wearsim.report.lives import against
 
     for result in results:
         warn_of_failures(result)
@@ -352,12 +368,14 @@ def report(
             data |= life_table.comparison_json(first.compare(others[0]))
         else:
             data["compared_with_first"] = [life_table.comparison_json(item) for item in compared]
+        if variable := against(results):
+            data["against"] = life_table.against_json(variable, results)
         write_json({**data, "figure": figure})
         return
     for result in results:
         more = [("results file", str(result.path))]
         life_table.write_life(result, more)
-        write_notes(result.notes, [*result.warnings, *_remarks(result)])
+        write_notes(result.notes, [*result.warnings, *life_table.remarks(result)])
     if others:
         life_table.write_lives_of(labels, results)
     if len(others) == 1:
@@ -367,25 +385,3 @@ def report(
             life_table.write_comparison([label, labels[0]], item)
     if figure is not None:
         note(f"figure: {figure}")
-
-
-def _remarks(result: LifeResult) -> list[str]:
-    """Return what a user should know of the lives."""
-    remarks = []
-    if result.count and result.at_once == result.count:
-        remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
-    elif result.at_once:
-        remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
-    if result.count and not result.observed.any():
-        greatest = []
-        for name, limit in result.scenario.limit.given.items():
-            stored = {"volume": "worn_volume"}.get(name, name)
-            if stored in result.observables:
-                part = float(result.at_end(stored).max()) / limit
-                greatest.append(f"{name.replace('_', ' ')} up to {100.0 * part:.3g} % of its limit")
-        reached = f" ({', '.join(greatest)})" if greatest else ""
-        remarks.append(
-            f"no realisation reaches a limit within {result.most:,.0f} {result.unit}{reached};"
-            " give a greater --max or other limits"
-        )
-    return remarks

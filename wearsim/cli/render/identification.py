@@ -8,7 +8,8 @@ from typing import Any, TypeAlias
 import typer
 
 from wearsim.cli.shared import write_list, write_notes, write_table
-from wearsim.report.text import NOTHING, in_unit, lapse, shown
+from wearsim.report.summary import with_range
+from wearsim.report.text import NOTHING, lapse, shown
 from wearsim.results import IdentificationResult
 from wearsim.studies.identify.planning import SCATTERS, PlannedDesign
 
@@ -65,18 +66,11 @@ def _line(test: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         test["file"].rpartition("/")[2],
         test["levelled_on"],
-        _with_range(test["depth_m"], depth[0], depth[1], 1e6),
-        _with_range(test["area_m2"], area[0], area[1], 1e6),
-        _with_range(k["value"], k["low"], k["high"], 1e12),
+        with_range(test["depth_m"], depth[0], depth[1], 1e6),
+        with_range(test["area_m2"], area[0], area[1], 1e6),
+        with_range(k["value"], k["low"], k["high"], 1e12),
         residuals,
     )
-
-
-def _with_range(value: float, low: float, high: float, scale: float) -> str:
-    """Return a value with its 95 % interval, with the digits that the interval leaves."""
-    digits = 3 if (high - low) > 0.02 * value else 4
-    texts = (in_unit(scale * one, "1", digits) for one in (value, low, high))
-    return "{} ({} to {})".format(*texts)
 
 
 def _energy(result: IdentificationResult) -> Rows:
@@ -148,11 +142,11 @@ def _scatter(summary: Mapping[str, Any], tests: int) -> Rows:
     rows += [
         (
             "K/H, median of specimens",
-            f"{_with_range(middle['value'], middle['low'], middle['high'], 1e12)} 1e-12 1/Pa",
+            f"{with_range(middle['value'], middle['low'], middle['high'], 1e12)} 1e-12 1/Pa",
         ),
         (
             "K/H, next specimen",
-            _with_range(
+            with_range(
                 following["median_per_Pa"], following["low_per_Pa"], following["high_per_Pa"], 1e12
             )
             + " 1e-12 1/Pa",

@@ -11,13 +11,13 @@ import numpy as np
 import typer
 
 from wearsim.cli.shared import write_list, write_table
+from wearsim.report.lives import life_cells, rare_text
 from wearsim.report.summary import Rows, input_rows, limits_of
 from wearsim.report.text import NOTHING, count, lapse, part_with_interval, shown, too_few
 from wearsim.results.ensemble.life import LifeResult
-from wearsim.results.ensemble.life_settings import LifeComparison
+from wearsim.results.ensemble.life_settings import DesignVariable, LifeComparison
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.lives import least_survival
-from wearsim.uq.survival.rare_events import LEAST_SIZE, RareProbability
 
 
 def write_life(result: LifeResult, more: Rows) -> None:
@@ -75,9 +75,9 @@ def _write_lives(result: LifeResult) -> None:
     heads = [f"life [{result.unit}]", "estimate", "95 % interval", "numerical error"]
     lines = []
     for share in result.settings.shares:
-        found, (low, high) = result.b(share), result.b_error(share)
+        low, high = result.b_error(share)
         error = f"{_life(low)}..{_life(high)}" if math.isfinite(low + high) else NOTHING
-        lines.append([f"B{share:g}", *_with_interval(result, share, found), error])
+        lines.append([f"B{share:g}", *life_cells(result, share), error])
     write_list(heads, lines)
     if not result.observed.any() and not result.is_exact and result.count:
         bound = least_survival(result.count)
@@ -89,23 +89,10 @@ def _write_lives(result: LifeResult) -> None:
     if target is not None:
         text = part_with_interval(result.probability_before(target))
         typer.echo(f"P(life < {count(target)} {result.unit}) = {_small(result, text)}")
-    if result.rare is not None:
-        typer.echo(_rare(result.rare))
-
-
-def _rare(found: RareProbability) -> str:
-    """Return a probability by importance sampling, or why there is none."""
-    size = f"effective sample size {found.effective_size or 0.0:.0f}"
-    if not found.is_reliable:
-        return (
-            f"by importance sampling: refused, {size} of {count(found.tests)} tests is below"
-            f" {LEAST_SIZE:.0f}; give a greater --rare"
-        )
-    chance = found.probability
-    return (
-        f"by importance sampling: {chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}],"
-        f" {count(found.tests)} tests, variation {shown(found.variation, '%', 2)}, {size}"
-    )
+    for method, estimate in result.rare_estimates.items():
+        typer.echo(f"by {method}: {rare_text(estimate)}")
+    if result.rare is not None and not result.rare.is_reliable:
+        typer.echo("no probability is stated; give a greater --rare")
 
 
 def _small(result: LifeResult, text: str) -> str:
@@ -116,23 +103,6 @@ def _small(result: LifeResult, text: str) -> str:
         return text
     interval = f" [{found.low:.2g}, {found.high:.2g}]" if found.low < found.high else ""
     return f"{found.value:.3g}{interval}"
-
-
-def _with_interval(result: LifeResult, share: float, found: Interval) -> tuple[str, str]:
-    """Return a life and its interval as cells; a one-sided bound of a small sample."""
-    if math.isnan(found.value):
-        beyond = f"above {count(result.most)}"
-        return beyond, f"from {_life(found.low)}" if math.isfinite(found.low) else NOTHING
-    if found.low == found.high:
-        return _life(found.value), ""
-    if math.isfinite(found.low) and math.isfinite(found.high):
-        return _life(found.value), f"{_life(found.low)}..{_life(found.high)}"
-    if math.isfinite(found.low):
-        return _life(found.value), f"from {_life(found.low)}"
-    bound = result.lower_bound(share)
-    if math.isfinite(bound):
-        return _life(found.value), f"from {_life(bound)} (one-sided)"
-    return _life(found.value), "too few lives"
 
 
 def _write_fits(result: LifeResult) -> None:
@@ -201,7 +171,7 @@ def write_lives_of(labels: Sequence[str], results: Sequence[LifeResult]) -> None
     for label, result in zip(labels, results, strict=True):
         cells = []
         for share in shares:
-            value, interval = _with_interval(result, share, result.b(share))
+            value, interval = life_cells(result, share)
             cells.append(f"{value} ({interval})" if interval else value)
         lines.append([label, *cells])
     typer.echo("")
@@ -279,6 +249,7 @@ def life_json(result: LifeResult) -> dict[str, Any]:
         "censored": result.censored,
         "reached_at_once": result.at_once,
         "maximum": result.most,
+        "variable": settings.variable or None,
         "finished": result.finished,
         "b": lives,
         "probability_before_target": probability,
@@ -314,8 +285,12 @@ def _rare_json(result: LifeResult) -> dict[str, Any] | None:
     found = result.rare
     if found is None:
         return None
-    known = asdict(found.probability) if found.is_reliable else None
-    return {**asdict(found), "probability": known, "refused": not found.is_reliable}
+    tried = {}
+    for method, item in result.rare_estimates.items():
+        known = asdict(item.probability) if item.is_reliable else None
+        tried[method] = {**asdict(item), "probability": known, "refused": not item.is_reliable}
+    method = next(reversed(tried))
+    return {**tried[method], "method": method, "tried": tried}
 
 
 def comparison_json(found: LifeComparison) -> dict[str, Any]:
@@ -326,3 +301,38 @@ def comparison_json(found: LifeComparison) -> dict[str, Any]:
         "two_specimens": asdict(found.two_specimens),
         "pairs": found.count,
     }
+
+
+def against_json(variable: DesignVariable, results: Sequence[LifeResult]) -> dict[str, Any]:
+    """Return the lives of designs against the design variable, both in the given order."""
+    return {
+        "key": variable.key,
+        "unit": variable.unit,
+        "values": [one.variable.value for one in results if one.variable],
+        "b": {
+            f"{share:g}": [asdict(one.b(share)) for one in results]
+            for share in results[0].settings.shares
+        },
+    }
+
+
+def remarks(result: LifeResult) -> list[str]:
+    """Return what a user should know of the lives."""
+    remarks = []
+    if result.count and result.at_once == result.count:
+        remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
+    elif result.at_once:
+        remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
+    if result.count and not result.observed.any():
+        greatest = []
+        for name, limit in result.scenario.limit.given.items():
+            stored = {"volume": "worn_volume"}.get(name, name)
+            if stored in result.observables:
+                part = float(result.at_end(stored).max()) / limit
+                greatest.append(f"{name.replace('_', ' ')} up to {100.0 * part:.3g} % of its limit")
+        reached = f" ({', '.join(greatest)})" if greatest else ""
+        remarks.append(
+            f"no realisation reaches a limit within {result.most:,.0f} {result.unit}{reached};"
+            " give a greater --max or other limits"
+        )
+    return remarks

@@ -19,6 +19,7 @@ from matplotlib.ticker import (
 )
 
 from wearsim.report.figures.comparison import COLOURS
+from wearsim.report.lives import against
 from wearsim.report.parts import (
     RECORDS,
     evenly_spaced,
@@ -27,7 +28,9 @@ from wearsim.report.parts import (
     write_message,
 )
 from wearsim.results.ensemble.life import LifeResult
+from wearsim.results.ensemble.life_settings import DesignVariable
 from wearsim.types import FloatArray
+from wearsim.units import engineers_unit
 from wearsim.uq.survival.fits import FAMILIES, Family
 from wearsim.uq.survival.lives import cumulative_incidence, survival_curve
 
@@ -50,22 +53,52 @@ def life_figure(results: Sequence[LifeResult], labels: Sequence[str]) -> Figure:
     Figure
         Survival with its 95 % band and ticks where lives are censored; probability plots on the
         scales of both fits; the effect of each input; the limits that were reached first, for a
-        cam by angle.
+        cam by angle; for a sweep also the lives against the design variable.
     """
     colours = list(COLOURS[: len(results)])
     if len(results) > len(COLOURS):
         colours = [to_hex(c) for c in colormaps[RECORDS](np.linspace(0.0, 0.9, len(results)))]
     titles = {result.title for result in results}
     title = titles.pop() if len(titles) == 1 else "lives of designs"
-    with titled_figure(14.0, 8.4, title) as figure:
-        panels = figure.subplots(2, 3)
-        draw_survival(panels[0, 0], results, labels, colours)
-        for axes, family in zip(panels[0, 1:], FAMILIES, strict=True):
-            _draw_probabilities(axes, results, labels, colours, family)
-        _draw_tornado(panels[1, 0], results, labels, colours)
-        _draw_incidence(panels[1, 1], results, labels, colours)
-        _draw_limits(panels[1, 2], results, labels, colours)
+    variable = against(results)
+    rows: list[list[str]] = [["survival", *FAMILIES], ["tornado", "incidence", "limits"]]
+    if variable is not None:
+        rows = [[*row, "against"] for row in rows]
+    with titled_figure(18.5 if variable else 14.0, 8.4, title) as figure:
+        panels = figure.subplot_mosaic([list(row) for row in rows])
+        draw_survival(panels["survival"], results, labels, colours)
+        for family in FAMILIES:
+            _draw_probabilities(panels[family], results, labels, colours, family)
+        _draw_tornado(panels["tornado"], results, labels, colours)
+        _draw_incidence(panels["incidence"], results, labels, colours)
+        _draw_limits(panels["limits"], results, labels, colours)
+        if variable is not None:
+            draw_against(panels["against"], results, variable)
     return figure
+
+
+def draw_against(axes: Axes, results: Sequence[LifeResult], variable: DesignVariable) -> None:
+    """Draw the lives of the shares with their intervals against the design variable of a sweep."""
+    unit, size = engineers_unit(variable.unit)
+    designs = {one.variable.value / size: one for one in results if one.variable}
+    shares = results[0].settings.shares
+    for number, share in enumerate(shares):
+        colour = colormaps[RECORDS](0.1 + 0.7 * number / len(shares))
+        found = [(value, one.b(share)) for value, one in sorted(designs.items())]
+        known = [(value, life) for value, life in found if np.isfinite(life.value)]
+        values, lives = [value for value, _ in known], [life.value for _, life in known]
+        ends = [[life.low, life.high] for _, life in known]
+        reach = np.abs(np.where(np.isfinite(ends), ends, np.nan) - np.array(lives)[:, None]).T
+        axes.errorbar(
+            values, lives, reach, fmt="o-", color=colour, capsize=4.0, label=f"B{share:g}"
+        )
+    if not axes.lines:
+        write_message(axes, "Life against the design", ["all lives are censored"])
+        return
+    axes.set_ylim(bottom=0.0)
+    label = variable.key if unit == "1" else f"{variable.key} [{unit}]"
+    name_axes(axes, "Life, with 95 % intervals", label, f"life [{results[0].unit}]")
+    axes.legend(fontsize=8.0)
 
 
 def draw_survival(

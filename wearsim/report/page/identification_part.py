@@ -8,6 +8,7 @@ from bokeh.models.ranges import Range1d
 from wearsim.report.page.part import Part, command_of, files_of, tables_of
 from wearsim.report.page.plots import COLOURS, MM, UM, Plot, axes, columns, hover, legend
 from wearsim.report.parts import BLUE, GREY, ORANGE, evenly_spaced
+from wearsim.report.summary import with_range
 from wearsim.report.text import in_unit, shown
 from wearsim.results.identification import IdentificationResult
 
@@ -74,8 +75,7 @@ def _ends(low: float, high: float) -> str:
 
 def _factor(value: float, low: float, high: float) -> str:
     """Return a wear factor with its interval."""
-    texts = [in_unit(_SCALE * one, "1", 3) for one in (value, low, high)]
-    return f"{texts[0]}e-12 1/Pa ({texts[1]} to {texts[2]})"
+    return f"{with_range(value, low, high, _SCALE)} 1e-12 1/Pa"
 
 
 def _factors(result: IdentificationResult) -> Plot:

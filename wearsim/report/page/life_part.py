@@ -10,12 +10,14 @@ import numpy as np
 
 from wearsim.report import summary
 from wearsim.report.figures.life import survival_of
+from wearsim.report.lives import against, life_cells, rare_text
 from wearsim.report.page.part import SAMPLING, Part, command_of, files_of, tables_of
 from wearsim.report.page.plots import COLOURS, Plot, axes, columns, hover, legend
 from wearsim.report.page.study_plots import effect_plots
 from wearsim.report.text import count, part_with_interval, pass_unit, with_interval
 from wearsim.results.ensemble.life import LifeResult
-from wearsim.uq.estimation.intervals import Interval
+from wearsim.results.ensemble.life_settings import DesignVariable
+from wearsim.units import engineers_unit
 
 _ERROR = (
     f"{SAMPLING} The numerical error of the lives is stated beside them; it does not contain the"
@@ -60,7 +62,7 @@ def _estimates(result: LifeResult) -> summary.Rows:
     if result.count == 0:
         return [("life", "no test is completed")]
     shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
-    rows = [(f"B{share:g}", _life(result, result.b(share))) for share in shares]
+    rows = [(f"B{share:g}", _life(result, share)) for share in shares]
     for share in shares:
         low, high = result.b_error(share)
         if math.isfinite(low + high):
@@ -68,6 +70,8 @@ def _estimates(result: LifeResult) -> summary.Rows:
     if result.target is not None:
         found = part_with_interval(result.probability_before(result.target))
         rows.append((f"P(life < {count(result.target)} {result.unit})", found))
+    for method, estimate in result.rare_estimates.items():
+        rows.append((f"the same by {method}", rare_text(estimate)))
     for name, share in result.first_limits.items():
         where = ""
         if name in result.angles:
@@ -76,13 +80,10 @@ def _estimates(result: LifeResult) -> summary.Rows:
     return rows
 
 
-def _life(result: LifeResult, found: Interval) -> str:
-    """Return a life with its interval, or that it is beyond the censoring."""
-    if not math.isfinite(found.value):
-        return f"above {count(result.most)} {result.unit}"
-    ends = [count(end) if math.isfinite(end) else "unknown" for end in (found.low, found.high)]
-    interval = "" if found.low == found.high else f" [{', '.join(ends)}]"
-    return f"{count(found.value)} {result.unit}{interval}"
+def _life(result: LifeResult, share: float) -> str:
+    """Return a life with its unit and its interval."""
+    value, interval = life_cells(result, share)
+    return f"{value} {result.unit}" + (f" [{interval}]" if interval else "")
 
 
 def of_lives(results: Sequence[LifeResult], labels: Sequence[str]) -> Part:
@@ -97,12 +98,14 @@ def of_lives(results: Sequence[LifeResult], labels: Sequence[str]) -> Part:
         text = f"{labels[0]} lasts longer with {part_with_interval(found.two_specimens)}"
         rows.append((f"two specimens, {pair}", text))
     rows += [
-        (f"B10, {label}", _life(one, one.b(10.0)))
-        for label, one in zip(labels, results, strict=True)
+        (f"B10, {label}", _life(one, 10.0)) for label, one in zip(labels, results, strict=True)
     ]
     curves = [one for one in zip(labels, results, strict=True) if one[1].count]
     text = "Share of the machines that outlast a life."
     plots = [Plot("Survival", text, _survival(curves))] if curves else []
+    if variable := against(results):
+        text = f"Lives, with their 95 % intervals, against {variable.key}."
+        plots.append(Plot("Life against the design", text, _against(results, variable)))
     return Part(
         title=f"{', '.join(labels[:-1])} and {labels[-1]}",
         question=f"Which design lasts more {first.unit}?",
@@ -111,6 +114,27 @@ def of_lives(results: Sequence[LifeResult], labels: Sequence[str]) -> Part:
         plots=plots,
         tables=[],
     )
+
+
+def _against(results: Sequence[LifeResult], variable: DesignVariable) -> Any:
+    """Return the lives of a sweep against its design variable."""
+    unit, size = engineers_unit(variable.unit)
+    plot = axes(variable.key if unit == "1" else f"{variable.key} [{unit}]", "")
+    plot.yaxis.axis_label = f"life [{results[0].unit}]"
+    designs = {one.variable.value / size: one for one in results if one.variable}
+    for colour, share in zip(COLOURS, results[0].settings.shares, strict=False):
+        lives = {value: designs[value].b(share) for value in sorted(designs)}
+        known = {value: life for value, life in lives.items() if math.isfinite(life.value)}
+        ends = {f: [getattr(life, f) for life in known.values()] for f in ("value", "low", "high")}
+        data = columns(design=list(known), **ends)
+        style: dict[str, Any] = {"color": colour, "source": data}
+        plot.segment("design", "low", "design", "high", **style)
+        plot.line("design", "value", **style, width=2, legend_label=f"B{share:g}")
+        points = plot.scatter("design", "value", **style, size=7)
+        interval = ("95 % interval", "@low{0,0} to @high{0,0}")
+        hover(plot, [points], ("", f"B{share:g}"), ("life", "@value{0,0}"), interval)
+    legend(plot)
+    return plot
 
 
 def _plots(result: LifeResult) -> list[Plot]:

@@ -14,6 +14,7 @@ import numpy as np
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.life_settings import LifeComparison, LifeTarget
 from wearsim.results.ensemble.life_values import LifeValues
+from wearsim.results.ensemble.rare import rare_estimates
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.types import IntArray
 from wearsim.uq.estimation.estimates import Target
@@ -25,7 +26,7 @@ from wearsim.uq.survival.distributions import (
 )
 from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
 from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
-from wearsim.uq.survival.rare_events import RareProbability, weighted_probability
+from wearsim.uq.survival.rare_events import RareProbability
 
 _FEWEST = 32  # realisations below which a target is not reached
 
@@ -321,16 +322,16 @@ class LifeResult(LifeValues):
 
     @property
     def rare(self) -> RareProbability | None:
-        """Probability of a life before the target by importance sampling, if it was requested."""
-        settings = self.settings
-        done = sum(stage["count"] for stage in settings.stages)
-        if settings.target is None or not settings.rare or done < settings.rare:
-            return None
-        chosen = self.raw.done[self.raw.done >= settings.stages[-1]["first"]]
-        if not len(chosen):
-            return None
-        lives, weights = (self.raw.rows(name, 0, None)[chosen] for name in ("life", "log_weight"))
-        return weighted_probability(lives < settings.target, weights, settings.rare)
+        """Probability of a life before the target from tests for rare events, if requested.
+
+        It is that of the last method in `rare_estimates`.
+        """
+        return next(reversed(self.rare_estimates.values()), None)
+
+    @cached_property
+    def rare_estimates(self) -> dict[str, RareProbability]:
+        """Estimates by "importance sampling" and "subset simulation", as far as they were used."""
+        return rare_estimates(self) if self.settings.rare else {}
 
     def final_estimates(self) -> dict[str, Any]:
         """Return lives and estimates at their ends, as plain values.

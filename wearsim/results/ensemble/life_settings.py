@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from wearsim.uq.estimation.intervals import Interval
@@ -76,6 +76,28 @@ class LifeTarget:
 
 
 @dataclass(frozen=True)
+class DesignVariable:
+    """Design variable of a sweep.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of the scenario.
+    value : float
+        In SI units.
+    unit : str
+        SI unit, "1" for plain numbers.
+    text : str
+        The value as given, "25 mm".
+    """
+
+    key: str
+    value: float
+    unit: str
+    text: str
+
+
+@dataclass(frozen=True)
 class LifeSettings:
     """Settings of a study of lives, stored with its results.
 
@@ -106,9 +128,14 @@ class LifeSettings:
         Number of realisations that are drawn without weights, the first ones.
     rare : int
         Number of further tests for the probability of a life before the target.
+    rare_method : {"auto", "importance", "subset"}
+        Method that they serve; "auto" is subset simulation where importance sampling fails.
     stages : tuple of dict
-        Of these tests: number of the first, their count and the shift of the normal scores of their
-        draws by name of the input.
+        Of these tests: number of the first, and their count. For importance sampling also the shift
+        of the normal scores of their draws by name of the input; for subset simulation the numbers
+        of the realisations from which they depart, and the scale of the change.
+    variable : dict
+        Fields of the `DesignVariable` in a sweep; empty otherwise.
     """
 
     most: float
@@ -124,7 +151,9 @@ class LifeSettings:
     alone: bool
     plain: int
     rare: int = 0
+    rare_method: str = "auto"
     stages: tuple[dict[str, Any], ...] = ()
+    variable: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.results.ensemble.life_settings import LifeSettings
+from wearsim.results.ensemble.life_settings import DesignVariable, LifeSettings
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim.uq.distributions.base import Distribution
@@ -38,6 +38,11 @@ class LifeValues(EnsembleResult):
         """Numbers of the successful realisations without weights, shape (count,)."""
         done = self.raw.done
         return np.asarray(done[done < self.settings.plain])
+
+    @property
+    def variable(self) -> DesignVariable | None:
+        """Design variable whose value differs from that of other results of a sweep."""
+        return DesignVariable(**self.settings.variable) if self.settings.variable else None
 
     @property
     def unit(self) -> str:

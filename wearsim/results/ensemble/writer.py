@@ -225,14 +225,17 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
             raise ValueError(f"an ensemble has no fields {sorted(unknown)}")
         self._add(blank_rows([], self.data), state)
 
-    def grow(self, requested: int) -> None:
+    def grow(self, requested: int, **state: Any) -> None:
         """Add pending realisations; the ensemble is then unfinished.
 
         Parameters
         ----------
         requested : int
             New number of realisations, larger than before.
+        state
+            Fields that change with it, as for `put_state`.
         """
+        self._state = {**self._state, **state}
         self._merge(replace(self.data, requested=requested, finished=False, statistics={}))
 
     def finish(self, complete: Completion) -> None:

@@ -50,6 +50,7 @@ class CamTurn:
             what = "is needed for the kinematics of a cam"
             raise ScenarioError(scenario.file, [Mistake("cam", "", what, "none", "a table [cam]")])
         self.scenario, self.cam = scenario, scenario.cam
+        self._integrals: dict[str, float] = {}
         self.speed = scenario.operation.speed
         load = scenario.load.build()
         self.load = load if isinstance(load, FollowerLoad) else None
@@ -314,7 +315,11 @@ class CamTurn:
 
     def integral(self, quantity: str) -> float:
         """Return the integral of a quantity over the turn: "travel" or "load" (N ds)."""
+        if quantity not in self._integrals:
+            self._integrals[quantity] = self._integral(quantity)
+        return self._integrals[quantity]
 
+    def _integral(self, quantity: str) -> float:
         def values(panel: Panel, theta: FloatArray) -> FloatArray:
             point = self.at(panel, theta)
             factor = point.normal_force if quantity == "load" else 1.0

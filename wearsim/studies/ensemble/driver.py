@@ -185,20 +185,38 @@ class EnsembleWork:
         self.warnings = list(dict.fromkeys([*self.warnings, *texts]))
 
     def finish(self) -> None:
-        """Run all pending realisations.
+        """Run all pending realisations, and finish the file.
 
         Raises
         ------
         Interrupted
             If the work was stopped before the end.
         """
+        self.run()
+        self.file.finish(self._complete)
+
+    def run(self) -> None:
+        """Run all pending realisations; raises as `finish`."""
         self._analyse()
         while not (self._is_complete() or self._stopping):
             self._run_batches(self._pending())
         if not self._is_complete():
             self.file.put_state(**self._state())
             raise self._interrupted()
-        self.file.finish(self._complete)
+
+    def extend(self, runner: RealisationRunner, total: int, **state: object) -> None:
+        """Add pending realisations that are run by another runner.
+
+        Parameters
+        ----------
+        runner : RealisationRunner
+        total : int
+            New number of realisations.
+        state
+            Fields of the results that change.
+        """
+        self.file.grow(total, **self._state(), **state)
+        self.runner, self.total = runner, total
 
     def run_failed_again(self) -> None:
         """Run the failed realisations again; raises as `finish`.
@@ -301,7 +319,7 @@ class EnsembleWork:
         while self.target and self._sizes and not self._reached:
             if (self.file.status[: self._limit] == PENDING).any():
                 return
-            if self.target.reached(self._result().estimate_for(self.target)):
+            if self.target.reached(self.result().estimate_for(self.target)):
                 self._reached = True
                 return
             self._sizes = self._sizes[1:]
@@ -312,7 +330,7 @@ class EnsembleWork:
     def _is_complete(self) -> bool:
         return self._reached or not (self.file.status == PENDING).any()
 
-    def _result(self) -> Any:
+    def result(self) -> Any:
         """Return the present content of the file."""
         return ensemble_result(
             replace(self.file.data, status=self.file.status.copy()), self.file.path
@@ -345,7 +363,7 @@ class EnsembleWork:
         status, target, now = self.file.status, self.target or default, time.monotonic()
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
         if done and (now > self._next_estimate or self._is_complete()):
-            self._estimate = target.interval(self._result().estimate_for(target))
+            self._estimate = target.interval(self.result().estimate_for(target))
             # at most 5 % of the time
             self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * (time.monotonic() - now))
         left = math.nan

@@ -232,26 +232,14 @@ def cluster(
             folder = stack.enter_context(TemporaryDirectory(prefix="wearsim-dask-"))
             stack.enter_context(dask.config.set({"temporary-directory": folder}))
             address = stack.enter_context(_local_cluster(count)).scheduler_address
-        stack.enter_context(_without_log())
+        for name in ("distributed.client", "distributed.batched", "tornado.application"):
+            log = logging.getLogger(name)  # repeats with tracebacks what is raised as an error here
+            stack.callback(log.setLevel, log.level)
+            log.setLevel(logging.CRITICAL + 1)
         client = stack.enter_context(_connected(address))
         found = Cluster(client, address, on_notice, stop_requested)
         found.check_versions()
         yield found
-
-
-@contextmanager
-def _without_log() -> Iterator[None]:
-    """Silence the client's log, which repeats with tracebacks what is raised as an error here."""
-    names = ("distributed.client", "distributed.batched", "tornado.application")
-    logs = [logging.getLogger(name) for name in names]
-    levels = [log.level for log in logs]
-    for log in logs:
-        log.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for log, level in zip(logs, levels, strict=True):
-            log.setLevel(level)
 
 
 def _local_cluster(count: int) -> LocalCluster:

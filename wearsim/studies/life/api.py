@@ -26,10 +26,15 @@ from wearsim.studies.ensemble.api import PRELOAD, Watcher, checked_request, ense
 from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.realisation import shared_grid
 from wearsim.studies.execution.factory import executor
-from wearsim.studies.execution.processes import Executor
 from wearsim.studies.life.rare import next_stage
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
-from wearsim.studies.life.settings import SHARES, settings_of, with_limits, with_rare_events
+from wearsim.studies.life.settings import (
+    SHARES,
+    design_variable,
+    settings_of,
+    with_limits,
+    with_rare_events,
+)
 from wearsim.studies.preparation import changed_origins, check_plugins
 from wearsim.studies.progress import shown_progress
 from wearsim.types import FloatArray, Grid
@@ -46,6 +51,8 @@ def life(
     most: float | str | None = None,
     precision: str | None = None,
     rare: int = 0,
+    rare_method: str = "auto",
+    variable: str = "",
     workers: int | None = None,
     scheduler: str = "processes",
     force: bool = False,
@@ -79,8 +86,13 @@ def life(
         Target that ends the study early, such as "b10 3%": the relative half-width of the 95 %
         confidence interval.
     rare : int
-        Number of further tests, 200 or more, for a small probability of a life before the target by
-        importance sampling; where the wear factor is integrated exactly, none are needed.
+        Number of further tests, 200 or more, for a small probability of a life before the target;
+        where the wear factor is integrated exactly, none are needed.
+    rare_method : {"auto", "importance", "subset"}
+        Importance sampling, subset simulation, or the second where the first fails, each with at
+        most `rare` tests.
+    variable : str
+        Dotted key of a design variable, whose value is stored for a comparison of designs.
     workers, scheduler, force, progress, on_progress, stop_requested, on_notice, storage
         As in `ensemble`.
 
@@ -109,7 +121,9 @@ def life(
     scenario = with_limits(as_scenario(scenario), limits)
     aim = None if precision is None else LifeTarget.parse(precision)
     settings = settings_of(scenario, realisations, target, b, most)
-    settings = with_rare_events(scenario, settings, rare, precision)
+    settings = with_rare_events(scenario, settings, rare, precision, rare_method)
+    if variable and (found := design_variable(scenario, variable)):
+        settings = replace(settings, variable=asdict(found))
     path = Path(f"{scenario.name}-life.h5") if output is None else Path(output)
     check_output(path, force, scenario.paths)
     runner, content = _prepared(scenario, settings, aim)
@@ -126,9 +140,7 @@ def life(
         EnsembleFile.create(path, *content, storage) as file,
     ):
         runner.compile_kernels()
-        work = EnsembleWork(file, runner, aim, pool, watch, stop_requested)
-        work.finish()
-        _finish_stages(file, runner, pool, watch, stop_requested)
+        _finish_stages(EnsembleWork(file, runner, aim, pool, watch, stop_requested), runner)
     return cast("LifeResult", open_ensemble(path))
 
 
@@ -213,38 +225,26 @@ def resume_life(
     ):
         runner.compile_kernels()
         if total > data.requested:
-            opened.put_state(life={**data.life, "plain": total})
-            opened.grow(total)
+            opened.grow(total, life={**data.life, "plain": total})
         work = EnsembleWork(opened, runner, aim, pool, watch, stop_requested)
         work.warn(changed_origins(data, scenario))
         if failed:
             work.run_failed_again()
         else:
-            work.finish()
-            _finish_stages(opened, runner, pool, watch, stop_requested)
+            _finish_stages(work, runner)
     return cast("LifeResult", open_ensemble(path))
 
 
-def _finish_stages(
-    file: EnsembleFile,
-    runner: LifeRunner,
-    pool: Executor,
-    watch: Watcher | None,
-    stop_requested: Callable[[], bool] | None,
-) -> None:
-    """Run the tests for rare events that are left, stage by stage; raises as `EnsembleWork`."""
-    while stage := next_stage(LifeResult(file.data, file.path)):
-        stages = [*file.data.life["stages"], stage]
-        file.put_state(life={**file.data.life, "stages": stages})
-        file.grow(stage["first"] + stage["count"])
-        runner = LifeRunner(
-            runner.scenario,
-            len(file.status),
-            runner.grid,
-            replace(runner.settings, stages=tuple(stages)),
-            runner.base,
-        )
-        EnsembleWork(file, runner, None, pool, watch, stop_requested).finish()
+def _finish_stages(work: EnsembleWork, runner: LifeRunner) -> None:
+    """Run all tests, also those for rare events stage by stage; raises as `EnsembleWork`."""
+    work.run()
+    while stage := next_stage(work.result()):
+        stages, total = (*runner.settings.stages, stage), stage["first"] + stage["count"]
+        settings = replace(runner.settings, stages=stages)
+        runner = LifeRunner(runner.scenario, total, runner.grid, settings, runner.base)
+        work.extend(runner, total, life={**asdict(settings), "base": runner.base})
+        work.run()
+    work.finish()
 
 
 def _prepared(

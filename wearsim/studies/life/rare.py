@@ -1,12 +1,14 @@
-"""Importance sampling of rare, early ends of life: further tests with shifted draws."""
+"""Further tests for rare, early ends of life: shifted draws, and changes of earlier draws."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from wearsim.results.ensemble.life import LifeResult
+from wearsim.results.ensemble.rare import by_importance, by_subset, needs_subset, responses
 from wearsim.scenario import Scenario
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray
@@ -41,8 +43,17 @@ def log_weight(drawer: Drawer, shift: dict[str, float], realisation: int) -> flo
     return float(log_weights(scores, np.array(list(shift.values())))[0])
 
 
+def changes_of(stages: Sequence[Mapping[str, Any]]) -> dict[int, tuple[int, float]]:
+    """Return from which realisation the draws of others depart, and the scale of the change."""
+    return {
+        stage["first"] + place: (parent, stage["scale"])
+        for stage in stages
+        for place, parent in enumerate(stage.get("parents", ()))
+    }
+
+
 def next_stage(result: LifeResult) -> dict[str, Any] | None:
-    """Return the first number, the count and the shift of the next tests; None if all are done.
+    """Return the first number, the count and the draws of the next tests; None if all are done.
 
     Parameters
     ----------
@@ -52,12 +63,20 @@ def next_stage(result: LifeResult) -> dict[str, Any] | None:
     Notes
     -----
     Two stages of a quarter of the tests choose the mean of the draws of the most influential
-    inputs; the last stage gives the estimate.
+    inputs; the next stage gives the estimate. If it is not reliable, those of subset simulation
+    follow.
     """
-    settings, stages = result.settings, list(result.raw.life["stages"])
-    done = sum(stage["count"] for stage in stages)
-    if settings.target is None or done >= settings.rare:
+    settings = result.settings
+    if settings.target is None or not settings.rare:
         return None
+    importance = by_importance(result)
+    if needs_subset(settings.rare_method, importance):
+        found = by_subset(result)
+        return found if isinstance(found, dict) else None
+    if importance:
+        return None
+    stages = list(settings.stages)
+    done = sum(stage["count"] for stage in stages)
     first = settings.plain + done
     count = settings.rare // 4 if len(stages) < _ADAPTED else settings.rare - done
     last: dict[str, Any] = (
@@ -66,11 +85,8 @@ def next_stage(result: LifeResult) -> dict[str, Any] | None:
     names = list(last["shift"]) or shifted_inputs(result.scenario)
     drawer = Drawer(result.scenario, "monte-carlo", shift=last["shift"])
     scores = drawn_scores(drawer, names, last["first"], last["count"])
-    numbers = np.arange(last["first"], last["first"] + last["count"])
-    good = np.isin(numbers, result.raw.done)
-    lives = result.raw.rows("life", last["first"], last["first"] + last["count"])
-    span = max(settings.target * 1e-3, 1.0), settings.most
-    response = np.log(np.clip(lives, *span) / settings.target)
+    response = responses(result)[last["first"] : last["first"] + last["count"]]
+    good = np.isfinite(response)
     if not last["shift"]:
         effect = np.abs(scores[good].T @ (response[good] - response[good].mean()))
         chosen = np.sort(np.argsort(-effect)[:MOST_INPUTS])

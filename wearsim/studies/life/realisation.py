@@ -19,7 +19,7 @@ from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
 from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths, shared_grid
 from wearsim.studies.life.batch import LifeRun, observe_lives
 from wearsim.studies.life.factor import ExactFactor, exact_factor
-from wearsim.studies.life.rare import log_weight
+from wearsim.studies.life.rare import changes_of, log_weight
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
 
@@ -73,14 +73,22 @@ class LevelRunner(RealisationRunner):
         grid: Grid,
         fixed: Mapping[str, float],
         shift: Mapping[str, float],
+        changes: Mapping[int, tuple[int, float]],
     ) -> None:
         super().__init__(scenario, "monte-carlo", total, grid)
-        self.fixed, self.shift = dict(fixed), dict(shift)
+        self.fixed, self.shift, self.changes = dict(fixed), dict(shift), dict(changes)
 
     @cached_property
     def drawer(self) -> Drawer:
         """Sampler of the random inputs."""
-        return Drawer(self.scenario, "monte-carlo", self.total, fixed=self.fixed, shift=self.shift)
+        return Drawer(
+            self.scenario,
+            "monte-carlo",
+            self.total,
+            fixed=self.fixed,
+            shift=self.shift,
+            changes=self.changes,
+        )
 
 
 class LifeRunner(RealisationRunner):
@@ -174,7 +182,10 @@ class LifeRunner(RealisationRunner):
             scenario = with_length(self.scenario, passes)
             grid = shared_grid(scenario) if level else self.grid
             shift = self.settings.stages[stage - 1]["shift"] if stage else {}
-            self._levels[level, stage] = LevelRunner(scenario, self.total, grid, self.fixed, shift)
+            changes = changes_of(self.settings.stages[:stage])
+            self._levels[level, stage] = LevelRunner(
+                scenario, self.total, grid, self.fixed, shift, changes
+            )
         return self._levels[level, stage]
 
     def _life_outcome(

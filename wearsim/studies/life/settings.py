@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.limits import OF_LIFE, Limit
-from wearsim.quantities import quantity
-from wearsim.results.ensemble.life_settings import LifeSettings
+from wearsim.quantities import NUMBER, quantity
+from wearsim.results.ensemble.life_settings import DesignVariable, LifeSettings
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import checked_request
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.rare import LEAST_TESTS, shifted_inputs
 from wearsim.studies.life.realisation import with_length
-from wearsim.units import QuantityError
+from wearsim.units import QuantityError, kind_of
 
 SHARES = (1.0, 10.0, 50.0)
+RARE_METHODS = ("auto", "importance", "subset")
 LONGEST = 10.0  # default censoring over the target or the length of the test
 
 
 def with_rare_events(
-    scenario: Scenario, settings: LifeSettings, rare: int, precision: str | None
+    scenario: Scenario,
+    settings: LifeSettings,
+    rare: int,
+    precision: str | None,
+    method: str = "auto",
 ) -> LifeSettings:
     """Return settings with further tests for rare events.
 
@@ -45,9 +52,16 @@ def with_rare_events(
         raise ValueError("rare events go with a fixed number of realisations, not a precision")
     if rare < LEAST_TESTS:
         raise ValueError(f"rare events take {LEAST_TESTS} tests or more, got {rare}")
+    if method not in RARE_METHODS:
+        raise ValueError(f"'{method}' is not a method, expected one of {', '.join(RARE_METHODS)}")
+    drawn = [item for item in scenario.random if not item.is_redrawn and item.role != "process"]
+    if not drawn:
+        raise ValueError("rare events need an input that is drawn once per test or roller")
     if not shifted_inputs(scenario):
-        raise ValueError("no random input of one number per test can be shifted")
-    return replace(settings, rare=rare)
+        if method == "importance":
+            raise ValueError("no random input of one number per test can be shifted; use subset")
+        method = "subset"
+    return replace(settings, rare=rare, rare_method=method)
 
 
 def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
@@ -138,6 +152,29 @@ def settings_of(
         alone=alone,
         plain=1 if alone else request.realisations,
     )
+
+
+def design_variable(scenario: Scenario, key: str) -> DesignVariable | None:
+    """Return the value of a key in SI; None if it is not a number or a quantity."""
+    value: Any = tomllib.loads(scenario.text)
+    for part in key.split("."):
+        if not isinstance(value, dict) or part not in value:
+            return None
+        value = value[part]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return DesignVariable(key, float(value), "1", f"{value:g}")
+    number = NUMBER.match(value.strip()) if isinstance(value, str) else None
+    if not number:
+        return None
+    text = value.strip()
+    unit = text[number.end() :].strip()
+    if not unit:
+        return DesignVariable(key, float(text), "1", text)
+    try:
+        unit = kind_of(unit).unit
+        return DesignVariable(key, quantity(text, unit), unit, text)
+    except ValueError:  # a number and other text
+        return None
 
 
 def parse_life(value: float | str, unit: str, rate: float, what: str) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -164,6 +165,9 @@ class Drawer:
         Values with which tests are run instead of those drawn, by key [SI].
     shift : mapping of str to float, optional
         Added to the normal scores of the uniform numbers, by name of the input.
+    changes : mapping of int to (int, float), optional
+        Realisations whose normal scores are changes of those of others: number of the other, and
+        scale. They are sqrt(1 - scale^2) times its scores, plus scale times their own.
 
     Raises
     ------
@@ -179,8 +183,10 @@ class Drawer:
         replicates: int = REPLICATES,
         fixed: Mapping[str, float] | None = None,
         shift: Mapping[str, float] | None = None,
+        changes: Mapping[int, tuple[int, float]] | None = None,
     ) -> None:
         self._fixed, self._shift = dict(fixed or {}), dict(shift or {})
+        self._changes = dict(changes or {})
         for item in scenario.random:
             if item.role == "field":
                 raise CapabilityError(
@@ -281,12 +287,30 @@ class Drawer:
     def uniforms(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the uniform numbers of consecutive realisations by name, (count, dimension)."""
         found = self._sampler.uniforms(first, count)
+        for place in [k for k in range(count) if first + k in self._changes]:
+            for name, numbers in self._changed(first + place).items():
+                found[name][place] = numbers
         if self._shift:
             from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
 
             for name, shift in self._shift.items():
                 found[name] = np.clip(ndtr(ndtri(found[name]) + shift), 1.0 - BELOW_ONE, BELOW_ONE)
         return found
+
+    def _changed(self, realisation: int) -> dict[str, FloatArray]:
+        """Return the uniform numbers of a realisation that is a change of others, (dimension,)."""
+        from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
+
+        line = [realisation]
+        while line[-1] in self._changes:
+            line.append(self._changes[line[-1]][0])
+        scores: dict[str, FloatArray] = {}
+        for number in reversed(line):
+            fresh = {name: ndtri(u[0]) for name, u in self._sampler.uniforms(number, 1).items()}
+            _, scale = self._changes.get(number, (number, 1.0))
+            part = math.sqrt(1.0 - scale**2)
+            scores = {n: part * scores[n] + scale * z if scores else z for n, z in fresh.items()}
+        return {name: np.clip(ndtr(z), 1.0 - BELOW_ONE, BELOW_ONE) for name, z in scores.items()}
 
     def columns(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the values drawn for whole tests and rollers in consecutive realisations.

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 
-from wearsim.types import BoolArray, FloatArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim.uq.estimation.intervals import Interval, t_quantile
 
 #: Response to normal scores, (m, dimension) to (m,); the event is a response of 0 or less.
 Response: TypeAlias = Callable[[FloatArray], FloatArray]
 
 LEAST_SIZE = 30.0  # effective sample size below which an estimate is refused
+LEAST = 1e-6  # probability for which the tests of subset simulation are planned
 _LEVEL = 0.1  # share of each level of subset simulation
+_SHORTEST = 3  # steps of a Markov chain
+_AHEAD = 1.0 / 3.0  # part of the levels to `LEAST` for which tests are kept
+_TOLERATED = 0.2  # levels that the last one may be longer than the others
 _FAR = 6.5  # greatest distance of a shift; P = 4e-11
 _STAGES = 4  # of the search for the shift, which take half of the tests
 _ACCEPTANCE = 0.44  # aim of the Markov chains
@@ -36,31 +40,51 @@ class RareProbability:
         Coefficient of variation of the estimate.
     effective_size : float, optional
         Effective number of weighted events, (sum w)^2/sum w^2; None without weights.
+    obstacle : str
+        Why the estimate permits no statement; empty if it does.
     """
 
     probability: Interval
     tests: int
     variation: float
     effective_size: float | None = None
+    obstacle: str = ""
 
     @property
     def is_reliable(self) -> bool:
         """Whether the effective sample size, or the variation, permits a statement."""
-        if self.effective_size is None:
-            return self.variation < 1.0
-        return self.effective_size >= LEAST_SIZE
+        return not self.obstacle
+
+
+@dataclass(frozen=True, eq=False)
+class SubsetStage:
+    """Tests of subset simulation that can be evaluated at once.
+
+    Parameters
+    ----------
+    count : int
+    parents : ndarray of int, shape (count,), optional
+        Number of the earlier test, in the order of evaluation, from which each draw departs; None
+        for independent draws.
+    scale : float
+        Standard deviation of the change: scores are sqrt(1 - scale^2) times those of the parent,
+        plus scale times independent ones.
+    """
+
+    count: int
+    parents: IntArray | None = None
+    scale: float = 1.0
 
 
 def _result(
-    value: float, variation: float, tests: int, size: float | None = None
+    value: float, variation: float, tests: int, size: float | None = None, obstacle: str = ""
 ) -> RareProbability:
     if value <= 0.0:
-        return RareProbability(Interval(0.0, 0.0, 1.0), tests, math.inf, size)
+        return RareProbability(Interval(0.0, 0.0, 1.0), tests, math.inf, size, obstacle)
     degrees = math.inf if size is None else max(size - 1.0, 1.0)
     reach = math.exp(min(t_quantile(degrees) * variation, 700.0))
-    return RareProbability(
-        Interval(value, value / reach, min(value * reach, 1.0)), tests, variation, size
-    )
+    interval = Interval(value, value / reach, min(value * reach, 1.0))
+    return RareProbability(interval, tests, variation, size, obstacle)
 
 
 def weighted_probability(event: BoolArray, log_weight: FloatArray, tests: int) -> RareProbability:
@@ -81,11 +105,16 @@ def weighted_probability(event: BoolArray, log_weight: FloatArray, tests: int) -
     """
     weight = np.where(event, np.exp(log_weight), 0.0)
     total, square, count = float(weight.sum()), float((weight**2).sum()), len(weight)
-    value = total / count
     if total == 0.0:
-        return _result(0.0, math.inf, tests, 0.0)
+        return _result(0.0, math.inf, tests, 0.0, _few(0.0, tests))
+    value = total / count
     variation = float(weight.std(ddof=1)) / math.sqrt(count) / value
-    return _result(value, variation, tests, total**2 / square)
+    size = total**2 / square
+    return _result(value, variation, tests, size, "" if size >= LEAST_SIZE else _few(size, tests))
+
+
+def _few(size: float, tests: int) -> str:
+    return f"effective sample size {size:.0f} of {tests:,} tests is below {LEAST_SIZE:.0f}"
 
 
 def design_point(scores: FloatArray, response: FloatArray) -> FloatArray:
@@ -181,7 +210,7 @@ def log_weights(scores: FloatArray, shift: FloatArray) -> FloatArray:
 
 
 def subset_simulation(
-    response: Response, dimension: int, tests: int, least: float = 1e-6, seed: int = 0
+    response: Response, dimension: int, tests: int, seed: int = 0
 ) -> RareProbability:
     """Return the probability of an event as a product over nested, less rare events.
 
@@ -190,15 +219,58 @@ def subset_simulation(
     response, dimension, seed
         As for `importance_sampling`.
     tests : int
-        Greatest number of evaluations, spent on levels of equal size.
-    least : float
-        Least probability for which the tests are planned.
+        Greatest number of evaluations.
 
     Returns
     -------
     RareProbability
-        With the variation that Au and Beck derive from the correlation along the chains. A
-        probability below a tenth of `least` is returned as 0, and is unreliable.
+
+    Examples
+    --------
+    >>> found = subset_simulation(lambda z: 4.0 - z[:, 0], 2, 2000)
+    >>> bool(found.probability.low < 3.167e-5 < found.probability.high)
+    True
+    """
+    random, stages = np.random.default_rng(seed), subset_stages(tests)
+    stage, scores = next(stages), np.empty((0, dimension))
+    while True:
+        trial = random.standard_normal((stage.count, dimension))
+        if stage.parents is not None:
+            part = math.sqrt(1.0 - stage.scale**2)
+            trial = part * scores[stage.parents] + stage.scale * trial
+        scores = np.concatenate([scores, trial])
+        try:
+            stage = stages.send(response(trial))
+        except StopIteration as end:
+            found: RareProbability = end.value
+            return found
+
+
+def subset_stages(
+    tests: int, drawn: int = 0
+) -> Generator[SubsetStage, FloatArray, RareProbability]:
+    """Yield the tests of subset simulation stage by stage; return the probability.
+
+    The responses to the tests of each stage are sent to the generator. Every level has a tenth of
+    the probability of the one before it. The line through the last two thresholds, against their
+    normal scores, gives the number of further levels, among which the remaining tests are divided.
+
+    Parameters
+    ----------
+    tests : int
+        Greatest number of tests.
+    drawn : int
+        Independent tests that are known already. They are used for the first level, as far as they
+        are at most a quarter of the tests.
+
+    Yields
+    ------
+    SubsetStage
+
+    Returns
+    -------
+    RareProbability
+        With the variation that Au and Beck derive from the correlation along the chains.
 
     Notes
     -----
@@ -206,53 +278,50 @@ def subset_simulation(
     conditional sampling after Papaioannou, Betz, Zwirglmaier and Straub, Probabilistic Engineering
     Mechanics 41 (2015), DOI 10.1016/j.probengmech.2015.06.006.
     """
-    levels = math.ceil(math.log(least) / math.log(_LEVEL) - 1e-9) + 1
-    per_level = round(1.0 / _LEVEL)
-    kept = int(tests / (1.0 + (1.0 - _LEVEL) * (levels - 1))) // per_level
-    size, random = kept * per_level, np.random.default_rng(seed)
-    scores = random.standard_normal((size, dimension))
-    values, tests, chains = response(scores), size, size
-    probability, square, scale = 1.0, 0.0, 0.6
-    for _ in range(levels):
-        threshold = max(float(np.sort(values)[kept - 1]), 0.0)
+    from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
+
+    levels = math.ceil(math.log(LEAST) / math.log(_LEVEL) - 1e-9)
+    done = max(int(tests / (1.0 + (1.0 - _LEVEL) * levels)), min(drawn, tests // 4))
+    values = yield SubsetStage(done)
+    states, chains, probability, square, scale = np.arange(done), done, 1.0, 0.0, 0.6
+    before = 0.0, float(np.median(values))
+    while True:
+        kept = max(round(_LEVEL * len(values)), 1)
+        is_last = tests - done < _SHORTEST * kept
+        threshold = 0.0 if is_last else max(float(np.sort(values)[kept - 1]), 0.0)
         event = values <= threshold
         share = float(event.mean())
         probability *= share
-        if share > 0.0:
-            correlation = _correlation(event.reshape(-1, chains), share)
-            square += (1.0 - share) / (share * size) * (1.0 + correlation)
+        if share == 0.0:
+            return _result(0.0, math.inf, done, obstacle="no test of the last level has the event")
+        if threshold > 0.0 and share > 0.5:
+            text = f"{100.0 * share:.0f} % of the tests of a level have the same response, such as"
+            text += " a censored life"
+            return _result(0.0, math.inf, done, obstacle=text)
+        correlation = _correlation(event.reshape(-1, chains), share)
+        square += (1.0 - share) / (share * len(values)) * (1.0 + correlation)
         if threshold == 0.0:
-            return _result(probability, math.sqrt(square), tests)
+            variation = math.sqrt(square)
+            obstacle = "" if variation < 1.0 else "its variation is above 100 %"
+            return _result(probability, variation, done, obstacle=obstacle)
+        score = float(ndtri(probability))
+        slope = min((threshold - before[1]) / (before[0] - score), -1e-12)
+        chance = max(float(ndtr(score + threshold / slope)), LEAST)
+        before, levels = (score, threshold), levels - 1
+        left = math.ceil(math.log(chance / probability) / math.log(_LEVEL) - _TOLERATED)
+        left = max(left, math.ceil(_AHEAD * levels), 1)
         seeds, chains = np.flatnonzero(event)[:kept], kept
-        scores, values, scale = _chains(
-            response, scores[seeds], values[seeds], threshold, size, scale, random
-        )
-        tests += size - kept
-    return _result(0.0, math.inf, tests)
-
-
-def _chains(
-    response: Response,
-    scores: FloatArray,
-    values: FloatArray,
-    threshold: float,
-    size: int,
-    scale: float,
-    random: np.random.Generator,
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return Markov chains from seeds within an event, step by step, and the adapted scale."""
-    found = [(scores, values)]
-    for _ in range(size // len(scores) - 1):
-        scale = min(scale, 1.0)
-        fresh = random.standard_normal(scores.shape)
-        trial = math.sqrt(1.0 - scale**2) * scores + scale * fresh
-        response_there = response(trial)
-        accepted = response_there <= threshold
-        scores = np.where(accepted[:, None], trial, scores)
-        values = np.where(accepted, response_there, values)
-        scale *= math.exp(float(accepted.mean()) - _ACCEPTANCE)
-        found.append((scores, values))
-    return np.concatenate([one for one, _ in found]), np.concatenate([v for _, v in found]), scale
+        state, value, found = states[seeds], values[seeds], []
+        for _ in range(max((tests - done) // (left * kept), 2)):
+            scale = min(scale, 1.0)
+            trial = yield SubsetStage(kept, state, scale)
+            accepted = trial <= threshold
+            state = np.where(accepted, np.arange(done, done + kept), state)
+            value = np.where(accepted, trial, value)
+            scale *= math.exp(float(accepted.mean()) - _ACCEPTANCE)
+            done += kept
+            found.append((state, value))
+        states, values = (np.concatenate(items) for items in zip(*found, strict=True))
 
 
 def _correlation(event: BoolArray, share: float) -> float:

@@ -1,0 +1,262 @@
+"""Rare, early ends of life through the whole study, with lives of a closed form."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.special import ndtri
+
+from tests.studies.ensemble_cases import LOGNORMAL, differences
+from tests.studies.life.test_life import FRICTION, LOAD, design, lives
+from tests.studies.life.test_life_kills import Killed, counted
+from wearsim.cli.render.life_table import life_json, write_life
+from wearsim.results import Outcome, read_ensemble
+from wearsim.results.ensemble.life import LifeResult
+from wearsim.results.ensemble.rare import IMPORTANCE, SUBSET
+from wearsim.results.ensemble.schema import OBSERVABLES
+from wearsim.scenario import Scenario
+from wearsim.studies.life.api import life, resume_life
+from wearsim.studies.life.rare import log_weight
+from wearsim.studies.life.realisation import LifeRunner
+from wearsim.studies.run.draws import Drawer
+from wearsim.uq.survival.rare_events import RareProbability, subset_stages
+
+MEDIAN = 1e6
+ROLLER = {**LOGNORMAL, "median": "1e-20 1/Pa"}
+SPREADS = {
+    "wear.cylinder.k_over_h": math.log(1.5),
+    "friction.coefficient": math.log(1.2),
+    "load.normal_force": math.log(1.1),
+}
+MEDIANS = {
+    "wear.cylinder.k_over_h": 2e-9,
+    "friction.coefficient": 0.1,
+    "load.normal_force": 300.0,
+}
+
+
+def closed_form(
+    self: LifeRunner, level: int, stage: int, numbers: list[int], outcomes: dict[int, Outcome]
+) -> list[int]:
+    """Set lives in inverse proportion to K/H, friction and load; of rollers to the mean of ln."""
+    runner = self._level(level, stage)
+    for number in numbers:
+        drawn = dict(runner.drawer.draw(number).values)
+        logs = [np.mean(np.log(drawn[key] / MEDIANS[key])) for key in MEDIANS if key in drawn]
+        value = MEDIAN * math.exp(-sum(logs))
+        scalars = dict.fromkeys(("life", "life_low", "life_high"), value)
+        weight = log_weight(runner.drawer, runner.shift, number) if runner.shift else 0.0
+        scalars |= {"first_limit": 0.0, "limit_angle": math.nan, "score_mean": 0.0}
+        scalars |= dict.fromkeys(("steps", "solves", "depth_error", "volume_error"), 1.0)
+        scalars |= {"log_weight": weight, "depth_profile": np.zeros(len(self.grid.y))}
+        courses = {name: np.ones(2) for name in OBSERVABLES}
+        outcomes[number] = Outcome(number=number, values={**drawn, **courses, **scalars})
+    return []
+
+
+@pytest.fixture
+def closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lives of a closed form instead of tests."""
+    monkeypatch.setattr(LifeRunner, "_attempt", closed_form)
+
+
+def target_of(probability: float, spread: float) -> float:
+    return MEDIAN * math.exp(float(ndtri(probability)) * spread)
+
+
+def estimate(path: Path, probability: float, tests: int, seed: int, method: str) -> LifeResult:
+    """Return a study with the given true probability of a life before the target."""
+    scenario = design(wear__roller__k_over_h=ROLLER, seed=seed)
+    target = target_of(probability, math.hypot(*SPREADS.values()))
+    return lives(path, scenario, 400, target=target, most=1e8, rare=tests, rare_method=method)
+
+
+def by_draws(probability: float, tests: int, seed: int, plain: int = 400) -> RareProbability:
+    """Return the estimate of subset simulation from the draws of a study, without its file."""
+    drawer = Drawer(design(wear__roller__k_over_h=ROLLER, seed=seed), "monte-carlo")
+    numbers = drawer.uniforms(0, plain + tests)
+    scores = np.column_stack([ndtri(numbers[name][:, 0]) for name in SPREADS])
+    spreads = np.array(list(SPREADS.values()))
+    excess = -float(ndtri(probability)) * math.hypot(*spreads)
+    stages = subset_stages(tests, plain)
+    stage = next(stages)
+    order, free = np.arange(min(plain, stage.count)), plain
+    while True:
+        missing = stage.count if stage.parents is not None else stage.count - len(order)
+        new, free = np.arange(free, free + missing), free + missing
+        if stage.parents is not None:
+            part = math.sqrt(1.0 - stage.scale**2)
+            scores[new] = part * scores[order[stage.parents]] + stage.scale * scores[new]
+        order = np.append(order, new)
+        try:
+            stage = stages.send(excess - scores[order[-stage.count :]] @ spreads)
+        except StopIteration as end:
+            found: RareProbability = end.value
+            return found
+
+
+@pytest.mark.parametrize(("probability", "tests"), [(1e-4, 2000), (1e-6, 5000)])
+def test_subset_simulation_holds_the_probability_in_repeats(probability: float, tests: int) -> None:
+    found = [by_draws(probability, tests, seed) for seed in range(200)]
+    values = np.array([item.probability.value for item in found])
+    held = [item.probability.low < probability < item.probability.high for item in found]
+    assert np.mean(held) >= 0.9
+    assert values.std() / probability < 0.5
+    assert max(item.tests for item in found) <= tests
+    assert all(item.is_reliable for item in found)
+
+
+@pytest.mark.usefixtures("closed")
+@pytest.mark.parametrize(
+    ("probability", "tests", "seed"),
+    [(1e-4, 2000, 1), pytest.param(1e-6, 5000, 2, marks=pytest.mark.slow)],
+)
+def test_study_has_the_subset_simulation_of_its_draws(
+    tmp_path: Path, probability: float, tests: int, seed: int
+) -> None:
+    rare = estimate(tmp_path / "rare.h5", probability, tests, seed, "subset").rare
+    expected = by_draws(probability, tests, seed)
+    assert rare is not None
+    assert rare.probability.value == pytest.approx(expected.probability.value, rel=1e-9)
+    assert rare.variation == pytest.approx(expected.variation, rel=1e-9)
+    assert rare.tests == expected.tests
+
+
+@pytest.mark.usefixtures("closed")
+@pytest.mark.parametrize(
+    ("probability", "tests", "seeds"),
+    [
+        (1e-4, 2000, range(1)),
+        pytest.param(1e-6, 5000, range(1), marks=pytest.mark.slow),
+    ],
+)
+def test_importance_sampling_has_the_probability_of_the_closed_form(
+    tmp_path: Path, probability: float, tests: int, seeds: range
+) -> None:
+    for seed in seeds:
+        result = estimate(tmp_path / "rare.h5", probability, tests, seed, "auto")
+        rare = result.rare
+        assert list(result.rare_estimates) == [IMPORTANCE]
+        assert rare is not None
+        assert rare.variation < 0.2
+        assert abs(rare.probability.value / probability - 1.0) < 4.0 * rare.variation
+
+
+def many(count: int = 3, **changes: object) -> Scenario:
+    """Return a design whose life is moved most by the loads of its rollers."""
+    each = {**LOAD, "factor": 2.0, "persistence": "per-roller"}
+    return design(
+        wear__cylinder__k_over_h="2e-9 1/Pa",
+        operation__rollers=count,
+        load__normal_force=each,
+        **changes,
+    )
+
+
+@pytest.mark.usefixtures("closed")
+def test_subset_simulation_follows_where_importance_sampling_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    spread = math.hypot(math.log(1.2), math.log(2.0) / math.sqrt(3.0))
+    options: dict[str, Any] = {"target": target_of(1e-2, spread), "most": 1e8, "rare": 400}
+    result = lives(tmp_path / "both.h5", many(), 40, **options)
+    first, second = result.rare_estimates.values()
+    assert list(result.rare_estimates) == [IMPORTANCE, SUBSET]
+    assert "effective sample size" in first.obstacle
+    assert second.is_reliable
+    assert second.tests <= 400
+    assert result.rare == second
+    assert second.probability.low < 1e-2 < second.probability.high
+    found = life_json(result)["rare"]
+    assert found["method"] == SUBSET
+    assert found["probability"]["value"] == second.probability.value
+    assert found["tried"][IMPORTANCE]["refused"]
+    write_life(result, [])
+    text = capsys.readouterr().out
+    assert "by importance sampling: refused, effective sample size" in text
+    assert f"by subset simulation: {second.probability.value:.3g} [" in text
+    alone = lives(tmp_path / "one.h5", many(friction__coefficient=0.1), 40, **options)
+    assert list(alone.rare_estimates) == [SUBSET]
+    assert alone.settings.rare_method == "subset"
+
+
+@pytest.mark.usefixtures("closed")
+def test_probability_is_refused_where_both_methods_fail(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # nine lives of ten are beyond the maximum, and do not show the way to the target
+    options = {"target": 0.05 * MEDIAN, "most": 0.4 * MEDIAN, "rare": 200}
+    result = lives(tmp_path / "refused.h5", many(friction__coefficient=FRICTION), 40, **options)
+    obstacles = [found.obstacle for found in result.rare_estimates.values()]
+    assert len(obstacles) == 2
+    assert "below 30" in obstacles[0]
+    assert "such as a censored life" in obstacles[1]
+    assert result.rare is not None
+    assert not result.rare.is_reliable
+    assert life_json(result)["rare"]["probability"] is None
+    write_life(result, [])
+    assert "no probability is stated; give a greater --rare" in capsys.readouterr().out
+
+
+def subset_study(path: Path, **options: Any) -> LifeResult:
+    """Return a study in which both methods are used."""
+    given = {"target": 4e5, "most": 1e8, "rare": 200, "scheduler": "serial", **options}
+    return life(many(), 20, path, **given)
+
+
+@pytest.mark.usefixtures("closed")
+def test_subset_simulation_does_not_depend_on_workers(tmp_path: Path) -> None:
+    one = subset_study(tmp_path / "one.h5")
+    two = subset_study(tmp_path / "two.h5", scheduler="threads", workers=2)
+    assert SUBSET in one.rare_estimates
+    assert differences(two, one) == []
+    assert two.rare_estimates == one.rare_estimates
+
+
+@pytest.mark.usefixtures("closed")
+@pytest.mark.parametrize(
+    "part",
+    [0.7, *(pytest.param(k / 8.0, marks=pytest.mark.slow) for k in (4, 6.8))],
+)
+def test_killed_subset_simulation_continues_bit_for_bit(tmp_path: Path, part: float) -> None:
+    stages: list[str] = []
+    whole = subset_study(tmp_path / "whole.h5", storage=counted(stages))
+    path, done = tmp_path / "killed.h5", list[str]()
+    with pytest.raises(Killed):
+        subset_study(path, storage=counted(done, int(part * len(stages))))
+    assert not read_ensemble(path).finished
+    result = resume_life(path, scheduler="serial")
+    assert differences(result, whole) == []
+    assert result.rare_estimates == whole.rare_estimates
+    assert result.settings == whole.settings
+
+
+def test_draws_are_changes_of_those_of_their_parents() -> None:
+    scenario, names = many(), ["friction.coefficient", "load.normal_force@1"]
+    plain = Drawer(scenario, "monte-carlo")
+    changed = Drawer(scenario, "monte-carlo", changes={7: (5, 0.6), 5: (2, 0.8)})
+    own, found = plain.uniforms(0, 8), changed.uniforms(0, 8)
+    for name in names:
+        z = ndtri(own[name][:, 0])
+        expected = 0.8 * (0.6 * z[2] + 0.8 * z[5]) + 0.6 * z[7]
+        assert ndtri(found[name][7, 0]) == pytest.approx(expected, rel=1e-12)
+        assert np.array_equal(np.delete(found[name], [5, 7]), np.delete(own[name], [5, 7]))
+        assert np.array_equal(changed.uniforms(7, 1)[name][0], found[name][7])
+
+
+@pytest.mark.parametrize(
+    ("changes", "method", "message"),
+    [
+        ({}, "simple", "is not a method"),
+        ({"friction__coefficient": 0.1}, "importance", "can be shifted; use subset"),
+    ],
+)
+def test_methods_without_meaning_are_refused(
+    tmp_path: Path, changes: dict[str, Any], method: str, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        lives(tmp_path / "bad.h5", many(**changes), target=250, rare=200, rare_method=method)
