@@ -1,9 +1,10 @@
 # make demo            run the 450-minute wear test: summary, results and figure in out/
 # make test            lint, types, import contracts and the quick tests: 5 minutes on 2 cores
 # make test-slow       the other tests: every kill of the writers, hard cases, installs, Dask: 18 minutes
-# make bench           speed against error, hard cases: out/bench/, out/benchmarks.md, out/models.md; a quarter of an hour
-# make bench-ensembles persistence and cost of ensembles: out/persistence.md, out/ensembles.md; a quarter of an hour
-# make docs            the site: docs/_build/html/index.html; two minutes, no network; make linkcheck looks at external links
+# make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; six minutes
+# make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
+# make bench-ensembles the same of persistence, ensembles and intervals of lives; a quarter of an hour
+# make docs            the site: docs/_build/html/index.html; three minutes, no network; make linkcheck looks at external links
 # make clean           remove what these targets made, including the environment
 
 PYTHON ?= python3
@@ -11,7 +12,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test test-slow lint bench bench-ensembles docs linkcheck clean
+.PHONY: demo test test-slow lint bench bench-docs bench-ensembles docs linkcheck clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -30,22 +31,33 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 
+# a topic that fails leaves the file of the last measurement; references do not depend on the stepper
+MEASURED := docs/measurements
+bench-docs: $(VENV)/.installed-dev
+	mkdir -p out
+	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
+	$(BIN)/wearsim bench stated-errors --tests 200 --seed 2 --references out/references -o out/bench --force \
+		&& cp out/bench/stated-errors.json $(MEASURED)
+	-$(BIN)/wearsim bench --hard -o out/bench --force
+	cp out/bench/hard.json $(MEASURED)
+	$(BIN)/python -m tests.benchmarks.report -o $(MEASURED)/report.json
+	$(BIN)/python -m tests.benchmarks.models -o $(MEASURED)/models.json
+
 bench: $(VENV)/.installed-dev
 	mkdir -p out
-	-$(BIN)/wearsim bench contact stepping sampling growth savings stated-errors --hard -o out/bench --force
-	$(BIN)/python -m tests.benchmarks.report -o out/benchmarks.md
-	$(BIN)/python -m tests.benchmarks.models -o out/models.md
+	for topic in contact sampling growth savings; do \
+		$(BIN)/wearsim bench $$topic -o out/bench --force && cp out/bench/$$topic.json $(MEASURED) || exit 1; done
 
 bench-ensembles: $(VENV)/.installed-dev
-	mkdir -p out
-	$(BIN)/python -m tests.benchmarks.persistence -o out/persistence.md
-	$(BIN)/python -m tests.benchmarks.ensembles -o out/ensembles.md
+	$(BIN)/python -m tests.benchmarks.persistence -o $(MEASURED)/persistence.json
+	$(BIN)/python -m tests.benchmarks.ensembles -o $(MEASURED)/ensembles.json
+	$(BIN)/python -m tests.uq.survival.coverage_study $(MEASURED)/life-coverage.json
 
 docs: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
 
 linkcheck: $(VENV)/.installed-dev
-	$(BIN)/python -m sphinx -q -b linkcheck docs docs/_build/linkcheck
+	$(BIN)/python -m sphinx -q -b linkcheck -D nb_execution_mode=off -d docs/_build/linkcheck/doctrees docs docs/_build/linkcheck
 
 # the stamps record what the environment holds; a change of any pyproject.toml renews it
 $(VENV)/bin/python:

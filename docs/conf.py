@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 import jupyter_server_mathjax
+from sphinx.application import Sphinx
 
 DOCS = Path(__file__).parent
 BUILD = DOCS / "_build"
@@ -29,6 +30,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx_design",
+    "wearsim_measurements",
     "wearsim_reference",
 ]
 exclude_patterns = ["_build", "_static", "_templates", "**/.ipynb_checkpoints"]
@@ -36,8 +38,12 @@ templates_path = ["_templates"]
 highlight_language = "none"
 default_role = "autolink"
 # notebooks load `notebook_pages`, and call the command wearsim of this environment
-for name, folder in {"PATH": Path(sys.executable).parent, "PYTHONPATH": DOCS / "_ext"}.items():
-    os.environ[name] = os.pathsep.join([str(folder), *filter(None, [os.environ.get(name)])])
+for name, folders in {
+    "PATH": [Path(sys.executable).parent],
+    "PYTHONPATH": [DOCS / "_ext", DOCS.parent],
+}.items():
+    given = filter(None, [os.environ.get(name)])
+    os.environ[name] = os.pathsep.join([*map(str, folders), *given])
 
 # links to other projects need a network; elsewhere they are plain names
 if os.environ.get("WEARSIM_DOCS_ONLINE"):
@@ -65,7 +71,7 @@ myst_heading_anchors = 4
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(BUILD / "notebooks" / _sources_digest())
 nb_execution_in_temp = True
-nb_execution_timeout = 300
+nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
 nb_merge_streams = True
@@ -143,3 +149,14 @@ html_sidebars = {"index": [], "start": []}
 linkcheck_timeout = 20
 linkcheck_retries = 2
 linkcheck_anchors = False
+
+
+def _registered(_app: Sphinx, uri: str) -> str | None:
+    """Return the address at which doi.org says whether a DOI exists; publishers refuse programs."""
+    start = "https://doi.org/"
+    return uri.replace(start, f"{start}api/handles/", 1) if uri.startswith(start) else None
+
+
+def setup(app: Sphinx) -> None:
+    """Register how DOIs are checked."""
+    app.connect("linkcheck-process-uri", _registered)

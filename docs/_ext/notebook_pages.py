@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
+from pathlib import Path
 from typing import Any
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 # the kernel asks programs for colours and control codes, which pages do not show
 FORCED = {"FORCE_COLOR", "CLICOLOR_FORCE", "CLICOLOR", "JPY_PARENT_PID"}
@@ -33,6 +37,7 @@ def run_shell(_line: str, cell: str) -> None:
 
 
 def load_ipython_extension(shell: Any) -> None:
-    """Register the cell magic `%%sh`, and show figures of pyplot and of wearsim as SVG."""
+    """Register `%%sh`, show figures as SVG, and copy the scenarios next to the notebook."""
     shell.register_magic_function(run_shell, "cell", "sh")
     shell.run_line_magic("config", "InlineBackend.figure_formats = ['svg']")
+    shutil.copytree(SCENARIOS, SCENARIOS.name, dirs_exist_ok=True)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import wearsim
 from tests.benchmarks.ensemble_cases import ALL, Size, drawn, end_values
-from tests.benchmarks.table import Row, markdown, part
+from tests.benchmarks.table import Row, markdown, part, save_tables
 from wearsim.scenario import Scenario
 from wearsim_bench.measure.machine import this_machine
 from wearsim_bench.measure.timing import timed
@@ -126,20 +126,18 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("--quick", action="store_true", help="shorten everything")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE.md", help="also write them to this file"
+        "-o", "--output", type=Path, metavar="FILE.json", help="also write them to this file"
     )
     options = parser.parse_args(arguments)
-    text = f"Measured on {this_machine()}.\n"
-    sys.stdout.write(text)
+    sys.stdout.write(f"Measured on {this_machine()}.\n")
+    tables = {}
     for name in options.parts or PARTS:
         title, rows = PARTS[name]
-        table = "\n" + markdown(title, rows(options.quick))
-        sys.stdout.write(table)
+        tables[title] = markdown(title, rows(options.quick))
+        sys.stdout.write("\n" + tables[title])
         sys.stdout.flush()
-        text += table
     if options.output is not None:
-        options.output.parent.mkdir(parents=True, exist_ok=True)
-        options.output.write_text(text, encoding="utf-8")
+        save_tables(options.output, "python -m tests.benchmarks.ensembles", tables)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Every contact model against the exact theory and the other models, as Markdown tables.
 
-``python -m tests.benchmarks.models -o out/models.md``. Contact models of other
+``python -m tests.benchmarks.models -o out/models.json``. Contact models of other
 distributions, such as the plugin template, which is added here, appear in the tables of worn
 profiles and whole tests with their default options and every option that changes the normal
 contact.
@@ -16,7 +16,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from tests.benchmarks.table import part
+from tests.benchmarks.table import part, save_tables
 from tests.benchmarks.wear_tests import SCENARIOS
 from wearsim import load_scenario, run
 from wearsim.errors import WearsimError
@@ -151,19 +151,20 @@ def _whole_cells(name: str, options: dict[str, Any], share: float) -> list[str]:
     ]
 
 
-def report(on_progress: Callable[[str], object], share: float = 1.0, repetitions: int = 5) -> str:
-    """Measure everything and return the page; call `on_progress` with each finished table."""
-    text = ""
+def report(
+    on_progress: Callable[[str], object], share: float = 1.0, repetitions: int = 5
+) -> dict[str, str]:
+    """Measure everything and return the tables; call `on_progress` with each finished one."""
+    tables = {}
     parts: tuple[tuple[str, Callable[[], str]], ...] = (
         ("Tangential theories on elliptic contacts", lambda: drawn_table(repetitions)),
         ("Normal models on worn profiles, closed-form strips for the tractions", worn_table),
         ("rig-450min to its end with every model", lambda: whole_table(share)),
     )
     for title, measure in parts:
-        section = f"## {title}\n\n{measure()}\n"
-        on_progress(section)
-        text += section
-    return text
+        tables[title] = f"## {title}\n\n{measure()}\n"
+        on_progress(tables[title])
+    return tables
 
 
 def install_template(folder: Path) -> None:
@@ -180,11 +181,11 @@ def install_template(folder: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Print the page, and write it to a file if one is named."""
+    """Print the tables, and write them to a file if one is named."""
     parser = argparse.ArgumentParser(prog="tests.benchmarks.models", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="shorten the whole tests")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE.md", help="also write it to this file"
+        "-o", "--output", type=Path, metavar="FILE.json", help="also write it to this file"
     )
     options_given = parser.parse_args(arguments)
 
@@ -195,10 +196,9 @@ def main(arguments: list[str] | None = None) -> None:
     on_progress(f"Measured on {this_machine()}.\n")
     with TemporaryDirectory() as folder:
         install_template(Path(folder))
-        text = report(on_progress, *((0.002, 1) if options_given.quick else ()))
+        tables = report(on_progress, *((0.002, 1) if options_given.quick else ()))
     if options_given.output is not None:
-        options_given.output.parent.mkdir(parents=True, exist_ok=True)
-        options_given.output.write_text(text, encoding="utf-8")
+        save_tables(options_given.output, "python -m tests.benchmarks.models", tables)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.benchmarks.ensemble_cases import Size, Variation, drawn, end_values
+from tests.benchmarks.table import save_tables
 from wearsim.types import FloatArray
 
 WHOLE = Size(tests=300)
@@ -77,15 +78,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="tests.benchmarks.persistence", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer and shortened tests")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE.md", help="also write it to this file"
+        "-o", "--output", type=Path, metavar="FILE.json", help="also write it to this file"
     )
     options = parser.parse_args(arguments)
     size = QUICK if options.quick else WHOLE
     text = table(spreads(size), float(drawn("per-test", WHOLE).total_passes))
     sys.stdout.write(text)
     if options.output is not None:
-        options.output.parent.mkdir(parents=True, exist_ok=True)
-        options.output.write_text(text, encoding="utf-8")
+        save_tables(options.output, "python -m tests.benchmarks.persistence", {"persistence": text})
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from tests.benchmarks import choices, contacts, starts, studies, wear_tests
-from tests.benchmarks.table import Effort, Row, markdown
+from tests.benchmarks.table import Effort, Row, markdown, save_tables
 from wearsim_bench.measure.machine import this_machine
 
 TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
@@ -36,18 +36,17 @@ QUICK = Effort(repetitions=1, part=0.005)
 
 def report(
     effort: Effort, on_progress: Callable[[str], object], titles: Iterable[str] = TABLES
-) -> str:
-    """Measure some tables and return the report; call `on_progress` with each finished table."""
-    text = f"Measured on {this_machine()}; best of {effort.repetitions}.\n"
+) -> dict[str, str]:
+    """Measure some tables and return them; call `on_progress` with each finished table."""
+    on_progress(f"Measured on {this_machine()}; best of {effort.repetitions}.\n")
     if effort.quick:
-        text += "\nShortened tests: these numbers only show that the report works.\n"
-    on_progress(text)
+        on_progress("\nShortened tests: these numbers only show that the report works.\n")
+    tables = {}
     for title in titles:
         rows = [row for function in TABLES[title] for row in function(effort)]
-        table = "\n" + markdown(title, rows)
-        on_progress(table)
-        text += table
-    return text
+        tables[title] = markdown(title, rows)
+        on_progress("\n" + tables[title])
+    return tables
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -55,7 +54,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="tests.benchmarks.report", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="shorten everything")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE.md", help="also write it to this file"
+        "-o", "--output", type=Path, metavar="FILE.json", help="also write it to this file"
     )
     parser.add_argument(
         "--table", action="append", choices=list(TABLES), help="only this table; may be repeated"
@@ -67,10 +66,9 @@ def main(arguments: list[str] | None = None) -> None:
         sys.stdout.flush()
 
     effort = QUICK if options.quick else Effort()
-    text = report(effort, on_progress, options.table or TABLES)
+    tables = report(effort, on_progress, options.table or TABLES)
     if options.output is not None:
-        options.output.parent.mkdir(parents=True, exist_ok=True)
-        options.output.write_text(text, encoding="utf-8")
+        save_tables(options.output, "python -m tests.benchmarks.report", tables)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,9 @@ Without that option each benchmark runs once, as a test.
 
 from __future__ import annotations
 
+import json
+import re
+
 import pytest
 
 import wearsim
@@ -80,10 +83,26 @@ def test_scatter_is_tabulated_by_persistence(monkeypatch):
 
 def test_tables_of_models_contain_every_model():
     tables = []
-    text = models.report(tables.append, share=0.0005, repetitions=1)
+    found = models.report(tables.append, share=0.0005, repetitions=1)
     assert [part.splitlines()[0][:3] for part in tables] == ["## "] * 3
     whole = tables[2].splitlines()[4:]
     rows = [line for line in whole if line.startswith("|")]
     assert len(rows) == len(models.normal_models())
     assert models.FAILED not in tables[2]
-    assert all(label in text for label in models.TANGENTIAL)
+    drawn = found["Tangential theories on elliptic contacts"]
+    assert all(label in drawn for label in models.TANGENTIAL)
+
+
+def test_saved_tables_have_date_machine_and_cells(tmp_path):
+    row = table.Row("a | b", 0.012, error="1 %")
+    file = tmp_path / "saved" / "report.json"
+    escaped = table.markdown("One", [row]).replace("a | b", r"a \| b")
+    table.save_tables(file, "python -m x", {"One": escaped + "\nA note.\n"})
+    saved = json.loads(file.read_text())
+    assert saved["command"] == "python -m x"
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", saved["machine"]["date"])
+    assert saved["tables"]["One"] == {
+        "columns": ["case", "measured", "target", "error"],
+        "rows": [["a | b", "12 ms", "", "1 %"]],
+        "notes": ["A note."],
+    }

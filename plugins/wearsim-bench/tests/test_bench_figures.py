@@ -20,7 +20,7 @@ from wearsim_bench.figures.topic import bench_figure
 from wearsim_bench.measure.machine import Machine
 from wearsim_bench.measure.measurement import Effort, Measurement, Topic
 
-MACHINE = Machine("a processor", 2, "3.12.1", {"numpy": "2.0"}, 1e-4)
+MACHINE = Machine("a processor", 2, "3.12.1", {"numpy": "2.0"}, 1e-4, "2026-11-22")
 
 
 def measured(method, setting, seconds, error, **keywords):

@@ -230,6 +230,7 @@ def test_verdicts_in_json_and_markdown(monkeypatch):
     assert all(verdict.holds for verdict in verdicts)
     kept = json.loads(json.dumps([verdict.as_json() for verdict in verdicts]))
     assert [item["case"] for item in kept] == [verdict.case for verdict in verdicts]
+    assert tuple(map(Verdict.from_json, kept)) == verdicts
     checks = {check["name"] for check in kept[0]["checks"]}
     assert checks == set(CRITERIA) - {"tolerance"}  # not part of the quick evaluation
     text = hard_markdown(verdicts)
@@ -240,6 +241,7 @@ def test_verdicts_in_json_and_markdown(monkeypatch):
 def test_failed_case_is_bold_in_markdown():
     wrong = Verdict("wrong", criteria=(Criterion("load", 1.0, 1e-9),))
     assert "**failed**: load 1.0e+00 > 1e-09" in hard_markdown((wrong,))
+    assert Verdict.from_json(wrong.as_json()).failures == wrong.failures
 
 
 def test_hard_cases_run_with_another_model(monkeypatch):

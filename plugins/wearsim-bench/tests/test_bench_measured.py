@@ -1,7 +1,10 @@
 """Pareto front, validation of measurements, and the machine."""
 
 import itertools
+import json
 import math
+from dataclasses import replace
+from datetime import date
 
 import pytest
 from hypothesis import given
@@ -71,9 +74,12 @@ def test_json_marks_the_front():
     rows = topic.as_json()["measurements"]
     assert [row["front"] for row in rows] == [True, False, True]
     assert topic.groups == ["problems"]
+    topic = replace(topic, details=("problems",), conclusions={"problems": "as expected"})
+    assert Topic.from_json(json.loads(json.dumps(topic.as_json()))) == topic
 
 
 def test_machine_is_named_and_measured():
     machine = this_machine(repetitions=1)
     assert f"{machine.cores} cores, Python 3." in str(machine)
     assert 1e-6 < machine.yardstick < 1.0
+    assert date.fromisoformat(machine.date).year >= 2026

@@ -1,6 +1,6 @@
 """Coverage of the intervals of lives: repeated samples of lives with known distributions.
 
-Run as a script, it prints the table of docs/life.md.
+Run as a script with the name of a JSON file, it writes the table of docs/life.md there.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -143,7 +144,12 @@ def rows(repeats: int, seed: int) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    chosen = [int(text) for text in sys.argv[1:]] or [REPEATS, SEED]
-    for line in rows(*chosen):
+    from tests.benchmarks.table import save_tables
+
+    lines = []
+    for line in rows(REPEATS, SEED):
         sys.stdout.write(f"{line}\n")
         sys.stdout.flush()
+        lines.append(line)
+    command = "python -m tests.uq.survival.coverage_study"
+    save_tables(Path(sys.argv[1]), command, {"coverage": "\n".join(lines)})

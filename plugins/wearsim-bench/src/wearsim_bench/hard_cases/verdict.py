@@ -109,4 +109,14 @@ class Verdict:
         """Return the verdict for JSON."""
         checks = [{**asdict(item), "holds": item.holds} for item in self.criteria]
         words = {"case": self.case, "holds": self.holds, "failures": list(self.failures)}
-        return {**words, "said": self.error, "checks": checks, "figures": dict(self.figures)}
+        words |= {"unexpected": self.unexpected, "said": self.error}
+        return {**words, "checks": checks, "figures": dict(self.figures)}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Verdict:
+        """Return the verdict of an object that `as_json` returned."""
+        criteria = tuple(
+            Criterion(**{key: value for key, value in item.items() if key != "holds"})
+            for item in data["checks"]
+        )
+        return cls(data["case"], data["said"], data["unexpected"], criteria, data["figures"])

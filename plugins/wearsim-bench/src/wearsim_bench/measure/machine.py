@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from dataclasses import dataclass
+from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 
@@ -34,6 +35,8 @@ class Machine:
         Versions of the libraries by name.
     yardstick : float
         Smallest time of a fixed compiled computation on one core [s].
+    date : str
+        Date of the measurement, "2026-11-22".
     """
 
     processor: str
@@ -41,6 +44,7 @@ class Machine:
     python: str
     libraries: dict[str, str]
     yardstick: float
+    date: str
 
     def __str__(self) -> str:
         libraries = ", ".join(f"{name} {number}" for name, number in self.libraries.items())
@@ -58,7 +62,12 @@ def this_machine(repetitions: int = 5) -> Machine:
     libraries = {name: version(name) for name in LIBRARIES}
     seconds = yardstick_seconds(repetitions)
     return Machine(
-        _processor(), available_processors(), platform.python_version(), libraries, seconds
+        _processor(),
+        available_processors(),
+        platform.python_version(),
+        libraries,
+        seconds,
+        date.today().isoformat(),  # noqa: DTZ011
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 #: called with a description of the current measurement and the completed fraction of the topic
@@ -158,12 +158,23 @@ class Topic:
         """Return the topic for JSON, in SI units; `front` marks the Pareto front."""
         in_front = {id(item) for group in self.groups for item in self.front(group)}
         rows = [{**asdict(item), "front": id(item) in in_front} for item in self.measurements]
-        words = {"title": self.title, "about": self.about, "seconds": self.seconds}
+        words = {"name": self.name, "title": self.title, "about": self.about}
+        words |= {"seconds": self.seconds}
         words |= {"timing": self.timing} if self.timing else {}
         against = {"error": self.error, "floor": self.floor}
         heads = {"errors": dict(self.errors), "counts": dict(self.counts)}
-        concluded = {"conclusions": dict(self.conclusions)}
+        concluded = {"details": list(self.details), "conclusions": dict(self.conclusions)}
         return {**words, **against, **heads, **concluded, "measurements": rows}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Topic:
+        """Return the topic of an object that `as_json` returned."""
+        rows = tuple(
+            Measurement(**{key: value for key, value in row.items() if key != "front"})
+            for row in data["measurements"]
+        )
+        known = {item.name: data[item.name] for item in fields(cls) if item.name in data}
+        return cls(**{**known, "measurements": rows, "details": tuple(data["details"])})
 
 
 def pareto(items: Iterable[Measurement], error: str, floor: float = 0.0) -> list[Measurement]:
