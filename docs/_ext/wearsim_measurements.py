@@ -148,7 +148,7 @@ class Measurements:
         """Return the text of a page with tables and numbers in place of its `{{ ... }}`."""
         names = [name for name in dir(self) if not name.startswith("_")]
         settings = {"undefined": jinja2.StrictUndefined, "comment_start_string": "{##"}
-        template = jinja2.Environment(autoescape=False, **settings).from_string(text)  # noqa: S701
+        template = jinja2.Environment(autoescape=False, **settings).from_string(text)
         return template.render({name: getattr(self, name) for name in names})
 
 

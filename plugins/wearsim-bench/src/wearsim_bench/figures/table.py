@@ -158,7 +158,10 @@ def measured_on(machine: Machine, effort: Effort, timing: str = "") -> str:
     """Return a sentence on the machine, its yardstick, and the extent of the benchmark."""
     best = "timed once" if effort.repetitions == 1 else f"best of {effort.repetitions}"
     times = timing or best
-    texts = [f"Measured on {machine.date} on {machine}; one yardstick is {brief(machine.yardstick)}; {times}"]
+    texts = [
+        f"Measured on {machine.date} on {machine}; one yardstick is {brief(machine.yardstick)}",
+        times,
+    ]
     texts += ["quick: few cases and short tests, for a trial run"] * effort.quick
     texts += [f"contact model {effort.plugin}"] * (effort.plugin is not None)
     return "; ".join(texts) + "."

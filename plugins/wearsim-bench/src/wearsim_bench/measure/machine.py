@@ -67,7 +67,7 @@ def this_machine(repetitions: int = 5) -> Machine:
         platform.python_version(),
         libraries,
         seconds,
-        date.today().isoformat(),  # noqa: DTZ011
+        date.today().isoformat(),
     )
 
 
