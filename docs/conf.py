@@ -138,13 +138,13 @@ html_theme_options = {
     "collapse_navigation": True,
     "header_links_before_dropdown": 7,
     "navigation_with_keys": False,
-    "secondary_sidebar_items": ["page-toc"],
+    "secondary_sidebar_items": [],  # the contents of a page are below the navigation, figures are wide
     "footer_start": ["copyright"],
     "footer_end": ["theme-version"],
     "pygments_light_style": "a11y-high-contrast-light",
     "pygments_dark_style": "a11y-high-contrast-dark",
 }
-html_sidebars = {"index": [], "start": []}
+html_sidebars = {"**": ["sidebar-nav-bs", "page-toc"], "index": [], "start": ["page-toc"]}
 
 linkcheck_timeout = 20
 linkcheck_retries = 2

@@ -8,6 +8,9 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
+
+WIDTH = 10.5  # greatest width of a figure [in], so that its letters are readable on a page
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 # the kernel asks programs for colours and control codes, which pages do not show
@@ -40,4 +43,14 @@ def load_ipython_extension(shell: Any) -> None:
     """Register `%%sh`, show figures as SVG, and copy the scenarios next to the notebook."""
     shell.register_magic_function(run_shell, "cell", "sh")
     shell.run_line_magic("config", "InlineBackend.figure_formats = ['svg']")
+    formatter = shell.display_formatter.formatters["image/svg+xml"]
+    drawn = formatter.lookup_by_type(Figure)
+
+    def draw(figure: Figure) -> str:
+        factor = min(1.0, WIDTH / figure.get_figwidth())
+        figure.set_size_inches(factor * figure.get_size_inches())
+        text: str = drawn(figure)
+        return text
+
+    formatter.for_type(Figure, draw)
     shutil.copytree(SCENARIOS, SCENARIOS.name, dirs_exist_ok=True)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 MEASURED = Path(__file__).parents[1] / "measurements"
 FIGURES = "_build/figures"  # of the documentation
+WIDTH = 10.5  # of a figure [in], so that its letters are readable on a page
 TEMPLATE = "{{ "
 
 
@@ -81,7 +82,9 @@ class Measurements:
             if "measurements" in data and stale:
                 folder.mkdir(parents=True, exist_ok=True)
                 effort, topic = Effort(**data["effort"]), self._topic(source.stem)
-                save_figure(bench_figure(topic, self._machine(source.stem), effort), path)
+                figure = bench_figure(topic, self._machine(source.stem), effort)
+                figure.set_figwidth(WIDTH)
+                save_figure(figure, path)
 
     def _one(self, name: str, group: str, method: str, setting: str) -> Measurement:
         """Return a measurement; of several defaults of a method, that with the fewest strips."""
