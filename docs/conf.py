@@ -138,7 +138,7 @@ html_theme_options = {
     "collapse_navigation": True,
     "header_links_before_dropdown": 7,
     "navigation_with_keys": False,
-    "secondary_sidebar_items": [],  # the contents of a page are below the navigation, figures are wide
+    "secondary_sidebar_items": [],  # figures are wide; the contents are below the navigation
     "footer_start": ["copyright"],
     "footer_end": ["theme-version"],
     "pygments_light_style": "a11y-high-contrast-light",

@@ -42,6 +42,7 @@ def run_shell(_line: str, cell: str) -> None:
 def load_ipython_extension(shell: Any) -> None:
     """Register `%%sh`, show figures as SVG, and copy the scenarios next to the notebook."""
     shell.register_magic_function(run_shell, "cell", "sh")
+    shell.run_line_magic("matplotlib", "inline")
     shell.run_line_magic("config", "InlineBackend.figure_formats = ['svg']")
     formatter = shell.display_formatter.formatters["image/svg+xml"]
     drawn = formatter.lookup_by_type(Figure)

@@ -16,6 +16,7 @@ import jinja2
 
 from wearsim.report.parts import save_figure
 from wearsim.report.text import brief
+from wearsim_bench import figures
 from wearsim_bench.figures.hard_cases import hard_markdown
 from wearsim_bench.figures.table import markdown, markdown_table, measured_on, percent
 from wearsim_bench.figures.topic import bench_figure
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
 MEASURED = Path(__file__).parents[1] / "measurements"
 FIGURES = "_build/figures"  # of the documentation
-WIDTH = 10.5  # of a figure [in], so that its letters are readable on a page
 TEMPLATE = "{{ "
 
 
@@ -76,15 +76,15 @@ class Measurements:
 
     def draw(self, folder: Path) -> None:
         """Draw the figures of all topics that are newer than their figures, as SVG."""
+        newest = max(path.stat().st_mtime for path in Path(figures.__file__).parent.glob("*.py"))
         for source in sorted(self.folder.glob("*.json")):
             data, path = self._read(source.stem), folder / f"{source.stem}.svg"
-            stale = not path.exists() or path.stat().st_mtime < source.stat().st_mtime
+            drawn = path.stat().st_mtime if path.exists() else 0.0
+            stale = drawn < max(newest, source.stat().st_mtime)
             if "measurements" in data and stale:
                 folder.mkdir(parents=True, exist_ok=True)
                 effort, topic = Effort(**data["effort"]), self._topic(source.stem)
-                figure = bench_figure(topic, self._machine(source.stem), effort)
-                figure.set_figwidth(WIDTH)
-                save_figure(figure, path)
+                save_figure(bench_figure(topic, self._machine(source.stem), effort), path)
 
     def _one(self, name: str, group: str, method: str, setting: str) -> Measurement:
         """Return a measurement; of several defaults of a method, that with the fewest strips."""

@@ -57,7 +57,7 @@ def cam_run_figure(result: Result, measured: tuple[Measured, ...] = ()) -> Figur
         _draw_shape(panels["shape"], turn, stations, depth)
         _draw_lift(panels["lift"], turn, stations, result, colours)
         draw_depth(panels["depth"], result)
-        panels["depth"].legend(loc="lower right")
+        panels["depth"].legend(loc="lower right", fontsize=7.0, handlelength=1.0)
         _draw_groove(panels["groove"], result, depth, colours)
         draw_measured(panels["groove"], measured)
         _draw_roller(panels["roller"], result, colours)

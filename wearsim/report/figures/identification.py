@@ -39,7 +39,7 @@ def identification_figure(result: IdentificationResult) -> Figure:
             axes = upper.subplots(2, columns, squeeze=False, sharex="col", height_ratios=[2.2, 1.0])
             for column, place in enumerate(shown):
                 _draw_trace(axes[0, column], axes[1, column], result, place)
-            axes[0, 0].legend(loc="lower right")
+            axes[0, 0].legend(loc="lower right", markerscale=4.0, fontsize=7.0)
         left, right = lower.subplots(1, 2)
         draw_factors(left, result)
         _draw_density(right, result)

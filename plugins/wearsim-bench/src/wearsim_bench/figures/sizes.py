@@ -15,8 +15,8 @@ from wearsim_bench.figures.lines import EndLabel, label_ends, set_log_axis
 from wearsim_bench.measure.measurement import Measurement, Topic
 
 _NUMBER = re.compile(r"\d[\d.]*(?:e[+-]?\d+)?")
-_ACROSS, _PANEL = 3, (4.4, 3.2)  # panels per row, and their size [in]
-_BAR, _WIDTH = 0.22, 12.0  # in
+_ACROSS, _PANEL = 3, (3.5, 3.0)  # panels per row, and their size [in]
+_BAR, _WIDTH = 0.22, 10.5  # in
 
 
 def growth_figure(topic: Topic, under: str) -> Figure:

@@ -9,7 +9,7 @@ from wearsim_bench.figures.lines import set_log_axis
 from wearsim_bench.measure.measurement import Topic
 from wearsim_bench.stated_errors.study import QUANTITIES, SMALL, STATED, TESTS, coverage
 
-_SIZE = 12.0, 4.6  # in
+_SIZE = 10.5, 4.6  # in
 _LOWEST = 1e-8  # errors below it are drawn there
 
 
@@ -51,7 +51,7 @@ def stated_errors_figure(topic: Topic, under: str) -> Figure:
             found = coverage(rows, name)
             title = f"{name}: {found.covered} of {len(rows)} covered"
             ratio = found.counts.get("median")
-            title += f", median ratio {ratio:.2g}" if ratio is not None else ""
+            title += f",\nmedian ratio {ratio:.2g}" if ratio is not None else ""
             name_axes(axes, title, "true error [%]", "")
         panels[0].set_ylabel("stated error [%]")
         handles, labels = panels[0].get_legend_handles_labels()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import ceil
 from textwrap import fill
 
-from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure, SubFigure
 
 from wearsim.report.parts import GREY, figure_style, name_axes, write_message
@@ -22,12 +21,16 @@ from wearsim_bench.measure.measurement import Effort, Measurement, Topic
 
 MOST = 6  # methods in one panel; a group of more has a panel for each family of methods
 ACROSS = 3  # panels in a row of groups with few methods
-_LETTERS = 160  # characters per line under the title
+_LETTERS = 120  # characters per line under the title
 _FRONT, _DEFAULT = "Pareto front", "default"
-_WIDTH, _HEIGHT, _SMALL_HEIGHT = 13.0, 3.1, 2.7  # of the figure and of rows of panels [in]
+_WIDTH, _HEIGHT, _SMALL_HEIGHT = 10.5, 3.1, 2.7  # of the figure and of rows of panels [in]
 _PANEL = 0.7  # height of a panel without title and labels, as a part of its row
 _TITLE = 0.9  # height of titles and legend [in]
-_MARKERS = "osD^vP*X<>ph"
+_MARKERS = "osD^vP*X"
+#: distinct also for the colour-blind, and dark enough for labels on white
+_COLOURS = (
+    "#0072b2", "#c2570c", "#117733", "#aa4499", "#8c6d00", "#332288", "#0e8a8a", "#882255",
+)  # fmt: skip
 _SMALLEST = 1e-8  # lower bound of the errors drawn
 
 
@@ -59,14 +62,15 @@ def bench_figure(topic: Topic, machine: Machine, effort: Effort) -> Figure:
     if "times" in topic.counts:
         return savings_figure(topic, under)
     rows = list(_rows(topic))
-    heights = [_SMALL_HEIGHT if len(_methods(topic.of(row[0]))) > MOST else _HEIGHT for row in rows]
+    families = [len(_families(topic, row)) for row in rows]
+    heights = [_SMALL_HEIGHT * ceil(n / ACROSS) if n else _HEIGHT for n in families]
     with figure_style():
         size = _WIDTH, _TITLE + sum(heights)
         figure = Figure(figsize=size, layout="constrained")
         parts = figure.subfigures(len(rows), 1, squeeze=False, height_ratios=heights).ravel()
         looks = _looks(topic)
-        for part, row, height in zip(parts, rows, heights, strict=True):
-            if height == _SMALL_HEIGHT:
+        for part, row, several in zip(parts, rows, families, strict=True):
+            if several:
                 _draw_families(part, topic, row[0], looks)
             else:
                 _draw_groups(part, topic, row, looks)
@@ -101,11 +105,15 @@ def _family(method: str) -> str:
     return method.partition(",")[0]
 
 
+def _families(topic: Topic, groups: Sequence[str]) -> list[str]:
+    """Return the families of a group of many methods; none of groups with few."""
+    methods = _methods(_timed(topic, groups[0]))
+    many = len(_methods(topic.of(groups[0]))) > MOST
+    return list(dict.fromkeys(map(_family, methods))) or [groups[0]] if many else []
+
+
 def _looks(topic: Topic) -> dict[str, tuple[str, str]]:
     """Return a colour and a marker for every method, different within a family or a group."""
-    wheel = [to_hex(colour) for colour in colormaps["tab10"].colors]  # type: ignore[attr-defined]
-    # grey is the colour of the other families
-    wheel = [colour for number, colour in enumerate(wheel) if number != 7]
     looks: dict[str, tuple[str, str]] = {}
     # defaults first, so that they get the strongest colours
     methods = _methods(sorted(topic.measurements, key=lambda item: not item.default))
@@ -116,8 +124,8 @@ def _looks(topic: Topic) -> dict[str, tuple[str, str]]:
         for method in present:
             others = [m for m in present if not split or _family(m) == _family(method)]
             used = {looks[m][0] for m in others if m in looks}
-            free = [colour for colour in wheel if colour not in used] or wheel
-            looks.setdefault(method, (free[0], _MARKERS[wheel.index(free[0])]))
+            free = [colour for colour in _COLOURS if colour not in used] or _COLOURS
+            looks.setdefault(method, (free[0], _MARKERS[_COLOURS.index(free[0])]))
     return looks
 
 
@@ -145,24 +153,30 @@ def _draw_families(
     part: SubFigure, topic: Topic, group: str, looks: dict[str, tuple[str, str]]
 ) -> None:
     """Draw a group of many methods, a panel for each family, with the others in grey."""
-    items = _timed(topic, group)
-    families = list(dict.fromkeys(_family(method) for method in _methods(items)))
-    row = part.subplots(1, len(families) or 1, squeeze=False, sharex=True, sharey=True)[0]
+    items, families = _timed(topic, group), _families(topic, [group])
+    lines = ceil(len(families) / ACROSS)
+    panels = part.subplots(lines, min(ACROSS, len(families)), squeeze=False, sharey=True)
+    row = panels.ravel()
+    for axes in row[len(families) :]:
+        axes.remove()
     if not items:
         write_message(row[0], group, ["no measurements"])
         return
+    for axes in row[1 : len(families)]:
+        axes.sharex(row[0])
     part.suptitle(group, x=0.01, ha="left", weight="bold", fontsize=9.5)
-    for axes, family in zip(row, families, strict=True):
+    for axes, family in zip(row, families, strict=False):
         for method in _methods(items):
             if _family(method) != family:
                 drawn = [item for item in items if item.method == method]
                 axes.plot(*_coordinates(drawn, topic.error), color=GREY, lw=0.6, alpha=0.35)
-    for axes, family in zip(row, families, strict=True):
+    for axes, family in zip(row, families, strict=False):
         own = [item for item in items if _family(item.method) == family]
         _draw_lines(axes, topic, group, own, looks)
         name_axes(axes, family, f"time of {topic.seconds}", "")
-    row[0].set_ylabel(f"{topic.errors[topic.error]} [%]")
-    for axes, family in zip(row, families, strict=True):
+    for first in panels[:, 0]:
+        first.set_ylabel(f"{topic.errors[topic.error]} [%]")
+    for axes, family in zip(row, families, strict=False):
         own = [item for item in items if _family(item.method) == family]
         names = {m: m.removeprefix(family).lstrip(", ") or "no option" for m in _methods(own)}
         _label_lines(axes, topic, own, names, looks, _SMALL_HEIGHT)
