@@ -48,7 +48,8 @@ def test_topic_is_printed_and_saved(command, tmp_path):
     names = {path.name for path in folder.iterdir()}
     assert names == {"growth.json", "growth.md", "growth.png"}
     saved = json.loads((folder / "growth.json").read_text())
-    assert saved["effort"] == {"quick": True, "repetitions": 1, "plugin": None}
+    effort = {"quick": True, "repetitions": 1, "plugin": None, "against": None}
+    assert saved["effort"] == effort
     assert saved["machine"]["yardstick"] > 0.0
     assert [row["front"] for row in saved["measurements"]] == [True, True, False]
     assert "| method | fine | 10 ms |" in (folder / "growth.md").read_text()
