@@ -1,5 +1,9 @@
 """The half-space model: requirements on contact models, Carter, hard contacts, runs."""
 
+import subprocess
+import sys
+from ast import literal_eval
+
 import pytest
 
 import wearsim
@@ -66,3 +70,11 @@ def test_extrapolation_leaves_a_part_of_the_error():
         error = abs(found.power / known.power - 1.0)
         assert error < rest
         assert error < 0.5 * abs(raw.power / known.power - 1.0)
+
+
+def test_plugin_loads_no_transforms_before_a_solution():
+    code = (
+        "import sys, wearsim_halfspace; print([m for m in sys.modules if m.startswith('scipy.')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"scipy.fft", "scipy.special", "scipy.optimize"} & set(literal_eval(done.stdout))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from scipy import fft
 
 from wearsim.types import FloatArray
 
@@ -53,6 +52,9 @@ class Convolution:
     """
 
     def __init__(self, coefficients: FloatArray) -> None:
+        from scipy import fft  # noqa: PLC0415  (slow to load)
+
+        self._fft = fft
         kernels, high, wide = coefficients.shape
         self.rows, self.columns = (high + 1) // 2, (wide + 1) // 2
         self.middle = coefficients[:, self.rows - 1, :]
@@ -85,12 +87,12 @@ class Convolution:
 
     def _forward(self, field: FloatArray) -> FloatArray:
         # the rows of the padding are not transformed
-        along = fft.rfft(field, n=self._wide, axis=-1)
-        return np.asarray(fft.fft(along, n=self._high, axis=-2))
+        along = self._fft.rfft(field, n=self._wide, axis=-1)
+        return np.asarray(self._fft.fft(along, n=self._high, axis=-2))
 
     def _back(self, transform: FloatArray) -> FloatArray:
-        across = fft.ifft(transform, axis=-2, overwrite_x=True)[..., : self.rows, :]
-        return np.asarray(fft.irfft(across, n=self._wide, axis=-1)[..., : self.columns])
+        across = self._fft.ifft(transform, axis=-2, overwrite_x=True)[..., : self.rows, :]
+        return np.asarray(self._fft.irfft(across, n=self._wide, axis=-1)[..., : self.columns])
 
 
 class Elements:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import fft
 
 from wearsim.plugins import ContactError
 from wearsim.types import FloatArray
@@ -127,6 +126,9 @@ class _ApproximateInverse:
     """Inverse of the convolution on a grid without padding, as if the grid were periodic."""
 
     def __init__(self, convolve: Convolution) -> None:
+        from scipy import fft  # noqa: PLC0415  (slow to load)
+
+        self._fft = fft
         high = fft.next_fast_len(convolve.rows)
         wide = fft.next_fast_len(convolve.columns, real=True)
         rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in (high, wide))
@@ -137,6 +139,6 @@ class _ApproximateInverse:
         self._shape = high, wide
 
     def __call__(self, field: FloatArray) -> FloatArray:
-        transform = self._inverse * fft.rfft2(field, s=self._shape)
-        found = fft.irfft2(transform, s=self._shape)
+        transform = self._inverse * self._fft.rfft2(field, s=self._shape)
+        found = self._fft.irfft2(transform, s=self._shape)
         return np.asarray(found[: field.shape[0], : field.shape[1]])
