@@ -52,6 +52,7 @@ def axes(x: str, y: str, **options: Any) -> Any:
         x_axis_label=x,
         y_axis_label=y,
         toolbar_location="above",
+        min_border_right=14,  # for half of the last tick label
         **options,
     )
     plot.toolbar.logo = None

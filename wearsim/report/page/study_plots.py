@@ -183,12 +183,12 @@ def effect_plots(result: EnsembleResult, name: str, values: FloatArray) -> list[
     effects = [item for item in result.sensitivity(name) if math.isfinite(item.first.value)]
     if not effects:
         return []
-    of = "logarithm of the life" if name == "life" else name
+    of = "ln life" if name == "life" else f"the {name}"
     names = [item.name for item in effects][::-1]
     first = [item.first for item in effects][::-1]
     low, high = [item.low for item in first], [item.high for item in first]
     extent = Range1d(start=min(0.0, *low), end=max(1.0, *high))
-    plot = axes(f"part of the variance of the {of}", "", y_range=names, x_range=extent)
+    plot = axes(f"part of the variance of {of}", "", y_range=names, x_range=extent)
     data = columns(name=names, value=[item.value for item in first], low=low, high=high)
     bars = plot.hbar("name", right="value", height=0.5, source=data, color=BLUE, alpha=0.6)
     plot.add_layout(Whisker(base="name", source=data, **WIDTH))
@@ -207,7 +207,7 @@ def _draws(result: EnsembleResult, effect: Effect, name: str, shown_values: Floa
     values = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1) / size
     drawn = np.flatnonzero(np.isfinite(shown_values))
     every = drawn[evenly_spaced(len(drawn), MOST_POINTS)]
-    label = "depth at the end [um]" if name == "depth" else name
+    label = "depth at the end [um]" if name == "depth" else f"life [{result.unit}]"
     plot = axes(f"{item['key']} [{unit}]", label)
     plot.xaxis.ticker = BasicTicker(desired_num_ticks=3)
     data = columns(x=values[every], value=shown_values[every], number=result.numbers[every])
