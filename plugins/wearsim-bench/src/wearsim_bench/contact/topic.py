@@ -134,7 +134,9 @@ def _solved_by(
     ContactError
         If it solves none of them.
     """
-    total, errors, found = sum(len(group.cases) for group in groups), [], []
+    total = sum(len(group.cases) for group in groups)
+    errors: list[float] = []
+    found: list[_Group] = []
     failure = ContactError(f"'{reference}' solves none of the contacts")
     for group in groups:
         cases = []
