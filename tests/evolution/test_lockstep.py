@@ -161,10 +161,10 @@ def test_tests_without_failures_are_solved_in_one_batch(recorded):
     problems, stepper, stop, sizes = recorded
     ends = ends_of(problems, stepper, stop)
     assert max(sizes) == len(problems)
-    # the two halves of a step and the whole step begin with all tests in progress
+    # every step begins with all tests in progress
     steps = [int(end.steps[0]) for end in ends]
-    assert sizes.count(len(problems)) >= 3 * min(steps)
-    assert len(sizes) < sum(steps) * 3
+    assert sizes.count(len(problems)) >= min(steps)
+    assert len(sizes) < sum(steps)
 
 
 def test_converged_realisations_are_not_solved_again(recorded):

@@ -177,12 +177,12 @@ def test_hdf5_of_another_program_is_refused(tmp_path: Path) -> None:
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 6
+    file.attrs["format_version"] = 7
     del file["depth"]
 
 
 def _older(file: h5py.File) -> None:
-    file.attrs["format_version"] = 4
+    file.attrs["format_version"] = 5
 
 
 def _incomplete(file: h5py.File) -> None:
@@ -208,14 +208,14 @@ def _with_about(text: str) -> Callable[[h5py.File], None]:
         (
             _newer,
             (
-                "has layout 6 of wearsim-run, and this wearsim reads layout 5; update wearsim to"
+                "has layout 7 of wearsim-run, and this wearsim reads layout 6; update wearsim to"
                 " read it"
             ),
         ),
         (
             _older,
             (
-                "has layout 4 of wearsim-run, and this wearsim reads layout 5; repeat the"
+                "has layout 5 of wearsim-run, and this wearsim reads layout 6; repeat the"
                 " computation, or read it with the version of wearsim that wrote it"
             ),
         ),

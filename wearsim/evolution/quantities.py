@@ -41,6 +41,11 @@ class ContactInputs:
     tilt: FloatArray
     bearing_torque: FloatArray
 
+    @cached_property
+    def mean_offset(self) -> FloatArray:
+        """Mean of `normal_force_offset` over the contacts, shape (realisations,) [N]."""
+        return np.asarray(self.normal_force_offset.mean(axis=0))
+
     @classmethod
     def uniform(cls, contacts: int, realisations: int = 1, **values: float) -> ContactInputs:
         """Return inputs that are equal for all contacts; zero where no value is given."""

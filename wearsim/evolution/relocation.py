@@ -18,7 +18,7 @@ from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.loads import displacement_at
 from wearsim.evolution.steppers.single_step import recovery_at, solve_at_record
 from wearsim.mechanics.cam import moved_stations
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
 
 MOVED = math.radians(0.25)  # movement of an end of a skid at which stations are placed again
 LOOK = 1e-3  # change of the normal force, relative to it, after which skids are located again
@@ -122,6 +122,7 @@ def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamSta
         contacts=fresh.contacts,
         approach_factor=fresh.approach_factor,
         solves=state.solves + 2 * problem.contacts_each,
+        stepping_error=_moved_errors(state, old.along, new.along, old.places),
         **cleared,
         **{
             name: _moved(problem, part.replaced(skid_loads=state.skid_loads), old, new)
@@ -130,6 +131,18 @@ def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamSta
     )
     contacts, _ = solve_at_record(problem, found, on_profile=False, cold=True)
     return found.replaced(contacts=contacts)
+
+
+def _moved_errors(
+    state: WearState, old: CamStations, new: CamStations, places: IntArray
+) -> FloatArray | None:
+    """Return the errors of the depths at new stations, interpolated along the angle."""
+    errors, stations = state.stepping_error, len(state.cylinder_depth)
+    if errors is None or old.panels is None or new.panels is None:
+        return None
+    matrix, _, _ = moved_stations(old.panels, new.panels)
+    cylinder = np.tensordot(matrix, errors[:stations][places], axes=1)
+    return np.concatenate([cylinder, errors[stations:]])
 
 
 def moved_depth(depth: FloatArray, old: CamStations, new: CamStations) -> FloatArray:

@@ -52,6 +52,7 @@ _AXES = {
     "past_spans": 1,
     "order": 0,
     "skid_loads": 2,
+    "stepping_error": 1,
 }
 
 
@@ -126,6 +127,8 @@ class WearState:
     skid_loads : ndarray, shape (2, stations of the unworn cam, realisations), optional
         Changes of the normal force of a cam with which its stations were placed, and with which
         the skids were last located, see `relocation` [N]; none before wear has changed them.
+    stepping_error : ndarray, shape (stations + rollers, realisations, strips), optional
+        Estimated error of the depths of cylinder and rollers, computed less true ones [m].
     """
 
     passes: FloatArray
@@ -157,6 +160,7 @@ class WearState:
     past_spans: FloatArray | None = None
     order: IntArray | None = None
     skid_loads: FloatArray | None = None
+    stepping_error: FloatArray | None = None
 
     @property
     def depths(self) -> Depths:
@@ -166,7 +170,7 @@ class WearState:
     @property
     def stacked(self) -> FloatArray:
         """Worn depths of all bodies, shape (stations + rollers, realisations, strips) [m]."""
-        return np.concatenate([self.cylinder_depth[:, 0], self.roller_depth[0]])
+        return stacked_depths(self.depths)
 
     def with_stacked(self, depths: FloatArray) -> WearState:
         """Return the state with other depths, as in `stacked`."""
@@ -272,6 +276,11 @@ def joined_states(states: Sequence[WearState]) -> WearState:
     )
 
 
+def stacked_depths(depths: Depths) -> FloatArray:
+    """Return depths of cylinder and rollers as `WearState.stacked`."""
+    return np.concatenate([depths[0][:, 0], depths[1][0]])
+
+
 def widened(array: FloatArray, strips: int) -> FloatArray:
     """Return `array` with `strips` zeros added at both ends of its last axis."""
     return np.pad(array, [(0, 0)] * (array.ndim - 1) + [(strips, strips)])
@@ -291,7 +300,7 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
     contacts = state.contacts
     optional = {
         name: widened(values, strips)
-        for name in ("loop_strips", "past_wear", "wear_exponents")
+        for name in ("loop_strips", "past_wear", "wear_exponents", "stepping_error")
         if (values := getattr(state, name)) is not None
     }
     if "wear_exponents" in optional:  # zero on the added strips

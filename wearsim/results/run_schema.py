@@ -166,5 +166,5 @@ CAM_VARIABLES: Mapping[str, Variable] = by_name(
 )
 ALL_VARIABLES: Mapping[str, Variable] = {**VARIABLES, **CAM_VARIABLES}
 
-RUN = Schema("wearsim-run", 5, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Schema("wearsim-run", 6, "a wear test, from `wearsim run`", AXES, VARIABLES)
 CAM_RUN = replace(RUN, variables=ALL_VARIABLES)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from wearsim.mechanics.numerics.linearised_wear import (
+    carried_errors,
     difference_sizes,
     linearised_wear,
     wear_of_bodies,
@@ -89,3 +90,35 @@ def test_sizes_of_differences():
     sizes = difference_sizes(depths, differences, weights)[:, 0]
     expected = [0.3, 2.0 * -9.1 + 3.0 * 5.3, np.linalg.norm(differences), np.linalg.norm(depths)]
     assert sizes == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 4e6])
+def test_wear_fills_the_errors_of_a_shape(stiffness):
+    n, spacing = 8, 1e-4
+    loads, depths = np.full((1, n), 2e5), np.zeros((2, 1, n))
+    wear = np.stack([np.full((1, n), 3e-6), np.zeros((1, n))])
+    before, added = np.zeros((2, 1, n)), np.zeros((2, 1, n))
+    added[0, 0] = 1e-8 * (1.0 + (-1.0) ** np.arange(n))
+    weights = np.array([[1.0, 0.0], [2.0, 5.0]])
+    errors, sizes = carried_errors(
+        before,
+        added,
+        loads,
+        wear,
+        np.ones((1, n)),
+        np.array([2e-6]),
+        np.zeros((1, n)),
+        depths,
+        np.array([[0, 1]]),
+        np.array([stiffness]),
+        spacing,
+        weights,
+    )
+    # strips as springs in series with the wear, and the spring of the load
+    elastic, worn = 0.5 * 2e-6 / 2e5, 3e-6 / 2e5
+    mean = 1e-8 * n / (n + stiffness / spacing * (elastic + worn))
+    expected = added[0, 0] - worn / (elastic + worn) * (added[0, 0] - mean)
+    np.testing.assert_allclose(errors[0, 0], expected, rtol=1e-12)
+    assert not errors[1].any()
+    assert sizes[2, 0] == pytest.approx(np.linalg.norm(expected))
+    assert sizes[5, 0] == pytest.approx(2.0 * expected.sum())

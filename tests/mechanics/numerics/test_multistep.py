@@ -41,6 +41,13 @@ class Solution:
         return guess.item()
 
 
+def errors_of(differences, spans, value, order):
+    """Relative errors at each order, and the error of one solution at an order."""
+    own = np.empty_like(value)
+    sizes = local_errors(differences, spans, value, np.array([order]), own)
+    return sizes[:, 0], own
+
+
 @pytest.mark.parametrize("order", ORDERS)
 def test_formula_is_exact_for_polynomials_of_its_order(order):
     exact = np.polynomial.Polynomial([0.3, -0.7, 1.1, 2.0, -1.3][: order + 1])
@@ -70,8 +77,11 @@ def test_local_error_is_that_of_a_step_from_exact_points(order):
     solution = Solution(lambda t: np.exp(-t), POINTS * 0.5)
     solution.step(length, order, -np.exp(-length))
     exact = np.exp(-length)
-    errors = local_errors(solution.differences, solution.spans, solution.value)[:, 0] * exact
+    sizes, own = errors_of(solution.differences, solution.spans, solution.value, order)
+    errors = sizes * exact
     assert errors[order - 1] == pytest.approx(abs(solution.value.item() - exact), rel=0.2)
+    # with its sign
+    assert own.item() == pytest.approx(solution.value.item() - exact, rel=0.2)
     assert (np.diff(errors[: order + 1]) < 0.0).all()
 
 
@@ -83,7 +93,7 @@ def test_known_derivative_replaces_a_past_point():
     solution.spans[:] = np.inf
     solution.spans[0] = 0.0
     solution.step(0.01, 1, np.exp(0.01))
-    errors = local_errors(solution.differences, solution.spans, solution.value)[:, 0]
+    errors, _ = errors_of(solution.differences, solution.spans, solution.value, 1)
     assert errors[0] == pytest.approx(0.5e-4, rel=0.02)
     assert not np.isfinite(errors[1:]).any()
 
@@ -101,5 +111,5 @@ def test_order_is_lowered_after_a_sudden_growth_of_the_step():
 
 def test_missing_points_have_no_estimate():
     spans = np.array([[1.0], [2.0], [np.inf], [np.inf], [np.inf]])
-    errors = local_errors(np.ones((ROWS, 1, 1, 2)), spans, np.ones((1, 1, 2)))
-    assert np.isfinite(errors[:, 0]).tolist() == [True, False, False, False]
+    errors, _ = errors_of(np.ones((ROWS, 1, 1, 2)), spans, np.ones((1, 1, 2)), 1)
+    assert np.isfinite(errors).tolist() == [True, False, False, False]

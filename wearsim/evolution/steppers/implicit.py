@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,10 @@ import numpy as np
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.contacts import at_least
-from wearsim.evolution.error_estimates import greatest_depth
+from wearsim.evolution.error_estimates import (
+    greatest_depth,
+    with_pass_errors,
+)
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Attempt, Step
@@ -19,6 +23,8 @@ from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
+from wearsim.mechanics.numerics.jit import kernel_input
+from wearsim.mechanics.numerics.linearised_wear import carried_errors
 from wearsim.mechanics.numerics.multistep import (
     MAX_ORDER,
     ROWS,
@@ -29,11 +35,17 @@ from wearsim.mechanics.numerics.multistep import (
 )
 from wearsim.types import BoolArray, FloatArray, IntArray
 
+SHARE = 0.5  # part of the tolerance that a step may add to the profiles
+COVER = np.array([5.0, 2.0, 5.0])  # safety factors on the errors of depth, volume and profile
+LEAST = 0.15  # error of the greatest depth, relative to that of the profile, as it crosses zero
 LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
 SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
 GROW = (2.2, 2.2, 1.8, 1.45)  # greatest ratio of successive steps, by order
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
+
+
+_PAST = attrgetter("past_wear", "past_energy", "past_feedback", "past_spans", "order")
 
 
 class Past(NamedTuple):
@@ -48,17 +60,16 @@ class Past(NamedTuple):
     @classmethod
     def of(cls, state: WearState) -> Past:
         """Return those of a state of the implicit stepper."""
-        wear, energy, spans, order = (
-            getattr(state, name) for name in ("past_wear", "past_energy", "past_spans", "order")
-        )
-        return cls(wear, energy, state.past_feedback, spans, order)
+        return cls(*_PAST(state))
 
 
 class ImplicitStepper(StepDoublingStepper):
     """Stepper of order one to four that solves the contacts on the profiles at each step's end.
 
     It is stable for any step length. Order and step length follow from the error that a step adds
-    to the profiles, estimated by the next divided difference.
+    to the profiles, estimated by the next divided difference. The sum of these errors, as far as
+    later wear has not reduced them, is the error estimate of the test. Where load or inputs vary,
+    and with fixed steps, step doubling estimates it.
     """
 
     taper = 4.0
@@ -78,16 +89,38 @@ class ImplicitStepper(StepDoublingStepper):
     def attempt(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
+        """Take a step, estimate its error, and choose order and length of the next one."""
+        varies = problem.constant_load is None or len(problem.varying) > 0
+        if varies or self.forced_step is not None:  # local errors miss peaks of a load
+            return self._attempt_doubled(problem, state, step, stop, scheme)
+        end = scheme(problem, state, step)
+        end = with_pass_errors(problem, state, end, end, scheme, step)
+        passes = np.where(step == stop - state.passes, stop, end.passes)
+        past, own = Past.of(end), np.empty_like(state.stacked)
+        errors = local_errors(past.wear, past.spans, end.stacked, past.order, own)
+        part = (passes / stop) ** PART_EXPONENT
+        over, order, ratio = _next_steps(errors * part / (SHARE * self.tolerance), past.order)
+        others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
+        end = end.replaced(
+            passes=passes,
+            steps=state.steps + 1,
+            order=order,
+            **_estimates(problem, state, end, own, step),
+            **others,
+        )
+        return Attempt((end,), over, ratio)
+
+    def _attempt_doubled(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
+    ) -> Attempt:
         """Take a step as two halves and as a whole; choose order and length of the next one."""
         doubled = self.doubled(problem, state, step, stop, scheme)
         half, end = doubled.path
         past = Past.of(end)
-        errors = local_errors(past.wear, past.spans, end.stacked)
+        own = np.empty_like(end.stacked)
+        errors = local_errors(past.wear, past.spans, end.stacked, past.order, own)
         part = (end.passes / stop) ** PART_EXPONENT
-        errors *= part / self.tolerance
-        columns = zip(errors.T.tolist(), past.order.tolist(), strict=True)
-        chosen = zip(*(_next_step(*column) for column in columns), strict=True)
-        over, order, ratio = (np.array(column) for column in chosen)
+        over, order, ratio = _next_steps(errors * (part / self.tolerance), past.order)
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
         added = doubled.added[0] / np.where(allowed > 0.0, allowed, np.inf)
@@ -105,6 +138,56 @@ class ImplicitStepper(StepDoublingStepper):
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
         return implicit_step
+
+
+def _estimates(
+    problem: WearProblem, start: WearState, end: WearState, added: FloatArray, passes: FloatArray
+) -> dict[str, FloatArray]:
+    """Return the error estimates at the end of a step, by their names in `WearState`.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    start, end : WearState
+        States before and after the step.
+    added : ndarray
+        Error of the depths that the step adds, as `WearState.stacked` [m].
+    passes : ndarray, shape (realisations,)
+        Length of the step.
+    """
+    contacts, shape = end.contacts, end.contacts.line_load.shape
+    stiffness = np.zeros(shape[0])
+    if problem.has_spring:
+        stiffness = np.broadcast_to(problem.stiffness, problem.shape).ravel()
+    errors, sizes = carried_errors(
+        np.asarray(start.stepping_error),
+        added,
+        contacts.line_load,
+        problem.wear_parts(contacts, passes).reshape(2, *shape),
+        np.asarray(end.wear_exponents).reshape(shape),
+        contacts.approach,
+        kernel_input(problem.nominal_gap).reshape(shape),
+        end.stacked,
+        problem.body_rows,
+        stiffness,
+        problem.grid.spacing,
+        problem.volume_weights,
+    )
+    profile = sizes[2] / np.where(sizes[3] > 0.0, sizes[3], np.inf)
+    # errors of greatest depth and volume may cross zero
+    depth, volume = np.maximum(sizes[0], LEAST * profile * sizes[4]), np.abs(sizes[5])
+    found = COVER[:, None] * np.array([depth, volume, profile])
+    found[1] += start.volume_error - start.irreducible[1]
+    names = "depth_error", "volume_error", "profile_error"
+    stated = zip(names, found + end.irreducible, strict=True)
+    return {"stepping_error": errors, **dict(stated)}
+
+
+def _next_steps(errors: FloatArray, orders: IntArray) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Return the results of `_next_step` for all realisations, the last axis of the errors."""
+    columns = zip(errors.T.tolist(), orders.tolist(), strict=True)
+    over, order, ratio = zip(*(_next_step(*column) for column in columns), strict=True)
+    return np.array(over), np.array(order), np.array(ratio)
 
 
 def _next_step(errors: list[float], order: int) -> tuple[float, int, float]:
@@ -139,7 +222,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     exposure = _exposure(here, problem, force)
     spans = np.full((ROWS - 1, len(state.passes)), np.inf)
     spans[0] = 0.0
-    feedback = problem.has_spring or bool(problem.terms)
+    feedback, error = problem.has_spring or bool(problem.terms), state.stepping_error
     past_feedback = np.zeros((ROWS, *problem.shape)) if feedback else None
     if past_feedback is not None and state.skid_loads is not None:  # a worn cam
         loads = carried_loads(here, state.contacts)
@@ -152,6 +235,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
         wear_exponents=np.ones((*problem.shape, problem.grid.strips)),
+        stepping_error=np.zeros_like(state.stacked) if error is None else error,
     )
 
 
@@ -219,7 +303,7 @@ def _exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> Flo
     """Return the exposure per pass for a load before feedback, shape (realisations,) [N]."""
     if force.ndim > 1:  # of a cam
         force = problem.mean_over_turn(force)[0, 0]
-    exposure = at_least(problem, force + here.inputs.normal_force_offset.mean(axis=0))
+    exposure = at_least(problem, force + here.inputs.mean_offset)
     if any(item.name == "friction" for item in problem.varying):
         exposure = exposure * here.inputs.friction.mean(axis=0)
     return np.asarray(exposure)

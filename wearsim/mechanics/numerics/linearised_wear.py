@@ -9,6 +9,7 @@ from wearsim.types import FloatArray, IntArray
 
 LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a steady wear rate
 DEEP = 0.5  # depths are compared where a groove is deeper than this part of its greatest depth
+FOUNDATION = 0.5  # elastic compliance of a strip, over approach per greatest line load
 MIN_LOG_CHANGE = 1e-7  # least relative change of a line load for the estimate of an exponent
 
 
@@ -178,6 +179,100 @@ def difference_sizes(
     return sizes
 
 
+@kernel
+def carried_errors(
+    errors: FloatArray,
+    added: FloatArray,
+    loads: FloatArray,
+    wear: FloatArray,
+    exponents: FloatArray,
+    approaches: FloatArray,
+    gap: FloatArray,
+    depths: FloatArray,
+    bodies: IntArray,
+    stiffness: FloatArray,
+    spacing: float,
+    weights: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return errors of the depths after a step, and their sizes.
+
+    Where a groove is too deep the line load is smaller, and wear fills the error. The strips are
+    taken as an elastic foundation, and all contacts of a body as wearing it by the same amount.
+
+    Parameters
+    ----------
+    errors, added : ndarray, shape (bodies, realisations, strips)
+        Errors of the depths before the step, and those that it adds [m].
+    loads : ndarray, shape (contacts, strips)
+        Line loads [N/m].
+    wear, exponents : ndarray
+        Wear of the step and its exponents, as in `linearised_wear`.
+    approaches : ndarray, shape (contacts,)
+        Approach of each contact [m].
+    gap : ndarray, shape (contacts, strips)
+        Gap before wear [m].
+    depths : ndarray, shape (bodies, realisations, strips)
+        Depths at the end of the step [m].
+    bodies : ndarray of int, shape (contacts each, 2)
+        Rows in `errors` of the two bodies of each contact.
+    stiffness : ndarray, shape (contacts,)
+        Loss of load per descent of each contact's roller [N/m].
+    spacing : float
+        Width of a strip [m].
+    weights : ndarray, shape (2, bodies)
+        As in `difference_sizes`.
+
+    Returns
+    -------
+    errors : ndarray, shape (bodies, realisations, strips)
+    sizes : ndarray, shape (6, realisations)
+        As from `difference_sizes`; then the greatest depth [m], and the volume of the change of the
+        errors [m^3].
+    """
+    rows, realisations, n = errors.shape
+    whole = errors + added
+    carried, soft, weight = whole.copy(), np.empty((rows, n)), np.empty(n)
+    own = np.empty((len(bodies), 2, n))
+    for v in range(realisations):
+        soft[:] = 0.0
+        for c in range(len(bodies)):
+            k = c * realisations + v
+            for side in range(2):
+                for i in range(n):
+                    own[c, side, i] = 0.0
+                    if loads[k, i] > 0.0:
+                        own[c, side, i] = exponents[k, i] * wear[side, k, i] / loads[k, i]
+                        soft[bodies[c, side], i] += own[c, side, i]
+        for c in range(len(bodies)):
+            k, one, other = c * realisations + v, bodies[c, 0], bodies[c, 1]
+            least, greatest = np.inf, 0.0
+            for i in range(n):
+                least = min(least, gap[k, i] + depths[one, v, i] + depths[other, v, i])
+                greatest = max(greatest, loads[k, i])
+            elastic = FOUNDATION * (approaches[k] - least) / greatest
+            opened, held = 0.0, stiffness[k] / spacing
+            for i in range(n):
+                weight[i] = 0.0
+                if loads[k, i] > 0.0:
+                    weight[i] = 1.0 / (elastic + soft[one, i] + soft[other, i])
+                opened += weight[i] * (whole[one, v, i] + whole[other, v, i])
+                held += weight[i]
+            for i in range(n):
+                change = weight[i] * (whole[one, v, i] + whole[other, v, i] - opened / held)
+                carried[one, v, i] -= own[c, 0, i] * change
+                carried[other, v, i] -= own[c, 1, i] * change
+    sizes = np.zeros((6, realisations))
+    sizes[:4] = difference_sizes(depths, carried, weights)
+    for v in range(realisations):
+        for b in range(rows):
+            change = 0.0
+            for i in range(n):
+                sizes[4, v] = max(sizes[4, v], depths[b, v, i])
+                change += carried[b, v, i] - errors[b, v, i]
+            sizes[5, v] += weights[1, b] * change
+    return carried, sizes
+
+
 def compile_linearised_wear() -> None:
     """Compile the kernels of a step by a call for one contact of one strip."""
     strip, wear, worn = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
@@ -187,6 +282,10 @@ def compile_linearised_wear() -> None:
         strip, strip, wear, wear, compliance, constant, rows, worn, 1.0, np.ones((1, 1)), worn
     )
     difference_sizes(worn, worn, np.ones((2, 2)))
+    one = np.ones(1)
+    carried_errors(
+        worn, worn, strip, wear, strip, one, strip, worn, rows, one, 1.0, np.ones((2, 2))
+    )
 
 
 compile_alongside("solve_slender", compile_linearised_wear)

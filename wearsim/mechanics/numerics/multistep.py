@@ -148,7 +148,13 @@ def new_differences(
 
 
 @kernel
-def local_errors(differences: FloatArray, spans: FloatArray, depths: FloatArray) -> FloatArray:
+def local_errors(
+    differences: FloatArray,
+    spans: FloatArray,
+    depths: FloatArray,
+    orders: IntArray,
+    errors: FloatArray,
+) -> FloatArray:
     """Return the relative error that the last step has added at each order.
 
     Parameters
@@ -158,6 +164,10 @@ def local_errors(differences: FloatArray, spans: FloatArray, depths: FloatArray)
         Distances from the present point back to the past points.
     depths : ndarray, shape (rows, solutions, columns)
         Values at the present point.
+    orders : ndarray of int, shape (solutions,)
+        Order of the step.
+    errors : ndarray, shape (rows, solutions, columns)
+        Result: error at this order, computed less true values.
 
     Returns
     -------
@@ -166,12 +176,13 @@ def local_errors(differences: FloatArray, spans: FloatArray, depths: FloatArray)
         points are missing.
     """
     _, rows, solutions, columns = differences.shape
-    errors = np.full((MAX_ORDER, solutions), np.inf)
+    sizes = np.full((MAX_ORDER, solutions), np.inf)
     for v in range(solutions):
         size = 0.0
         for r in range(rows):
             for i in range(columns):
                 size += depths[r, v, i] ** 2
+                errors[r, v, i] = 0.0
         product, inverse = 1.0, 0.0
         for k in range(MAX_ORDER):
             if not np.isfinite(spans[k + 1, v]):
@@ -179,13 +190,15 @@ def local_errors(differences: FloatArray, spans: FloatArray, depths: FloatArray)
             product *= spans[k, v]
             inverse += 1.0 / spans[k, v]
             total = 0.0
+            # the difference contains the error of the step itself
+            factor = product / (inverse + 1.0 / spans[k + 1, v])
             for r in range(rows):
                 for i in range(columns):
                     total += differences[k + 2, r, v, i] ** 2
-            # the difference contains the error of the step itself
-            factor = product / (inverse + 1.0 / spans[k + 1, v])
-            errors[k, v] = np.sqrt(total / size) * factor if size > 0.0 else 0.0
-    return errors
+                    if k < orders[v]:
+                        errors[r, v, i] = factor * differences[k + 2, r, v, i]
+            sizes[k, v] = np.sqrt(total / size) * factor if size > 0.0 else 0.0
+    return sizes
 
 
 def compile_multistep() -> None:
@@ -196,7 +209,7 @@ def compile_multistep() -> None:
     formulas(spans, one, order, one, weights, np.empty(1), np.empty((ROWS - 1, 1)))
     extrapolated(weights, differences)
     new_differences(value, value, one, differences, spans)
-    local_errors(differences, spans, value)
+    local_errors(differences, spans, value, order, np.empty((1, 1, 1)))
 
 
 compile_alongside("solve_slender", compile_multistep)

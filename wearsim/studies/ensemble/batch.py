@@ -61,6 +61,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
         and all(getattr(first, name) == getattr(second, name) for name in _RADII)
         and (first.cam is None or second.cam is None or first.cam.matches(second.cam))
         and varying[0] == varying[1]
+        and (one.constant_load is None) == (other.constant_load is None)
     )
 
 
