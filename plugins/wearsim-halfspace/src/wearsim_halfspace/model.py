@@ -79,6 +79,8 @@ class Halfspace(ws.SingleContactModel):
         self, options: HalfspaceOptions, grid: Grid, materials: Sequence[Material]
     ) -> None:
         self.options, self.grid = options, grid
+        # an even number, so that the larger elements end at the ends of the longest strip too
+        self._across = options.mx + options.mx % 2
         self.shear_modulus, self.poisson_ratio = combined(materials)
         #: contact modulus E* of both bodies [Pa]
         self.contact_modulus = self.shear_modulus / (1.0 - self.poisson_ratio)
@@ -218,14 +220,14 @@ class Halfspace(ws.SingleContactModel):
         first = max(int(touching[0]) - SPARE, 0)
         last = min(int(touching[-1]) + SPARE, len(load) - 1)
         # the ends of the longest strip are ends of elements on the coarser grids too
-        spare = COARSER * int(np.ceil((MARGIN * self.options.mx + SPARE) / COARSER))
-        columns = self.options.mx + 2 * spare
+        spare = COARSER * int(np.ceil((MARGIN * self._across + SPARE) / COARSER))
+        columns = self._across + 2 * spare
         places = np.arange(columns) - 0.5 * (columns - 1)
         return slice(first, last + 1), np.asarray(places * self._length(half_length))
 
     def _length(self, half_length: FloatArray) -> float:
         """Return the length of the elements along rolling [m]."""
-        return 2.0 * float(half_length.max()) / self.options.mx
+        return 2.0 * float(half_length.max()) / self._across
 
     def _extent(
         self, normal: NormalSolution, strips: slice, x: FloatArray
@@ -239,7 +241,7 @@ class Halfspace(ws.SingleContactModel):
             raise ws.ContactError("the contact reaches the edge of its strips; raise contact.width")
         inside = not pressure[[0, -1]].any() or len(pressure) == self.grid.strips
         across = int((pressure > 0.0).sum(axis=1).max())
-        fits = FEWEST * self.options.mx <= across <= pressure.shape[1] - 2
+        fits = FEWEST * self._across <= across <= pressure.shape[1] - 2
         return load, half_length, inside and fits
 
     def _rolled(self, patch: Patch) -> Solution:

@@ -71,6 +71,7 @@ def solve_normal(
 
     pressure = start * (force / (start.sum() * area))
     inside = pressure > 0.0
+    # overlap at an approach of zero, and the preconditioned unit pressure of the contact
     closed, unit = -gap - opened(pressure), None
     direction, last, product = pressure, None, 1.0
     for iteration in range(1, MAX_ITERATIONS + 1):
