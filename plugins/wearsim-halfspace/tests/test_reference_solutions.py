@@ -123,7 +123,7 @@ def test_middle_of_a_long_contact_is_that_of_carter(mx, extrapolate, slip):
     middle = grid.strips // 2
     assert found.line_load[middle] == pytest.approx(load, rel=1e-3)
     exact = creepage * friction * load * (1.0 - (1.0 - slip) ** 2)
-    assert found.dissipation[middle] == pytest.approx(exact, rel=0.002 if extrapolate else 0.01)
+    assert found.dissipation[middle] == pytest.approx(exact, rel=0.005 if extrapolate else 0.01)
 
 
 @pytest.mark.parametrize(
@@ -134,7 +134,7 @@ def test_worn_profiles_are_those_of_contact(name):
     assert errors.line_load < 1e-3
     assert abs(errors.approach) < 2e-5
     assert max(abs(error) for error in errors.power.values()) < 1e-3
-    assert max(errors.dissipation.values()) < 8e-3
+    assert max(errors.dissipation.values()) < 6e-3
 
 
 def creepage_coefficients(a_over_b, poisson_ratio, n):

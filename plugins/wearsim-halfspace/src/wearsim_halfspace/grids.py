@@ -127,7 +127,10 @@ class Solution(NamedTuple):
         return Work(power, force_x, force_y, moment, rows)
 
     def extrapolated(self) -> Work:
-        """Return forces and power extrapolated from this grid and the coarser one."""
+        """Return forces and power extrapolated from this grid and the coarser one.
+
+        The rows are not: where single elements enter adhesion, they vary irregularly.
+        """
         fine = self.work()
         if self.coarser is None:
             return fine
@@ -137,7 +140,7 @@ class Solution(NamedTuple):
             force_x=_further(fine.force_x, coarse.force_x),
             force_y=_further(fine.force_y, coarse.force_y),
             moment=_further(fine.moment, coarse.moment),
-            rows=fine.rows + FURTHER * (fine.rows - coarse.rows),
+            rows=fine.rows,
         )
 
 

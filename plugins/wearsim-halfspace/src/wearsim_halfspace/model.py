@@ -40,7 +40,8 @@ class HalfspaceOptions(ws.Options):
         100, description="strips across a fresh contact, if neither their number nor width is given"
     )
     extrapolate: bool = ws.Field(
-        True, description="extrapolate forces and powers from the grid and one of twice the size"
+        True,
+        description="extrapolate forces and power from these elements and ones of twice the length",
     )
     tolerance: float = ws.Field(1e-6, gt=0.0, le=1e-2, description="of pressure and traction")
 
