@@ -22,7 +22,10 @@ PAGES = [
     "start",
     "theory",
     "cam",
+    "life",
+    "speed",
     "tutorials/my-rig",
+    "tutorials/identify",
     "tutorials/contact-model",
     "reference/generated/scenario-keys",
     "reference/generated/api/wearsim.run",
@@ -76,6 +79,14 @@ def test_reference_is_written_from_the_package(site: Path):
     files = (site / "reference" / "generated" / "result-files.html").read_text()
     assert "cylinder_depth_profile" in files
     assert (site / "reference" / "generated" / "api" / "wearsim.run.html").exists()
+
+
+def test_measured_numbers_are_on_their_pages(site: Path):
+    for page in ("speed", "benchmarks", "hard-cases", "theory", "life"):
+        text = (site / f"{page}.html").read_text(encoding="utf-8")
+        assert "{{" not in text
+        assert "Measured on 20" in text or "on 20" in text
+    assert list((site / "_images").glob("stepping*.svg"))
 
 
 def test_pages_load_nothing_from_elsewhere(site: Path):
