@@ -144,7 +144,7 @@ def _groups(effort: Effort) -> list[_Group]:
 
     groups.append(_Group(title, all_models, (2 + len(usual)) * len(models)))
     if effort.plugin is None:
-        decades = QUICK_TOLERANCES if effort.quick else TOLERANCES
+        decades = QUICK_TOLERANCES if effort.quick else FINER
         for minutes, counts in ((whole, STRIPS), (early, EARLY_STRIPS)):
             name = f"strips, {minutes:g} min"
 
