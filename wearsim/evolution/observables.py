@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from wearsim.contact_batch import ContactBatch
+from wearsim.evolution.contacts import at_least, contact_batch
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, mean_along, sum_in_order, width, worn_volume
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents
-from wearsim.evolution.steppers.single_step import solve_at_record
+from wearsim.evolution.steppers.single_step import (
+    carried_loads,
+    present_problem,
+    solve_at_record,
+)
 from wearsim.types import FloatArray
 
 
@@ -30,6 +36,13 @@ def present_contacts(
     )
     contacts, loads = opened(problem, state.passes, contacts, loads)
     return recorded, state.replaced(contacts=contacts), loads
+
+
+def present_batch(problem: WearProblem, state: WearState) -> ContactBatch:
+    """Return the contacts on the profiles of a state, under the loads that they carry."""
+    present = present_problem(problem, state)
+    loads = at_least(problem, carried_loads(problem, state.contacts))
+    return contact_batch(present, present.gap(*state.depths), loads, *state.depths)
 
 
 def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:

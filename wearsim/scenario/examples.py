@@ -23,7 +23,7 @@ from wearsim.scenario.parse.toml import REQUIRED, TABLES
 from wearsim.scenario.scenario import Scenario, load_scenario
 from wearsim.scenario.tables.cam_motion import MotionTable
 from wearsim.scenario.tables.plain import TopTable
-from wearsim.scenario.tables.plugin import PLUGIN_TABLES
+from wearsim.scenario.tables.plugin import AUTO, PLUGIN_TABLES, AutoTable
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -180,11 +180,16 @@ def _choices(table: str, random: RandomInputs) -> list[Model]:
             default = spec.name if spec.name == named.default else ...
             described = Field(default, description=named.description)
             options[spec.name] = {**fields, **_fields(base), key: (Literal[spec.name], described)}
-    return [
+    models = [
         _model(f"{table} {spec.name}", spec.summary, {**terms, **options[spec.name]})
         for spec in specs
         if spec.name in options
     ]
+    if table == "contact":
+        chosen = Literal["auto"], Field(..., description=named.description)
+        fields = {**_fields(AutoTable), **_fields(base), key: chosen}
+        models.append(_model(f"{table} {AUTO}", AutoTable.__doc__, fields))
+    return models
 
 
 def _fields(

@@ -17,3 +17,17 @@ def test_error_of_a_model_exceeds_that_of_the_reference():
     assert slender.errors.dissipation < 0.01
     assert abs(slender.errors.power) < 0.003
     assert abs(slender.errors.peak_pressure) < 0.003
+
+
+def test_exact_theory_is_chosen_where_no_cheaper_model_suffices():
+    round_contact = {"contact.model": "auto", "roller.crown_radius": "0.2 mm"}
+    study = wearsim.study_contact(shipped_scenario("rig-450min", round_contact))
+    assert study.model == "halfspace"
+    assert any("'auto' has taken 'halfspace" in note for note in study.notes)
+
+
+def test_estimate_holds_during_a_run():
+    short = {"contact.model": "auto", "operation.passes": 3000, "evolution.tolerance": 0.01}
+    result = wearsim.run(shipped_scenario("rig-450min", short))
+    assert result.described_model.endswith("(auto)")
+    assert not any("'auto'" in warning for warning in result.warnings)

@@ -124,7 +124,8 @@ def contact(
             cylinder, profile=measured, profile_file=str(profile), profile_filter=wavelength
         )
     start = profile_data(cylinder, files)
-    has_fields = loaded.contact.spec.capabilities.fields
+    automatic = loaded.contact.model == "auto"  # all models that it takes have fields
+    has_fields = automatic or loaded.contact.spec.capabilities.fields
     with_fields = figure is not None and has_fields
 
     def kernels() -> set[str]:

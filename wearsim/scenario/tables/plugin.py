@@ -47,6 +47,31 @@ class ContactTable(Options):
     )
 
 
+AUTO = "auto"
+
+
+class ChosenTable(Options):
+    """Contact model that a study has chosen."""
+
+    model: str = Field(description="Name of the contact model.")
+    options: dict[str, Any] = Field(default_factory=dict, description="Options of the model.")
+    why: str = Field(default="", description="Reason of the choice.")
+
+
+class AutoTable(Options):
+    """Options of `model = "auto"`: the cheapest model whose estimated error is small enough."""
+
+    tolerance: float = Field(
+        default=0.03,
+        gt=0.0,
+        lt=1.0,
+        description="Estimated error of P_l(y) that is accepted, L2 over the strips.",
+    )
+    chosen: ChosenTable | None = Field(
+        default=None, description="The choice, written by the study that has made it."
+    )
+
+
 class LoadTable(Options):
     """Load on a roller; other keys are options of the chosen load, sub-tables are added terms."""
 
@@ -73,6 +98,9 @@ class ContactChoice:
         Number of strips.
     width, centre : float, optional
         Width and centre of the strip grid [m].
+    auto : AutoTable, optional
+        Options of the automatic choice that has taken this model. Before the choice, `model` is
+        "auto" and `options` are these.
     """
 
     model: str
@@ -80,6 +108,7 @@ class ContactChoice:
     strips: int | None = None
     width: float | None = None
     centre: float | None = None
+    auto: AutoTable | None = None
 
     @property
     def spec(self) -> ContactModelSpec:
@@ -183,11 +212,32 @@ def _default_model(mistakes: Mistakes) -> str:
 def read_contact(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice | None:
     """Return the contact model, or None after adding the mistakes of the table [contact]."""
     raw = {"model": _default_model(mistakes), **raw} if "model" not in raw else raw
+    if raw["model"] == AUTO:
+        return _read_auto(mistakes, raw)
     own, spec, rest = _choose(mistakes, "contact", raw)
     options = validate(mistakes, spec.options, rest, "contact", ContactTable) if spec else None
     if own is None or options is None:
         return None
     return ContactChoice(own.model, options, own.strips, own.width, own.centre)
+
+
+def _read_auto(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice | None:
+    """Return the automatic choice of a contact model, or the model that a study has chosen."""
+    given, rest = split_keys(raw, ContactTable)
+    own = validate(mistakes, ContactTable, given, "contact")
+    auto = validate(mistakes, AutoTable, rest, "contact", ContactTable)
+    if own is None or auto is None:
+        return None
+    strips = own.strips, own.width, own.centre
+    if auto.chosen is None:
+        return ContactChoice(AUTO, auto, *strips)
+    chosen = auto.chosen
+    spec = mistakes.find_plugin(ContactModelSpec, chosen.model, "contact.chosen", "model")
+    options = validate(mistakes, spec.options, chosen.options, "contact.chosen") if spec else None
+    if options is None:
+        return None
+    mistakes.notes += [chosen.why] if chosen.why else []
+    return ContactChoice(chosen.model, options, *strips, auto)
 
 
 def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | None:
@@ -263,9 +313,12 @@ def described_model(model: str, scenario_text: str) -> str:
     str
         Only the name if the scenario gives no option.
     """
+    table = tomllib.loads(scenario_text).get("contact", {})
+    automatic = table.get("model") == AUTO and "chosen" in table
     given = [
         f"{key} = {shown(value)}"
-        for key, value in tomllib.loads(scenario_text).get("contact", {}).items()
+        for key, value in (table["chosen"].get("options", {}) if automatic else table).items()
         if key not in ContactTable.model_fields
     ]
+    given += [AUTO] if automatic else []
     return f"{model} ({', '.join(given)})" if given else model

@@ -8,14 +8,19 @@ from time import perf_counter
 
 import numpy as np
 
-from wearsim.errors import ContactError, PluginError
+from wearsim.contact_batch import ContactBatch
+from wearsim.errors import ContactError, PluginError, WearsimError
 from wearsim.plugins import ContactModel, ContactModelSpec, Options, registry
+from wearsim.scenario.tables.plugin import ContactChoice
 from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
 
+REFERENCE = "halfspace"  # the exact theory
 #: Numbers of elements along rolling at which a reference is solved, over its usual number.
-RESOLUTIONS = (0.5, 0.7, 1.0, 1.4)
+RESOLUTIONS = (0.5, 0.6, 0.75, 0.95, 1.2, 1.5)
+FEW = (0.5, 1.0)  # of a check during a run
 _LEAST_SOLVED = 3  # of them
-_INSTALL = {"halfspace": "pip install 'wearsim[halfspace]'"}  # models of the project's plugins
+#: How to install models of the project's plugins.
+INSTALL = {"halfspace": "pip install 'wearsim[halfspace]'"}
 
 #: Builds a model with some options for strips.
 Build = Callable[[Options, Grid], ContactModel]
@@ -102,8 +107,8 @@ def reference_spec(name: str) -> ContactModelSpec:
     names = registry().names(ContactModelSpec)
     if name not in names:
         remedy = f"there are {', '.join(names)}"
-        if name in _INSTALL:
-            remedy = f"install it with: {_INSTALL[name]}"
+        if name in INSTALL:
+            remedy = f"install it with: {INSTALL[name]}"
         raise PluginError(f"no contact model '{name}' is installed; {remedy}")
     return registry().get(ContactModelSpec, name)
 
@@ -120,10 +125,11 @@ def solve_reference(
     """Solve a contact with a reference model, and estimate the reference's own errors.
 
     A model whose elements along rolling are chosen by the option `mx` is solved with several
-    numbers of them. Its error decreases with 1/mx, and varies irregularly as single elements enter
-    and leave the contact and the adhesion zone; the straight line over 1/mx that fits all solutions
-    gives the value at 1/mx = 0. The error stated is half the difference between the values by every
-    other solution. Another model is solved with half as many strips too, and the change is stated.
+    numbers of them, without extrapolation by the model (`extrapolate`). Its error decreases with
+    1/mx, and varies irregularly as single elements enter and leave the adhesion zone; the straight
+    line over 1/mx that fits all solutions gives the value at 1/mx = 0. The error stated is half the
+    difference between the values by every other solution. Another model is also solved with half as
+    many strips; the change is stated.
 
     Parameters
     ----------
@@ -161,11 +167,12 @@ def solve_reference(
 
     if spec.reference and "mx" in spec.options.model_fields:
         usual = float(spec.options.model_fields["mx"].default)
+        raw = {"extrapolate": False} if "extrapolate" in spec.options.model_fields else {}
         found, inverse = [], []
         for part in resolutions:
             number = round(part * usual)
             try:
-                found.append(solve(spec.options.model_validate({"mx": number}), grid))
+                found.append(solve(spec.options.model_validate({"mx": number, **raw}), grid))
                 inverse.append(1.0 / number)
             except ContactError as error:
                 failure = error
@@ -191,6 +198,52 @@ def at_creepage(point: OperatingPoint, solution: ContactSolution) -> OperatingPo
     """Return the operating point with the longitudinal creepage of a solution prescribed."""
     creepage = replace(point.creepage, longitudinal=solution.longitudinal_creepage)
     return replace(point, creepage=creepage, bearing_torque=None, rolling_radius=None)
+
+
+def excess(
+    name: str,
+    choice: ContactChoice,
+    grid: Grid,
+    materials: tuple[Material, Material],
+    batch: ContactBatch,
+    tolerance: float,
+) -> str:
+    """Return how far the error of a model exceeds a tolerance in the most loaded contact.
+
+    Parameters
+    ----------
+    name : str
+        The reference model.
+    choice : ContactChoice
+        The model with its options.
+    grid, materials
+        Strips and bodies.
+    batch : ContactBatch
+        The contacts.
+    tolerance : float
+        Of P_l(y), L2 over the strips.
+
+    Returns
+    -------
+    str
+        Empty if the error is within the tolerance and the reference's own error, or the reference
+        does not solve the contact.
+    """
+    number = int(np.argmax(batch.normal_force))
+    gap, curvature = batch.gap[number], float(batch.longitudinal_curvature[number])
+    try:
+        solution = choice.build(grid, materials).solve_one(gap, curvature, batch.point(number))
+        point = at_creepage(batch.point(number), solution)
+        reference = solve_reference(name, grid, materials, gap, curvature, point, FEW)
+    except WearsimError:
+        return ""
+    error, own = reference.errors_of(solution).dissipation, reference.own.dissipation
+    if error <= tolerance + own:
+        return ""
+    return (
+        f"P_l(y) differs by {100.0 * error:.2g} % from '{name}' (whose own error is"
+        f" {100.0 * own:.2g} %), tolerance {100.0 * tolerance:g} %"
+    )
 
 
 _SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")

@@ -24,6 +24,7 @@ from wearsim.results import (
 )
 from wearsim.results.ensemble.schema import ALL_OBSERVABLES, OBSERVABLES
 from wearsim.scenario import Scenario, as_scenario, parse_scenario, require_run
+from wearsim.studies.automatic import settled
 from wearsim.studies.cam.observables import CURVE_ANGLES
 from wearsim.studies.ensemble.designs import (
     BASE_PLANS,
@@ -131,7 +132,7 @@ def ensemble(
     >>> tests.count
     8
     """
-    scenario = as_scenario(scenario)
+    scenario = settled(as_scenario(scenario), test=True)
     precision = named_precision(precision, until)
     request = checked_request(scenario, realisations, plan, precision)
     path = Path(output)

@@ -13,8 +13,10 @@ from wearsim.errors import Interrupted, ResultsFileError, failure_text
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
+from wearsim.evolution.observables import present_batch
 from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
+from wearsim.plugins import ContactModelSpec, registry
 from wearsim.results import (
     Result,
     RunData,
@@ -23,6 +25,7 @@ from wearsim.results import (
 )
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, station_columns
+from wearsim.studies.contact.comparison import REFERENCE, excess
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
@@ -188,6 +191,7 @@ class RunInProgress:
                 return
             self.recorder.add(advance, self.stop)
             state = advance.end
+            self._verify_model(float(advance.path[0].passes[0]))
             if advance.warning is not None:
                 self._warn(advance.warning)
             self.on_event(
@@ -208,6 +212,23 @@ class RunInProgress:
             if time.monotonic() - written > every:
                 self._write()
                 written = time.monotonic()
+
+    def _verify_model(self, start: float) -> None:
+        """Compare an automatically chosen contact model with exact theory, where it is installed.
+
+        The contacts are those at the end of the first step, and of the steps in which half of the
+        passes and all are reached; `start` is the pass at the start of the step.
+        """
+        choice, state = self.scenario.contact, self.recorder.state
+        due = start == 0.0 or any(start < part * self.stop <= self._passes for part in (0.5, 1.0))
+        known = REFERENCE in registry().names(ContactModelSpec)
+        if choice.auto is None or choice.model == REFERENCE or not (due and known):
+            return
+        materials = self.scenario.cylinder.material, self.scenario.roller.material
+        batch = present_batch(self.problem, state)
+        tolerance, grid = choice.auto.tolerance, self.problem.grid
+        if text := excess(REFERENCE, choice, grid, materials, batch, tolerance):
+            self._warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
 
     def _warn(self, message: str) -> None:
         """Report and store a warning, the first of each kind only."""

@@ -1,0 +1,237 @@
+"""Choice of the contact model by its estimated error: contact.model = "auto"."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatch
+from wearsim.errors import CapabilityError, SolverError, WearsimError
+from wearsim.evolution.contacts import unworn_contacts
+from wearsim.evolution.observables import present_batch
+from wearsim.evolution.state import WearState
+from wearsim.plugins import ContactModelSpec, registry
+from wearsim.results import DISK
+from wearsim.scenario import Scenario
+from wearsim.scenario.parse.toml import apply_overrides
+from wearsim.scenario.tables.plugin import AUTO, AutoTable, ContactChoice
+from wearsim.studies.contact.comparison import INSTALL, REFERENCE, at_creepage
+from wearsim.studies.contact.estimate import Calibration, ErrorModel, calibration, indicators_of
+from wearsim.studies.run.assemble import build_problem, chosen_stepper, prepared_model
+from wearsim.studies.run.draws import draw
+from wearsim.studies.run.grid import contact_grid, wider_grid
+from wearsim.studies.run.in_progress import RunInProgress
+from wearsim.studies.run.inputs import load_range
+from wearsim.studies.run.recorder import Event, Stepped
+from wearsim.types import FloatArray, Grid
+
+_INDICATING = ("slender", "hertz")  # models whose solution gives the indicators, in this order
+_LEAST_LOAD = 0.01  # of the greatest in a state: others are next to a pause
+_EARLY = 0.1  # of the passes, after which the second state is taken
+_TOLERANCE = 1e-2  # of that test
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Contacts whose errors are estimated: their strips and, for each, its indicators."""
+
+    grid: Grid
+    batch: ContactBatch
+    indicators: list[FloatArray]
+
+
+def settled(scenario: Scenario, test: bool) -> Scenario:
+    """Return a scenario with the contact model that `contact.model = "auto"` takes.
+
+    The cheapest installed model is taken whose estimated error of P_l(y) is at most
+    `contact.tolerance` in every contact that is looked at: that of the first roller at the start of
+    the load; in a test all contacts at the start, after a tenth of the passes and at the end, with
+    random inputs at their means, as stepped by `slender`. If none suffices, it is `halfspace`, if
+    it is installed. The text of the scenario names what was taken, so that it is kept.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any; one that names a model, or has chosen before, is returned as it is.
+    test : bool
+        Whether the contacts of a wear test are looked at, instead of a single one.
+
+    Raises
+    ------
+    CapabilityError
+        If no installed model suffices, or a friction field is given.
+    """
+    if scenario.contact.model != AUTO:
+        return scenario
+    options = scenario.contact.options
+    assert isinstance(options, AutoTable)
+    table = calibration()
+    field = next((item.name for item in scenario.random if item.role == "field"), None)
+    if field is not None:
+        raise _refusal(scenario, f"{field} is a field, and no error is calibrated for it")
+    states, where = _looked_at(scenario, test)
+    reason = _not_calibrated(table, states)
+    tried: list[tuple[float, ErrorModel]] = []
+    for candidate in table.models:
+        choice = _choice(scenario, candidate.model, candidate.options)
+        if not _able(scenario, choice, states, test):
+            continue
+        error = np.inf
+        if not reason:
+            every = [table.scaled(each) for state in states for each in state.indicators]
+            error = max(candidate.error(scaled) for scaled in every)
+        tried.append((error, candidate))
+        if error <= options.tolerance:
+            return _with(scenario, choice, _why(candidate, error, options, where))
+    finest = [item for item in tried if item[1].model == REFERENCE][-1:]
+    if not reason and tried:
+        least, best = min(tried, key=lambda item: item[0])
+        reason = f"the least estimated error is {100.0 * least:.2g} %, of '{best.label}'"
+    if not finest:
+        raise _refusal(scenario, reason)
+    error, candidate = finest[0]
+    choice = _choice(scenario, candidate.model, candidate.options)
+    own = "" if error == np.inf else f"; error of its elements {100.0 * error:.2g} %"
+    why = (
+        f"contact.model = 'auto' has taken '{candidate.label}', the exact theory: no model has an"
+        f" estimated error of P_l(y) within {100.0 * options.tolerance:g} % {where}"
+    )
+    return _with(scenario, choice, f"{why} ({reason}){own}")
+
+
+def _why(candidate: ErrorModel, error: float, options: AutoTable, where: str) -> str:
+    return (
+        f"contact.model = 'auto' has taken '{candidate.label}': estimated error of P_l(y)"
+        f" {100.0 * error:.2g} %, tolerance {100.0 * options.tolerance:g} %, {where}"
+    )
+
+
+def _refusal(scenario: Scenario, reason: str) -> CapabilityError:
+    missing = REFERENCE not in registry().names(ContactModelSpec)
+    install = f"install '{REFERENCE}' ({INSTALL[REFERENCE]}), " if missing else ""
+    return CapabilityError(
+        f"{scenario.file}: contact.model = 'auto' finds no model within contact.tolerance ="
+        f" {scenario.contact.options.tolerance:g}: {reason}; {install}raise the tolerance or name a"  # type: ignore[attr-defined]
+        " contact.model"
+    )
+
+
+def _choice(scenario: Scenario, model: str, options: dict[str, object]) -> ContactChoice:
+    """Return a model instead of that of a scenario, or `auto` if it is not installed."""
+    if model not in registry().names(ContactModelSpec):
+        return scenario.contact
+    found = registry().get(ContactModelSpec, model).options.model_validate(options)
+    return replace(scenario.contact, model=model, options=found)
+
+
+def _with(scenario: Scenario, choice: ContactChoice, why: str) -> Scenario:
+    """Return a scenario with a model that has been chosen, also in its text."""
+    auto = scenario.contact.options
+    assert isinstance(auto, AutoTable)
+    options = choice.options.model_dump(exclude_unset=True)
+    chosen = {"model": choice.model, "options": options, "why": why}
+    text = apply_overrides(scenario.text, scenario.file, {"contact.chosen": chosen})
+    return replace(
+        scenario, contact=replace(choice, auto=auto), text=text, notes=(*scenario.notes, why)
+    )
+
+
+def _able(scenario: Scenario, choice: ContactChoice, states: list[_State], test: bool) -> bool:
+    """Return whether a model is installed, supports a scenario and solves all its contacts.
+
+    Tests take models that step implicitly: others need several times as many solutions.
+    """
+    if choice.model == AUTO or (test and not choice.spec.capabilities.wear_compliance):
+        return False
+    changed = replace(scenario, contact=choice)
+    try:
+        for state in states:
+            model = prepared_model(changed, state.grid)
+            if test:
+                chosen_stepper(changed, model, scenario.operation.rollers)
+            if choice.model != REFERENCE:
+                model.solve(state.batch)
+    except WearsimError:
+        return False
+    return True
+
+
+def _not_calibrated(table: Calibration, states: list[_State]) -> str:
+    """Return why no error can be estimated, or nothing."""
+    for state in states:
+        if not state.indicators:
+            return "no cheap model solves the contact"
+        batch = state.batch
+        if batch.friction.ndim > 1 or batch.variation is not None:
+            return "creepage or friction that varies across the track is not calibrated"
+        for each in state.indicators:
+            if outside := table.outside(each):
+                return f"outside the calibrated contacts: {outside}"
+    return ""
+
+
+def _looked_at(scenario: Scenario, test: bool) -> tuple[list[_State], str]:
+    """Return the states whose contacts are looked at, and their description."""
+    scout = replace(scenario, contact=_choice(scenario, "slender", {}), random=())
+    if not test:
+        return [_single(scout)], "in this contact"
+    evolution = scout.evolution.model_copy(
+        update={"stepper": "auto", "step": None, "nodes": None, "tolerance": _TOLERANCE}
+    )
+    seen: list[WearState] = []
+    run: RunInProgress | None = None
+
+    def watch(event: Event) -> None:
+        if isinstance(event, Stepped) and run is not None:
+            seen.append(run.recorder.state)
+
+    mean = replace(scout, evolution=evolution)
+    try:
+        run = RunInProgress(mean, draw(mean), None, DISK, watch, None)
+        problem = run.problem
+        states = [_state(scout, problem.grid, unworn_contacts(problem))]
+        run.finish()
+    except SolverError:
+        return [_single(scout)], "at the start of the test, which 'slender' does not step"
+    early = min(seen, key=lambda state: abs(float(state.passes[0]) - _EARLY * run.stop))
+    states += [
+        _state(scout, problem.grid, present_batch(problem, state)) for state in (early, seen[-1])
+    ]
+    return states, "at the start, after a tenth and at the end of the test with mean inputs"
+
+
+def _single(scout: Scenario) -> _State:
+    """Return the contact of the first roller at the start of the load."""
+    force = load_range(scout, scout.load.build(), 0.0)[0]
+    grid = contact_grid(scout, force)
+    state = _unworn(scout, grid)
+    if not state.indicators and (wider := wider_grid(scout, grid, force)):
+        state = _unworn(scout, wider)
+    return state
+
+
+def _unworn(scout: Scenario, grid: Grid) -> _State:
+    problem = build_problem(scout, prepared_model(scout, grid), grid, {})
+    return _state(scout, grid, unworn_contacts(problem))
+
+
+def _state(scout: Scenario, grid: Grid, batch: ContactBatch) -> _State:
+    """Return the indicators of contacts; none if no cheap model solves them all."""
+    for name in _INDICATING:
+        try:
+            model = prepared_model(replace(scout, contact=_choice(scout, name, {})), grid)
+            solutions = model.solve(batch)
+        except WearsimError:
+            continue
+        loaded = batch.normal_force > _LEAST_LOAD * batch.normal_force.max()
+        found = [
+            indicators_of(
+                solutions[k],
+                float(batch.longitudinal_curvature[k]),
+                at_creepage(batch.point(k), solutions[k]),
+            )
+            for k in np.flatnonzero(loaded).tolist()
+        ]
+        return _State(grid, batch, found)
+    return _State(grid, batch, [])
