@@ -140,7 +140,7 @@ def test_figure_is_written(command: Command, slim: Path, wide: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--limit", "dept=5um"], "is not a limit"),
+        (["--limit", "dept=5um"], "is not a limit of a life, expected depth, roller_depth,"),
         (["--limit", "depth=-5um"], "must be above zero"),
         (["--limit", "lift_error=5um"], "is a quantity of cams"),
         (["--target", "5 kg"], "is not a life"),
@@ -159,10 +159,25 @@ def test_bad_input_has_exit_code_2(
 
 
 def test_limit_that_is_never_reached_is_stated(command: Command, slim: Path) -> None:
-    done = command("life", slim, "-n", 3, "--limit", "depth=5mm", "--max", "3000", *HERE)
-    text = " ".join(done.output.split())
+    never = ["--limit", "depth=5mm", "--max", "3000", "--figure", "never.svg"]
+    text = " ".join(command("life", slim, "-n", 3, *never, *HERE).output.split())
     assert "3 censored at 3,000 passes" in text
     assert "B50 above 3,000" in text
+    assert "no realisation reaches a limit within 3,000 passes" in text
+    assert "nothing, no two lives differ" in text
+    figure = Path("never.svg").read_text()
+    assert "no limit was reached" in figure
+    assert "friction.coefficient" not in figure
+
+
+def test_limit_that_is_reached_at_once_is_stated(command: Command, slim: Path) -> None:
+    fresh = ["--limit", "peak_pressure=100MPa", "--figure", "fresh.svg"]
+    text = " ".join(command("life", slim, "-n", 3, *fresh, *HERE).output.split())
+    assert "3 reached a limit at once, when fresh" in text
+    assert "every life is 0" in text
+    assert "nothing, no two lives differ" in text
+    assert "RuntimeWarning" not in text
+    assert "every life is 0" in Path("fresh.svg").read_text()
 
 
 def test_all_failed_has_exit_code_1(command: Command, slim: Path) -> None:

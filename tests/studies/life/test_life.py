@@ -75,6 +75,11 @@ def test_life_of_a_mean_design_is_that_of_the_closed_form(tmp_path: Path) -> Non
         math.exp(math.log(1.5) * -1.2815516), rel=1e-6
     )
     assert found.b(10).low == found.b(10).high
+    wider = {"load__normal_force": "300 N", "friction__coefficient": 0.1}
+    other = lives(tmp_path / "wider.h5", design(roller__crown_radius="600 mm", **wider), 400)
+    machine = other.compare(found).same_machine
+    assert machine is not None
+    assert (machine.low, machine.value, machine.high) == (1.0, 1.0, 1.0)
 
 
 def test_lives_at_drawn_factors_are_those_of_single_runs(exact: LifeResult) -> None:

@@ -148,6 +148,9 @@ def _write_effects(result: LifeResult) -> None:
         only = result.settings.factor if result.settings.alone else "too few realisations"
         write_list([f"{head}: {only}"], [])
         return
+    if result.are_equal:
+        write_list([f"{head}: nothing, no two lives differ"], [])
+        return
     effects = result.sensitivity("life")
     if not any(math.isfinite(item.first.value) for item in effects):
         write_list([f"{head}: {too_few(result)}"], [])

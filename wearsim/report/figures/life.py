@@ -108,6 +108,9 @@ def draw_survival(
     colours: Sequence[str] = COLOURS,
 ) -> None:
     """Draw the survival of designs with its 95 % band, censored lives and target."""
+    if all(result.at_once == result.count for result in results):
+        write_message(axes, "Survival", ["every life is 0"])
+        return
     for result, label, colour in zip(results, labels, colours, strict=False):
         life, survival, low, high = survival_of(result)
         step: Literal["post"] | None = None if result.is_exact else "post"
@@ -203,12 +206,16 @@ def _draw_probabilities(
                 ls="-" if best else "--",
                 label=f"fit{', lower AIC' if best else ''}",
             )
-        if result.is_exact and result.count > 1:
-            across = np.geomspace(0.7 * lives[0], 1.3 * lives[-1], _POINTS)
+        if result.is_exact:
+            first, last = 0.7 * lives[0], 1.3 * lives[-1]
+            if result.settings.alone:  # one test, which is a point of the distribution
+                first, last = (result.distribution.quantile_of_mean(p) for p in (0.002, 0.998))
+                ends += [first, last]
+            across = np.geomspace(first, last, _POINTS)
             mean = np.clip(result.distribution.failed(across).mean(axis=0), 1e-4, 1.0 - 1e-4)
             axes.plot(across, scale(mean), color="0.3", lw=0.9, ls=":", label="exact K/H")
     if not ends:
-        write_message(axes, title, ["no life ended"])
+        write_message(axes, title, ["no life above 0 ended"])
         return
     axes.set_xscale("log")
     axes.set_xlim(0.75 * min(ends), 1.3 * max(ends))
@@ -229,10 +236,12 @@ def _draw_tornado(
 ) -> None:
     """Draw how far each input moves the life."""
     title = "What moves the life"
-    bars = [result.tornado() if result.count > 1 else {} for result in results]
+    bars = [{} if result.are_equal else result.tornado() for result in results]
     names = list(dict.fromkeys(name for found in bars for name in found))
     if not names:
-        write_message(axes, title, ["too few realisations"])
+        alone = {result.settings.factor for result in results if result.settings.alone}
+        text = f"only {', '.join(alone)}" if alone else "too few realisations, or equal lives"
+        write_message(axes, title, [text])
         return
     height = 0.7 / len(results)
     for number, (found, colour, label) in enumerate(zip(bars, colours, labels, strict=False)):
@@ -305,6 +314,9 @@ def _draw_limits(
         axes.xaxis.set_major_locator(FixedLocator(range(0, 361, 60)))
         name_axes(axes, "Angle at which the limit is reached", "angle [deg]", "share [%]")
         axes.legend(fontsize=8.0)
+        return
+    if not any(result.observed.any() for result in results):
+        write_message(axes, "Limit reached first", ["no limit was reached"])
         return
     names = list(dict.fromkeys(name for result in results for name in result.first_limits))
     width = 0.7 / len(results)

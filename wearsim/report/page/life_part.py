@@ -144,7 +144,7 @@ def _plots(result: LifeResult) -> list[Plot]:
     text = "Share of the machines that outlast a life, with its 95 % band."
     if result.target is not None:
         text += f" Dotted: the target of {count(result.target)} {result.unit}."
-    several = result.count > 1 and not result.settings.alone
+    several = not (result.are_equal or result.settings.alone)
     effects = effect_plots(result, "life", result.lives) if several else []
     return [Plot("Survival", text, _survival([("", result)])), *effects]
 

@@ -299,6 +299,8 @@ class LifeResult(LifeValues):
                 first, second = _at(first, places[0]), _at(second, places[1])
                 one, two = one[places[0]], two[places[1]]
         machine = same_machine(one, two, most) if paired and len(one) == len(two) else None
+        if machine and all(item.settings.alone for item in both):  # for any wear factor
+            machine = Interval(machine.value, machine.value, machine.value)
         return LifeComparison(
             quantile_ratio(first, second, 0.1, most, paired),
             machine,

@@ -158,6 +158,11 @@ class LifeValues(EnsembleResult):
         return {name: angles for name, angles in found.items() if len(angles)}
 
     @property
+    def are_equal(self) -> bool:
+        """Whether no two lives differ, such as if all are censored, or zero."""
+        return self.count < 2 or float(np.ptp(self.log_lives)) == 0.0
+
+    @property
     def log_lives(self) -> FloatArray:
         """Logarithms of the lives, those that are censored or zero at the ends of the range."""
         positive = self.lives[self.lives > 0.0]

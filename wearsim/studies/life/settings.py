@@ -21,6 +21,7 @@ from wearsim.studies.life.realisation import with_length
 from wearsim.units import QuantityError, kind_of
 
 SHARES = (1.0, 10.0, 50.0)
+_LIMITS = f"{', '.join(name.replace(' ', '_') for name in OF_LIFE)}, as in depth=50um"
 RARE_METHODS = ("auto", "importance", "subset")
 LONGEST = 10.0  # default censoring over the target or the length of the test
 
@@ -76,6 +77,9 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
     """
     found: dict[str, str] = {}
     for text in limits:
+        name = text.replace("_", " ").split("=")[0].strip().lower().removeprefix("worn ")
+        if "=" in text and name not in OF_LIFE:
+            raise ValueError(f"'{text}' is not a limit of a life, expected {_LIMITS}")
         limit = Limit.parse(text)
         if limit.quantity not in OF_LIFE:
             raise ValueError(

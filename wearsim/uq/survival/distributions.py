@@ -185,7 +185,8 @@ class FactorMixture(LifeDistribution):
         """Return each realisation's probability of failure before `life`, (m,) to (count, m)."""
         from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
-        factor = self.kappa[:, None] / life
+        with np.errstate(divide="ignore", invalid="ignore"):  # a life of 0 is no failure before it
+            factor = self.kappa[:, None] / life
         shift = np.broadcast_to(np.asarray(self.shift), self.kappa.shape)[:, None]
         return np.asarray(ndtr((shift - self.score(factor)) / self.spread))
 
