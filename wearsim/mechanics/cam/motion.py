@@ -152,9 +152,9 @@ def motion_mistakes(
     total = sum(part.angle for part in segments)
     if abs(total - math.tau) > _CLOSURE * math.tau:
         missing = math.degrees(math.tau - total + segments[-1].angle)
-        remedy = f"{missing:.6g} deg for {motion.segment_label(last)}" if missing > 0 else "less"
-        what = f"the angles of {last + 1} segments sum to"
-        found.append((last, what, f"{math.degrees(total):.9g} deg", f"360 deg, such as {remedy}"))
+        remedy = f", with {missing:.6g} deg for {motion.segment_label(last)}" if missing > 0 else ""
+        what = "the angles of the segments do not sum to a turn"
+        found.append((last, what, f"{math.degrees(total):.9g} deg", f"360 deg{remedy}"))
     ends = np.array([part.ends for part in segments])
     rises = np.cumsum(ends[:, 0, 1])
     height = float(np.abs(rises).max())
