@@ -205,8 +205,11 @@ def test_results_of_a_cam_are_exported_and_drawn(tmp_path, eccentric):
     lost = 25.0 - np.hypot(worn[0] - 5.0, worn[1])
     assert lost.max() == pytest.approx(1e3 * eccentric.depth[-1], rel=1e-3)
     assert lost.min() == pytest.approx(1e3 * eccentric.values("station_depth")[-1].min(), rel=1e-3)
-    titles = {axes.get_title(loc="left") for axes in cam_run_figure(eccentric).axes}
-    assert {"Worn depth of the cam", "Worn cam", "Lift error against the unworn cam"} <= titles
+    panels = {axes.get_title(loc="left"): axes for axes in cam_run_figure(eccentric).axes}
+    assert {"Worn depth of the cam", "Worn cam", "Lift error against the unworn cam"} <= set(panels)
+    depth = panels["Worn depth of the cam"]
+    assert (depth.get_xlabel(), depth.get_ylabel()) == ("angle [deg]", "y across the track [mm]")
+    assert [text.get_text() for text in depth.texts] == ["eccentric"]
     assert json.dumps(eccentric.final)
 
 

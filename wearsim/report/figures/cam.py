@@ -37,6 +37,7 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
     lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
     scale = PER_SI[unit]
     found, angle = fine.kinematics, fine.angle * DEG
+    shaded = " (skids shaded)" if study.skids else ""
 
     def broken(one: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
         return between_flanks(one, fine), between_flanks(other, fine)
@@ -49,26 +50,32 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
         draw_shape(panels["shape"], turn, fine)
         axes = panels["motion"]
         axes.plot(angle, found.lift * scale, color=BLUE, label=f"{lift} [{unit}]")
-        axes.plot(angle, found.lift_per_rad * scale, color=ORANGE, label="velocity, per rad")
-        axes.plot(angle, found.lift_per_rad2 * scale, color=GREEN, label="acceleration, per rad^2")
-        name_axes(axes, "motion of the follower", "", f"[{unit}]")
+        velocity, acceleration = f"velocity [{unit}/rad]", f"acceleration [{unit}/rad$^2$]"
+        axes.plot(angle, found.lift_per_rad * scale, color=ORANGE, label=velocity)
+        axes.plot(angle, found.lift_per_rad2 * scale, color=GREEN, label=acceleration)
+        name_axes(axes, "Motion of the follower", "", f"{lift} and its derivatives")
         axes.margins(y=0.18)
         axes.legend(loc="upper right", ncols=3)
         axes = panels["pressure"]
         axes.plot(angle, found.pressure_angle * DEG, color=BLUE)
-        name_axes(axes, "pressure angle, and curvature of the cam", "", "pressure angle [deg]")
+        name_axes(axes, "Pressure angle, and curvature of the cam", "", "pressure angle [deg]")
         _second(axes, *broken(angle, found.curvature / MM), "curvature [1/mm]")
         axes = panels["speed"]
         axes.plot(*broken(angle, turn.speed * found.travel), color=BLUE)
-        name_axes(axes, "rolling speed, and roller/cam speed", "angle [deg]", "rolling speed [m/s]")
+        title = f"Rolling speed, and roller/cam speed{shaded}"
+        name_axes(axes, title, "angle [deg]", "rolling speed [m/s]")
         _second(axes, *broken(angle, found.spin), "roller/cam speed")
         axes = panels["load"]
         axes.plot(angle, fine.normal_force, color=BLUE)
         axes.plot(study.point.angle * DEG, study.point.normal_force, ".", color=BLUE, ms=4.0)
-        name_axes(axes, "normal force, and peak pressure", "angle [deg]", "normal force [N]")
+        title = f"Normal force, and peak pressure{shaded}"
+        name_axes(axes, title, "angle [deg]", "normal force [N]")
         curve = peak_pressures(turn.scenario, fine)
         other = _second(axes, *broken(angle, curve * MPA), "peak pressure [MPa]")
         other.plot(study.point.angle * DEG, study.peak_pressure * MPA, ".", color=ORANGE, ms=4.0)
+        for each in (axes, other):
+            low, high = each.get_ylim()
+            each.set_ylim(low - 0.1 * (high - low), high)  # the names of the segments lie below
         for name in ("motion", "pressure", "speed", "load"):
             name_segments(panels[name], turn.cam.motion, names=name in {"motion", "load"})
         for skid in study.skids:
@@ -129,5 +136,6 @@ def draw_shape(axes: Axes, turn: CamTurn, point: Point) -> None:
     axes.plot(*(base * MM), color=GREY, lw=0.6, ls=":", label="base circle")
     axes.plot(0.0, 0.0, "+", color="black", ms=8.0)
     axes.set_aspect("equal")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
-    name_axes(axes, "cam", "x [mm]", "y [mm]")
+    axes.set_anchor("N")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.11), ncols=4, columnspacing=1.2)
+    name_axes(axes, "Cam", "x [mm]", "y [mm]")

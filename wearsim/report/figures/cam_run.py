@@ -89,7 +89,7 @@ def _draw_map(
     values = np.maximum(values, 0.0)  # interpolation overshoots next to an edge
     mesh = axes.pcolormesh(angle * DEG, y * MM, values.T * UM, shading="nearest", cmap="magma_r")
     mesh.set_rasterized(True)
-    axes.set_ylim(1.05 * extent[0] * MM, 1.05 * extent[-1] * MM)
+    axes.set_ylim(1.25 * extent[0] * MM, 1.05 * extent[-1] * MM)  # the names of segments lie below
     axes.grid(visible=False)
     figure.colorbar(mesh, ax=axes, label="depth [um]", pad=0.01, aspect=30)
     name_axes(axes, "Worn depth of the cam", "angle [deg]", "y across the track [mm]")
