@@ -116,7 +116,8 @@ def scenario_keys() -> str:
     schema = scenario_schema()
     definitions = schema["$defs"]
     introduction = (
-        "From the JSON Schema, `wearsim schema`, of this version with its built-in models. A value"
+        "From the JSON Schema, `wearsim schema`, of this version with the models of wearsim and"
+        " of its shipped plugins. A value"
         ' with a unit is a string, such as `"20 mm"`; any unit of the same kind is accepted, and'
         " the column *unit* has an example. A key without default is needed where it says so, and"
         " optional elsewhere. *Random* marks values that may be [distributions]"

@@ -30,6 +30,10 @@ FINER = (1e-1, 3e-2, 1e-2, 3e-3, DEFAULT_TOLERANCE, 3e-4, 1e-4, 3e-5, 1e-5)  # d
 STRIPS, EARLY_STRIPS = (25, 41, 75), (15, 25, 41)
 QUICK = 0.005  # fraction of every test
 QUICK_TOLERANCES = (1e-1, DEFAULT_TOLERANCE)
+OF_STEPS = (
+    "Errors are those of the steps, against a converged run with the same contact model;"
+    " `wearsim bench contact` measures the errors of the models."
+)
 ERRORS = {"depth": "depth", "profile": "profile, L2", "volume": "worn volume"}
 COUNTS = {"steps": "steps", "solves": "contact solves", "truth": "error of reference"}
 ABOUT = (
@@ -61,6 +65,7 @@ class _Group:
     name: str
     measure: Callable[[Report], list[Measurement]]
     size: int
+    remark: str = ""
 
 
 def stepping(effort: Effort, on_progress: OnProgress) -> Topic:
@@ -92,7 +97,8 @@ def stepping(effort: Effort, on_progress: OnProgress) -> Topic:
 
         items = group.measure(report)
         measurements += items
-        conclusions[group.name] = conclusion(items, DEFAULT_TOLERANCE)
+        texts = conclusion(items, DEFAULT_TOLERANCE), group.remark
+        conclusions[group.name] = " ".join(filter(None, texts))
         completed += group.size
     return Topic(
         name="stepping",
@@ -142,7 +148,8 @@ def _groups(effort: Effort) -> list[_Group]:
         )
         return [item for bench in benches for item in of_model(bench, usual)]
 
-    groups.append(_Group(title, all_models, (2 + len(usual)) * len(models)))
+    size = (2 + len(usual)) * len(models)
+    groups.append(_Group(title, all_models, size, OF_STEPS))
     if effort.plugin is None:
         decades = QUICK_TOLERANCES if effort.quick else FINER
         for minutes, counts in ((whole, STRIPS), (early, EARLY_STRIPS)):
