@@ -24,6 +24,7 @@ from wearsim.cli.shared import (
 
 if TYPE_CHECKING:
     from wearsim.studies.cam.study import CamStudy
+    from wearsim.types import FloatArray
 
 AtAngles = Annotated[
     str | None,
@@ -191,13 +192,21 @@ def _stations_table(study: CamStudy) -> tuple[list[str], list[list[str]]]:
     ]
     if study.film is not None:
         columns.append(("film [um]", study.film, "um"))
-    cells = [[in_unit(float(v), unit) for v in values] for _, values, unit in columns]
+    cells = [[in_unit(v, unit) for v in _without_rounding(values)] for _, values, unit in columns]
     rows, segments = zip(*cells, strict=True), study.turn.cam.motion.segments
     names = [segments[k].name for k in _segments(study)]
     return (
         [*(head for head, *_ in columns), "segment"],
         [[*row, name] for row, name in zip(rows, names, strict=True)],
     )
+
+
+def _without_rounding(values: FloatArray) -> list[float]:
+    """Return values, with 0 for those that are zero to the rounding of the greatest."""
+    import numpy as np
+
+    size = np.abs(values)
+    return [float(v) for v in np.where(size > 1e-11 * size.max(), values, 0.0)]
 
 
 def _segments(study: CamStudy) -> list[int]:
