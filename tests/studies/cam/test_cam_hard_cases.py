@@ -24,8 +24,9 @@ CASES = {
     "jump of the acceleration": with_law("harmonic", prescribed(**SHORT)),
     "jump of the acceleration of a free roller": with_law("harmonic", cam(**SHORT)),
     "jump of the jerk": with_law("modified-trapezoid", prescribed(**SHORT)),
-    "nearly a cusp": prescribed(roller__radius="37.5 mm", **SHORT),
+    "nearly a cusp": prescribed(cam__base_radius="5.152253 mm", **SHORT),
     "load close to zero": prescribed(load__preload="75.61 N", **SHORT),
+    "load of zero": prescribed(load__preload="75.527312208 N", **SHORT),
     "load close to zero of a free roller": cam(load__preload="76 N", **SHORT),
     "feedback close to the harmonic limit": prescribed(
         load__feedback="inertia", load__preload="78 N", **SHORT
@@ -53,6 +54,11 @@ def test_hard_case_is_finite_and_conserves_volume(name):
     assert rollers == pytest.approx(energy, rel=1e-12)
 
 
+def test_cusp_has_a_radius_of_zero():
+    study = wearsim.study_cam(CASES["nearly a cusp"])
+    assert 0.0 < study.min_radius_of_curvature < 1e-9
+
+
 @pytest.mark.parametrize("radius", ["0.025 mm", "25 m"])
 def test_extreme_ratios_of_the_radii_run(radius):
     scenario = cam("eccentric", roller__radius=radius, **SHORT)
@@ -67,6 +73,7 @@ def test_extreme_ratios_of_the_radii_run(radius):
     ("changes", "words"),
     [
         ({"roller__radius": "40 mm", "cam__base_radius": "5 mm"}, "undercut"),
+        ({"cam__base_radius": "5.152252 mm"}, "undercut"),
         ({"load__preload": "75.3 N"}, "the follower jumps"),
         ({"cam__stations": 0}, r"\[cam\] stations: is out of range"),
     ],
