@@ -15,7 +15,6 @@ from wearsim.studies.cam.turn import CamTurn
 from wearsim.types import FloatArray
 
 MM, DEG, MPA = PER_SI["mm"], PER_SI["deg"], PER_SI["MPa"]
-_SAMPLES = 121  # of a panel
 
 
 def cam_figure(study: CamStudy, title: str) -> Figure:
@@ -33,7 +32,8 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
         normal force with peak pressure.
     """
     turn = study.turn
-    fine = turn.at_stations(Stations(turn.panels, (_SAMPLES,) * len(turn.panels)))
+    samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
+    fine = turn.at_stations(Stations(turn.panels, samples))
     lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
     scale = PER_SI[unit]
     found, angle = fine.kinematics, fine.angle * DEG
