@@ -41,7 +41,7 @@ def open_results(
     Examples
     --------
     >>> wearsim.open_results("rig-ensemble.h5")
-    <EnsembleResult 'a wear test': 16 realisations, depth 47.82 um>
+    <EnsembleResult 'a wear test': 16 realisations, depth 47.63 um>
     """
     kind = kind_of(path)
     if kind == "run":
@@ -71,6 +71,6 @@ def open_ensemble(path: str | Path) -> EnsembleResult:
     Examples
     --------
     >>> wearsim.open_ensemble("rig-ensemble.h5").plan
-    'sobol'
+    'monte-carlo'
     """
     return ensemble_result(read_ensemble(path), Path(path))

@@ -63,12 +63,14 @@ def kernels_of(
             found |= {"solve_strips"} if fields or not batched else set()
     if steps and model == "slender" and theory == "strip" and name == "per-pass":
         found |= {"run_passes"}
-    if steps and name != "per-pass":
-        found |= {"difference_sizes"}
+    roles = {item.role for item in scenario.random}
+    doubled = "process" in roles or not scenario.load.build().constant or evolution.step is not None
     if steps and model in {"slender", "semi-hertzian"} and name in {"auto", "implicit"}:
         found |= {"formulas", "extrapolated", "new_differences", "local_errors"}
         found |= {"linearised_wear", "wear_of_bodies"}
-    roles = {item.role for item in scenario.random}
+        found |= {"difference_sizes" if doubled else "carried_errors"}
+    elif steps and name != "per-pass":
+        found |= {"difference_sizes"}
     found |= {"filter_noise"} if "process" in roles else set()
     return found | ({"smooth", "half_lengths"} if "field" in roles else set())
 

@@ -1,13 +1,13 @@
-"""Example of the page on identification: three grooves whose truth is stated."""
+"""Tutorial of identification: three grooves whose truth is stated."""
 
 from __future__ import annotations
 
 import json
 import re
-import runpy
 import shutil
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -15,35 +15,44 @@ from typer.testing import CliRunner
 from wearsim.cli.app import app
 
 ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs" / "tutorials" / "identify.md").read_text(encoding="utf-8")
+CELLS = re.findall(r"^```\{code-cell\} ipython3\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)
+GROOVES, TESTS = (cell for cell in CELLS if not cell.startswith(("%", ":tags:")))
+INPUTS = [("321 N", 0.093, 1.25e-3)]
+
+
+def identified(*words: str) -> dict[str, Any]:
+    scenario = "scenarios/rig-identify.toml"
+    done = CliRunner().invoke(app, ["identify", scenario, *words, "--json", "-q"])
+    assert done.exit_code == 0, done.output
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
 
 
 @pytest.mark.slow
-def test_example_of_the_page_gives_the_printed_verdict(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    page = (ROOT / "docs" / "identification.md").read_text(encoding="utf-8")
+def test_intervals_of_the_tutorial_hold_the_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    for name in ("rig-450min.toml", "rig-identify.toml"):
-        shutil.copy(ROOT / "scenarios" / name, tmp_path)
-    (code,) = re.findall(r"^```python\n(.*?)^```$", page, flags=re.DOTALL | re.MULTILINE)
-    (tmp_path / "grooves.py").write_text(code)
-    runpy.run_path("grooves.py")
-    files = ["t1.csv", "t2.csv", "t3.csv"]
-    done = CliRunner().invoke(app, ["identify", "rig-identify.toml", *files, "--json", "-q"])
-    assert done.exit_code == 0, done.output
-    found = json.loads(done.stdout)
-    assert found["verdict"] == "undecided"
-    printed = re.findall(r"^t\d.csv .*?  (\d+\.\d+) \(", page, flags=re.MULTILINE)[:3]
-    depths = [1e6 * test["depth_m"] for test in found["tests"]]
-    assert depths == pytest.approx([float(text) for text in printed], rel=0.005)
+    shutil.copytree(ROOT / "scenarios", tmp_path / "scenarios")
+    names: dict[str, Any] = {}
+    exec(GROOVES, names)
+    exec(TESTS, names)
+    unknown = identified("t1.csv", "t2.csv", "t3.csv")
+    measured = identified("--tests", "tests.toml")
+    assert unknown["verdict"] == "undecided"
+    depths = [1e6 * test["depth_m"] for test in unknown["tests"]]
     assert depths == pytest.approx([52.2, 36.7, 47.2], rel=0.015)
-    for test in found["tests"]:
-        assert test["k_over_h_per_Pa"]["low"] < 1e-11 < test["k_over_h_per_Pa"]["high"]
+    for wide, narrow in zip(unknown["tests"], measured["tests"], strict=True):
+        ends = [
+            (one["k_over_h_per_Pa"]["low"], one["k_over_h_per_Pa"]["high"])
+            for one in (wide, narrow)
+        ]
+        assert all(low < 1e-11 < high for low, high in ends)
+        assert ends[1][1] - ends[1][0] < 0.6 * (ends[0][1] - ends[0][0])
 
 
-def test_tests_file_of_the_page_is_valid():
-    page = (ROOT / "docs" / "identification.md").read_text(encoding="utf-8")
-    (text,) = re.findall(r"^```toml\n(.*?)^```$", page, flags=re.DOTALL | re.MULTILINE)
-    (test,) = tomllib.loads(text)["test"]
+def test_tests_file_of_the_tutorial_is_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    exec(TESTS, {"inputs": INPUTS})
+    (test,) = tomllib.loads((tmp_path / "tests.toml").read_text())["test"]
     assert set(test) == {"profile", "set", "std"}
     assert set(test["std"]) == set(test["set"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import compile_alongside, kernel
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
 from wearsim.types import FloatArray, IntArray
 
 LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a steady wear rate
@@ -156,6 +156,11 @@ def difference_sizes(
         greatest depth [m]; volume of the differences [m^3]; Euclidean norms of differences and
         depths [m].
     """
+    return _sizes(depths, differences, weights)
+
+
+@subroutine
+def _sizes(depths: FloatArray, differences: FloatArray, weights: FloatArray) -> FloatArray:
     bodies, realisations, n = depths.shape
     sizes = np.zeros((4, realisations))
     for v in range(realisations):
@@ -262,7 +267,7 @@ def carried_errors(
                 carried[one, v, i] -= own[c, 0, i] * change
                 carried[other, v, i] -= own[c, 1, i] * change
     sizes = np.zeros((6, realisations))
-    sizes[:4] = difference_sizes(depths, carried, weights)
+    sizes[:4] = _sizes(depths, carried, weights)
     for v in range(realisations):
         for b in range(rows):
             change = 0.0

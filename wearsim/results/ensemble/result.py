@@ -38,7 +38,7 @@ class EnsembleResult(EnsembleValues):
     (16, ['friction.coefficient'])
     >>> depth = tests.estimate("depth").mean
     >>> print(f"{depth.value * 1e6:.0f} um, 95 % interval from {depth.low * 1e6:.0f} um")
-    48 um, 95 % interval from 47 um
+    48 um, 95 % interval from 46 um
     """
 
     def __repr__(self) -> str:

@@ -225,6 +225,21 @@ class EnsembleValues(StudyResult[EnsembleData]):
         ----------
         name : str
             "depth_profile", or "lift_error_curve" of a cam.
+
+        Returns
+        -------
+        ndarray, shape (realisations, ...)
+            In SI; the last axis is that of strips or angles.
+
+        Raises
+        ------
+        AttributeError
+            If there is no such variable.
+
+        Examples
+        --------
+        >>> wearsim.open_ensemble("rig-ensemble.h5").kept_values("depth_profile").shape
+        (16, 169)
         """
         if name not in self.raw.schema.variables or name not in KEPT:
             raise unknown_name(name, "a curve", KEPT[: 1 + self.raw.cam])

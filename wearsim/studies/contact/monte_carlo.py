@@ -86,7 +86,7 @@ def dissipation(
     >>> friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
     >>> scenario = wearsim.load_scenario("rig.toml", {"friction.coefficient": friction})
     >>> wearsim.dissipation(scenario, 100)
-    <DissipationResult 'a wear test': 100 realisations, power 0.07657 W, std 0.007357 W>
+    <DissipationResult 'a wear test': 100 realisations, power 0.07761 W, std 0.00744 W>
     """
     scenario = settled(as_scenario(scenario), test=False)
     realisations = checked_count(scenario, realisations)
