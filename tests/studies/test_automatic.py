@@ -10,7 +10,7 @@ from wearsim.errors import CapabilityError, Interrupted, ScenarioError
 from wearsim.plugins.manager import Registry
 from wearsim.scenario import parse_scenario
 from wearsim.scenario.examples import scenario_schema, shipped_scenario
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.contact.estimate import INDICATORS, calibration, indicators_of
 from wearsim.studies.dry_run import dry_run
 
@@ -41,16 +41,16 @@ def test_contact_takes_a_cheap_model_and_says_why():
 
 def test_named_model_is_kept_as_it_is():
     scenario = shipped_scenario("rig-450min")
-    assert settled(scenario, test=True) is scenario
+    assert with_chosen_model(scenario, test=True) is scenario
 
 
 def test_choice_is_kept_in_the_text():
-    once = settled(rig(), test=True)
+    once = with_chosen_model(rig(), test=True)
     again = parse_scenario(once.text, once.file, once.files.__getitem__)
     assert again.contact.model == once.contact.model == "slender"
     assert again.notes == once.notes
-    assert settled(again, test=True) is again
-    changed = settled(again.changed({"load.normal_force": "30 N"}), test=True)
+    assert with_chosen_model(again, test=True) is again
+    changed = with_chosen_model(again.changed({"load.normal_force": "30 N"}), test=True)
     assert changed.contact.model == "slender"
 
 
@@ -82,7 +82,7 @@ def test_ensemble_and_check_choose_once(tmp_path):
 
 
 def test_cam_is_judged_at_all_stations():
-    cam = settled(shipped_scenario("cam-eccentric", AUTO), test=True)
+    cam = with_chosen_model(shipped_scenario("cam-eccentric", AUTO), test=True)
     assert cam.contact.model == "slender"
 
 

@@ -41,7 +41,7 @@ class _State:
     indicators: list[FloatArray]
 
 
-def settled(scenario: Scenario, test: bool) -> Scenario:
+def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     """Return a scenario with the contact model that `contact.model = "auto"` takes.
 
     The cheapest installed model is taken whose estimated error of P_l(y) is at most

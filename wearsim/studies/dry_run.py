@@ -11,7 +11,7 @@ from wearsim.csv_tables import column_names
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import Load
 from wearsim.scenario import Cylinder, RandomInput, Scenario, described_model
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.plausibility import log_file, plausibility_warnings, range_90
@@ -53,7 +53,7 @@ def dry_run(scenario: Scenario) -> Data:
     'slender'
     """
     is_run = scenario.has_length and scenario.wear is not None
-    scenario, load = settled(scenario, is_run), scenario.load.build()
+    scenario, load = with_chosen_model(scenario, is_run), scenario.load.build()
     low, high = load_range(scenario, load, scenario.total_time if is_run else 0.0)
     roller, cylinder = scenario.roller, scenario.cylinder
     pair, patch = combine(cylinder.material, roller.material), fresh_patch(scenario, high)

@@ -17,7 +17,7 @@ from wearsim.mechanics.cam import Panel, extreme
 from wearsim.mechanics.film import minimum_film
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, as_scenario
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.checks import (
     Skid,
     cam_warnings,
@@ -130,7 +130,7 @@ def study_cam(
     >>> print([f"{force:.6f} N" for force in study.point.normal_force])
     ['319.538258 N', '324.369394 N']
     """
-    scenario = settled(as_scenario(scenario), test=False)
+    scenario = with_chosen_model(as_scenario(scenario), test=False)
     turn, chosen = turn_of(scenario), None
     weight = None
     if angles is None:

@@ -13,7 +13,7 @@ from wearsim.errors import Interrupted, ScenarioError, SolverError
 from wearsim.results import DissipationData, DissipationResult, check_output, write_results
 from wearsim.results.dissipation import BAND, as_numbers, summaries
 from wearsim.scenario import Scenario, as_scenario
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.contact.batch import Realisations
 from wearsim.studies.preparation import checked_count, nothing_random, origin_of
 from wearsim.studies.progress import shown_progress
@@ -88,7 +88,7 @@ def dissipation(
     >>> wearsim.dissipation(scenario, 100)
     <DissipationResult 'a wear test': 100 realisations, power 0.07761 W, std 0.00744 W>
     """
-    scenario = settled(as_scenario(scenario), test=False)
+    scenario = with_chosen_model(as_scenario(scenario), test=False)
     realisations = checked_count(scenario, realisations)
     path = Path(output) if output is not None else None
     if path is not None:

@@ -12,7 +12,7 @@ from wearsim.evolution.contacts import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.profiles import load_profile
 from wearsim.scenario import Scenario, as_scenario, described_model
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.contact.comparison import (
     ContactErrors,
@@ -155,7 +155,7 @@ def study_contact(
             kind = type(profile).__name__
             raise TypeError(f"profile must be a Profile or the path of a file, got a {kind}")
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
-    scenario = settled(scenario, test=False)
+    scenario = with_chosen_model(scenario, test=False)
     force = load_range(scenario, scenario.load.build(), 0.0)[0]
     grid, notes = contact_grid(scenario, force), scenario.notes
     model, gap, curvature, point = _contact(scenario, grid)

@@ -24,7 +24,7 @@ from wearsim.results import (
 )
 from wearsim.results.ensemble.schema import ALL_OBSERVABLES, OBSERVABLES
 from wearsim.scenario import Scenario, as_scenario, parse_scenario, require_run
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.observables import CURVE_ANGLES
 from wearsim.studies.ensemble.designs import (
     BASE_PLANS,
@@ -132,7 +132,7 @@ def ensemble(
     >>> tests.count
     8
     """
-    scenario = settled(as_scenario(scenario), test=True)
+    scenario = with_chosen_model(as_scenario(scenario), test=True)
     precision = named_precision(precision, until)
     request = checked_request(scenario, realisations, plan, precision)
     path = Path(output)

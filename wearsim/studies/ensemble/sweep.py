@@ -17,7 +17,7 @@ from wearsim.results import (
     read_results,
 )
 from wearsim.scenario import Scenario, as_scenario
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.api import checked_request, ensemble, named_precision, resume_ensemble
 from wearsim.studies.run.run import resume, run
 
@@ -102,7 +102,7 @@ def run_sweep(
         raise ResultsFileError(
             f"{same[0]}: would be the file of two values; write them differently"
         )
-    scenarios = [settled(scenario, test=True) for scenario in scenarios]
+    scenarios = [with_chosen_model(scenario, test=True) for scenario in scenarios]
     force, resumed = options.get("force", False), []
     for scenario, path in zip(scenarios, paths, strict=True):
         request: tuple[object, ...] = (scenario.sha256,)

@@ -15,7 +15,7 @@ from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.results import IdentificationResult, check_output, write_results
 from wearsim.scenario import Scenario, as_scenario, require_run
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.identify.analysis import Identified, identified
 from wearsim.studies.identify.inputs import with_known
 from wearsim.studies.identify.measurements import (
@@ -116,7 +116,7 @@ def identify(
         scenario = scenario.changed({key_of(key): value for key, value in fix.items()})
     require_run(scenario)
     check_law(scenario)
-    scenario = settled(scenario, test=True)
+    scenario = with_chosen_model(scenario, test=True)
     shared = _checked_share(share)
     width = quantity(shoulders, "m") if isinstance(shoulders, str) else shoulders
     items = _measurements(tests, before, choice, width)

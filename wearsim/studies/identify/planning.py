@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.scenario import Scenario, as_scenario, require_run
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.identify.analysis import kernel_of
 from wearsim.studies.identify.inputs import with_measured
@@ -100,7 +100,7 @@ def plan_tests(
     scenario = as_scenario(scenario)
     require_run(scenario)
     check_law(scenario)
-    scenario = settled(scenario, test=True)
+    scenario = with_chosen_model(scenario, test=True)
     if not tests or min(tests) < 2:
         raise ValueError("scatter needs 2 tests or more")
     designs = [("as in the scenario", scenario)]

@@ -22,7 +22,7 @@ from wearsim.results import (
 from wearsim.results.ensemble.life import LifeResult
 from wearsim.results.ensemble.life_settings import LifeSettings, LifeTarget
 from wearsim.scenario import Scenario, as_scenario, parse_scenario
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.api import PRELOAD, Watcher, checked_request, ensemble_content
 from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.realisation import shared_grid
@@ -119,7 +119,7 @@ def life(
     >>> print(f"B10 {lives.b(10).value:.3g} {lives.unit}")
     B10 8.51e+05 passes
     """
-    scenario = with_limits(settled(as_scenario(scenario), test=True), limits)
+    scenario = with_limits(with_chosen_model(as_scenario(scenario), test=True), limits)
     aim = None if precision is None else LifeTarget.parse(precision)
     settings = settings_of(scenario, realisations, target, b, most)
     settings = with_rare_events(scenario, settings, rare, precision, rare_method)

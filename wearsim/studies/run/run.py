@@ -19,7 +19,7 @@ from wearsim.results import (
     read_results,
 )
 from wearsim.scenario import Scenario, as_scenario
-from wearsim.studies.automatic import settled
+from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.preparation import check_plugins
 from wearsim.studies.progress import shown_progress
 from wearsim.studies.run.continuation import (
@@ -92,7 +92,7 @@ def run(
     48.1 um
     >>> kept = wearsim.run("rig.toml", "rig.h5")  # writes the file as well
     """
-    scenario = settled(as_scenario(scenario), test=True)
+    scenario = with_chosen_model(as_scenario(scenario), test=True)
     limit = None if until is None else Limit.parse(until)
     path = Path(output) if output is not None else None
     if path is not None:
