@@ -40,7 +40,7 @@ def go(scenario: Scenario, count: int, path: Path, storage: Storage = DISK) -> i
 
 
 def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) -> None:
-    """Kill an ensemble at all write stages, or at some of each kind and of each of its writers.
+    """Kill an ensemble at every third write stage, or one of each kind, of each of its writers.
 
     The names of all stages are printed first. Every fifth is killed again when it is resumed.
     """

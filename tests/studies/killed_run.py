@@ -95,7 +95,10 @@ def stages_of(work: Callable[[Storage], object]) -> list[str]:
 
 def chosen_of(stages: list[str], extent: str) -> list[int]:
     """Return the numbers of the write stages at which to kill."""
-    return {"all": list(range(len(stages))), "each stage": one_of_each(stages)}[extent]
+    each = one_of_each(stages)
+    if extent == "each stage":
+        return each
+    return sorted({*range(0, len(stages), 3), *each})
 
 
 def killing(at: int) -> Storage:
@@ -119,7 +122,7 @@ def one_of_each(stages: list[str]) -> list[int]:
 
 
 def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
-    """Kill a run at all write stages or one of each kind; every fifth again when it is resumed.
+    """Kill a run at some write stages, see `chosen_of`; every fifth again when it is resumed.
 
     The names of all stages are printed first.
     """

@@ -56,6 +56,8 @@ class WearIncrement:
 REALISATION = 2  # axis of the realisations
 SAME_LOAD = 1e-9  # relative change of a load below which a contact is not solved again
 MAX_LOAD_ITERATIONS = 40
+LEAST_CORRECTED = 0.1  # load after a correction, over that before it
+LOST = 1e-6  # load over that of the first iteration, below which contact is lost
 
 
 def solve_loaded(
@@ -102,6 +104,7 @@ def solve_loaded(
     if problem.has_spring:  # a stiff spring may seem unloaded until the approach has converged
         loads = np.where(loads > 0.0, loads, carried_loads(problem, state.contacts))
     contacts = solve(problem, state, checked_loads(state, loads))
+    first_loads = loads
     solves = int(contacts is not state.contacts)
     if not problem.has_spring:
         return contacts, loads, solves
@@ -112,8 +115,11 @@ def solve_loaded(
         open_ = np.abs(target - loads) > problem.iteration_tolerance * loads
         if not np.count_nonzero(open_):
             return contacts, loads, solves
-        loads = np.where(open_, corrected_loads(problem, loads, target, elastic), loads)
-        contacts = contacts_at(problem, state, checked_loads(state, loads))
+        corrected = corrected_loads(problem, loads, target, elastic)
+        # close to zero load the correction, linear in the approach, may lead below zero
+        checked_loads(state, np.where(loads > LOST * first_loads, 1.0, corrected))
+        loads = np.where(open_, np.maximum(corrected, LEAST_CORRECTED * loads), loads)
+        contacts = contacts_at(problem, state, loads)
         solves += 1
     raise StepError(
         f"the load of a spring and its contact did not converge at pass {state.passes[0]:.0f}",
