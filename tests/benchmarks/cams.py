@@ -27,7 +27,7 @@ BATCH = 8
 
 
 def random_cam(number: int, tolerance: float = 1e-2) -> wearsim.Scenario:
-    """Return a cam whose motion, radii, masses, load and speed are drawn, with a free roller."""
+    """Return a cam with random motion, radii, masses, load and speed, and a free roller."""
     random = np.random.default_rng([17, number])
     while True:
         rise = f"{random.uniform(4.0, 12.0)} mm"

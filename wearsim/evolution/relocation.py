@@ -21,9 +21,10 @@ from wearsim.mechanics.cam import moved_stations
 from wearsim.types import FloatArray, IntArray
 
 MOVED = math.radians(0.25)  # movement of an end of a skid at which stations are placed again
-LOOK = 1e-3  # change of the normal force, relative to it, after which skids are located again
-FALLEN = 0.01  # the same, after which stations are placed again: beside a skid the traction of a
-# rolling roller is 2 % below friction
+LOOK = 1e-3  # relative change of the normal force after which skids are located again
+# relative change after which stations are placed again: next to a skid the traction of a rolling
+# roller is 2 % below the traction bound
+FALLEN = 0.01
 _SMALL = 0.05  # of the greatest normal force, which smaller ones are compared with
 
 

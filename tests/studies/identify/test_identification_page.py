@@ -1,4 +1,4 @@
-"""Tutorial of identification: three grooves whose truth is stated."""
+"""Tutorial of identification: three grooves with known wear factors."""
 
 from __future__ import annotations
 

@@ -162,7 +162,7 @@ def densities(rolling: TangentialSolution) -> FloatArray:
 def solve(
     problem: Problem, normal: NormalSolution, tolerance: float, *, below: bool = False
 ) -> Solution:
-    """Return tractions and slip of a contact whose normal problem is solved.
+    """Return tractions and slip of a contact with known pressure.
 
     The grids are made coarser until they are small; the tractions of each are the initial guess on
     the next.

@@ -279,7 +279,7 @@ class Halfspace(ws.SingleContactModel):
 def _with_slip(
     problem: Problem, creepage: Creepage, y: FloatArray, load: FloatArray, strips: slice
 ) -> Problem:
-    """Return a problem with its rigid slip, whose centre is that of the line load."""
+    """Return a problem with its rigid slip; spin is about the centre of the line load."""
     varies = -creepage.spin * y if creepage.variation is None else creepage.variation
     along = creepage.longitudinal + varies - float(load @ varies) / float(load.sum())
     rigid = problem.rigid_slip
