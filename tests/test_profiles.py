@@ -263,3 +263,8 @@ def test_wrong_choice_of_a_start_profile_is_refused(
     with pytest.raises(ScenarioError) as caught:
         load_scenario(_rig(tmp_path, keys))
     assert message in str(caught.value)
+
+
+def test_results_file_as_a_profile_names_the_export() -> None:
+    with pytest.raises(ScenarioError, match=r"w.h5: this is a results file; wearsim export"):
+        read_profile(b"\x89HDF\r\n\x1a\n\0\0", "w.h5")

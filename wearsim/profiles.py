@@ -23,6 +23,11 @@ if TYPE_CHECKING:
 
 _SDF = (b"aISO-", b"bISO-", b"aBCR-", b"bBCR-")
 _X3P = b"PK\x03\x04"
+_HDF5 = b"\x89HDF"
+_EXPORT = (
+    "wearsim export writes its profiles as CSV, of which --profile takes one:"
+    " cylinder_depth_profiles.csv with --columns 'y,-depth at N passes'"
+)
 MAX_POINTS = 1_000_000  # of a filtered profile
 ROW_CHOICES = ("row", "mean_rows", "at")
 _NAMES = (
@@ -144,6 +149,8 @@ def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None =
     if isinstance(content, bytes):
         if is_surface(content):
             return _chosen_row(_surface(content, file), file, choice)
+        if content.startswith(_HDF5):
+            raise _error(file, f"this is a results file; {_EXPORT}")
         content = decode(content)
     if choice.rows:
         what = f"{choice.rows[0]} is for the rows of a surface, and this is a CSV file"

@@ -196,7 +196,7 @@ def _rows(study: ContactStudy) -> list[tuple[str, str]]:
         ("lateral force", shown(solution.force_y, "N")),
         ("spin moment", shown(moment, "N mm")),
         ("dissipated power", shown(solution.power, "W")),
-        ("adhesion fraction", shown(solution.adhesion_fraction, "%")),
+        ("adhesion fraction", shown(round(solution.adhesion_fraction, _DIGITS), "%")),
     ]
 
 
@@ -210,11 +210,13 @@ def _difference_rows(study: ContactStudy) -> list[tuple[str, str]]:
     rows = []
     for name, error in vars(study.errors).items():
         sign = "" if name in {"dissipation", "greatest"} else "+" if error >= 0.0 else "-"
-        text = f"{sign}{shown(abs(error), '%', 2)}"
-        rows.append((_DIFFERENCES[name], f"{text}, its own error {shown(own[name], '%', 2)}"))
+        text = f"{sign}{shown(abs(round(error, _DIGITS)), '%', 2)}"
+        theirs = shown(round(own[name], _DIGITS), "%", 2)
+        rows.append((_DIFFERENCES[name], f"{text}, its own error {theirs}"))
     return [*rows, ("time of the reference", lapse(study.reference.seconds))]
 
 
+_DIGITS = 10  # after the point, of a fraction; beyond them is rounding
 _DIFFERENCES = {
     "dissipation": "P_l(y), L2 over the strips",
     "greatest": "P_l(y), greatest over its maximum",
