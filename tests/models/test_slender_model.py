@@ -196,6 +196,19 @@ def test_solution_from_another_load_equals_the_cold_one(half_length, wear):
         assert warm.line_load.sum() * spacing == pytest.approx(300.0, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("ratio", "most"), [(0.25, 1), (0.9, 1), (0.99, -1), (1.0, -2), (1.01, -1), (1.1, 0), (4.0, 0)]
+)
+def test_solution_from_another_load_takes_few_iterations(ratio, most):
+    """`most` is the number of iterations beyond that of a solution without a start."""
+    grid = Grid.spanning(-4e-3, 4e-3, 161)
+    model, gap, point, cold = contact(grid)
+    near = model.solve_one(gap, RIG, replace(point, normal_force=ratio * point.normal_force))
+    warm = model.solve_one(gap, RIG, point, None, near)
+    assert warm.iterations <= cold.iterations + most
+    np.testing.assert_allclose(warm.line_load, cold.line_load, atol=2e-8 * cold.line_load.max())
+
+
 def test_gap_that_is_not_finite_fails_alone():
     model, gap, point, alone = contact()
     bad = gap.copy()

@@ -60,10 +60,27 @@ def factor_in_place(matrix: FloatArray, size: int) -> bool:
             f2 = (matrix[i, s2] - f0 * u02 - f1 * u12) * p2
             f3 = (matrix[i, s3] - f0 * u03 - f1 * u13 - f2 * u23) * p3
             matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3] = f0, f1, f2, f3
+        i = stop
+        while i + PANEL <= size:  # several rows together, for which the panel is read once
+            i1, i2, i3 = i + 1, i + 2, i + 3
+            f0, f1, f2, f3 = matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3]
+            g0, g1, g2, g3 = matrix[i1, start], matrix[i1, s1], matrix[i1, s2], matrix[i1, s3]
+            h0, h1, h2, h3 = matrix[i2, start], matrix[i2, s1], matrix[i2, s2], matrix[i2, s3]
+            l0, l1, l2, l3 = matrix[i3, start], matrix[i3, s1], matrix[i3, s2], matrix[i3, s3]
+            for j in range(np.uint64(stop), np.uint64(size)):
+                a, b, c, d = matrix[start, j], matrix[s1, j], matrix[s2, j], matrix[s3, j]
+                matrix[i, j] -= (f0 * a + f1 * b) + (f2 * c + f3 * d)
+                matrix[i1, j] -= (g0 * a + g1 * b) + (g2 * c + g3 * d)
+                matrix[i2, j] -= (h0 * a + h1 * b) + (h2 * c + h3 * d)
+                matrix[i3, j] -= (l0 * a + l1 * b) + (l2 * c + l3 * d)
+            i += PANEL
+        while i < size:
+            f0, f1, f2, f3 = matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3]
             for j in range(np.uint64(stop), np.uint64(size)):
                 matrix[i, j] -= (f0 * matrix[start, j] + f1 * matrix[s1, j]) + (
                     f2 * matrix[s2, j] + f3 * matrix[s3, j]
                 )
+            i += 1
     return True
 
 

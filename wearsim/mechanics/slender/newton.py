@@ -43,6 +43,7 @@ from wearsim.mechanics.slender.newton_step import (
     NewtonState,
     add_approach,
     add_displacement,
+    add_missing_load,
     complete_surface,
     correct_residual,
     fill_jacobian,
@@ -61,7 +62,9 @@ TOLERANCE = 1e-8  # predicted change of the next step, relative to the greatest 
 REUSED = 0.1  # relative change up to which the Jacobian may be reused
 SHRINKING = 0.2  # ratio of successive steps up to which it may be reused
 FIRST = 0.1  # assumed ratio of the second step to the first
-AT_BEST = 0.01  # least assumed ratio of successive steps, as the Jacobian is approximate
+MUCH = 0.05  # share of the load that starting line loads lack and a foundation corrects
+SMALL = 1e-3  # relative change since the Jacobian up to which its nonlinear part is neglected
+AT_BEST = 0.005  # least assumed ratio of successive steps, as the Jacobian is approximate
 GAP_TOLERANCE = 1e-8  # of the approach
 FIRST_FOUNDATION = 8.0  # elastic compliance of strips without displacement, in 1/(pi E*)
 FOUNDATION = 5.0  # the same of strips under the displacement of all
@@ -190,9 +193,10 @@ def solve_slender(
     """Solve sets of slender contacts, from starting line loads.
 
     The contacts of a set are independent or wear shared bodies. Strips on an elastic foundation
-    give line loads to a contact without a start, and correct starting line loads where bodies wear.
-    A set that fails is solved again without start and correction. The kernel is compiled separately
-    for independent contacts (`bodies` and `shared` None), without the parts for shared bodies.
+    give line loads to a contact without a start, and correct starting line loads where bodies wear
+    or the load differs much. A set that fails is solved again without start and correction. The
+    kernel is compiled separately for independent contacts (`bodies` and `shared` None), without the
+    parts for shared bodies.
 
     Parameters
     ----------
@@ -256,6 +260,7 @@ def solve_slender(
                         both = worn[number, k, 0, i] + worn[number, k, 1, i]
                         softness[k, i] += contacts * both
                     corrected = corrected or softness[k, i] > 0.0
+                corrected = add_missing_load(load[k] / spacing, total[k]) > MUCH or corrected
                 number_strips(k, total, FIRST_MARGIN, state)
             # a foundation gives loads to contacts without a start; another one, under the
             # displacements of these loads, brings them within a tenth in a quarter of the time of a
@@ -279,7 +284,7 @@ def solve_slender(
                         rest_on_foundation(
                             k, surface, softness, soft, sum_of_loads, first, end, total, delta
                         )
-            outcome, before, iteration = CONTINUE, 0.0, 0
+            outcome, before, stale, iteration = CONTINUE, 0.0, 0.0, 0
             while outcome == CONTINUE:
                 iteration += 1
                 renewed = False
@@ -322,7 +327,8 @@ def solve_slender(
                 ):
                     outcome = SINGULAR
                     break
-                for sweep in range(2):
+                # the second sweep corrects the Jacobian by the nonlinearity of large changes
+                for sweep in range(2 if renewed or stale > SMALL else 1):
                     for k in range(contacts):
                         if sweep:
                             correct_residual(k, table, unit, total, lengths, state)
@@ -333,6 +339,7 @@ def solve_slender(
                     if bodies is not None:
                         solve_depths(members, worn[number], state, system, delta)
                 change, left = update_loads(total, state, iteration > CAUTIOUS)
+                stale = change if renewed else stale + change
                 for k in range(contacts):
                     predict_surface(k, surface, state)
                 if bodies is not None:

@@ -99,6 +99,29 @@ def number_strips(k: int, line_load: FloatArray, margin: int, state: NewtonState
 
 
 @subroutine
+def add_missing_load(load: float, line_load: FloatArray) -> float:
+    """Distribute the load that a contact's strips lack evenly, and return its ratio to `load`.
+
+    On a Hertzian ellipse the line load of all strips changes with the load by the same amount.
+
+    Parameters
+    ----------
+    load : float
+        Sum of the line loads [N/m].
+    line_load : ndarray, shape (strips,)
+        Line load, changed where it is positive [N/m].
+    """
+    count, missing = 0, load
+    for i in range(line_load.shape[0]):
+        if line_load[i] > 0.0:
+            count, missing = count + 1, missing - line_load[i]
+    for i in range(line_load.shape[0]):
+        if line_load[i] > 0.0:
+            line_load[i] = max(line_load[i] + missing / count, 0.0)
+    return abs(missing) / load
+
+
+@subroutine
 def rest_on_foundation(
     k: int,
     gap: FloatArray,
