@@ -71,6 +71,13 @@ def test_two_designs_are_compared(command: Command, slim: Path, wide: Path) -> N
     assert "a specimen of wide outlives a specimen of slim" in " ".join(text.split())
 
 
+def test_results_file_is_named_after_the_scenario(command: Command, slim: Path) -> None:
+    again = slim.with_name("slim-life.toml")
+    again.write_text(slim.read_text())
+    assert command("life", again, "-n", 2, *HERE).exit_code == 0
+    assert sorted(path.name for path in again.parent.glob("*.h5")) == ["slim-life.h5"]
+
+
 def test_table_states_limits_and_reason(command: Command, slim: Path) -> None:
     logged = ("--set", "evolution.stepper=per-pass", "--set", "limit.depth=1 um")
     text = command("life", slim, "-n", 2, *logged, *HERE).stdout

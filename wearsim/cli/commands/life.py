@@ -232,12 +232,12 @@ def _run(
     from wearsim.studies.life import api, settings
 
     several = len(scenarios) > 1
-    base = output or Path(f"{scenarios[0].name}-life.h5")
-    same = {scenario.name for scenario in scenarios}
+    base = output or settings.results_file(scenarios[0])
+    same = {settings.results_file(scenario) for scenario in scenarios}
     if not several:
         paths = [base]
     elif output is None and len(same) == len(scenarios):
-        paths = [Path(f"{scenario.name}-life.h5") for scenario in scenarios]
+        paths = [settings.results_file(scenario) for scenario in scenarios]
     else:
         paths = [path_of(base, label) for label in labels]
     checked = []

@@ -32,6 +32,7 @@ from wearsim.studies.life.realisation import LifeRunner, first_length, with_leng
 from wearsim.studies.life.settings import (
     SHARES,
     design_variable,
+    results_file,
     settings_of,
     with_limits,
     with_rare_events,
@@ -72,7 +73,7 @@ def life(
     realisations : int
         Maximum number of realisations; one is sufficient where the wear factor alone is random.
     output : path, optional
-        Results file; by default the name of the scenario with ``-life.h5``.
+        Results file; by default the name of the scenario, which ends in ``-life.h5``.
     limits : sequence of str
         Limits in addition to those of the scenario, or instead of equal ones: "depth 50 um",
         "lift_error=30um".
@@ -125,7 +126,7 @@ def life(
     settings = with_rare_events(scenario, settings, rare, precision, rare_method)
     if variable and (found := design_variable(scenario, variable)):
         settings = replace(settings, variable=asdict(found))
-    path = Path(f"{scenario.name}-life.h5") if output is None else Path(output)
+    path = results_file(scenario) if output is None else Path(output)
     check_output(path, force, scenario.paths)
     runner, content = _prepared(scenario, settings, aim)
     with (

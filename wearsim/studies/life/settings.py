@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,11 @@ def with_rare_events(
             raise ValueError("no random input of one number per test can be shifted; use subset")
         method = "subset"
     return replace(settings, rare=rare, rare_method=method)
+
+
+def results_file(scenario: Scenario) -> Path:
+    """Return the default name of the results file of a study of lives."""
+    return Path(f"{scenario.name.removesuffix('-life')}-life.h5")
 
 
 def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
