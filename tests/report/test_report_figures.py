@@ -82,7 +82,9 @@ def test_depth_of_every_roller_pass_has_no_stepping_error() -> None:
 def test_figure_states_the_limit_at_which_a_run_stopped() -> None:
     scenario = load_scenario(SCENARIOS / "rig-450min.toml", SHORT)
     stopped = study_run.run(scenario, until="depth 0.1 um")
-    assert "(slender, implicit, stopped at depth 0.1 um)" in run_figure(stopped).get_suptitle()
+    title = run_figure(stopped).get_suptitle()
+    assert "(slender, implicit, stopped at depth 0.1 um)" in title
+    assert title.endswith("width 0 mm, not deeper than 1.000 um")
 
 
 def test_different_rollers_have_separate_curves_of_dissipation() -> None:

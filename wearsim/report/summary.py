@@ -43,6 +43,13 @@ def _by_roller(values: Any, unit: str) -> str:
     return " / ".join(text.removesuffix(f" {unit}") for text in texts) + f" {unit}"
 
 
+def width_of(result: Result, width: Any) -> str:
+    """Return widths of the groove, or the depth that it has not reached."""
+    if not np.any(width):
+        return f"0 mm, not deeper than {shown(result.raw.width_threshold, 'um')}"
+    return _by_roller(width, "mm")
+
+
 def end_state(result: Result) -> Rows:
     """Return rows on the observables at the end of a run."""
     rows = [("depth", _by_roller(result.depth[-1], "um"))]
@@ -52,7 +59,7 @@ def end_state(result: Result) -> Rows:
     if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
         rows.insert(1, ("roller depth", _by_roller(result.roller_depth[-1], "um")))
     rows += [
-        ("width", _by_roller(result.width[-1], "mm")),
+        ("width", width_of(result, result.width[-1])),
         ("worn volume", _by_roller(result.worn_volume[-1], "mm^3")),
         ("dissipated energy", _by_roller(result.dissipated_energy[-1], "J")),
         ("dissipated power", _by_roller(result.power[-1], "W")),

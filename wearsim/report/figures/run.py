@@ -26,6 +26,7 @@ from wearsim.report.parts import (
     set_depth_axes,
     titled_figure,
 )
+from wearsim.report.summary import width_of
 from wearsim.report.text import PER_SI, count, pass_unit, shown
 from wearsim.results import Result
 from wearsim.types import FloatArray
@@ -80,7 +81,7 @@ def caption(result: Result) -> str:
         f"{count(float(result.passes[-1]))} roller passes in"
         f" {shown(float(result.time[-1]), 'min')}"
         f" ({result.described_model}, {result.stepper}{unfinished})\n"
-        f"{depth}, width {shown(float(np.max(result.width[-1])), 'mm')}"
+        f"{depth}, width {width_of(result, np.max(result.width[-1]))}"
     )
 
 
