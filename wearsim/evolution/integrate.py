@@ -150,6 +150,8 @@ class Evolution:
         tests = enumerate(zip(self.numbers.tolist(), self.state.passes.tolist(), strict=True))
         over = self.failures.keys() | self._ended
         going = [k for k, (n, passes) in tests if passes < self.stop and n not in over]
+        if len(going) == len(self.numbers):
+            return
         kept = np.array(going, dtype=np.int64)
         self.numbers = self.numbers[kept]
         if going:
@@ -168,18 +170,19 @@ class Evolution:
             return _finite(self.stepper.attempt(*some, self.stop, scheme))
 
         resting = self._resting()
-        done, failed = bisect_failures(attempt, np.flatnonzero(~resting))
+        done, failed = bisect_failures(attempt, (~resting).nonzero()[0])
         failures = self._rejected(failed, lengths)
         accepted: list[tuple[IntArray, list[WearState]]] = []
-        if resting.any():
-            places = np.flatnonzero(resting)
+        if np.count_nonzero(resting):
+            places = resting.nonzero()[0]
             some = problem.at(places), state.at(places), lengths[places]
             accepted.append((places, list(self.stepper.rest(*some, self.stop))))
         for places, tried in done:
             columns = self.numbers[places], tried.excess, lengths[places], tried.ratio
-            each = zip(*(column.tolist() for column in columns), strict=True)
-            chosen = np.flatnonzero([self._trials[n].accepts(*values) for n, *values in each])
-            if chosen.size:
+            each = enumerate(zip(*(column.tolist() for column in columns), strict=True))
+            taken = [k for k, (n, *values) in each if self._trials[n].accepts(*values)]
+            if taken:
+                chosen = np.array(taken)
                 accepted.append((places[chosen], [item.at(chosen) for item in tried.path]))
         warning = done[0][1].warning if done else None
         advance = self._continued(accepted, warning) if accepted else None
@@ -256,7 +259,7 @@ class Evolution:
         """Continue from accepted steps, given by the places of their tests and their path."""
         places = np.concatenate([part for part, _ in accepted])
         *middle, end = map(joined_states, zip(*(path for _, path in accepted), strict=True))
-        if (np.diff(places) < 0).any():  # pauses come first
+        if len(accepted) > 1 and (np.diff(places) < 0).any():  # pauses come first
             order = np.argsort(places)
             places, end = places[order], end.at(order)
             middle = [part.at(order) for part in middle]
@@ -273,7 +276,9 @@ class Evolution:
 def _finite(tried: Attempt) -> Attempt:
     """Return a step; raise StepError if it leads to a value that is not finite."""
     end = tried.path[-1]
-    if not (np.isfinite(end.cylinder_depth).all() and np.isfinite(end.energy).all()):
+    # counted, since all() takes twice as long on short arrays
+    checked = end.cylinder_depth, end.energy
+    if any(np.count_nonzero(np.isfinite(values)) < values.size for values in checked):
         raise StepError(f"a value is not finite after pass {end.passes[0]:.0f}", end.to_arrays())
     return tried
 

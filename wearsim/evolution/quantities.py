@@ -392,4 +392,4 @@ def sum_in_order(values: FloatArray, axis: int) -> FloatArray:
     """
     if values.shape[axis] == 1:
         return values.squeeze(axis)
-    return np.asarray(np.take(np.add.accumulate(values, axis=axis), -1, axis=axis))
+    return np.asarray(np.add.accumulate(values, axis=axis).take(-1, axis=axis))

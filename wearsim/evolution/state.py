@@ -172,13 +172,6 @@ class WearState:
         """Worn depths of all bodies, shape (stations + rollers, realisations, strips) [m]."""
         return stacked_depths(self.depths)
 
-    def with_stacked(self, depths: FloatArray) -> WearState:
-        """Return the state with other depths, as in `stacked`."""
-        stations = len(self.cylinder_depth)
-        return self.replaced(
-            cylinder_depth=depths[:stations, None], roller_depth=depths[None, stations:]
-        )
-
     @property
     def auxiliary(self) -> dict[str, Any]:
         """The coarse-step and half-quadrature solutions that exist, by field name."""
@@ -188,7 +181,9 @@ class WearState:
     def replaced(self, **others: Any) -> WearState:
         """Return the state with some fields replaced, in a tenth of the time of `replace`."""
         state = object.__new__(WearState)
-        state.__dict__.update(self.__dict__, **others)
+        values = state.__dict__
+        values.update(self.__dict__)
+        values.update(others)
         return state
 
     def with_added(self, depths: Depths) -> WearState:
@@ -223,6 +218,8 @@ class WearState:
     @property
     def irreducible(self) -> FloatArray:
         """Errors of depth [m] and volume [m^3] not due to step size, shape (2, realisations)."""
+        if not np.count_nonzero(self.scatter):
+            return self.quadrature
         return np.asarray(self.quadrature + SIGMAS * np.sqrt(self.scatter))
 
     def to_arrays(self) -> dict[str, npt.NDArray[np.generic]]:
@@ -279,6 +276,11 @@ def joined_states(states: Sequence[WearState]) -> WearState:
 def stacked_depths(depths: Depths) -> FloatArray:
     """Return depths of cylinder and rollers as `WearState.stacked`."""
     return np.concatenate([depths[0][:, 0], depths[1][0]])
+
+
+def separated(depths: FloatArray, stations: int) -> Depths:
+    """Return the depths of cylinder and rollers from those of `WearState.stacked`."""
+    return depths[:stations, None], depths[None, stations:]
 
 
 def widened(array: FloatArray, strips: int) -> FloatArray:

@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 
 from wearsim.mechanics.numerics.multistep import (
+    GROW,
+    LIMIT,
     MAX_ORDER,
     ROWS,
+    SAFETY,
     extrapolated,
     formulas,
     local_errors,
     new_differences,
+    next_steps,
 )
 
 ORDERS = range(1, MAX_ORDER + 1)
@@ -113,3 +117,46 @@ def test_missing_points_have_no_estimate():
     spans = np.array([[1.0], [2.0], [np.inf], [np.inf], [np.inf]])
     errors, _ = errors_of(np.ones((ROWS, 1, 1, 2)), spans, np.ones((1, 1, 2)), 1)
     assert np.isfinite(errors).tolist() == [True, False, False, False]
+
+
+def chosen(sizes, order, part=1.0, aim=1.0):
+    """Excess, order and ratio of the next step after one with errors of given sizes."""
+    known = len(sizes)
+    spans = np.array([[1.0 + k] if k <= known else [np.inf] for k in range(ROWS - 1)])
+    differences, value = np.zeros((ROWS, 1, 1, 1)), np.ones((1, 1, 1))
+    differences[2:] = 1.0
+    unit = local_errors(differences, spans, value, np.array([order]), np.empty_like(value))
+    for k, size in enumerate(sizes):
+        differences[k + 2] = size / unit[k, 0]
+    orders, own = np.array([0]), np.empty_like(value)
+    found = next_steps(differences, spans, value, np.array([order]), part * ONE, aim, own, orders)
+    return found[0, 0], orders[0], found[1, 0]
+
+
+def test_next_step_would_meet_the_aim():
+    excess, order, ratio = chosen([1e3, 0.5, 1e3, 1e3], 2)
+    assert (excess, order) == (pytest.approx(0.5 / LIMIT), 2)
+    assert ratio == pytest.approx(SAFETY * 0.5 ** (-1.0 / 3.0))
+
+
+def test_error_is_compared_with_the_aim_over_the_part():
+    excess, _, _ = chosen([1.0, 1e-4, 1.0, 1.0], 2, part=0.5, aim=1e-3)
+    assert excess == pytest.approx(0.05 / LIMIT)
+
+
+def test_order_changes_by_one_to_that_of_the_longest_step():
+    assert chosen([0.1, 1.0, 1.0, 1e-9], 2)[1] == 1
+    assert chosen([1.0, 1.0, 0.1, 1e-9], 2)[1] == 3
+
+
+def test_growth_is_limited_by_the_order():
+    for order in ORDERS:
+        sizes = [1.0, 1.0, 1.0, 1.0]
+        sizes[order - 1] = 1e-15
+        assert chosen(sizes, order)[1:] == (order, GROW[order - 1])
+
+
+def test_first_steps_raise_the_order():
+    assert chosen([], 1) == (0.0, 1, GROW[0])
+    assert chosen([0.5], 1)[1] == 2
+    assert chosen([5.0], 1)[:2] == (pytest.approx(5.0 / LIMIT), 1)

@@ -30,17 +30,13 @@ from wearsim.mechanics.numerics.multistep import (
     ROWS,
     extrapolated,
     formulas,
-    local_errors,
     new_differences,
+    next_steps,
 )
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.5  # part of the tolerance that a step may add to the profiles
-COVER = np.array([5.0, 2.0, 5.0])  # safety factors on the errors of depth, volume and profile
-LEAST = 0.15  # error of the greatest depth, relative to that of the profile, as it crosses zero
-LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
-SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
-GROW = (2.2, 2.2, 1.8, 1.45)  # greatest ratio of successive steps, by order
+COVER = np.array([[5.0], [2.0], [5.0]])  # safety factors on the errors of depth, volume, profile
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
@@ -79,12 +75,9 @@ class ImplicitStepper(StepDoublingStepper):
         """Return the state with the rates and differences that the formulas need."""
         return state if state.past_spans is not None else with_rates(problem, state)
 
-    def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
-        """Return the forced step, the one proposed after the last step, or a first step."""
-        proposed = super().proposed(problem, state)
-        if self.forced_step is not None:
-            return proposed
-        return np.where(state.step > 0.0, proposed, math.sqrt(self.tolerance) * proposed)
+    def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
+        """Return the length of the first step, shape (realisations,) [passes]."""
+        return math.sqrt(self.tolerance) * super().first_steps(problem, state)
 
     def attempt(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
@@ -96,16 +89,16 @@ class ImplicitStepper(StepDoublingStepper):
         end = scheme(problem, state, step)
         end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
-        past, own = Past.of(end), np.empty_like(state.stacked)
-        errors = local_errors(past.wear, past.spans, end.stacked, past.order, own)
-        part = (passes / stop) ** PART_EXPONENT
-        over, order, ratio = _next_steps(errors * part / (SHARE * self.tolerance), past.order)
+        past, depths = Past.of(end), end.stacked
+        own, order = np.empty_like(depths), np.empty_like(past.order)
+        part, aim = (passes / stop) ** PART_EXPONENT, SHARE * self.tolerance
+        over, ratio = next_steps(past.wear, past.spans, depths, past.order, part, aim, own, order)
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
             steps=state.steps + 1,
             order=order,
-            **_estimates(problem, state, end, own, step),
+            **_estimates(problem, state, end, depths, own, step),
             **others,
         )
         return Attempt((end,), over, ratio)
@@ -116,17 +109,17 @@ class ImplicitStepper(StepDoublingStepper):
         """Take a step as two halves and as a whole; choose order and length of the next one."""
         doubled = self.doubled(problem, state, step, stop, scheme)
         half, end = doubled.path
-        past = Past.of(end)
-        own = np.empty_like(end.stacked)
-        errors = local_errors(past.wear, past.spans, end.stacked, past.order, own)
+        past, depths = Past.of(end), end.stacked
+        own, order = np.empty_like(depths), np.empty_like(past.order)
         part = (end.passes / stop) ** PART_EXPONENT
-        over, order, ratio = _next_steps(errors * (part / self.tolerance), past.order)
+        scale = part / self.tolerance
+        over, ratio = next_steps(past.wear, past.spans, depths, past.order, scale, 1.0, own, order)
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
         added = doubled.added[0] / np.where(allowed > 0.0, allowed, np.inf)
         over = np.maximum(over, added)
         ratio = np.where(added > 1.0, np.minimum(ratio, self.ratio(added)), ratio)
-        unknown = np.isinf(errors[0])
+        unknown = np.isinf(past.spans[1])
         if unknown.any():
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
@@ -141,7 +134,12 @@ class ImplicitStepper(StepDoublingStepper):
 
 
 def _estimates(
-    problem: WearProblem, start: WearState, end: WearState, added: FloatArray, passes: FloatArray
+    problem: WearProblem,
+    start: WearState,
+    end: WearState,
+    depths: FloatArray,
+    added: FloatArray,
+    passes: FloatArray,
 ) -> dict[str, FloatArray]:
     """Return the error estimates at the end of a step, by their names in `WearState`.
 
@@ -150,8 +148,8 @@ def _estimates(
     problem : WearProblem
     start, end : WearState
         States before and after the step.
-    added : ndarray
-        Error of the depths that the step adds, as `WearState.stacked` [m].
+    depths, added : ndarray
+        Depths of the end, and error that the step adds to them, as `WearState.stacked` [m].
     passes : ndarray, shape (realisations,)
         Length of the step.
     """
@@ -167,51 +165,21 @@ def _estimates(
         np.asarray(end.wear_exponents).reshape(shape),
         contacts.approach,
         kernel_input(problem.nominal_gap).reshape(shape),
-        end.stacked,
+        depths,
         problem.body_rows,
         stiffness,
         problem.grid.spacing,
         problem.volume_weights,
     )
-    profile = sizes[2] / np.where(sizes[3] > 0.0, sizes[3], np.inf)
-    # errors of greatest depth and volume may cross zero
-    depth, volume = np.maximum(sizes[0], LEAST * profile * sizes[4]), np.abs(sizes[5])
-    found = COVER[:, None] * np.array([depth, volume, profile])
-    found[1] += start.volume_error - start.irreducible[1]
-    names = "depth_error", "volume_error", "profile_error"
-    stated = zip(names, found + end.irreducible, strict=True)
-    return {"stepping_error": errors, **dict(stated)}
-
-
-def _next_steps(errors: FloatArray, orders: IntArray) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Return the results of `_next_step` for all realisations, the last axis of the errors."""
-    columns = zip(errors.T.tolist(), orders.tolist(), strict=True)
-    over, order, ratio = zip(*(_next_step(*column) for column in columns), strict=True)
-    return np.array(over), np.array(order), np.array(ratio)
-
-
-def _next_step(errors: list[float], order: int) -> tuple[float, int, float]:
-    """Return the excess of a step, and order and length of the next one relative to it.
-
-    Parameters
-    ----------
-    errors : list of float
-        Error that the step has added at each order, relative to the one aimed at; infinite where
-        it is unknown.
-    order : int
-        Order of the step.
-    """
-    known = sum(map(math.isfinite, errors))
-    if not known:
-        return 0.0, order, GROW[0]
-    excess = errors[min(order, known) - 1] / LIMIT
-    best = (0.0, 1)
-    for other in range(max(1, order - 1), min(order + 1, known) + 1):
-        error = max(errors[other - 1], 1e-12)
-        best = max(best, (SAFETY * error ** (-1.0 / (other + 1)), other))
-    # the first steps have no estimate of the next order
-    order = order + 1 if order + 1 > known and order < MAX_ORDER and excess <= 1.0 else best[1]
-    return excess, order, min(best[0], GROW[order - 1])
+    found = COVER * sizes
+    found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
+    depth, volume, profile = found + end.irreducible
+    return {
+        "stepping_error": errors,
+        "depth_error": depth,
+        "volume_error": volume,
+        "profile_error": profile,
+    }
 
 
 def with_rates(problem: WearProblem, state: WearState) -> WearState:
@@ -328,19 +296,18 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = _conditions(here, problem, state, passes)
     order = Past.of(state).order
-    first_order = np.ones_like(order)
     try:
         end, decreased = _step(here, state, passes, conditions, order)
     except StepError:
         # the past points may lead beyond the depth at which a spring is unloaded
         if len(order) > 1 or order[0] == 1:
             raise
-        return _step(here, state, passes, conditions, first_order)[0]
-    again = np.flatnonzero(decreased & (order > 1))
+        return _step(here, state, passes, conditions, np.ones_like(order))[0]
+    again: IntArray = (decreased & (order > 1)).nonzero()[0]
     if again.size:
         conditions = _Conditions(*(column[..., again] for column in vars(conditions).values()))
         some = here.at(again), state.at(again), passes[again]
-        part, _ = _step(*some, conditions, first_order[again])
+        part, _ = _step(*some, conditions, np.ones_like(again))
         end = end.with_others(again, part)
     return end
 
@@ -370,7 +337,8 @@ def _step(
         old = past.feedback.reshape(ROWS, -1, realisations, 1)
         feedback = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
         feedback = feedback.reshape(problem.shape)
-    step = EndOfStep(problem, state, start + added, conditions.force, passes, worn_passes)
+    base = start + added
+    step = EndOfStep(problem, state, base, conditions.force, passes, worn_passes)
     end, worn, feedback = step.solved(start + guess, feedback)
     rate = _energy_per_pass(problem, end.contacts)[None, :, None]
     energy = energy + worn_passes[:, None] * rate
@@ -390,5 +358,5 @@ def _step(
         past_feedback=past_feedback,
         past_spans=spans,
     )
-    decreased = (end.stacked < start).any(axis=(0, 2)) | (energy[0, :, 0] < 0.0)
+    decreased = (base + worn < start).any(axis=(0, 2)) | (energy[0, :, 0] < 0.0)
     return end, decreased

@@ -10,7 +10,7 @@ from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.loads import (
     advanced_terms,
     checked_loads,
@@ -97,18 +97,28 @@ class EndOfStep:
         if feedback is not None:
             loads = np.maximum(prescribed + feedback, LEAST_GUESS * prescribed)
         target = loads
-        gap = problem.gap(*start.with_stacked(self.base).depths)
-        depths, ends, contacts = guess, start.with_stacked(guess), start.contacts
+        stations, depths, contacts = problem.shape[0], guess, start.contacts
+        gap = problem.gap(*separated(self.base, stations))
         # line loads and wear about which the wear is linearised
         line_load, wear = contacts.line_load, self._parts(contacts)
-        exponents = np.asarray(start.wear_exponents).reshape(contacts.line_load.shape)
+        shape = line_load.shape
+        exponents = np.asarray(start.wear_exponents).reshape(shape)
         active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
         iterations = np.zeros(len(active), dtype=np.int64)
         worn = np.empty_like(self.base)
         for iteration in range(1, MAX_FIXED_POINT + 1):
-            compliance = np.empty((len(active), len(problem.bodies), 2, gap.shape[-1]))
-            constant = linearised_wear(line_load, wear, exponents, compliance)
-            batch = contact_batch(problem, gap + self._opening(constant), loads, *ends.depths)
+            opened = np.empty(shape)
+            compliance = np.empty((len(active), len(problem.bodies), 2, shape[1]))
+            constant = linearised_wear(
+                line_load,
+                wear,
+                exponents,
+                problem.body_rows,
+                gap.reshape(shape),
+                compliance,
+                opened,
+            )
+            batch = contact_batch(problem, opened, loads, *separated(depths, stations))
             shared = SharedWear(problem.bodies, compliance)
             solved = solve_compliant(problem, batch, shared, contacts, active)
             iterations += active
@@ -126,10 +136,7 @@ class EndOfStep:
                 exponents,
                 worn,
             )
-            used, depths = depths, self.base + worn
-            ends = start.with_stacked(depths)
-            depth[depth <= 0.0] = np.inf
-            change = rest
+            used, depths, change = depths, self.base + worn, rest
             if feedback is not None:
                 # loads of realisations that have converged must not depend on the others
                 target = np.where(active, self._equilibrium(solved, loads, gap), target)
@@ -144,8 +151,11 @@ class EndOfStep:
             relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
             converged = CONVERGED * problem.iteration_tolerance * relaxation
             active &= ~(change <= converged * depth)
-            if not active.any():
-                end = ends.replaced(
+            if not np.count_nonzero(active):
+                cylinder, roller = separated(depths, stations)
+                end = start.replaced(
+                    cylinder_depth=cylinder,
+                    roller_depth=roller,
                     solves=start.solves + iterations * problem.contacts_each,
                     contacts=solved,
                     terms=self._terms(solved),
@@ -167,15 +177,6 @@ class EndOfStep:
         """Return the contributions of the contacts to the wear, shape (2, contacts, strips) [m]."""
         parts = self.problem.wear_parts(contacts, self.worn_passes)
         return parts.reshape(2, *contacts.line_load.shape)
-
-    def _opening(self, parts: FloatArray) -> FloatArray | float:
-        """Return the gap opened by contributions of the contacts, shape (S, C, N, strips) [m]."""
-        if not parts.any():
-            return 0.0
-        problem = self.problem
-        shaped = parts.reshape(2, *problem.shape, -1)
-        cylinder, roller = problem.sum_of_parts(*shaped)
-        return cylinder + problem.at_contacts(roller)
 
     def _equilibrium(
         self, solved: ContactBatchSolution, loads: FloatArray, gap: FloatArray

@@ -59,9 +59,16 @@ class StepDoublingStepper(Stepper):
         """Return the forced step, the one proposed after the last step, or a first step."""
         if self.forced_step is not None:
             return np.full(state.passes.shape, self.forced_step)
-        if state.step.all():
+        if np.count_nonzero(state.step) == len(state.step):
             return state.step
-        return np.where(state.step > 0.0, state.step, first_steps(problem, state))
+        return np.where(state.step > 0.0, state.step, self.first_steps(problem, state))
+
+    def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
+        """Return the passes that wear off a tenth of the elastic approach, (realisations,)."""
+        cylinder, roller = problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))
+        rate = (cylinder + roller).max(axis=(0, 1, 3))
+        worn, approach = np.where(rate > 0.0, rate, 1.0), elastic_approach(problem, state)
+        return np.asarray(np.where(rate > 0.0, 0.1 * approach / worn, np.inf))
 
     def attempt(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
@@ -127,11 +134,3 @@ class StepDoublingStepper(Stepper):
     ) -> tuple[WearState, ...]:
         """Return the states in the middle and at the end of a step in a pause."""
         return rest(problem, state, 0.5 * step, stop), rest(problem, state, step, stop)
-
-
-def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the passes that wear off a tenth of the elastic approach, shape (realisations,)."""
-    cylinder, roller = problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))
-    rate = (cylinder + roller).max(axis=(0, 1, 3))
-    worn = np.where(rate > 0.0, rate, 1.0)
-    return np.asarray(np.where(rate > 0.0, 0.1 * elastic_approach(problem, state) / worn, np.inf))

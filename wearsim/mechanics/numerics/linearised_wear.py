@@ -11,11 +11,18 @@ LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a ste
 DEEP = 0.5  # depths are compared where a groove is deeper than this part of its greatest depth
 FOUNDATION = 0.5  # elastic compliance of a strip, over approach per greatest line load
 MIN_LOG_CHANGE = 1e-7  # least relative change of a line load for the estimate of an exponent
+LEAST = 0.15  # error of the greatest depth, relative to that of the profile, as it crosses zero
 
 
 @kernel
 def linearised_wear(
-    line_load: FloatArray, wear: FloatArray, exponents: FloatArray, compliance: FloatArray
+    line_load: FloatArray,
+    wear: FloatArray,
+    exponents: FloatArray,
+    bodies: IntArray,
+    gap: FloatArray,
+    compliance: FloatArray,
+    opened: FloatArray,
 ) -> FloatArray:
     """Linearise the wear u of each strip about its line load q_0.
 
@@ -29,8 +36,14 @@ def linearised_wear(
         Depth u_0 that each contact wears off its two bodies [m].
     exponents : ndarray, shape (contacts, strips)
         Exponent e.
+    bodies : ndarray of int, shape (contacts each, 2)
+        Rows of the two bodies of each contact, numbered together.
+    gap : ndarray, shape (contacts, strips)
+        Gap without this wear [m].
     compliance : ndarray, shape (realisations, contacts each, 2, strips)
         Result: e u_0/q_0 [m/(N/m)]; u_0/q_0 is interpolated to strips without load.
+    opened : ndarray, shape (contacts, strips)
+        Result: gap opened by the constant part of the wear of all contacts [m].
 
     Returns
     -------
@@ -39,13 +52,14 @@ def linearised_wear(
     """
     contacts, n = line_load.shape
     realisations = len(compliance)
-    constant = np.empty((2, contacts, n))
+    constant, worn = np.empty((2, contacts, n)), np.zeros((bodies.max() + 1, realisations, n))
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for side in range(2):
             last = -1
             for i in range(n):
                 constant[side, k, i] = (1.0 - exponents[k, i]) * wear[side, k, i]
+                worn[bodies[c, side], v, i] += constant[side, k, i]
                 if not line_load[k, i] > 0.0:
                     continue
                 here = wear[side, k, i] / line_load[k, i]
@@ -59,6 +73,10 @@ def linearised_wear(
                 compliance[v, c, side, j] = compliance[v, c, side, last] if last >= 0 else 0.0
             for i in range(n):
                 compliance[v, c, side, i] *= exponents[k, i]
+    for k in range(contacts):
+        c, v = k // realisations, k % realisations
+        for i in range(n):
+            opened[k, i] = gap[k, i] + (worn[bodies[c, 0], v, i] + worn[bodies[c, 1], v, i])
     return constant
 
 
@@ -101,7 +119,7 @@ def wear_of_bodies(
     -------
     ndarray, shape (3, realisations)
         Greatest opening less the linearised one, greatest opening, and greatest depth of both
-        bodies of a contact [m].
+        bodies of a contact, infinite without any [m].
     """
     contacts, n = loads.shape
     realisations = len(compliance)
@@ -133,6 +151,9 @@ def wear_of_bodies(
                 sizes[0, v] = max(sizes[0, v], abs(rest[one, v, i] + rest[other, v, i]))
                 sizes[1, v] = max(sizes[1, v], opening)
                 sizes[2, v] = max(sizes[2, v], depth)
+    for v in range(realisations):
+        if sizes[2, v] <= 0.0:
+            sizes[2, v] = np.inf
     return sizes
 
 
@@ -230,9 +251,9 @@ def carried_errors(
     Returns
     -------
     errors : ndarray, shape (bodies, realisations, strips)
-    sizes : ndarray, shape (6, realisations)
-        As from `difference_sizes`; then the greatest depth [m], and the volume of the change of the
-        errors [m^3].
+    sizes : ndarray, shape (3, realisations)
+        Error of the greatest depth [m]; volume by which the errors have changed, without its sign
+        [m^3]; Euclidean norm of the errors over that of the depths.
     """
     rows, realisations, n = errors.shape
     whole = errors + added
@@ -266,23 +287,27 @@ def carried_errors(
                 change = weight[i] * (whole[one, v, i] + whole[other, v, i] - opened / held)
                 carried[one, v, i] -= own[c, 0, i] * change
                 carried[other, v, i] -= own[c, 1, i] * change
-    sizes = np.zeros((6, realisations))
-    sizes[:4] = _sizes(depths, carried, weights)
+    sizes, found = _sizes(depths, carried, weights), np.empty((3, realisations))
     for v in range(realisations):
+        deepest, volume = 0.0, 0.0
         for b in range(rows):
             change = 0.0
             for i in range(n):
-                sizes[4, v] = max(sizes[4, v], depths[b, v, i])
+                deepest = max(deepest, depths[b, v, i])
                 change += carried[b, v, i] - errors[b, v, i]
-            sizes[5, v] += weights[1, b] * change
-    return carried, sizes
+            volume += weights[1, b] * change
+        profile = sizes[2, v] / sizes[3, v] if sizes[3, v] > 0.0 else 0.0
+        # the error of the greatest depth may cross zero
+        found[0, v] = max(sizes[0, v], LEAST * profile * deepest)
+        found[1, v], found[2, v] = abs(volume), profile
+    return carried, found
 
 
 def compile_linearised_wear() -> None:
     """Compile the kernels of a step by a call for one contact of one strip."""
     strip, wear, worn = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     compliance, rows = np.ones((1, 1, 2, 1)), np.array([[0, 1]])
-    constant = linearised_wear(strip, wear, strip, compliance)
+    constant = linearised_wear(strip, wear, strip, rows, strip, compliance, np.ones((1, 1)))
     wear_of_bodies(
         strip, strip, wear, wear, compliance, constant, rows, worn, 1.0, np.ones((1, 1)), worn
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import compile_alongside, kernel
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
 from wearsim.types import FloatArray, IntArray
 
 MAX_ORDER = 4
@@ -12,6 +12,9 @@ ROWS = MAX_ORDER + 2  # of the divided differences: the highest one is that of t
 # greatest ratios of a step to the last one at order 2, 3 and 4, below those at which steps are
 # unstable: 1 + sqrt(2), and 2.64 and 1.64 if only every second step grows
 _RATIOS = (2.4, 1.9, 1.5)
+LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
+SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
+GROW = (2.2, 2.2, 1.8, 1.45)  # greatest ratio of successive steps, by order
 
 
 @kernel
@@ -147,7 +150,7 @@ def new_differences(
     return new
 
 
-@kernel
+@subroutine
 def local_errors(
     differences: FloatArray,
     spans: FloatArray,
@@ -201,6 +204,62 @@ def local_errors(
     return sizes
 
 
+@kernel
+def next_steps(
+    differences: FloatArray,
+    spans: FloatArray,
+    depths: FloatArray,
+    orders: IntArray,
+    part: FloatArray,
+    aim: float,
+    errors: FloatArray,
+    next_orders: IntArray,
+) -> FloatArray:
+    """Return the excess of error of the last step, and order and length of the next one.
+
+    Parameters
+    ----------
+    differences, spans, depths, orders
+        As of `local_errors`.
+    part : ndarray, shape (solutions,)
+    aim : float
+        Relative error that a step should add is ``aim / part``.
+    errors : ndarray, shape (rows, solutions, columns)
+        Result: error of the step, as of `local_errors`.
+    next_orders : ndarray of int, shape (solutions,)
+        Result: order of the next step.
+
+    Returns
+    -------
+    ndarray, shape (2, solutions)
+        Error of the step relative to the greatest accepted one, zero where it is unknown, and
+        ratio of the next step to it.
+    """
+    sizes, found = (
+        local_errors(differences, spans, depths, orders, errors),
+        np.empty((2, len(part))),
+    )
+    for v in range(len(part)):
+        known, order = 0, orders[v]
+        for k in range(MAX_ORDER):
+            sizes[k, v] = sizes[k, v] * part[v] / aim
+            known += np.isfinite(sizes[k, v])
+        excess, ratio, best = 0.0, 0.0, 1
+        if known > 0:
+            excess = sizes[min(order, known) - 1, v] / LIMIT
+        for other in range(max(1, order - 1), min(order + 1, known) + 1):
+            size = SAFETY * max(sizes[other - 1, v], 1e-12) ** (-1.0 / (other + 1))
+            if size >= ratio:
+                ratio, best = size, other
+        if known == 0:
+            best, ratio = order, GROW[0]
+        elif order + 1 > known and order < MAX_ORDER and excess <= 1.0:
+            best = order + 1  # the first steps have no estimate of the next order
+        next_orders[v] = best
+        found[0, v], found[1, v] = excess, min(ratio, GROW[best - 1])
+    return found
+
+
 def compile_multistep() -> None:
     """Compile the kernels of a step by a call for one solution of one value."""
     one, order = np.ones(1), np.ones(1, dtype=np.int64)
@@ -209,7 +268,7 @@ def compile_multistep() -> None:
     formulas(spans, one, order, one, weights, np.empty(1), np.empty((ROWS - 1, 1)))
     extrapolated(weights, differences)
     new_differences(value, value, one, differences, spans)
-    local_errors(differences, spans, value, order, np.empty((1, 1, 1)))
+    next_steps(differences, spans, value, order, one, 1.0, np.empty((1, 1, 1)), order.copy())
 
 
 compile_alongside("solve_slender", compile_multistep)
