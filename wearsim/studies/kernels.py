@@ -66,7 +66,7 @@ def kernels_of(
     roles = {item.role for item in scenario.random}
     doubled = "process" in roles or not scenario.load.build().constant or evolution.step is not None
     if steps and model in {"slender", "semi-hertzian"} and name in {"auto", "implicit"}:
-        found |= {"formulas", "extrapolated", "new_differences", "local_errors"}
+        found |= {"formulas", "extrapolated", "new_differences", "next_steps"}
         found |= {"linearised_wear", "wear_of_bodies"}
         found |= {"difference_sizes" if doubled else "carried_errors"}
     elif steps and name != "per-pass":
