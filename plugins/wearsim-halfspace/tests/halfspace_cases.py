@@ -30,8 +30,8 @@ def middles(count: int) -> np.ndarray:
     return np.arange(count) - 0.5 * (count - 1)
 
 
-def problem_of(case: dict, n: int) -> Problem:
-    """Return the contact of a case on n x n elements across its ellipse."""
+def problem_of(case: dict, n: int, order: int = 1) -> Problem:
+    """Return the contact of a case on n x n elements across its ellipse, by default CONTACT's."""
     dx, dy = 2.0 * case["a_m"] / n, 2.0 * case["b_m"] / n
     x, y = middles(n + 2 * SPARE) * dx, middles(n + 2 * SPARE) * dy
     slip = np.empty((2, len(y), len(x)))
@@ -50,6 +50,7 @@ def problem_of(case: dict, n: int) -> Problem:
         spin=case["phi_per_m"],
         x=x,
         y=y,
+        order=order,
     )
 
 
@@ -60,7 +61,7 @@ def normal_of(problem: Problem, case: dict, tolerance: float = 1e-7):
     return solve_normal(problem.elements, problem.gap, problem.force, start, tolerance)
 
 
-def solved(case: dict, n: int, tolerance: float = 1e-6) -> Solution:
+def solved(case: dict, n: int, tolerance: float = 1e-6, order: int = 1) -> Solution:
     """Return the solution of a case on n x n elements."""
-    problem = problem_of(case, n)
+    problem = problem_of(case, n, order)
     return solve(problem, normal_of(problem, case), tolerance)

@@ -13,16 +13,17 @@ from halfspace_cases import (
     rows,
     solved,
 )
+from scipy.special import elliprd
 
 from wearsim.types import Creepage, Grid, OperatingPoint
 from wearsim_bench.contact.accuracy import choose_model, worn_errors
 from wearsim_bench.exact_solutions import WORN
 from wearsim_halfspace import Halfspace, HalfspaceOptions
-from wearsim_halfspace.grids import FURTHER
+from wearsim_halfspace.grids import AHEAD, FURTHER, entry
 from wearsim_halfspace.influence import Elements
 from wearsim_halfspace.normal import solve_normal
 from wearsim_halfspace.strips import half_width
-from wearsim_halfspace.tangential import solve_tangential
+from wearsim_halfspace.tangential import Within, solve_tangential
 
 CONTACT_MODULUS = SHEAR / (1.0 - STEEL.poisson_ratio)
 
@@ -46,12 +47,47 @@ def test_power_of_hard_contacts_is_that_of_contact(case):
     assert solved(case, 60).work().power == pytest.approx(case["power_60_N"], rel=1e-5)
 
 
-def test_power_converges_with_the_order_of_the_extrapolation():
+@pytest.mark.parametrize("order", [1, 2])
+def test_power_converges_with_the_order_of_the_extrapolation(order):
     cases = RANDOM[::8]
-    powers = np.array([[solved(case, n).work().power for n in (20, 40, 80)] for case in cases])
+    powers = np.array(
+        [[solved(case, n, order=order).work().power for n in (20, 40, 80)] for case in cases]
+    )
     steps = np.abs(np.diff(powers, axis=1))
-    order = np.median(np.log2(steps[:, 0] / steps[:, 1]))
-    assert order == pytest.approx(np.log2(1.0 + 1.0 / FURTHER), abs=0.3)
+    measured = np.median(np.log2(steps[:, 0] / steps[:, 1]))
+    assert measured == pytest.approx(np.log2(1.0 + 1.0 / FURTHER[order]), abs=0.3)
+
+
+def test_elements_of_second_order_are_closer_to_the_limit_of_contact():
+    errors = []
+    for case in RANDOM[::4]:
+        power = case["power_120_N"]
+        power += FURTHER[1] * (power - case["power_60_N"])
+        found = solved(case, 60, order=2).work().power
+        errors.append((found / power - 1.0, case["power_60_N"] / power - 1.0))
+    new, old = np.median(np.abs(errors), axis=0)
+    assert np.abs(errors).max(axis=0)[0] < 3e-3
+    assert new < 1e-3
+    assert new < 0.2 * old
+
+
+@pytest.mark.parametrize("creepage", [Creepage(2e-4, 1e-4), Creepage(3e-4, 3e-4, 1.0)])
+def test_dissipation_of_each_strip_converges(creepage):
+    grid, point = Grid.spanning(-1.7e-3, 1.7e-3, 41), OperatingPoint(300.0, 1.0, creepage, 0.2)
+
+    def dissipation(mx, order):
+        options = HalfspaceOptions(mx=mx, order=order, extrapolate=False)
+        model = Halfspace(options, grid, (STEEL, STEEL))
+        return model.solve_one(grid.y**2, 90.0, point).dissipation
+
+    exact = dissipation(140, 2)
+
+    def error(mx, order):
+        return np.linalg.norm(dissipation(mx, order) - exact) / np.linalg.norm(exact)
+
+    assert error(24, 2) < 4e-3
+    assert error(50, 2) < 2e-3
+    assert error(50, 2) < 0.2 * error(50, 1)
 
 
 @pytest.mark.slow
@@ -60,7 +96,7 @@ def test_extrapolated_power_agrees_within_its_stated_error(case):
     found = solved(case, 120)
     assert found.work().power == pytest.approx(case["power_120_N"], rel=1e-5)
     power = case["power_120_N"]
-    power += FURTHER * (power - case["power_60_N"])
+    power += FURTHER[1] * (power - case["power_60_N"])
     assert found.extrapolated().power == pytest.approx(power, rel=3e-3)
     # half the number of elements, against the finer grids
     coarse = solved(case, 60)
@@ -106,15 +142,15 @@ def test_shift_is_that_of_cattaneo_and_mindlin():
         assert stick == pytest.approx(a * np.cbrt(1.0 - part), rel=0.01)
 
 
-@pytest.mark.parametrize(("mx", "extrapolate"), [(60, False), (60, True)])
+@pytest.mark.parametrize(("mx", "order", "limit"), [(60, 1, 0.01), (24, 2, 2e-3), (60, 2, 1e-3)])
 @pytest.mark.parametrize("slip", [0.3, 0.6])  # length of the slip zone over the half-length
-def test_middle_of_a_long_contact_is_that_of_carter(mx, extrapolate, slip):
+def test_middle_of_a_long_contact_is_that_of_carter(mx, order, limit, slip):
     along, across, force, friction = 45.0, 0.189865872, 300.0, 0.1
     half = half_width(along, across, force, CONTACT_MODULUS)
     a = half_width(across, along, force, CONTACT_MODULUS)
     assert half / a == pytest.approx(30.0, rel=1e-6)
     grid = Grid.spanning(-1.2 * half, 1.2 * half, 61)
-    options = HalfspaceOptions(mx=mx, extrapolate=extrapolate)
+    options = HalfspaceOptions(mx=mx, order=order, extrapolate=False)
     load = 0.75 * force / half  # of the middle
     creepage = 4.0 * friction * load * slip / (np.pi * a * CONTACT_MODULUS)
     point = OperatingPoint(force, 1.0, Creepage(creepage), friction)
@@ -123,7 +159,7 @@ def test_middle_of_a_long_contact_is_that_of_carter(mx, extrapolate, slip):
     middle = grid.strips // 2
     assert found.line_load[middle] == pytest.approx(load, rel=1e-3)
     exact = creepage * friction * load * (1.0 - (1.0 - slip) ** 2)
-    assert found.dissipation[middle] == pytest.approx(exact, rel=0.005 if extrapolate else 0.01)
+    assert found.dissipation[middle] == pytest.approx(exact, rel=limit)
 
 
 @pytest.mark.parametrize(
@@ -133,12 +169,13 @@ def test_worn_profiles_are_those_of_contact(name):
     errors = worn_errors(choose_model("halfspace", mx=60), name)
     assert errors.line_load < 1e-3
     assert abs(errors.approach) < 2e-5
-    assert max(abs(error) for error in errors.power.values()) < 1e-3
-    assert max(errors.dissipation.values()) < 6e-3
+    # the reference itself is extrapolated from elements of the first order
+    assert max(abs(error) for error in errors.power.values()) < 2e-3
+    assert max(errors.dissipation.values()) < 5e-3
 
 
-def creepage_coefficients(a_over_b, poisson_ratio, n):
-    """Return C11, C22, C23 and C33 of full adhesion in an ellipse with a b = 1.
+def coefficients_of_first_order(a_over_b, poisson_ratio, n):
+    """Return C11, C22, C23 and C33 of full adhesion on the elements in an ellipse with a b = 1.
 
     The elements within the ellipse do not have its area, by which the coefficients are corrected.
     """
@@ -172,10 +209,58 @@ VARIED = [row for number, row in enumerate(KALKER) if number // 19 == number % 3
 
 @pytest.mark.slow
 @pytest.mark.parametrize("row", VARIED, ids=lambda row: f"{row['a_over_b']:.3g}, {row['nu']}")
-def test_linear_theory_has_the_coefficients_of_kalker(row):
-    coarse, fine = (creepage_coefficients(row["a_over_b"], row["nu"], n) for n in (30, 60))
+def test_extrapolated_coefficients_are_those_of_kalker(row):
+    coarse, fine = (coefficients_of_first_order(row["a_over_b"], row["nu"], n) for n in (30, 60))
     for name, value in fine.items():
         known = row["rel_err"][name]  # of the reference
         assert value == pytest.approx(row[name], rel=0.02 + known), name
         further = 2.0 * value - coarse[name]
         assert further == pytest.approx(row[name], rel=0.005 if known <= 0.003 else 0.01), name
+
+
+def creepage_coefficients(a_over_b, poisson_ratio, n):
+    """Return C11, C22, C23 and C33 of full adhesion in the contact of Hertz with a b = 1."""
+    a, b = np.sqrt(a_over_b), 1.0 / np.sqrt(a_over_b)
+    peak = 1e-3 * (1.0 - poisson_ratio)  # pressure, for a shear modulus of 1
+    along, across = (elliprd(0.0, *sizes) / 3.0 * peak * (1.0 - poisson_ratio)
+                     for sizes in ((b**2, a**2), (a**2, b**2)))  # fmt: skip
+    dx, dy = 2.0 * a / n, 2.0 * b / n
+    x, y = middles(n + 4) * dx, middles(n + 4)[:, None] * dy
+    elements = Elements(n + 4, n + 4, dx, dy, 1.0, poisson_ratio)
+    start = np.sqrt(np.maximum(1.0 - (x / a) ** 2 - (y / b) ** 2, 0.0))
+    gap, force = along * x**2 + across * y**2, 2.0 / 3.0 * np.pi * peak
+    normal = solve_normal(elements, gap, force, start, 1e-8)
+    slip_ahead = np.zeros((3, 2, *gap.shape))
+    slip_ahead[0, 0], slip_ahead[1, 1] = 1.0, 1.0
+    slip_ahead[2, 0], slip_ahead[2, 1] = -y, x + AHEAD[2] * dx
+    within = Within(entry(normal.pressure), np.zeros_like(gap))
+    along, across, spin = (
+        solve_tangential(
+            elements.rolling, 1e9 * normal.pressure, slip, 1e-12, np.zeros_like(slip), within
+        ).traction
+        * (dx * dy)
+        for slip in slip_ahead
+    )
+    return {
+        "C11": -along[0].sum(),
+        "C22": -across[1].sum(),
+        "C23": -spin[1].sum(),
+        "C33": -(x * spin[1] - y * spin[0]).sum(),
+    }
+
+
+SEVEN = [
+    row
+    for row in rows("kalker")
+    if row["nu"] == 0.25 and row["a_over_b"] in {0.05, 0.3, 1, 2, 5, 10, 20}
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("row", SEVEN, ids=lambda row: f"{row['a_over_b']:.3g}")
+def test_linear_theory_has_the_coefficients_of_kalker(row):
+    for name, value in creepage_coefficients(row["a_over_b"], row["nu"], 60).items():
+        known = row["rel_err"][name]  # of the reference
+        assert value == pytest.approx(
+            row[name], rel=0.004 + known if name != "C33" else 0.02 + known
+        )

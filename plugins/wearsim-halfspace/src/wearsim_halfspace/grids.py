@@ -11,13 +11,15 @@ import numpy as np
 from wearsim.types import FloatArray
 from wearsim_halfspace.influence import Elements
 from wearsim_halfspace.normal import NormalSolution, solve_normal
-from wearsim_halfspace.tangential import TangentialSolution, solve_tangential
+from wearsim_halfspace.tangential import TangentialSolution, Within, solve_tangential
 
 FEWEST = 16  # rows or columns of a grid that is started from a coarser one
 LOOSE = 1e-4  # tolerance on coarser grids
-#: of the difference of two grids, added in an extrapolation: that of the order 1.08
-FURTHER = 0.9
-AHEAD = 1.0 / 6.0  # of an element: where the rigid slip is taken, see `Problem.slip_ahead`
+LEAST_ENTRY = -0.3  # of `Within.entry`
+#: Of the difference of two grids, added in an extrapolation: that of the orders 1.08 and 2.
+FURTHER = {1: 0.9, 2: 1.0 / 3.0}
+#: Where the rigid slip is taken, in elements ahead of the middle, for elements of each order.
+AHEAD = {1: 1.0 / 6.0, 2: 0.5}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ class Problem:
         [1/m].
     x, y : ndarray, shapes (columns,) and (rows,)
         Positions of the elements about the centre of the spin moment [m].
+    order : int
+        Of the elements along rolling: 1 as in CONTACT, or 2 by positions within elements.
     """
 
     dx: float
@@ -58,6 +62,7 @@ class Problem:
     spin: float
     x: FloatArray
     y: FloatArray
+    order: int = 2
 
     @cached_property
     def elements(self) -> Elements:
@@ -67,13 +72,14 @@ class Problem:
 
     @property
     def slip_ahead(self) -> FloatArray:
-        """Rigid slip a sixth of an element ahead, where particles come from.
+        """Rigid slip a part of an element ahead, where particles come from.
 
-        CONTACT takes it there too. With a sixth, the error of the lateral force by spin is
-        smallest; with a half, that of the spin moment would be.
+        The slip is that on the way from one element to the next, and its place half an element
+        ahead. CONTACT takes a sixth; with elements of the first order, the error of the lateral
+        force by spin is smallest there.
         """
         slip = self.rigid_slip.copy()
-        slip[1] += AHEAD * self.spin * self.dx
+        slip[1] += AHEAD[self.order] * self.spin * self.dx
         return slip
 
     def coarser(self, across: bool) -> Problem:
@@ -92,6 +98,7 @@ class Problem:
             self.spin,
             halved(self.x, (0,)),
             halved(self.y, rows),
+            self.order,
         )
 
 
@@ -134,19 +141,14 @@ class Solution(NamedTuple):
         fine = self.work()
         if self.coarser is None:
             return fine
-        coarse = self.coarser.work()
+        coarse, factor = self.coarser.work(), FURTHER[self.problem.order]
         return Work(
-            power=_further(fine.power, coarse.power),
-            force_x=_further(fine.force_x, coarse.force_x),
-            force_y=_further(fine.force_y, coarse.force_y),
-            moment=_further(fine.moment, coarse.moment),
+            power=fine.power + factor * (fine.power - coarse.power),
+            force_x=fine.force_x + factor * (fine.force_x - coarse.force_x),
+            force_y=fine.force_y + factor * (fine.force_y - coarse.force_y),
+            moment=fine.moment + factor * (fine.moment - coarse.moment),
             rows=fine.rows,
         )
-
-
-def _further(fine: float, coarse: float) -> float:
-    """Return a value extrapolated from two grids."""
-    return fine + FURTHER * (fine - coarse)
 
 
 def densities(rolling: TangentialSolution) -> FloatArray:
@@ -188,7 +190,7 @@ def solve(
         return Solution(
             problem, normal, TangentialSolution(nothing, nothing, normal.pressure > 0.0), None
         )
-    coarser, start = None, None
+    coarser, start, turn = None, None, np.zeros_like(bound)
     if min(finest) >= FEWEST:
         # the first coarser grid has the same rows, for the extrapolation
         coarse, loose = problem.coarser(across=below), max(LOOSE, tolerance)
@@ -199,11 +201,49 @@ def solve(
         coarser = solve(coarse, found, loose, below=True)
         rows, columns = finest
         start = doubled(coarser.rolling.traction, 2, columns)
-        start = doubled(start, 1, rows) if below else start
+        turn = doubled(_turn(coarser.rolling, found.pressure), 1, columns)
+        if below:
+            start, turn = doubled(start, 1, rows), doubled(turn, 0, rows)
+    within = Within(entry(normal.pressure), turn) if problem.order == 2 else None
     rolling = solve_tangential(
-        problem.elements.rolling, bound, problem.slip_ahead, tolerance, start
+        problem.elements.rolling, bound, problem.slip_ahead, tolerance, start, within
     )
     return Solution(problem, normal, rolling, coarser)
+
+
+def entry(pressure: FloatArray) -> FloatArray:
+    """Return `Within.entry`, shape (rows, columns).
+
+    Tractions that need no slip on a whole row of elements are those of a contact that ends 0.825
+    elements ahead of the middle of its first element. Where the edge is closer, particles adhere
+    for a part of the way only; with the slip s of the first element, over that of the element
+    ahead, the tractions are those of a contact that ends closer. The edge itself follows from the
+    pressure of the first element over that of the second, p: it is -0.175 + 0.93 p + 0.70 p^2
+    elements ahead of the middle. Both relations are those of line contacts on many elements; the
+    polynomial below is s(p), within 0.02.
+    """
+    columns = pressure.shape[1]
+    rows = np.flatnonzero((pressure > 0.0).sum(axis=1) > 1)
+    first = columns - 1 - np.argmax(pressure[rows, ::-1] > 0.0, axis=1)
+    ratio = pressure[rows, first] / pressure[rows, first - 1]
+    found = np.zeros_like(pressure)
+    found[rows, first] = np.maximum(0.623 - 0.164 * ratio - ratio**2, LEAST_ENTRY)
+    return found
+
+
+def _turn(rolling: TangentialSolution, pressure: FloatArray) -> FloatArray:
+    """Return `Within.turn` for elements of half the length.
+
+    It is a quarter of the change of the slip's direction from one element to the next.
+    """
+    slides = (pressure > 0.0) & ~rolling.sticks
+    ahead, behind = rolling.slip[..., 1:], rolling.slip[..., :-1]
+    sine = ahead[0] * behind[1] - ahead[1] * behind[0]
+    cosine = (ahead * behind).sum(axis=0)
+    smooth = slides[:, 1:] & slides[:, :-1] & (cosine > 0.0)
+    found = np.zeros_like(pressure)
+    found[:, 1:] = np.where(smooth, 0.25 * np.arctan2(sine, cosine), 0.0)
+    return found
 
 
 def halved(field: FloatArray, axes: tuple[int, ...]) -> FloatArray:

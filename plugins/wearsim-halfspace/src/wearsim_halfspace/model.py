@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 
@@ -42,6 +42,9 @@ class HalfspaceOptions(ws.Options):
     extrapolate: bool = ws.Field(
         True,
         description="extrapolate forces and power from these elements and ones of twice the length",
+    )
+    order: Literal[1, 2] = ws.Field(
+        2, description="of convergence with elements along rolling: 2, or 1 as in CONTACT"
     )
     tolerance: float = ws.Field(1e-6, gt=0.0, le=1e-2, description="of pressure and traction")
 
@@ -176,6 +179,7 @@ class Halfspace(ws.SingleContactModel):
                 spin=creepage.spin,
                 x=x,
                 y=self.grid.y[strips],
+                order=self.options.order,
             )
             normal = solve_normal(
                 problem.elements,

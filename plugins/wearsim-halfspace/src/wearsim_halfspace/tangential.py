@@ -30,12 +30,37 @@ class TangentialSolution(NamedTuple):
     sticks: BoolArray
 
 
+class Within(NamedTuple):
+    """Positions within elements, with which steady rolling is of second order in their length.
+
+    Parameters
+    ----------
+    entry : ndarray, shape (rows, columns)
+        Slip of the elements that particles enter first, while they adhere, over that of the
+        elements ahead of them; zero elsewhere. Particles are outside for a part of the way.
+    turn : ndarray, shape (rows, columns)
+        Angle from the slip at the leading end of an element to that in its middle [rad].
+    """
+
+    entry: FloatArray
+    turn: FloatArray
+
+    def __call__(self, slip: FloatArray) -> FloatArray:
+        """Return the slip that Coulomb's law opposes to the traction of each element."""
+        along, across = slip
+        along[:, :-1] -= self.entry[:, :-1] * along[:, 1:]
+        across[:, :-1] -= self.entry[:, :-1] * across[:, 1:]
+        cosine, sine = np.cos(self.turn), np.sin(self.turn)
+        return np.stack([cosine * along - sine * across, sine * along + cosine * across])
+
+
 def solve_tangential(
     kernel: Convolution,
     bound: FloatArray,
     rigid_slip: FloatArray,
     tolerance: float,
     start: FloatArray | None = None,
+    within: Within | None = None,
 ) -> TangentialSolution:
     """Return traction and slip of half-spaces in steady rolling, or after a shift.
 
@@ -57,6 +82,8 @@ def solve_tangential(
         Greatest residual of the equation relative to the greatest bound.
     start : ndarray, shape (2, rows, columns), optional
         Initial guess of the traction [Pa]; by default that of full slip.
+    within : Within, optional
+        By default the slip is that at the leading ends of elements.
 
     Raises
     ------
@@ -73,16 +100,17 @@ def solve_tangential(
     columns = kernel.columns
     own = float(kernel.middle[:2, columns - 1].max())  # of an element on itself
     distance = np.arange(columns)[:, None] - np.arange(columns) + columns - 1
-    within = kernel.middle[:2, distance]  # influence within a row of both components
+    of_row = kernel.middle[:2, distance]  # influence within a row of both components
     touches, most = bound > 0.0, float(bound.max())
     if start is None:
         start = -rigid_slip / np.maximum(np.hypot(*rigid_slip), TINY) * bound
+    opposed = _unchanged if within is None else within
     traction, preconditioner, products = _projected(start, bound), None, 0
     for iteration in range(MAX_ITERATIONS):
         # a smaller rate keeps tractions from changing their direction back and forth
         rate = FIRST_RATE * SLOWER ** (iteration // PATIENCE) / own
         slip = rigid_slip + kernel.of_vector(traction)
-        trial = traction - rate * slip
+        trial = traction - rate * opposed(slip.copy())
         size = np.maximum(np.hypot(*trial), TINY)
         sticks = (size <= bound) & touches
         unit, part = trial / size, np.where(sticks, 1.0, bound / size)
@@ -93,7 +121,7 @@ def solve_tangential(
         if preconditioner is None or products > REUSED_UP_TO or iteration % PATIENCE == 0:
             # the components of a row are decoupled, and the rows are
             diagonal = np.where(sticks, 1.0, part * (1.0 - unit**2))
-            preconditioner = _Rows(diagonal, rate * within)
+            preconditioner = _Rows(diagonal, rate * of_row)
         removed = np.where(sticks, 0.0, part)
 
         def product(
@@ -103,7 +131,7 @@ def solve_tangential(
             part: FloatArray = part,
             removed: FloatArray = removed,
         ) -> FloatArray:
-            change = given - rate * kernel.of_vector(given)
+            change = given - rate * opposed(kernel.of_vector(given))
             along = removed * (unit * change).sum(axis=0)
             return np.asarray(given - part * change + unit * along)
 
@@ -115,6 +143,10 @@ def solve_tangential(
         f"the tangential contact of half-spaces has not converged in {MAX_ITERATIONS} iterations"
         f" (last relative residual {error:.1e})"
     )
+
+
+def _unchanged(slip: FloatArray) -> FloatArray:
+    return slip
 
 
 def _projected(traction: FloatArray, bound: FloatArray) -> FloatArray:
