@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.types import FloatArray
-from wearsim_halfspace.influence import Elements
+from wearsim_halfspace.influence import Elements, inner
 from wearsim_halfspace.normal import NormalSolution, solve_normal
 from wearsim_halfspace.tangential import TangentialSolution, Within, solve_tangential
 
@@ -127,7 +127,7 @@ class Solution(NamedTuple):
         """Return forces and power on this grid."""
         problem, traction = self.problem, self.rolling.traction
         area = problem.dx * problem.dy
-        power = -float(np.vdot(traction, problem.rigid_slip)) * area
+        power = -inner(traction, problem.rigid_slip) * area
         force_x, force_y = (float(part.sum()) * area for part in traction)
         moment = float((problem.x * traction[1] - problem.y[:, None] * traction[0]).sum()) * area
         rows = densities(self.rolling).sum(axis=1) * problem.dx

@@ -35,6 +35,15 @@ def _integrals(columns: int, rows: int, dx: float, dy: float) -> FloatArray:
     return np.asarray(np.diff(np.diff(corners, axis=1), axis=2))
 
 
+def inner(one: FloatArray, other: FloatArray) -> float:
+    """Return the sum of the products of two fields.
+
+    Libraries of linear algebra start threads for fields of this size, and wait for them where
+    another process is busy; this takes one thread.
+    """
+    return float(np.einsum("i,i->", one.ravel(), other.ravel()))
+
+
 class Convolution:
     """Convolution of fields on a grid with influence coefficients, by fast Fourier transforms.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from wearsim.plugins import ContactError
 from wearsim.types import FloatArray
-from wearsim_halfspace.influence import Convolution, Elements
+from wearsim_halfspace.influence import Convolution, Elements, inner
 
 MAX_ITERATIONS = 400
 LEAST = 1e-3  # eigenvalue, relative to the influence of an element on itself
@@ -91,18 +91,18 @@ def solve_normal(
             residual = closed + approach
         residual *= inside
         each += approach * unit
-        new = float(np.vdot(each, residual))
+        new = inner(each, residual)
         if last is None:
             direction = each
         else:
-            factor = max((new - float(np.vdot(each, last))) / product, 0.0)
+            factor = max((new - inner(each, last)) / product, 0.0)
             direction *= inside
             # directions carry no force
             direction = each + factor * (direction - (float(direction.sum()) / total) * unit)
         along = opened(direction)
-        curvature = float(np.vdot(direction, along))
+        curvature = inner(direction, along)
         # no direction is left if a single element is in contact
-        step = float(np.vdot(residual, direction)) / curvature if curvature > 0.0 else 0.0
+        step = inner(residual, direction) / curvature if curvature > 0.0 else 0.0
         last, product = residual, new
         moved = pressure + step * direction
         leaves = moved < 0.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.plugins import ContactError
 from wearsim.types import BoolArray, FloatArray
-from wearsim_halfspace.influence import Convolution
+from wearsim_halfspace.influence import Convolution, inner
 
 MAX_ITERATIONS = 60  # of Newton's method
 MOST_PRODUCTS = 80  # in the solution of a linear system
@@ -97,10 +97,8 @@ def solve_tangential(
     .. [2] P. Alart, A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991),
        DOI 10.1016/0045-7825(91)90022-X.
     """
-    columns = kernel.columns
-    own = float(kernel.middle[:2, columns - 1].max())  # of an element on itself
-    distance = np.arange(columns)[:, None] - np.arange(columns) + columns - 1
-    of_row = kernel.middle[:2, distance]  # influence within a row of both components
+    of_row = kernel.middle[:2]  # influence within a row of both components
+    own = float(of_row[:, kernel.columns - 1].max())  # of an element on itself
     touches, most = bound > 0.0, float(bound.max())
     if start is None:
         start = -rigid_slip / np.maximum(np.hypot(*rigid_slip), TINY) * bound
@@ -162,24 +160,27 @@ class _Rows:
     ----------
     diagonal : ndarray, shape (2, rows, columns)
         D in the system ``I - D (I - r B)``.
-    influence : ndarray, shape (2, columns, columns)
-        r B within a row.
+    influence : ndarray, shape (2, 2 columns - 1)
+        r B within a row, for all distances.
     """
 
     def __init__(self, diagonal: FloatArray, influence: FloatArray) -> None:
-        size = diagonal.shape[2]
-        self._touching = np.flatnonzero(diagonal.any(axis=(0, 2)))
+        from wearsim_halfspace import rows  # noqa: PLC0415  (loads numba)
+
+        inside = np.any(diagonal, axis=0)
+        self._touching = np.flatnonzero(inside.any(axis=1))
+        inside, columns = inside[self._touching], diagonal.shape[2]
+        self._ends = np.argmax(inside, axis=1), columns - 1 - np.argmax(inside[:, ::-1], axis=1)
         # single precision suffices for a preconditioner
-        influence = (np.eye(size) - influence).astype(np.float32)
-        self._inverses = np.empty((2, len(self._touching), size, size), dtype=np.float32)
-        for place, row in enumerate(self._touching):
-            systems = diagonal[:, row, :, None].astype(np.float32) * influence
-            self._inverses[:, place] = np.linalg.inv(np.eye(size, dtype=np.float32) - systems)
+        parts = diagonal[:, self._touching].astype(np.float32)
+        self._factors = rows.factor(parts, influence.astype(np.float32), *self._ends)
+        self._solve = rows.solve
 
     def __call__(self, field: FloatArray) -> FloatArray:
+        given = field[:, self._touching].astype(np.float32)
+        self._solve(self._factors, given, *self._ends)
         found = field.copy()
-        given = field[:, self._touching, :, None].astype(np.float32)
-        found[:, self._touching] = (self._inverses @ given)[..., 0]
+        found[:, self._touching] = given
         return found
 
 
@@ -194,7 +195,7 @@ def _gmres(
     Generalised minimal residuals with the preconditioner on the right; the tolerance is that of
     the residual relative to the right-hand side.
     """
-    length = float(np.linalg.norm(right))
+    length = float(np.sqrt(inner(right, right)))
     basis = np.empty((MOST_PRODUCTS + 1, right.size))
     basis[0] = right.ravel() / length
     hessenberg = np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS))
@@ -205,10 +206,11 @@ def _gmres(
         tried.append(preconditioner(basis[count - 1].reshape(right.shape)))
         new, known = product(tried[-1]).ravel(), basis[:count]
         for _ in range(2):  # once more, against rounding
-            parts = known @ new
-            new -= parts @ known
+            # in one thread, see `inner`
+            parts = np.einsum("ij,j->i", known, new)
+            new -= np.einsum("i,ij->j", parts, known)
             hessenberg[:count, count - 1] += parts
-        rest = float(np.linalg.norm(new))
+        rest = float(np.sqrt(inner(new, new)))
         hessenberg[count, count - 1] = rest
         normal[count] = -float(normal[:count] @ hessenberg[:count, count - 1]) / max(rest, TINY)
         basis[count] = new / max(rest, TINY)
@@ -217,4 +219,4 @@ def _gmres(
     right_side = np.zeros(count + 1)
     right_side[0] = length
     weights = np.linalg.lstsq(hessenberg[: count + 1, :count], right_side, rcond=None)[0]
-    return np.tensordot(weights, np.stack(tried), axes=1), count
+    return np.einsum("i,i...->...", weights, np.stack(tried)), count
