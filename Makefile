@@ -42,6 +42,7 @@ bench-docs: $(VENV)/.installed-dev
 	cp out/bench/hard.json $(MEASURED)
 	$(BIN)/python -m tests.benchmarks.report -o $(MEASURED)/report.json
 	$(BIN)/python -m tests.benchmarks.models -o $(MEASURED)/models.json
+	$(BIN)/python -m tests.benchmarks.model_choice -o $(MEASURED)/model-choice.json
 
 bench: $(VENV)/.installed-dev
 	mkdir -p out

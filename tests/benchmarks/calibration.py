@@ -1,9 +1,10 @@
 """Errors of contact models against half-space solutions: calibration of `contact.model = "auto"`.
 
 ``python -m tests.benchmarks.calibration solve elliptic 1 500 -o out/elliptic-1.npz`` solves random
-contacts of a kind and a seed; ``fit FILE... -o wearsim/studies/contact/calibration.json`` fits the
-error models. Seed 1 of all kinds is calibrated; ``elliptic 2 200`` and ``worn 2 20`` are kept
-apart, see `tests.benchmarks.model_choice`.
+contacts of a kind and a seed; run again after a stop, it continues. ``fit FILE... -o
+wearsim/studies/contact/calibration.json`` fits the error models. Calibrated are ``elliptic 1 500``,
+``worn 1 180`` and ``wavy 1 60``; ``elliptic 2 200`` and ``worn 2 20`` are kept apart, see
+`tests.benchmarks.model_choice`.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from importlib.metadata import version
 from multiprocessing import Pool
 from pathlib import Path
 from time import perf_counter
@@ -30,11 +32,13 @@ from wearsim.studies.contact.estimate import indicators_of, terms_of
 from wearsim.studies.preparation import software
 from wearsim.studies.run.run import run
 from wearsim.types import ContactSolution, Creepage, FloatArray, Grid, Material, OperatingPoint
+from wearsim_bench.measure.machine import this_machine
 
 STEEL = Material(youngs_modulus=206e9, poisson_ratio=0.3)
 MODULUS = combine(STEEL, STEEL).contact_modulus
 CURVATURE, LOAD = 40.0, 300.0  # 1/m along rolling and N; the errors do not depend on them
-NUMBERS = (24, 34, 40, 47, 66, 78, 92)  # elements along rolling of the reference
+#: The reference: P_l(y) varies irregularly with the elements, and is not extrapolated over them.
+FINE, COARSER = "halfspace, 280", "halfspace, 200"
 #: model and options by label
 MODELS: dict[str, tuple[str, dict[str, Any]]] = {
     "hertz": ("hertz", {}),
@@ -47,8 +51,10 @@ MODELS: dict[str, tuple[str, dict[str, Any]]] = {
     "halfspace, 24": ("halfspace", {"mx": 24}),
     "halfspace, 50": ("halfspace", {"mx": 50}),
     "halfspace, 100": ("halfspace", {"mx": 100}),
+    "halfspace, 200": ("halfspace", {"mx": 200}),
 }
-RIDGE, FOLDS, COVERED = 1.0, 10, 0.975
+RIDGE, FOLDS, COVERED = 1.0, 10, 0.95
+SAVED = 20  # contacts between two writings
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +184,7 @@ def solved(task: tuple[str, int, int]) -> dict[str, FloatArray] | None:
     kind, seed, number = task
     contact = KINDS[kind](np.random.default_rng([seed, number]))
     found = {}
-    for label, (model, options) in MODELS.items():
+    for label, (model, options) in {**MODELS, FINE: ("halfspace", {"mx": 280})}.items():
         try:
             solution = contact.solve(model, options)
         except ContactError:
@@ -186,60 +192,52 @@ def solved(task: tuple[str, int, int]) -> dict[str, FloatArray] | None:
         found[label] = solution.dissipation
         if label in {"slender", "hertz"}:
             found["indicators"] = indicators_of(solution, contact.curvature, contact.point)
-    for mx in NUMBERS:
-        raw = {"mx": mx, "extrapolate": False}
-        try:
-            found[f"raw, {mx}"] = contact.solve("halfspace", raw).dissipation
-        except ContactError:
-            continue
     return found if "indicators" in found else None
 
 
 def errors(found: dict[str, FloatArray]) -> tuple[FloatArray, float] | None:
-    """Return the errors of `MODELS`, infinite where one fails, and that of the reference."""
-    rows = {k: found[f"raw, {mx}"] for k, mx in enumerate(NUMBERS) if f"raw, {mx}" in found}
+    """Return the errors of `MODELS`, infinite where one fails, and that of the reference.
 
-    def limit(chosen: Sequence[int]) -> FloatArray:
-        line = np.vander([1.0 / NUMBERS[k] for k in chosen], 2)
-        values = np.array([rows[k] for k in chosen])
-        return np.asarray(np.linalg.lstsq(line, values, rcond=None)[0][-1])
-
-    halves = [[k for k in rows if k % 2 == side] for side in (0, 1)]
-    if min(map(len, halves)) < 2:
+    The latter is the change from coarser elements: an upper estimate, since the error decreases
+    with the square of their length.
+    """
+    if FINE not in found or COARSER not in found:
         return None
-    exact = limit(list(rows))
+    exact = found[FINE]
     size = float(np.linalg.norm(exact))
-    own = 0.5 * float(np.linalg.norm(limit(halves[0]) - limit(halves[1]))) / size
     each = [
         float(np.linalg.norm(found[label] - exact)) / size if label in found else np.inf
         for label in MODELS
     ]
-    return np.array(each), own
+    return np.array(each), float(np.linalg.norm(found[COARSER] - exact)) / size
 
 
 def solve(kind: str, seed: int, count: int, processes: int, output: Path) -> None:
-    """Solve random contacts and write their indicators and errors."""
-    numbers: list[int] = []
-    indicators, rows, own = [], [], []
+    """Solve random contacts and write their indicators and errors; continue what is there."""
+    rows: list[dict[str, Any]] = []
+    if output.exists():
+        known = dict(np.load(output))
+        rows = [{key: known[key][k] for key in known} for k in range(len(known["number"]))]
+    done = {int(row["number"]) for row in rows}
+    tasks = [(kind, seed, number) for number in range(count) if number not in done]
+
+    def save() -> None:
+        part = output.with_suffix(".part.npz")
+        ordered = sorted(rows, key=lambda row: int(row["number"]))
+        np.savez(part, **{key: np.array([row[key] for row in ordered]) for key in ordered[0]})
+        part.replace(output)
+
     with Pool(processes) as pool:
-        tasks = [(kind, seed, number) for number in range(count)]
-        for number, found in enumerate(pool.imap(solved, tasks)):
+        for task, found in zip(tasks, pool.imap(solved, tasks), strict=True):
             measured = errors(found) if found is not None else None
             if found is None or measured is None:
                 continue
-            numbers.append(number)
-            indicators.append(found["indicators"])
-            rows.append(measured[0])
-            own.append(measured[1])
-    np.savez(
-        output,
-        kind=np.array([kind] * len(own)),
-        number=np.array(numbers),
-        indicators=np.array(indicators),
-        errors=np.array(rows),
-        own=np.array(own),
-    )
-    sys.stdout.write(f"{output}: {len(own)} of {count}\n")
+            row = {"kind": kind, "seed": seed, "number": task[2], "own": measured[1]}
+            rows.append(row | {"indicators": found["indicators"], "errors": measured[0]})
+            if len(rows) % SAVED == 0:
+                save()
+    save()
+    sys.stdout.write(f"{output}: {len(rows)} of {count}\n")
 
 
 def read(files: Sequence[Path]) -> dict[str, FloatArray]:
@@ -251,7 +249,7 @@ def read(files: Sequence[Path]) -> dict[str, FloatArray]:
 def costs(repetitions: int = 5) -> dict[str, float]:
     """Return the time of one contact of each model over that of the cheapest, a median."""
     times: dict[str, list[float]] = {label: [] for label in MODELS}
-    for number in range(24):
+    for number in range(16):
         contact = elliptic(np.random.default_rng([1, number]))
         for label, (model, options) in MODELS.items():
             try:
@@ -268,54 +266,76 @@ def costs(repetitions: int = 5) -> dict[str, float]:
     return {label: lapse / min(medians.values()) for label, lapse in medians.items()}
 
 
+def _coefficients(terms: FloatArray, logs: FloatArray) -> FloatArray:
+    """Return the polynomial for ln(error) of the contacts that a model solves."""
+    part, known = terms[np.isfinite(logs)], logs[np.isfinite(logs)]
+    penalty = RIDGE * np.eye(terms.shape[1])
+    return np.linalg.solve(part.T @ part + penalty, part.T @ known)
+
+
+def _fitted(data: dict[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return the terms of the polynomial and ln(error), one row per contact."""
+    indicators = data["indicators"]
+    terms = terms_of((indicators - indicators.mean(axis=0)) / indicators.std(axis=0))
+    return terms, np.log(data["errors"])
+
+
+def crossed(data: dict[str, FloatArray]) -> FloatArray:
+    """Return ln(error) of contacts and models, fitted to other contacts; infinite if unsolved."""
+    terms, logs = _fitted(data)
+    found = np.full(logs.shape, np.inf)
+    fold = np.random.default_rng(0).permutation(len(terms)) % FOLDS
+    for column in range(len(MODELS)):
+        for number in range(FOLDS):
+            left = fold == number
+            coefficients = _coefficients(terms[~left], logs[~left, column])
+            left &= np.isfinite(logs[:, column])
+            found[left, column] = terms[left] @ coefficients
+    return found
+
+
 def fit(data: dict[str, FloatArray], relative: dict[str, float]) -> dict[str, Any]:
     """Return the calibration: a quadratic polynomial for ln(error) of each model."""
     indicators = data["indicators"]
-    mean, scale = indicators.mean(axis=0), indicators.std(axis=0)
-    terms = terms_of((indicators - mean) / scale)
-    fold = np.random.default_rng(0).permutation(len(terms)) % FOLDS
-    penalty = RIDGE * np.eye(terms.shape[1])
+    (terms, logs), predicted = _fitted(data), crossed(data)
     models = []
     for column, (label, (model, options)) in enumerate(MODELS.items()):
-        with np.errstate(divide="ignore"):
-            logs = np.log(data["errors"][:, column])
-        solved_ = np.isfinite(logs)
-
-        def coefficients(rows: Any, logs: FloatArray = logs) -> FloatArray:
-            part = terms[rows]
-            return np.linalg.solve(part.T @ part + penalty, part.T @ logs[rows])
-
-        missed = np.full(len(logs), np.nan)
-        for number in range(FOLDS):
-            left = solved_ & (fold == number)
-            missed[left] = logs[left] - terms[left] @ coefficients(solved_ & (fold != number))
+        solved_ = np.isfinite(logs[:, column])
+        missed = logs[solved_, column] - predicted[solved_, column]
         models.append(
             {
                 "model": model,
                 "options": options,
                 "cost": float(f"{relative[label]:.3g}"),
-                "coefficients": [float(f"{c:.5g}") for c in coefficients(solved_)],
-                "factor": float(f"{np.exp(np.nanquantile(missed, COVERED)):.4g}"),
+                "coefficients": [float(f"{c:.5g}") for c in _coefficients(terms, logs[:, column])],
+                "factor": float(f"{np.exp(np.quantile(missed, COVERED)):.4g}"),
             }
         )
-        spread = f"{label}: {solved_.sum()} contacts, deviation {np.nanstd(missed):.2f}"
+        spread = f"{label}: {solved_.sum()} contacts, deviation {np.std(missed):.2f}"
         sys.stdout.write(f"{spread} of ln(error)\n")
-    kinds, counts = np.unique(data["kind"], return_counts=True)
+    sets = {}
+    for kind in np.unique(data["kind"]).tolist():
+        own = data["kind"] == kind
+        seeds = np.unique(data["seed"][own]).tolist()
+        numbers = f"0 to {data['number'][own].max()}"
+        sets[kind] = {"seeds": seeds, "numbers": numbers, "solved": int(own.sum())}
+    own_errors = {f"{part:.0%} below": np.quantile(data["own"], part) for part in (0.5, 0.9, 1.0)}
     return {
         "provenance": {
             "date": datetime.now(UTC).date().isoformat(),
-            "command": "python -m tests.benchmarks.calibration fit",
-            "machine": "2-core x86-64",
-            "software": {**software(), "wearsim-halfspace": "0.1.0"},
-            "reference": "halfspace, the straight line over 1/mx through mx = "
-            + ", ".join(map(str, NUMBERS)),
+            "command": "python -m tests.benchmarks.calibration solve KIND SEED COUNT, and fit",
+            "contacts": sets,
+            "machine": str(this_machine()),
+            "software": {**software(), "wearsim-halfspace": version("wearsim-halfspace")},
+            "reference": f"'{FINE}' elements along rolling",
+            f"its error, the change from '{COARSER}'": {
+                key: float(f"{error:.2g}") for key, error in own_errors.items()
+            },
             "strips": "48 over 1.15 times the patch, worn and wavy 64 over 1.12 times the patch",
-            "contacts": dict(zip(kinds.tolist(), counts.tolist(), strict=True)),
-            "median error of the reference": float(f"{np.median(data['own']):.2g}"),
-            "90 % of these errors are below": float(f"{np.quantile(data['own'], 0.9):.2g}"),
+            "covered": COVERED,
         },
-        "mean": mean.tolist(),
-        "scale": scale.tolist(),
+        "mean": indicators.mean(axis=0).tolist(),
+        "scale": indicators.std(axis=0).tolist(),
         "least": indicators.min(axis=0).tolist(),
         "greatest": indicators.max(axis=0).tolist(),
         "models": models,

@@ -15,9 +15,15 @@ from wearsim.plugins import ContactModelSpec, registry
 from wearsim.results import DISK
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.toml import apply_overrides
-from wearsim.scenario.tables.plugin import AUTO, AutoTable, ContactChoice
+from wearsim.scenario.tables.plugin import AUTO, AutoTable, ChosenTable, ContactChoice
 from wearsim.studies.contact.comparison import INSTALL, REFERENCE, at_creepage
-from wearsim.studies.contact.estimate import Calibration, ErrorModel, calibration, indicators_of
+from wearsim.studies.contact.estimate import (
+    Calibration,
+    ErrorModel,
+    calibration,
+    indicators_of,
+    preference,
+)
 from wearsim.studies.run.assemble import build_problem, chosen_stepper, prepared_model
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import contact_grid, wider_grid
@@ -47,8 +53,10 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     The cheapest installed model is taken whose estimated error of P_l(y) is at most
     `contact.tolerance` in every contact that is looked at: that of the first roller at the start of
     the load; in a test all contacts at the start, after a tenth of the passes and at the end, with
-    random inputs at their means, as stepped by `slender`. If none suffices, it is `halfspace`, if
-    it is installed. The text of the scenario names what was taken, so that it is kept.
+    random inputs at their means, as stepped by `slender`. Models that cost less than `CHEAP` count
+    as equally cheap, and the one with the least estimated error is taken. If none suffices, it is
+    `halfspace` on its finest elements, if it is installed, with a warning. The text of the scenario
+    names what was taken, so that it is kept.
 
     Parameters
     ----------
@@ -72,38 +80,38 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
         raise _refusal(scenario, f"{field} is a field, and no error is calibrated for it")
     states, where = _looked_at(scenario, test)
     reason = _not_calibrated(table, states)
-    tried: list[tuple[float, ErrorModel]] = []
-    for candidate in table.models:
-        choice = _choice(scenario, candidate.model, candidate.options)
-        if not _able(scenario, choice, states, test):
-            continue
-        error = np.inf
-        if not reason:
-            every = [table.scaled(each) for state in states for each in state.indicators]
-            error = max(candidate.error(scaled) for scaled in every)
-        tried.append((error, candidate))
-        if error <= options.tolerance:
-            return _with(scenario, choice, _why(candidate, error, options, where))
-    finest = [item for item in tried if item[1].model == REFERENCE][-1:]
-    if not reason and tried:
-        least, best = min(tried, key=lambda item: item[0])
+    every = [] if reason else [table.scaled(each) for state in states for each in state.indicators]
+    known = [
+        (max((model.error(scaled) for scaled in every), default=np.inf), model)
+        for model in table.models
+        if model.model in registry().names(ContactModelSpec)
+    ]
+    accepted = f"{100.0 * options.tolerance:g} %"
+    for error, model in sorted(known, key=lambda item: preference(*item)):
+        choice = _choice(scenario, model.model, model.options)
+        if error <= options.tolerance and _able(scenario, choice, states, test):
+            estimate = f"estimated error of P_l(y) {100.0 * error:.2g} %, tolerance {accepted}"
+            return _with(scenario, choice, model, f"{estimate}, {where}")
+    able = [
+        (error, model)
+        for error, model in known
+        if _able(scenario, _choice(scenario, model.model, model.options), states, test)
+    ]
+    if not reason and able:
+        least, best = min(able, key=lambda item: item[0])
         reason = f"the least estimated error is {100.0 * least:.2g} %, of '{best.label}'"
+    finest = [item for item in able if item[1].model == REFERENCE][-1:]
     if not finest:
         raise _refusal(scenario, reason)
-    error, candidate = finest[0]
-    choice = _choice(scenario, candidate.model, candidate.options)
-    own = "" if error == np.inf else f"; error of its elements {100.0 * error:.2g} %"
-    why = (
-        f"contact.model = 'auto' has taken '{candidate.label}', the exact theory: no model has an"
-        f" estimated error of P_l(y) within {100.0 * options.tolerance:g} % {where}"
-    )
-    return _with(scenario, choice, f"{why} ({reason}){own}")
-
-
-def _why(candidate: ErrorModel, error: float, options: AutoTable, where: str) -> str:
-    return (
-        f"contact.model = 'auto' has taken '{candidate.label}': estimated error of P_l(y)"
-        f" {100.0 * error:.2g} %, tolerance {100.0 * options.tolerance:g} %, {where}"
+    error, model = finest[0]
+    own = "cannot be estimated" if error == np.inf else f"is estimated as {100.0 * error:.2g} %"
+    why = f"no estimated error of P_l(y) is within {accepted} {where} ({reason})"
+    return _with(
+        scenario,
+        _choice(scenario, model.model, model.options),
+        model,
+        f"exact theory on its finest elements, since {why}",
+        f"contact model: the error of P_l(y) by '{model.label}' {own}, tolerance {accepted}",
     )
 
 
@@ -125,15 +133,19 @@ def _choice(scenario: Scenario, model: str, options: dict[str, object]) -> Conta
     return replace(scenario.contact, model=model, options=found)
 
 
-def _with(scenario: Scenario, choice: ContactChoice, why: str) -> Scenario:
+def _with(
+    scenario: Scenario, choice: ContactChoice, model: ErrorModel, why: str, warning: str = ""
+) -> Scenario:
     """Return a scenario with a model that has been chosen, also in its text."""
     auto = scenario.contact.options
     assert isinstance(auto, AutoTable)
-    options = choice.options.model_dump(exclude_unset=True)
-    chosen = {"model": choice.model, "options": options, "why": why}
-    text = apply_overrides(scenario.text, scenario.file, {"contact.chosen": chosen})
+    note = f"contact.model = 'auto' has taken '{model.label}': {why}"
+    chosen = ChosenTable(model=model.model, options=model.options, why=note, warning=warning)
+    written = chosen.model_dump(exclude_defaults=True)
+    text = apply_overrides(scenario.text, scenario.file, {"contact.chosen": written})
+    auto = auto.model_copy(update={"chosen": chosen})
     return replace(
-        scenario, contact=replace(choice, auto=auto), text=text, notes=(*scenario.notes, why)
+        scenario, contact=replace(choice, auto=auto), text=text, notes=(*scenario.notes, note)
     )
 
 

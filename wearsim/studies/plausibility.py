@@ -43,6 +43,8 @@ def range_90(item: RandomInput) -> list[tuple[float, float]]:
 def plausibility_warnings(scenario: Scenario) -> list[str]:
     """Return warnings of implausible pressures, creepages, friction, logs and contact widths.
 
+    Also that of an automatically chosen contact model, if its error may exceed the tolerance.
+
     Parameters
     ----------
     scenario : Scenario
@@ -60,6 +62,7 @@ def plausibility_warnings(scenario: Scenario) -> list[str]:
         *_of_width(scenario, load),
         *_of_log(scenario, load),
         *_of_cam(scenario),
+        *_of_model(scenario),
     ]
 
 
@@ -168,3 +171,9 @@ def _of_log(scenario: Scenario, load: Load) -> Iterator[str]:
         how = getattr(scenario.load.options, "gaps", "interpolate")
         done = "the last value is held" if how == "hold" else "the load is interpolated"
         yield (f'{log_file(scenario)}: {gap_text(gaps)}; {done} (load.gaps = "{how}")')
+
+
+def _of_model(scenario: Scenario) -> Iterator[str]:
+    auto = scenario.contact.auto
+    if auto is not None and auto.chosen is not None and auto.chosen.warning:
+        yield auto.chosen.warning

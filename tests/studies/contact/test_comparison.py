@@ -1,13 +1,18 @@
 """Difference of a contact from a reference model."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import wearsim
-from wearsim.errors import PluginError
+from wearsim.errors import ContactError, PluginError
+from wearsim.plugins import ContactModelSpec, Options, registry
 from wearsim.plugins.manager import Registry
 from wearsim.scenario.examples import shipped_scenario
-from wearsim.studies.contact.comparison import _extrapolated, solve_reference
+from wearsim.studies.contact import comparison
+from wearsim.studies.contact.comparison import solve_reference
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
 STEEL = Material(youngs_modulus=200e9, poisson_ratio=0.3)
@@ -49,15 +54,41 @@ def test_free_roller_is_compared_at_its_creepage():
     assert any("longitudinal creepage of this solution" in note for note in study.notes)
 
 
-def test_line_over_the_inverse_number_gives_the_limit_and_its_error():
-    inverse = 1.0 / np.array([25.0, 35.0, 50.0, 70.0])
-    exact = np.array([2.0, 3.0, 1.0, 0.5, 1.0, 1.0, 4.0, 4.0])
-    found = exact + inverse[:, None] * np.arange(8.0)
-    values, own = _extrapolated(inverse, found)
-    np.testing.assert_allclose(values, exact, rtol=1e-12)
-    assert own.dissipation < 1e-12
-    found[1, 0] += 0.1  # one solution has an irregular error
-    assert _extrapolated(inverse, found)[1].power > 0.01
+class _Elements(Options):
+    mx: int = 20
+
+
+class _Fails:
+    """Reference whose P_l(y) has a relative error of 1/mx**2; it does not solve with some mx."""
+
+    def __init__(self, unsolved):
+        self.options, self.reference, self.unsolved = _Elements, True, unsolved
+
+    def factory(self, options, grid, materials):
+        slender = registry().get(ContactModelSpec, "slender")
+        model = slender.factory(slender.options(), grid, materials)
+
+        def solve_one(*contact):
+            if options.mx in self.unsolved:
+                raise ContactError("no contact")
+            found = model.solve_one(*contact)
+            return replace(found, dissipation=found.dissipation * (1.0 + options.mx**-2))
+
+        return SimpleNamespace(solve_one=solve_one)
+
+
+@pytest.mark.parametrize(("unsolved", "taken"), [((), (60, 40)), ((60,), (40, 30))])
+def test_reference_has_the_finest_elements_and_the_change_from_fewer(monkeypatch, unsolved, taken):
+    monkeypatch.setattr(comparison, "reference_spec", lambda _: _Fails(unsolved))
+    grid = Grid.spanning(-2e-3, 2e-3, 80)
+    contact = grid, (STEEL, STEEL), grid.y**2, 90.0
+    point = OperatingPoint(300.0, 1.0, Creepage(1e-3, 0.0, 0.0), 0.1)
+    found = solve_reference("any", *contact, point)
+    fine, coarse = (1.0 + number**-2 for number in taken)
+    assert found.own.dissipation == pytest.approx(coarse / fine - 1.0, rel=1e-6)
+    monkeypatch.setattr(comparison, "reference_spec", lambda _: _Fails((60, 40, 30)))
+    with pytest.raises(ContactError):
+        solve_reference("any", *contact, point)
 
 
 def test_missing_plugin_is_named_with_its_installation(monkeypatch):

@@ -65,7 +65,7 @@ def cam(
     with Display(quiet=False, kernels=lambda: kernels_of(loaded, "contacts"), transient=True):
         study = study_cam(loaded, angles)
     if json:
-        write_json({**_data(study), "notes": loaded.notes, "figure": figure})
+        write_json({**_data(study), "notes": study.notes, "figure": figure})
     else:
         write_table(loaded.title, _summary(study))
         write_list(*_stations_table(study))
@@ -75,7 +75,7 @@ def cam(
 
         save_figure(cam_figure(study, loaded.title), figure)
     if not json:
-        write_notes(loaded.notes, study.warnings)
+        write_notes(study.notes, study.warnings)
         if figure:
             note(f"figure: {figure}")
 

@@ -56,6 +56,9 @@ class ChosenTable(Options):
     model: str = Field(description="Name of the contact model.")
     options: dict[str, Any] = Field(default_factory=dict, description="Options of the model.")
     why: str = Field(default="", description="Reason of the choice.")
+    warning: str = Field(
+        default="", description="Warning, if its estimated error is not within the tolerance."
+    )
 
 
 class AutoTable(Options):
@@ -99,8 +102,8 @@ class ContactChoice:
     width, centre : float, optional
         Width and centre of the strip grid [m].
     auto : AutoTable, optional
-        Options of the automatic choice that has taken this model. Before the choice, `model` is
-        "auto" and `options` are these.
+        Options of the automatic choice that has taken this model, with the choice. Before it,
+        `model` is "auto" and `options` are these.
     """
 
     model: str

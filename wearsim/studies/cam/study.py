@@ -74,6 +74,8 @@ class CamStudy:
     skids : tuple of Skid
         Arcs in which a free roller skids.
     warnings : tuple of str
+    notes : tuple of str
+        Notes on the scenario, with the automatic choice of a contact model.
 
     Examples
     --------
@@ -102,6 +104,7 @@ class CamStudy:
     sweeps: float | None
     skids: tuple[Skid, ...]
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def study_cam(
@@ -181,6 +184,7 @@ def study_cam(
         sweeps,
         skids,
         tuple(cam_warnings(turn, skids, sweeps)),
+        scenario.notes,
     )
 
 

@@ -15,10 +15,9 @@ from wearsim.scenario.tables.plugin import ContactChoice
 from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
 
 REFERENCE = "halfspace"  # the exact theory
-#: Numbers of elements along rolling at which a reference is solved, over its usual number.
-RESOLUTIONS = (0.5, 0.6, 0.75, 0.95, 1.2, 1.5)
-FEW = (0.5, 1.0)  # of a check during a run
-_LEAST_SOLVED = 3  # of them
+#: Numbers of elements along rolling over the usual one; the first two that solve are the reference.
+RESOLUTIONS = (3.0, 2.0, 1.5, 1.0)
+FEW = (1.0, 0.5)  # of a check during a run
 #: How to install models of the project's plugins.
 INSTALL = {"halfspace": "pip install 'wearsim[halfspace]'"}
 
@@ -124,12 +123,11 @@ def solve_reference(
 ) -> ContactReference:
     """Solve a contact with a reference model, and estimate the reference's own errors.
 
-    A model whose elements along rolling are chosen by the option `mx` is solved with several
-    numbers of them, without extrapolation by the model (`extrapolate`). Its error decreases with
-    1/mx, and varies irregularly as single elements enter and leave the adhesion zone; the straight
-    line over 1/mx that fits all solutions gives the value at 1/mx = 0. The error stated is half the
-    difference between the values by every other solution. Another model is also solved with half as
-    many strips; the change is stated.
+    A model whose elements along rolling are chosen by the option `mx` is solved with two numbers of
+    them. The values are those with more elements, and the error stated is the change from fewer. It
+    is an upper estimate where errors decrease with the square of the length of the elements.
+    P_l(y) is not extrapolated: as single elements enter and leave the adhesion zone, it varies
+    irregularly. Another model is solved with half as many strips too; the change is stated.
 
     Parameters
     ----------
@@ -138,7 +136,7 @@ def solve_reference(
     grid, materials, gap, longitudinal_curvature, point
         The contact, as for `ContactModel.solve_one`.
     resolutions : tuple of float
-        Numbers of elements along rolling, over the usual number.
+        Numbers of elements along rolling, over the usual number, the greatest first.
 
     Returns
     -------
@@ -166,19 +164,18 @@ def solve_reference(
         return _values(model.solve_one(heights, longitudinal_curvature, _on(point, grid, on)))
 
     if spec.reference and "mx" in spec.options.model_fields:
-        usual = float(spec.options.model_fields["mx"].default)
-        raw = {"extrapolate": False} if "extrapolate" in spec.options.model_fields else {}
-        found, inverse = [], []
+        usual, found = spec.options.model_fields["mx"].default, []
         for part in resolutions:
-            number = round(part * usual)
             try:
-                found.append(solve(spec.options.model_validate({"mx": number, **raw}), grid))
-                inverse.append(1.0 / number)
+                found.append(solve(spec.options.model_validate({"mx": round(part * usual)}), grid))
             except ContactError as error:
                 failure = error
-        if len(found) < min(_LEAST_SOLVED, len(resolutions)):
+            if len(found) == _SOLUTIONS:
+                break
+        else:
             raise failure
-        values, own = _extrapolated(np.array(inverse), np.array(found))
+        values, coarse = found
+        own = _differences(coarse, values)
     else:
         values = solve(spec.options(), grid)
         half = Grid.spanning(*grid.edges, (grid.strips + 1) // 2)
@@ -246,6 +243,7 @@ def excess(
     )
 
 
+_SOLUTIONS = 2  # of a reference
 _SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
 
 
@@ -254,20 +252,6 @@ def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:
     scalars = solution.power, solution.peak_pressure, float(solution.half_length.max())
     fields = (np.pad(each, beyond) for each in (solution.line_load, solution.dissipation))
     return np.concatenate([[*scalars, solution.adhesion_fraction], *fields])
-
-
-def _extrapolated(inverse: FloatArray, found: FloatArray) -> tuple[FloatArray, ContactErrors]:
-    """Return the values at 1/mx = 0 and their errors; `found` has one row per number."""
-
-    def value(rows: slice) -> FloatArray:
-        line = np.vander(inverse[rows], 2)
-        return np.asarray(np.linalg.lstsq(line, found[rows], rcond=None)[0][-1])
-
-    values = value(slice(None))
-    if len(inverse) < 4:  # too few for two straight lines
-        return values, _differences(found[np.argmin(inverse)], values)
-    twice = _differences(value(slice(0, None, 2)), value(slice(1, None, 2)))
-    return values, replace(twice, **{name: 0.5 * error for name, error in vars(twice).items()})
 
 
 def _differences(values: FloatArray, reference: FloatArray) -> ContactErrors:

@@ -24,6 +24,9 @@ INDICATORS = (
     "ln of the line load's curvature over a half-length, plus 0.001",
 )
 _BEYOND = 0.1  # allowed beyond the range of an indicator, over that range
+#: Times of one contact up to this one, over that of the cheapest model, do not count: well below a
+#: millisecond.
+CHEAP = 10.0
 #: indicators whose errors do not increase beyond their greatest and their least value: contacts
 #: that are longer across rolling, in full slip, and smoother
 _UNLIMITED_ABOVE, _UNLIMITED_BELOW = [0, 2], [5, 6]
@@ -44,7 +47,7 @@ class ErrorModel:
     coefficients : ndarray, shape (36,)
         Of the quadratic polynomial of the scaled indicators that gives ln(error).
     factor : float
-        Safety factor: 97.5 % of the calibrated contacts have less than `factor` times the
+        Safety factor: 95 % of the calibrated contacts have less than `factor` times the
         polynomial's error, by cross-validation.
     """
 
@@ -95,6 +98,15 @@ class Calibration:
         found[_UNLIMITED_ABOVE] = np.minimum(found, self.greatest)[_UNLIMITED_ABOVE]
         found[_UNLIMITED_BELOW] = np.maximum(found, self.least)[_UNLIMITED_BELOW]
         return found
+
+
+def preference(error: float, model: ErrorModel) -> tuple[float, float]:
+    """Return the key by which models within the tolerance are ordered, the best one first.
+
+    The cheapest is the best; of models that cost at most `CHEAP`, that with the least estimated
+    error.
+    """
+    return max(model.cost, CHEAP), error
 
 
 @cache
