@@ -34,6 +34,12 @@ def test_progress_goes_to_stderr_in_plain_lines(command: Command, scenario: Path
     assert len(lines) < 20
 
 
+def test_automatic_choice_of_the_contact_model_is_a_note(command: Command, scenario: Path) -> None:
+    lines = command("run", scenario, "--set", "contact.model=auto").stderr.splitlines()
+    (note,) = [line for line in lines if line.startswith("note: contact.model = 'auto' has taken")]
+    assert "estimated error of P_l(y)" in note
+
+
 def test_quiet_shows_no_progress(command: Command, scenario: Path) -> None:
     result = command("run", scenario, "--quiet")
     assert result.stderr == ""

@@ -78,6 +78,8 @@ def run(
                 error.add_note(f"the last accepted step is kept: wearsim show {path}")
         raise
     report(result, json)
+    # the study has chosen the contact model
+    write_notes(note for note in result.notes if note not in loaded.notes)
 
 
 def report(result: Result, json: bool) -> None:
