@@ -66,6 +66,7 @@ def run(name="rig-450min.toml", **overrides):
 for stepper in ("implicit", "explicit", "per-pass"):
     for name in ("rig-450min.toml", "rig-three-rollers.toml"):
         run(name, evolution__stepper=stepper)
+run(load={{"kind": "spring", "normal_force": "300 N", "stiffness": "690 N/mm"}})
 run(contact__tangential="fastsim")
 for model in ("hertz-fastsim", "hertz"):
     run(contact__model=model)

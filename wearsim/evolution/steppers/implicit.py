@@ -156,7 +156,7 @@ def _estimates(
     contacts, shape = end.contacts, end.contacts.line_load.shape
     stiffness = np.zeros(shape[0])
     if problem.has_spring:
-        stiffness = np.broadcast_to(problem.stiffness, problem.shape).ravel()
+        stiffness = np.broadcast_to(problem.stiffness, problem.shape).flatten()
     errors, sizes = carried_errors(
         np.asarray(start.stepping_error),
         added,

@@ -37,7 +37,7 @@ def linearised_wear(
     exponents : ndarray, shape (contacts, strips)
         Exponent e.
     bodies : ndarray of int, shape (contacts each, 2)
-        Rows of the two bodies of each contact, numbered together.
+        Numbers of the two bodies of each contact, less than twice the number of contacts.
     gap : ndarray, shape (contacts, strips)
         Gap without this wear [m].
     compliance : ndarray, shape (realisations, contacts each, 2, strips)
@@ -52,7 +52,7 @@ def linearised_wear(
     """
     contacts, n = line_load.shape
     realisations = len(compliance)
-    constant, worn = np.empty((2, contacts, n)), np.zeros((bodies.max() + 1, realisations, n))
+    constant, worn = np.empty((2, contacts, n)), np.zeros((2 * len(bodies), realisations, n))
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for side in range(2):
@@ -256,11 +256,14 @@ def carried_errors(
         [m^3]; Euclidean norm of the errors over that of the depths.
     """
     rows, realisations, n = errors.shape
-    whole = errors + added
-    carried, soft, weight = whole.copy(), np.empty((rows, n)), np.empty(n)
-    own = np.empty((len(bodies), 2, n))
+    # written as loops: array expressions take four times as long to compile
+    whole, carried = np.empty((rows, realisations, n)), np.empty((rows, realisations, n))
+    soft, weight, own = np.empty((rows, n)), np.empty(n), np.empty((len(bodies), 2, n))
     for v in range(realisations):
-        soft[:] = 0.0
+        for b in range(rows):
+            for i in range(n):
+                soft[b, i] = 0.0
+                whole[b, v, i] = carried[b, v, i] = errors[b, v, i] + added[b, v, i]
         for c in range(len(bodies)):
             k = c * realisations + v
             for side in range(2):
