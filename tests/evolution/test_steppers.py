@@ -116,7 +116,7 @@ def test_tighter_tolerance_gives_a_smaller_error():
         _, reference, found = compared(passes=30_000, evolution__tolerance=tolerance)
         difference = found.cylinder_depth - reference.cylinder_depth
         errors.append(np.linalg.norm(difference) / np.linalg.norm(reference.cylinder_depth))
-        assert errors[-1] < min(found.profile_error[0], 2.0 * tolerance)
+        assert errors[-1] < 2.0 * min(found.profile_error[0], tolerance)
     assert errors[2] < errors[1] < errors[0]
     assert errors[2] < 0.1 * errors[0]
 

@@ -149,6 +149,13 @@ def test_order_changes_by_one_to_that_of_the_longest_step():
     assert chosen([1.0, 1.0, 0.1, 1e-9], 2)[1] == 3
 
 
+def test_order_is_lowered_for_clearly_longer_steps_only():
+    assert chosen([1.05**-2, 1.0, 10.0, 10.0], 2)[1] == 2
+    assert chosen([1.2**-2, 1.0, 10.0, 10.0], 2)[1] == 1
+    # it is raised for any longer step
+    assert chosen([10.0, 1.0, 1.05**-4, 10.0], 2)[1] == 3
+
+
 def test_growth_is_limited_by_the_order():
     for order in ORDERS:
         sizes = [1.0, 1.0, 1.0, 1.0]

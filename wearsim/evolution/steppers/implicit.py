@@ -36,7 +36,7 @@ from wearsim.mechanics.numerics.multistep import (
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.5  # part of the tolerance that a step may add to the profiles
-COVER = np.array([[5.0], [2.0], [5.0]])  # safety factors on the errors of depth, volume, profile
+COVER = np.array([[5.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 

@@ -15,6 +15,9 @@ _RATIOS = (2.4, 1.9, 1.5)
 LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
 SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
 GROW = (2.2, 2.2, 1.8, 1.45)  # greatest ratio of successive steps, by order
+# a lower order is taken for clearly longer steps only, of which this is the part that counts: the
+# differences that a step leaves are less smooth after a change of order
+KEEP = 0.9
 
 
 @kernel
@@ -244,13 +247,14 @@ def next_steps(
         for k in range(MAX_ORDER):
             sizes[k, v] = sizes[k, v] * part[v] / aim
             known += np.isfinite(sizes[k, v])
-        excess, ratio, best = 0.0, 0.0, 1
+        excess, ratio, best, longest = 0.0, 0.0, 1, 0.0
         if known > 0:
             excess = sizes[min(order, known) - 1, v] / LIMIT
         for other in range(max(1, order - 1), min(order + 1, known) + 1):
             size = SAFETY * max(sizes[other - 1, v], 1e-12) ** (-1.0 / (other + 1))
-            if size >= ratio:
-                ratio, best = size, other
+            worth = KEEP * size if other < order else size
+            if worth >= longest:
+                longest, ratio, best = worth, size, other
         if known == 0:
             best, ratio = order, GROW[0]
         elif order + 1 > known and order < MAX_ORDER and excess <= 1.0:
