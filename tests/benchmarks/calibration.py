@@ -3,8 +3,8 @@
 ``python -m tests.benchmarks.calibration solve elliptic 1 500 -o out/elliptic-1.npz`` solves random
 contacts of a kind and a seed; run again after a stop, it continues. ``fit FILE... -o
 wearsim/studies/contact/calibration.json`` fits the error models. Calibrated are ``elliptic 1 500``,
-``worn 1 180`` and ``wavy 1 60``; ``elliptic 2 200`` and ``worn 2 20`` are kept apart, see
-`tests.benchmarks.model_choice`.
+``worn 1 180`` and ``wavy 1 60``; ``elliptic 2 200``, ``worn 2 20`` and ``worn 3 60`` are kept
+apart, see `tests.benchmarks.model_choice`.
 """
 
 from __future__ import annotations

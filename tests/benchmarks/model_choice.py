@@ -1,8 +1,9 @@
 """How often `contact.model = "auto"` meets its tolerance on contacts kept apart from calibration.
 
 ``python -m tests.benchmarks.model_choice FILE... [-o FILE.json]`` with the files of
-`tests.benchmarks.calibration` (``solve elliptic 2 200``, ``solve worn 2 20``), by default the
-stored ones, prints the verdicts as a Markdown table: errors are relative to half-space solutions.
+`tests.benchmarks.calibration` (``solve elliptic 2 200``, ``solve worn 2 20``, ``solve worn 3 60``),
+by default the stored ones, prints the verdicts as a Markdown table: errors are relative to
+half-space solutions.
 ``--crossed FILE...`` does so for the calibrated contacts by cross-validation, with safety factors
 that cover several shares of them: `COVERED` is the least with which 99 % of all choices meet each
 tolerance.
@@ -131,7 +132,11 @@ def verify(data: dict[str, FloatArray], estimated: FloatArray, table: Calibratio
         " | best constant model of this cost"
     )
     lines = [f"| {head} |", "|" + "---|" * (head.count("|") + 1)]
-    parts = {kind: data["kind"] == kind for kind in np.unique(data["kind"]).tolist()}
+    sets = sorted(set(zip(data["kind"].tolist(), data["seed"].tolist(), strict=True)))
+    parts = {
+        f"{kind}, seed {seed}": (data["kind"] == kind) & (data["seed"] == seed)
+        for kind, seed in sets
+    }
     for kind, own in {**parts, "in all": np.ones(len(data["own"]), dtype=bool)}.items():
         for tolerance in TOLERANCES:
             found, _ = verified(data["errors"][own], estimated[own], table, tolerance)

@@ -147,12 +147,15 @@ def test_calibration_has_its_provenance():
 @pytest.mark.parametrize("tolerance", TOLERANCES)
 def test_choice_meets_its_tolerance_on_contacts_kept_apart(tolerance):
     data, table = read([STORED]), calibration()
-    kinds, counts = np.unique(data["kind"], return_counts=True)
-    assert dict(zip(kinds.tolist(), counts.tolist(), strict=True)) == {"elliptic": 200, "worn": 20}
     assert np.quantile(data["own"], 0.9) < 0.001
     estimated = estimates(data, table)
-    for kind, least in {"elliptic": 0.95, "worn": 0.9, "": 0.95}.items():
-        part = data["kind"] == kind if kind else np.ones(len(data["kind"]), dtype=bool)
+    sets = {("elliptic", 2): (200, 0.95), ("worn", 2): (20, 0.9), ("worn", 3): (60, 0.95)}
+    parts = {
+        expected: (data["kind"] == kind) & (data["seed"] == seed)
+        for (kind, seed), expected in sets.items()
+    }
+    for (count, least), part in {**parts, (280, 0.95): data["own"] >= 0.0}.items():
+        assert part.sum() == count
         found, _ = verified(data["errors"][part], estimated[part], table, tolerance)
         assert found.met >= least
         assert found.met_unwarned >= least
