@@ -14,7 +14,9 @@ LEAST = np.float32(1e-6)  # pivot, against division by zero
 
 
 @numba.njit(cache=True, fastmath=True)
-def factor(diagonal: Singles, influence: Singles, first: IntArray, last: IntArray) -> Singles:
+def factor(
+    diagonal: Singles, influence: Singles, first: IntArray, last: IntArray, factors: Singles
+) -> None:
     """Factor the systems I - D (I - B) of rows, by elimination without pivoting.
 
     The symmetric part of B is positive definite.
@@ -27,17 +29,13 @@ def factor(diagonal: Singles, influence: Singles, first: IntArray, last: IntArra
         B for all distances of two elements.
     first, last : ndarray, shape (rows,)
         The columns in contact, to which the systems are restricted.
-
-    Returns
-    -------
-    ndarray of float32, shape (2, rows, size, size)
-        Factors, with the reciprocals of the pivots on the diagonal.
+    factors : ndarray of float32, shape (2, rows, size, size)
+        Overwritten with the factors, and with the reciprocals of the pivots on the diagonal.
     """
-    columns, size = diagonal.shape[2], (last - first).max() + 1
-    found = np.empty((2, len(first), size, size), dtype=np.float32)
+    columns = diagonal.shape[2]
     for component in range(2):
         for row in range(len(first)):
-            matrix, count = found[component, row], last[row] - first[row] + 1
+            matrix, count = factors[component, row], last[row] - first[row] + 1
             for i in range(count):
                 scale = diagonal[component, row, first[row] + i]
                 for j in range(count):
@@ -51,7 +49,6 @@ def factor(diagonal: Singles, influence: Singles, first: IntArray, last: IntArra
                     matrix[i, k] = part
                     for j in range(np.uint64(k + 1), np.uint64(count)):
                         matrix[i, j] -= part * matrix[k, j]
-    return found
 
 
 @numba.njit(cache=True, fastmath=True)

@@ -173,7 +173,9 @@ class _Rows:
         self._ends = np.argmax(inside, axis=1), columns - 1 - np.argmax(inside[:, ::-1], axis=1)
         # single precision suffices for a preconditioner
         parts = diagonal[:, self._touching].astype(np.float32)
-        self._factors = rows.factor(parts, influence.astype(np.float32), *self._ends)
+        size = int(np.ptp(self._ends, axis=0).max(initial=0)) + 1
+        self._factors = np.empty((2, len(self._touching), size, size), dtype=np.float32)
+        rows.factor(parts, influence.astype(np.float32), *self._ends, self._factors)
         self._solve = rows.solve
 
     def __call__(self, field: FloatArray) -> FloatArray:
