@@ -102,7 +102,9 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
         reason = f"the least estimated error is {100.0 * least:.2g} %, of '{best.label}'"
     finest = [item for item in able if item[1].model == REFERENCE][-1:]
     if not finest:
-        raise _refusal(scenario, reason)
+        missing = REFERENCE not in registry().names(ContactModelSpec)
+        remedies = [f"install '{REFERENCE}' ({INSTALL[REFERENCE]})"] if missing else []
+        raise _refusal(scenario, reason, *remedies, *(["raise the tolerance"] if every else []))
     error, model = finest[0]
     own = "cannot be estimated" if error == np.inf else f"is estimated as {100.0 * error:.2g} %"
     why = f"no estimated error of P_l(y) is within {accepted} {where} ({reason})"
@@ -115,13 +117,12 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     )
 
 
-def _refusal(scenario: Scenario, reason: str) -> CapabilityError:
-    missing = REFERENCE not in registry().names(ContactModelSpec)
-    install = f"install '{REFERENCE}' ({INSTALL[REFERENCE]}), " if missing else ""
+def _refusal(scenario: Scenario, reason: str, *remedies: str) -> CapabilityError:
+    options = scenario.contact.options
+    assert isinstance(options, AutoTable)
     return CapabilityError(
         f"{scenario.file}: contact.model = 'auto' finds no model within contact.tolerance ="
-        f" {scenario.contact.options.tolerance:g}: {reason}; {install}raise the tolerance or name a"  # type: ignore[attr-defined]
-        " contact.model"
+        f" {options.tolerance:g}: {reason}; {', '.join([*remedies, 'name a contact.model'])}"
     )
 
 
