@@ -119,7 +119,7 @@ def test_missing_points_have_no_estimate():
     assert np.isfinite(errors).tolist() == [True, False, False, False]
 
 
-def chosen(sizes, order, part=1.0, aim=1.0):
+def chosen(sizes, order, part=1.0, aim=1.0, keep=0.9):
     """Excess, order and ratio of the next step after one with errors of given sizes."""
     known = len(sizes)
     spans = np.array([[1.0 + k] if k <= known else [np.inf] for k in range(ROWS - 1)])
@@ -129,7 +129,9 @@ def chosen(sizes, order, part=1.0, aim=1.0):
     for k, size in enumerate(sizes):
         differences[k + 2] = size / unit[k, 0]
     orders, own = np.array([0]), np.empty_like(value)
-    found = next_steps(differences, spans, value, np.array([order]), part * ONE, aim, own, orders)
+    found = next_steps(
+        differences, spans, value, np.array([order]), part * ONE, aim, keep, own, orders
+    )
     return found[0, 0], orders[0], found[1, 0]
 
 
@@ -151,6 +153,7 @@ def test_order_changes_by_one_to_that_of_the_longest_step():
 
 def test_order_is_lowered_for_clearly_longer_steps_only():
     assert chosen([1.05**-2, 1.0, 10.0, 10.0], 2)[1] == 2
+    assert chosen([1.05**-2, 1.0, 10.0, 10.0], 2, keep=1.0)[1] == 1
     assert chosen([1.2**-2, 1.0, 10.0, 10.0], 2)[1] == 1
     # it is raised for any longer step
     assert chosen([10.0, 1.0, 1.05**-4, 10.0], 2)[1] == 3

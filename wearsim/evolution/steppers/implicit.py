@@ -37,6 +37,9 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.5  # part of the tolerance that a step may add to the profiles
 COVER = np.array([[5.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
+# of a step at a lower order, compared with other orders: the differences that a step leaves are
+# less smooth after a change of order; where inputs vary they are not smooth at any order
+KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
@@ -92,7 +95,9 @@ class ImplicitStepper(StepDoublingStepper):
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
         part, aim = (passes / stop) ** PART_EXPONENT, SHARE * self.tolerance
-        over, ratio = next_steps(past.wear, past.spans, depths, past.order, part, aim, own, order)
+        over, ratio = next_steps(
+            past.wear, past.spans, depths, past.order, part, aim, KEEP, own, order
+        )
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
@@ -113,7 +118,9 @@ class ImplicitStepper(StepDoublingStepper):
         own, order = np.empty_like(depths), np.empty_like(past.order)
         part = (end.passes / stop) ** PART_EXPONENT
         scale = part / self.tolerance
-        over, ratio = next_steps(past.wear, past.spans, depths, past.order, scale, 1.0, own, order)
+        over, ratio = next_steps(
+            past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, own, order
+        )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
         added = doubled.added[0] / np.where(allowed > 0.0, allowed, np.inf)

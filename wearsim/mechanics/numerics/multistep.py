@@ -15,9 +15,6 @@ _RATIOS = (2.4, 1.9, 1.5)
 LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
 SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
 GROW = (2.2, 2.2, 1.8, 1.45)  # greatest ratio of successive steps, by order
-# a lower order is taken for clearly longer steps only, of which this is the part that counts: the
-# differences that a step leaves are less smooth after a change of order
-KEEP = 0.9
 
 
 @kernel
@@ -215,6 +212,7 @@ def next_steps(
     orders: IntArray,
     part: FloatArray,
     aim: float,
+    keep: float,
     errors: FloatArray,
     next_orders: IntArray,
 ) -> FloatArray:
@@ -227,6 +225,9 @@ def next_steps(
     part : ndarray, shape (solutions,)
     aim : float
         Relative error that a step should add is ``aim / part``.
+    keep : float
+        Part of the length of a step at a lower order that is compared with those at other orders:
+        below one, the order is lowered for clearly longer steps only.
     errors : ndarray, shape (rows, solutions, columns)
         Result: error of the step, as of `local_errors`.
     next_orders : ndarray of int, shape (solutions,)
@@ -252,7 +253,7 @@ def next_steps(
             excess = sizes[min(order, known) - 1, v] / LIMIT
         for other in range(max(1, order - 1), min(order + 1, known) + 1):
             size = SAFETY * max(sizes[other - 1, v], 1e-12) ** (-1.0 / (other + 1))
-            worth = KEEP * size if other < order else size
+            worth = keep * size if other < order else size
             if worth >= longest:
                 longest, ratio, best = worth, size, other
         if known == 0:
@@ -272,7 +273,7 @@ def compile_multistep() -> None:
     formulas(spans, one, order, one, weights, np.empty(1), np.empty((ROWS - 1, 1)))
     extrapolated(weights, differences)
     new_differences(value, value, one, differences, spans)
-    next_steps(differences, spans, value, order, one, 1.0, np.empty((1, 1, 1)), order.copy())
+    next_steps(differences, spans, value, order, one, 1.0, 1.0, np.empty((1, 1, 1)), order.copy())
 
 
 compile_alongside("solve_slender", compile_multistep)
