@@ -1,10 +1,13 @@
 """Contacts at the limits of the theory: Coulomb's law and equilibrium hold on every element."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from halfspace_cases import RANDOM, STEEL, normal_of, problem_of
 
-from wearsim.errors import ContactError
+from wearsim.errors import CapabilityError, ContactError
+from wearsim.plugins import ContactBatch
 from wearsim.types import Creepage, Grid, OperatingPoint
 from wearsim_halfspace import Halfspace, HalfspaceOptions
 from wearsim_halfspace.grids import solve
@@ -36,7 +39,7 @@ def assert_law(model, gap, point):
     opened = problem.elements.normal(pressure) + problem.gap - found.normal.approach
     assert np.abs(opened[touching]).max() < 1e-4 * found.normal.approach
     assert opened[~touching].min() > -1e-4 * found.normal.approach
-    bound = problem.friction[:, None] * pressure
+    bound = problem.friction * pressure
     size = np.hypot(*rolling.traction)
     assert (size <= bound * (1.0 + 1e-9)).all()
     slips = touching & ~rolling.sticks
@@ -72,6 +75,23 @@ def test_strips_of_scattered_friction_keep_their_own_bounds():
     friction = 0.1 * np.exp(0.5 * generator.standard_normal(GRID.strips))
     model = Halfspace(HalfspaceOptions(mx=24), GRID, (STEEL, STEEL))
     assert_law(model, crown(GRID.y), OperatingPoint(300.0, 1.0, GENTLE, friction))
+
+
+def test_friction_of_each_point_bounds_its_traction():
+    model = Halfspace(HalfspaceOptions(mx=24), GRID, (STEEL, STEEL))
+    uniform = OperatingPoint(300.0, 1.0, GENTLE, 0.1)
+    batch = ContactBatch.of(crown(GRID.y)[None], CURVATURE, [uniform])
+    x, y = model.friction_points(batch)
+    assert x.shape == (1, 24, GRID.strips)
+    friction = 0.1 * np.exp(0.5 * np.random.default_rng(4).standard_normal(x[0].shape))
+    assert_law(model, crown(y), replace(uniform, friction=friction))
+    # in full slip, the power is that of the local friction
+    sliding = replace(uniform, creepage=Creepage(1e-2))
+    halves = replace(sliding, friction=np.where(x[0] > 0.0, 0.2, 0.1))
+    power = model.solve_one(crown(y), CURVATURE, halves).power
+    assert power == pytest.approx(0.15 * 300.0 * 1e-2, rel=1e-3)
+    with pytest.raises(CapabilityError, match="not steady"):
+        model.solve_one(crown(y), CURVATURE, replace(halves, friction_carried=True))
 
 
 def test_full_adhesion_needs_no_slip():
@@ -116,6 +136,6 @@ def test_warm_grids_do_not_change_the_solution():
     problem = problem_of(case, 40)
     normal = normal_of(problem, case)
     nested = solve(problem, normal, 1e-8).rolling.traction
-    bound = problem.friction[:, None] * normal.pressure
+    bound = problem.friction * normal.pressure
     alone = solve_tangential(problem.elements.rolling, bound, problem.slip_ahead, 1e-8).traction
     assert np.abs(nested - alone).max() < 1e-5 * bound.max()

@@ -38,7 +38,7 @@ class Problem:
         Normal force [N].
     compliance : ndarray, shape (rows,)
         Gap opened by wear per line load of a row [m/(N/m)].
-    friction : ndarray, shape (rows,)
+    friction : ndarray, shape (rows, columns)
         Friction coefficient.
     rigid_slip : ndarray, shape (2, rows, columns)
         Rigid slip of body 1 on body 2 per distance rolled, at the middle of the elements.
@@ -93,7 +93,7 @@ class Problem:
             halved(self.gap, (*rows, 1)),
             self.force,
             halved(self.compliance, rows),
-            halved(self.friction, rows),
+            halved(self.friction, (*rows, 1)),
             halved(self.rigid_slip, (1, 2) if across else (2,)),
             self.spin,
             halved(self.x, (0,)),
@@ -184,7 +184,7 @@ def solve(
     ContactError
         If an iteration does not converge.
     """
-    bound, finest = problem.friction[:, None] * normal.pressure, normal.pressure.shape
+    bound, finest = problem.friction * normal.pressure, normal.pressure.shape
     if not bound.any() or not problem.rigid_slip.any():
         nothing = np.zeros_like(problem.rigid_slip)
         return Solution(

@@ -76,7 +76,11 @@ class Halfspace(ws.SingleContactModel):
     """
 
     capabilities = ws.Capabilities(
-        wear_compliance=True, creepage_variation=True, local_friction=True, fields=True
+        wear_compliance=True,
+        creepage_variation=True,
+        local_friction=True,
+        friction_field=True,
+        fields=True,
     )
 
     def __init__(
@@ -100,6 +104,16 @@ class Halfspace(ws.SingleContactModel):
         """Solve one contact; see `SingleContactModel.solve_contact`."""
         patch = self._patch(gap, longitudinal_curvature, point, wear_compliance, warm)
         return self._solution(patch, point, self._rolled(patch))
+
+    def friction_points(self, batch: ws.ContactBatch) -> tuple[FloatArray, FloatArray]:
+        """Return the points of the friction coefficients: `mx` along each strip."""
+        lengths = [
+            self._patch(
+                batch.gap[k], float(batch.longitudinal_curvature[k]), batch.point(k), None, None
+            ).half_length
+            for k in range(len(batch))
+        ]
+        return self._places()[:, None] * np.array(lengths)[:, None, :], self.grid.y
 
     def fields(
         self,
@@ -159,7 +173,6 @@ class Halfspace(ws.SingleContactModel):
                 f"no contact: load {force:.4g} N, or a gap, creepage or friction that is not finite"
             )
         compliance = np.zeros_like(gap) if wear_compliance is None else wear_compliance
-        friction = np.broadcast_to(np.asarray(point.friction, dtype=np.float64), gap.shape)
         # the elements must not depend on the warm start; those of a solution that determines
         # them again do not depend on the estimate either
         load, half_length = self._estimate(gap, longitudinal_curvature, force, compliance)
@@ -174,7 +187,7 @@ class Halfspace(ws.SingleContactModel):
                 gap=0.5 * longitudinal_curvature * x**2 + gap[strips, None],
                 force=force,
                 compliance=compliance[strips],
-                friction=friction[strips],
+                friction=np.zeros((strips.stop - strips.start, len(x))),
                 rigid_slip=np.zeros((2, strips.stop - strips.start, len(x))),
                 spin=creepage.spin,
                 x=x,
@@ -194,9 +207,45 @@ class Halfspace(ws.SingleContactModel):
                 number >= FREE_GRIDS or abs(self._length(half_length) / problem.dx - 1.0) < SAME
             ):
                 problem = _with_slip(problem, creepage, self.grid.y, load, strips)
+                friction = self._friction(point, half_length, strips, x)
+                problem = replace(problem, friction=friction)
                 return Patch(problem, normal, strips, load, half_length)
             warm = None
         raise ws.ContactError("no grid suits the contact; its strips differ too much in length")
+
+    def _places(self) -> FloatArray:
+        """Return the points along a strip from the leading edge on, over its half-length."""
+        steps = np.arange(self.options.mx, dtype=np.float64) + 0.5
+        return np.asarray(1.0 - steps * (2.0 / self.options.mx))
+
+    def _friction(
+        self, point: OperatingPoint, half_length: FloatArray, strips: slice, x: FloatArray
+    ) -> FloatArray:
+        """Return the friction coefficient of each element."""
+        given = np.asarray(point.friction, dtype=np.float64)
+        if given.ndim < 2:
+            rows = np.broadcast_to(given, half_length.shape)[strips]
+            return np.repeat(rows[:, None], len(x), axis=1)
+        if given.shape != (self.options.mx, len(half_length)):
+            raise ValueError(
+                f"friction has the shape {given.shape}, expected (mx, strips) ="
+                f" {(self.options.mx, len(half_length))}; take it at `friction_points`"
+            )
+        if point.friction_carried and np.ptp(given, axis=0).any():
+            raise ws.CapabilityError(
+                "friction that is carried through the contact is not steady; contact.model ="
+                " 'halfspace' solves steady rolling: give friction that is fixed to the contact"
+                " (frame = 'contact'), or use 'hertz-fastsim'"
+            )
+        places = self._places()[::-1]
+        return np.array(
+            [
+                np.interp(x, length * places, values[::-1])
+                if length > 0.0
+                else values.mean() + 0.0 * x
+                for length, values in zip(half_length[strips], given.T[strips], strict=True)
+            ]
+        )
 
     def _estimate(
         self, gap: FloatArray, curvature: float, force: float, compliance: FloatArray
