@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -155,11 +156,15 @@ def bench(
 
 def _run_hard_cases(effort: Effort, results: Output, quiet: bool) -> bool:
     """Run the hard cases, write the verdicts, and return whether all pass."""
+    from wearsim_bench.contact.methods import is_reference
     from wearsim_bench.hard_cases.topic import hard as run_hard_cases
 
+    if is_reference(effort.plugin) and not effort.quick:
+        note(f"note: '{effort.plugin}' is a slow reference; the hard cases are those of --quick")
+        effort = replace(effort, quick=True)
     with progress_bar("hard cases", quiet) as on_progress:
         verdicts = run_hard_cases(effort, on_progress)
-    results.hard(verdicts)
+    results.hard(verdicts, effort)
     return all(verdict.holds for verdict in verdicts)
 
 

@@ -75,15 +75,15 @@ class Output:
         if not self.as_json:
             self._show(topic)
 
-    def hard(self, verdicts: tuple[Verdict, ...]) -> None:
-        """Write the verdicts on the hard cases."""
+    def hard(self, verdicts: tuple[Verdict, ...], effort: Effort) -> None:
+        """Write the verdicts on the hard cases, which ran with an effort."""
         from wearsim_bench.figures.hard_cases import hard_markdown
         from wearsim_bench.figures.table import measured_on
 
         passed = sum(verdict.holds for verdict in verdicts)
         cases = [verdict.as_json() for verdict in verdicts]
         self._write_json("hard", {"holding": passed, "cases": cases})
-        about = measured_on(self.machine, self.effort)
+        about = measured_on(self.machine, effort)
         self._write_text("hard.md", f"{about}\n\n{hard_markdown(verdicts)}")
         if not self.as_json:
             title = f"Hard cases: {passed} of {len(verdicts)} pass; numbers are the largest values"

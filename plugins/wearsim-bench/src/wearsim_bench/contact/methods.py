@@ -87,6 +87,11 @@ def compared_models() -> list[str]:
     return [spec.name for spec in specs if not spec.reference]
 
 
+def is_reference(plugin: str | None) -> bool:
+    """Return whether a contact model is a reference, which takes up to seconds a contact."""
+    return plugin is not None and registry().get(ContactModelSpec, plugin).reference
+
+
 def methods(plugin: str | None = None) -> list[Method]:
     """Return contact models with all their choices, one choice at a time.
 

@@ -10,12 +10,11 @@ from itertools import groupby
 import numpy as np
 
 from wearsim.errors import ContactError
-from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.run.grid import strips_over
 from wearsim_bench.contact.against import solved_by
 from wearsim_bench.contact.cases import Case, all_worn_cases, elliptic_cases
-from wearsim_bench.contact.methods import Method, methods, normal_methods
+from wearsim_bench.contact.methods import Method, is_reference, methods, normal_methods
 from wearsim_bench.contact.worn_profiles import failure_reason, measure
 from wearsim_bench.exact_solutions import POWER_ERRORS, PURE_SPIN_ERROR, STRIPS_ERROR
 from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic
@@ -83,7 +82,7 @@ def contact(effort: Effort, on_progress: OnProgress) -> Topic:
         If the requested contact model is not registered.
     """
     measurements: list[Measurement] = []
-    slow = effort.plugin is not None and registry().get(ContactModelSpec, effort.plugin).reference
+    slow = is_reference(effort.plugin)
     stride = _EVERY if effort.quick or slow else 1
     # without the finest strips, on which a reference takes seconds a contact
     groups, about, floor = _groups(effort, stride, -1 if slow else None), ABOUT, STRIPS_ERROR
