@@ -34,6 +34,7 @@ from wearsim.mechanics.slender.body_wear import (
     solve_depths,
 )
 from wearsim.mechanics.slender.half_length import (
+    HalfLengths,
     fill_half_lengths,
     find_factors,
     new_half_lengths,
@@ -122,11 +123,15 @@ def check_convergence(
     before: float,
     change: float,
     left: bool,
+    table: FloatArray,
+    lengths: HalfLengths,
     state: NewtonState,
     approach: FloatArray,
     line_load: FloatArray,
 ) -> tuple[int, float]:
     """Add penetrated strips, mark contacts that need a new Jacobian and test for convergence.
+
+    The strips that are not followed are tested where the others have converged.
 
     Parameters
     ----------
@@ -156,7 +161,13 @@ def check_convergence(
             state.fresh[k] = True
     if left or entered:
         return CONTINUE, 0.0
-    return CONVERGED if change * shrinking < TOLERANCE else CONTINUE, change
+    if not change * shrinking < TOLERANCE:
+        return CONTINUE, change
+    for k in range(contacts):
+        first, end = complete_surface(k, approach[k], table, unit, line_load, lengths, state)
+        if add_penetrated(k, first, end, iteration, unit, state, approach, line_load):
+            entered = True
+    return (CONTINUE, 0.0) if entered else (CONVERGED, change)
 
 
 @subroutine
@@ -345,12 +356,8 @@ def solve_slender(
                 if bodies is not None:
                     add_depths(members, worn[number], state.change, surface)
                 outcome, before = check_convergence(
-                    iteration, unit, before, change, left, state, delta, total
+                    iteration, unit, before, change, left, table, lengths, state, delta, total
                 )
-                for k in range(contacts if outcome == CONVERGED else 0):
-                    first, end = complete_surface(k, delta[k], table, unit, total, lengths, state)
-                    if add_penetrated(k, first, end, iteration, unit, state, delta, total):
-                        outcome, before = CONTINUE, 0.0
                 if outcome == CONTINUE and iteration == MAX_ITERATIONS:
                     outcome = NO_CONVERGENCE
             status[number], iterations[number] = outcome, iteration
