@@ -31,7 +31,7 @@ from wearsim.types import FloatArray, IntArray
 SWEEPS = 2
 LOWEST_FACTOR = 0.1
 HIGHEST_FACTOR = 4.0
-REACH = 3  # neighbours on either side in the derivative of s with respect to the line loads
+REACH = 4  # neighbours on either side in the derivative of s with respect to the line loads
 
 
 class HalfLengths(NamedTuple):
