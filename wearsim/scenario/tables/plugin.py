@@ -202,7 +202,9 @@ def _default_model(mistakes: Mistakes) -> str:
     """Return the model of a scenario that names none: one for a friction field if there is any."""
     default = str(ContactTable.model_fields["model"].default)
     fields = [item for item in mistakes.random_inputs if item.role == "field"]
-    for spec in installed(ContactModelSpec) if fields else []:
+    # a reference model, which takes far longer, last
+    models = sorted(installed(ContactModelSpec), key=lambda spec: spec.reference) if fields else []
+    for spec in models:
         if spec.capabilities.friction_field:
             mistakes.notes.append(
                 f"contact.model is '{spec.name}': {fields[0].name} is a field, {fields[0].kind},"

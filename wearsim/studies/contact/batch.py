@@ -63,6 +63,7 @@ class LocalFriction:
                 registry().get(ContactModelSpec, name)
                 for name in registry().names(ContactModelSpec)
             ]
+            specs.sort(key=lambda spec: spec.reference)
             names = [f"'{spec.name}'" for spec in specs if spec.capabilities.friction_field]
             models = f"contact.model = {' or '.join(names)}" if names else "another distribution"
             raise CapabilityError(
