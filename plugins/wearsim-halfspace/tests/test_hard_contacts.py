@@ -139,3 +139,15 @@ def test_warm_grids_do_not_change_the_solution():
     bound = problem.friction * normal.pressure
     alone = solve_tangential(problem.elements.rolling, bound, problem.slip_ahead, 1e-8).traction
     assert np.abs(nested - alone).max() < 1e-5 * bound.max()
+
+
+def test_wear_that_gives_way_far_more_than_the_bodies():
+    """The line load is then the penetration over the wear compliance."""
+    grid = Grid.spanning(-6e-3, 6e-3, 81)
+    model = Halfspace(HalfspaceOptions(mx=24), grid, (STEEL, STEEL))
+    point, compliance = OperatingPoint(300.0, 2.6, Creepage(1e-3), 0.1), 3e-8
+    gap = 2700.0 * grid.y**2
+    found = model.solve_one(gap, CURVATURE, point, np.full_like(gap, compliance))
+    line_load = np.maximum(found.approach - gap, 0.0) / compliance
+    np.testing.assert_allclose(found.line_load, line_load, atol=0.01 * line_load.max())
+    assert found.line_load.sum() * grid.spacing == pytest.approx(300.0, rel=1e-9)

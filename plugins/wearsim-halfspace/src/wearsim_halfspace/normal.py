@@ -10,7 +10,7 @@ from wearsim.plugins import ContactError
 from wearsim.types import FloatArray
 from wearsim_halfspace.influence import Convolution, Elements, inner
 
-MAX_ITERATIONS = 400
+MAX_ITERATIONS = 5000  # far more than usual: where wear gives way far more than the bodies
 LEAST = 1e-3  # eigenvalue, relative to the influence of an element on itself
 
 
