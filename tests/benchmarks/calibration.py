@@ -213,7 +213,7 @@ def errors(found: dict[str, FloatArray]) -> tuple[FloatArray, float] | None:
 
 
 def solve(kind: str, seed: int, count: int, processes: int, output: Path) -> None:
-    """Solve random contacts and write their indicators and errors; continue what is there."""
+    """Write indicators and errors of random contacts; contacts already in the file are kept."""
     rows: list[dict[str, Any]] = []
     if output.exists():
         known = dict(np.load(output))

@@ -59,7 +59,7 @@ class _Elements(Options):
 
 
 class _Fails:
-    """Reference whose P_l(y) has a relative error of 1/mx**2; it does not solve with some mx."""
+    """Reference with a relative error of P_l(y) of 1/mx**2, which fails for given numbers mx."""
 
     def __init__(self, unsolved):
         self.options, self.reference, self.unsolved = _Elements, True, unsolved

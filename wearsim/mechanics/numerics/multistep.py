@@ -239,10 +239,8 @@ def next_steps(
         Error of the step relative to the greatest accepted one, zero where it is unknown, and
         ratio of the next step to it.
     """
-    sizes, found = (
-        local_errors(differences, spans, depths, orders, errors),
-        np.empty((2, len(part))),
-    )
+    sizes = local_errors(differences, spans, depths, orders, errors)
+    found = np.empty((2, len(part)))
     for v in range(len(part)):
         known, order = 0, orders[v]
         for k in range(MAX_ORDER):
