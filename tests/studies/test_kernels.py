@@ -85,7 +85,9 @@ def test_expected_kernels_are_those_that_are_compiled(case, tmp_path: Path):
 
 def test_kernels_that_a_run_calls_are_expected():
     expected, _, ready = kernels(CASES[0])
-    assert set(ready) == set(expected)
+    # a kernel from the cache contains those that it calls
+    assert set(expected) - set(ready) <= {"factor_in_place", "solve_factored"}
+    assert set(ready) <= set(expected)
 
 
 @pytest.fixture

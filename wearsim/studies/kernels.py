@@ -11,7 +11,7 @@ from wearsim.scenario import Scenario
 
 #: Kernels of the built-in contact models and tangential theories, with the kernels that they call.
 _MODELS = {
-    "slender": {"solve_slender"},
+    "slender": {"solve_slender", "factor_in_place", "solve_factored"},
     "hertz": {"hertz_on_profile"},
     "hertz-fastsim": {"hertz_on_profile"},
     "semi-hertzian": {"solve_semi_hertzian"},

@@ -140,6 +140,10 @@ def _compile_others() -> None:
     raise AssertionError("is called in another process")
 
 
+def _compile_parts() -> None:
+    raise AssertionError("is called in another process")
+
+
 @pytest.mark.parametrize("cached", [True, False])
 def test_other_kernels_are_compiled_in_a_process_alongside(cached, monkeypatch, tmp_path):
     started = []
@@ -153,9 +157,28 @@ def test_other_kernels_are_compiled_in_a_process_alongside(cached, monkeypatch, 
         return 3.0 * x
 
     compile_alongside("large", _compile_others)
+    compile_alongside("large", _compile_parts, within=True)
     assert large(1.0) + large(2.0) == 9.0
     ends = [command[-1].partition("; from ")[2] for command in started]
-    assert ends == [f"{__name__} import _compile_others; _compile_others()"] * cached
+    names = "_compile_parts", "_compile_others"
+    calls = [f"{__name__} import {name}; {name}()" for name in names]
+    assert ends == ["; from ".join(calls)] * cached
+
+
+def test_no_process_is_started_for_a_kernel_in_the_cache(monkeypatch, tmp_path):
+    monkeypatch.setattr(jit, "_cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(jit.os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
+    compile_alongside("largest", _compile_others)
+    (tmp_path / "numerics").mkdir()
+    (tmp_path / "numerics" / "module.largest-7.py311.nbi").touch()
+
+    @kernel
+    def largest(x: float) -> float:
+        return 5.0 * x
+
+    before = len(jit._STARTED)
+    assert largest(1.0) == 5.0
+    assert len(jit._STARTED) == before
 
 
 def test_nothing_is_started_on_one_processor(monkeypatch, tmp_path):

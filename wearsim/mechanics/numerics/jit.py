@@ -66,6 +66,9 @@ class Kernel:
         """Dispatcher of numba, which compiled functions call."""
         with _LOCK:
             if self._dispatcher is None:
+                # before numba is imported, which takes half a second
+                if not_cached({self.__name__}):
+                    _call_elsewhere(_ALONGSIDE.pop(self.__name__, []))
                 self._dispatcher = _compiled(self._function)
         return self._dispatcher
 
@@ -106,7 +109,6 @@ def _prepared_numba() -> Any:
             """Report the kernel; subroutines are compiled as a part of it."""
             dispatcher = event.data["dispatcher"]
             if any(kernel.is_compiled_by(dispatcher) for kernel in _KERNELS):
-                _call_elsewhere(_ALONGSIDE.pop(dispatcher.__name__, []))
                 for report in _REPORTS:
                     report(dispatcher.__name__)
 
@@ -120,9 +122,12 @@ def _prepared_numba() -> Any:
 
 
 def _compile_borrowed() -> None:
-    """Let compiled functions call `borrowed`: arrays without an owner are not counted."""
+    """Let compiled functions call `borrowed` and `kept`: arrays without an owner are not counted.
+
+    Both are compiled into the caller, since separate functions take far longer to compile.
+    """
     from numba.core import cgutils, types  # noqa: PLC0415
-    from numba.extending import intrinsic, overload  # noqa: PLC0415
+    from numba.extending import lower_builtin, type_callable  # noqa: PLC0415
 
     def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         if isinstance(kind, types.BaseTuple):
@@ -137,14 +142,14 @@ def _compile_borrowed() -> None:
             return array._getvalue()
         return value
 
-    def typed(_: Any, values: Any) -> Any:
-        return values(values), lambda context, builder, signature, arguments: without_owner(
-            context, builder, signature.args[0], arguments[0]
+    type_callable(borrowed)(lambda _: lambda values: values)
+    lower_builtin(borrowed, types.Any)(
+        lambda context, builder, signature, arguments: without_owner(
+            context, builder, signature.return_type, arguments[0]
         )
-
-    uncounted: Any = intrinsic(typed)
-    overload(borrowed)(lambda values: lambda values: uncounted(values))  # noqa: PLW0108
-    overload(kept)(lambda values: lambda values: None)
+    )
+    type_callable(kept)(lambda _: lambda values: types.none)
+    lower_builtin(kept, types.Any)(lambda context, *_: context.get_dummy_value())
 
 
 def borrowed(values: R) -> R:
@@ -217,20 +222,23 @@ def compilation_reported(report: Callable[[str], None]) -> Iterator[None]:
         _REPORTS.remove(report)
 
 
-def compile_alongside(name: str, function: Callable[[], None]) -> None:
-    """Call a function that compiles kernels in another process, when this one compiles a kernel.
+def compile_alongside(name: str, function: Callable[[], None], *, within: bool = False) -> None:
+    """Call a function that compiles kernels in another process, while this one compiles a kernel.
 
-    This process reads the kernels from the cache when it calls them; it compiles those that are not
-    there by then. Nothing is started without a cache or a second processor.
+    This process reads from the cache what the other one has compiled by then, and compiles the
+    rest. Nothing is started without a cache or a second processor.
 
     Parameters
     ----------
     name : str
-        The kernel whose compilation starts the process.
+        The kernel that this process compiles, as it is not in the cache when it is first called.
     function : callable
         Public function of a module.
+    within : bool
+        Whether the kernel calls the kernels, which are then compiled before others.
     """
-    _ALONGSIDE.setdefault(name, []).append(function)
+    functions = _ALONGSIDE.setdefault(name, [])
+    functions.insert(0 if within else len(functions), function)
 
 
 def _call_elsewhere(functions: Sequence[Callable[[], None]]) -> None:

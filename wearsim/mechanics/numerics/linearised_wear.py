@@ -52,7 +52,12 @@ def linearised_wear(
     """
     contacts, n = line_load.shape
     realisations = len(compliance)
-    constant, worn = np.empty((2, contacts, n)), np.zeros((2 * len(bodies), realisations, n))
+    # written as loops in this file: np.zeros and array expressions take longer to compile
+    constant, worn = np.empty((2, contacts, n)), np.empty((2 * len(bodies), realisations, n))
+    for b in range(2 * len(bodies)):
+        for v in range(realisations):
+            for i in range(n):
+                worn[b, v, i] = 0.0
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for side in range(2):
@@ -122,9 +127,12 @@ def wear_of_bodies(
         bodies of a contact, infinite without any [m].
     """
     contacts, n = loads.shape
-    realisations = len(compliance)
-    worn[:] = 0.0
-    rest = np.zeros(worn.shape)
+    rows, realisations = worn.shape[0], worn.shape[1]
+    rest = np.empty((rows, realisations, n))
+    for b in range(rows):
+        for v in range(realisations):
+            for i in range(n):
+                worn[b, v, i] = rest[b, v, i] = 0.0
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for side in range(2):
@@ -141,19 +149,19 @@ def wear_of_bodies(
             if abs(rise) > MIN_LOG_CHANGE:
                 slope = np.log(new / old) / rise
                 exponents[k, i] = min(max(slope, LEAST_EXPONENT), greatest)
-    sizes = np.zeros((3, realisations))
-    for c in range(len(bodies)):
-        one, other = bodies[c, 0], bodies[c, 1]
-        for v in range(realisations):
+    sizes = np.empty((3, realisations))
+    for v in range(realisations):
+        difference, greatest_opening, deepest = 0.0, 0.0, 0.0
+        for c in range(len(bodies)):
+            one, other = bodies[c, 0], bodies[c, 1]
             for i in range(n):
                 opening = worn[one, v, i] + worn[other, v, i]
                 depth = base[one, v, i] + base[other, v, i] + opening
-                sizes[0, v] = max(sizes[0, v], abs(rest[one, v, i] + rest[other, v, i]))
-                sizes[1, v] = max(sizes[1, v], opening)
-                sizes[2, v] = max(sizes[2, v], depth)
-    for v in range(realisations):
-        if sizes[2, v] <= 0.0:
-            sizes[2, v] = np.inf
+                difference = max(difference, abs(rest[one, v, i] + rest[other, v, i]))
+                greatest_opening = max(greatest_opening, opening)
+                deepest = max(deepest, depth)
+        sizes[0, v], sizes[1, v] = difference, greatest_opening
+        sizes[2, v] = deepest if deepest > 0.0 else np.inf
     return sizes
 
 
@@ -183,25 +191,29 @@ def difference_sizes(
 @subroutine
 def _sizes(depths: FloatArray, differences: FloatArray, weights: FloatArray) -> FloatArray:
     bodies, realisations, n = depths.shape
-    sizes = np.zeros((4, realisations))
+    sizes = np.empty((4, realisations))
     for v in range(realisations):
-        deepest = np.zeros(2)
+        of_first, of_others = 0.0, 0.0  # greatest depths of both kinds
         for b in range(bodies):
-            kind = 0 if weights[0, b] > 0.0 else 1
             for i in range(n):
-                deepest[kind] = max(deepest[kind], depths[b, v, i])
+                if weights[0, b] > 0.0:
+                    of_first = max(of_first, depths[b, v, i])
+                else:
+                    of_others = max(of_others, depths[b, v, i])
+        greatest, volume, square, square_of_depth = 0.0, 0.0, 0.0, 0.0
         for b in range(bodies):
-            kind = 0 if weights[0, b] > 0.0 else 1
+            deepest = of_first if weights[0, b] > 0.0 else of_others
             total = 0.0
             for i in range(n):
                 difference = differences[b, v, i]
                 total += difference
-                sizes[2, v] += difference * difference
-                sizes[3, v] += depths[b, v, i] * depths[b, v, i]
-                if depths[b, v, i] >= DEEP * deepest[kind]:
-                    sizes[0, v] = max(sizes[0, v], abs(difference))
-            sizes[1, v] += weights[1, b] * total
-        sizes[2, v], sizes[3, v] = np.sqrt(sizes[2, v]), np.sqrt(sizes[3, v])
+                square += difference * difference
+                square_of_depth += depths[b, v, i] * depths[b, v, i]
+                if depths[b, v, i] >= DEEP * deepest:
+                    greatest = max(greatest, abs(difference))
+            volume += weights[1, b] * total
+        sizes[0, v], sizes[1, v] = greatest, volume
+        sizes[2, v], sizes[3, v] = np.sqrt(square), np.sqrt(square_of_depth)
     return sizes
 
 
@@ -256,7 +268,6 @@ def carried_errors(
         [m^3]; Euclidean norm of the errors over that of the depths.
     """
     rows, realisations, n = errors.shape
-    # written as loops: array expressions take four times as long to compile
     whole, carried = np.empty((rows, realisations, n)), np.empty((rows, realisations, n))
     soft, weight, own = np.empty((rows, n)), np.empty(n), np.empty((len(bodies), 2, n))
     for v in range(realisations):
@@ -314,11 +325,11 @@ def compile_linearised_wear() -> None:
     wear_of_bodies(
         strip, strip, wear, wear, compliance, constant, rows, worn, 1.0, np.ones((1, 1)), worn
     )
-    difference_sizes(worn, worn, np.ones((2, 2)))
     one = np.ones(1)
     carried_errors(
         worn, worn, strip, wear, strip, one, strip, worn, rows, one, 1.0, np.ones((2, 2))
     )
+    difference_sizes(worn, worn, np.ones((2, 2)))
 
 
 compile_alongside("solve_slender", compile_linearised_wear)

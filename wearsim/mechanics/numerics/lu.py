@@ -14,13 +14,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import subroutine
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
 from wearsim.types import FloatArray
 
 PANEL = 4  # unknowns eliminated together; the loops over the rows of a panel are unrolled
 
 
-@subroutine
+@kernel
 def factor_in_place(matrix: FloatArray, size: int) -> bool:
     """Factor a linear system by elimination without pivoting.
 
@@ -84,7 +84,7 @@ def factor_in_place(matrix: FloatArray, size: int) -> bool:
     return True
 
 
-@subroutine
+@kernel
 def solve_factored(matrix: FloatArray, size: int, solution: FloatArray) -> None:
     """Solve a linear system from its factors.
 
@@ -168,3 +168,13 @@ def invert_factored(matrix: FloatArray, size: int, inverse: FloatArray) -> None:
         _combine_rows(matrix, size, i, i + 1, size, inverse)
         for j in range(size):
             inverse[i, j] *= matrix[i, i]
+
+
+def compile_linear_systems() -> None:
+    """Compile `factor_in_place` and `solve_factored` by a call for one unknown."""
+    one = np.ones((1, 1))
+    factor_in_place(one, 1)
+    solve_factored(one, 1, one[0])
+
+
+compile_alongside("solve_slender", compile_linear_systems, within=True)

@@ -179,13 +179,15 @@ def local_errors(
         points are missing.
     """
     _, rows, solutions, columns = differences.shape
-    sizes = np.full((MAX_ORDER, solutions), np.inf)
+    sizes = np.empty((MAX_ORDER, solutions))
     for v in range(solutions):
         size = 0.0
         for r in range(rows):
             for i in range(columns):
-                size += depths[r, v, i] ** 2
+                size += depths[r, v, i] * depths[r, v, i]
                 errors[r, v, i] = 0.0
+        for k in range(MAX_ORDER):
+            sizes[k, v] = np.inf
         product, inverse = 1.0, 0.0
         for k in range(MAX_ORDER):
             if not np.isfinite(spans[k + 1, v]):
@@ -197,7 +199,7 @@ def local_errors(
             factor = product / (inverse + 1.0 / spans[k + 1, v])
             for r in range(rows):
                 for i in range(columns):
-                    total += differences[k + 2, r, v, i] ** 2
+                    total += differences[k + 2, r, v, i] * differences[k + 2, r, v, i]
                     if k < orders[v]:
                         errors[r, v, i] = factor * differences[k + 2, r, v, i]
             sizes[k, v] = np.sqrt(total / size) * factor if size > 0.0 else 0.0

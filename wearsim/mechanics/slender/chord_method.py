@@ -107,10 +107,9 @@ class ChordState(NamedTuple):
 
 def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> ChordState:
     """Return the `ChordState` of contacts without an anchor."""
-    log_scale = np.empty(contacts)
-    fill_log_scales(
-        constants.contact_modulus, constants.longitudinal_curvature, constants.spacing, log_scale
-    )
+    modulus, curvature = constants.contact_modulus, constants.longitudinal_curvature
+    lengths = new_half_lengths(constants.curvature_influence, contacts)
+    fill_log_scales(modulus, curvature, constants.spacing, lengths.log_scale)
     return ChordState(
         np.zeros((contacts, n), np.int64),
         np.zeros(contacts, np.int64),
@@ -121,7 +120,7 @@ def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> Chord
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
         np.zeros((contacts, n)),
-        new_half_lengths(constants.curvature_influence, log_scale),
+        lengths,
         np.empty(n),
         np.empty(n),
         np.empty((6, max(n, BAND) + 4 * REACH)),

@@ -57,9 +57,9 @@ class HalfLengths(NamedTuple):
 
 
 @subroutine
-def new_half_lengths(table: FloatArray, log_scale: FloatArray) -> HalfLengths:
+def new_half_lengths(table: FloatArray, contacts: int) -> HalfLengths:
     """Return the `HalfLengths` of contacts, to be filled."""
-    contacts, n = log_scale.shape[0], (table.shape[2] + 1) // 2
+    n = (table.shape[2] + 1) // 2
     wide = n + 4 * REACH
     slopes = np.empty((contacts + 2, 2 * REACH + 1, wide))
     for k in range(contacts + 2):  # numba compiles loops faster than np.zeros
@@ -68,7 +68,7 @@ def new_half_lengths(table: FloatArray, log_scale: FloatArray) -> HalfLengths:
                 slopes[k, c, i] = 0.0
     return HalfLengths(
         table,
-        log_scale,
+        np.empty(contacts),
         np.empty((contacts, n)),
         np.empty((contacts, n)),
         slopes[:contacts],

@@ -239,10 +239,10 @@ def solve_slender(
     unit = 1.0 / (np.pi * contact_modulus)
     gap, compliance, loads = borrowed((gap, compliance, loads))
     line_load, approach = borrowed((line_load, approach))
-    table, half_length, softness = borrowed(table), borrowed(half_length), np.empty((contacts, n))
-    owned = new_newton_state(contacts, n), new_half_lengths(curvature_influence, np.empty(contacts))
+    table, half_length = borrowed(table), borrowed(half_length)
+    owned = new_newton_state(contacts, n), new_half_lengths(curvature_influence, contacts)
     state, lengths = borrowed(owned)
-    surface, lowest = state.surface, state.lowest
+    surface, lowest, softness = state.surface, state.lowest, state.softness
     if bodies is not None:
         depths = new_depth_system(bodies, n)
         members, worn, system = borrowed((bodies, shared, depths))

@@ -32,7 +32,9 @@ class NewtonState(NamedTuple):
     `unit_load_sum` is their sum. `diagonal` is the derivative of the displacement of each strip by
     its own load, `missing` the residual [m], `step` the step by row [N/m] and `change` the applied
     change of load by strip [N/m]. `surface` is the sum of gap and displacement above the least gap
-    `lowest` [m], complete for the followed strips; `weight` is work space.
+    `lowest` [m], complete for the followed strips. `softness` is the wear compliance of each
+    contact, with that of the strips of shared bodies it alone touches [m/(N/m)]; `weight` is work
+    space.
     """
 
     fresh: BoolArray
@@ -50,6 +52,7 @@ class NewtonState(NamedTuple):
     step: FloatArray
     change: FloatArray
     surface: FloatArray
+    softness: FloatArray
     lowest: FloatArray
     weight: FloatArray
 
@@ -68,6 +71,7 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
         np.empty(contacts),
+        np.empty((contacts, n)),
         np.empty((contacts, n)),
         np.empty((contacts, n)),
         np.empty((contacts, n)),
