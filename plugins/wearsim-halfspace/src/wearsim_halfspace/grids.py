@@ -11,11 +11,16 @@ import numpy as np
 from wearsim.types import FloatArray
 from wearsim_halfspace.influence import Elements, inner
 from wearsim_halfspace.normal import NormalSolution, solve_normal
-from wearsim_halfspace.tangential import TangentialSolution, Within, solve_tangential
+from wearsim_halfspace.tangential import (
+    TangentialSolution,
+    Within,
+    solve_rolling,
+    solve_tangential,
+)
 
 FEWEST = 16  # rows or columns of a grid that is started from a coarser one
 LOOSE = 1e-4  # tolerance on coarser grids
-LEAST_ENTRY = -0.3  # of `Within.entry`
+LEAST_ENTRY, LEAST_EXIT = -0.3, -0.5  # of `Within`
 #: Of the difference of two grids, added in an extrapolation: that of the orders 1.08 and 2.
 FURTHER = {1: 0.9, 2: 1.0 / 3.0}
 #: Where the rigid slip is taken, in elements ahead of the middle, for elements of each order.
@@ -204,31 +209,36 @@ def solve(
         turn = doubled(_turn(coarser.rolling, found.pressure), 1, columns)
         if below:
             start, turn = doubled(start, 1, rows), doubled(turn, 0, rows)
-    within = Within(entry(normal.pressure), turn) if problem.order == 2 else None
-    rolling = solve_tangential(
-        problem.elements.rolling, bound, problem.slip_ahead, tolerance, start, within
-    )
+    given = problem.elements.rolling, bound, problem.slip_ahead, tolerance, start
+    if problem.order == 2:
+        rolling = solve_rolling(*given, Within(*edges(normal.pressure), turn))
+    else:
+        rolling = solve_tangential(*given)
     return Solution(problem, normal, rolling, coarser)
 
 
-def entry(pressure: FloatArray) -> FloatArray:
-    """Return `Within.entry`, shape (rows, columns).
+def edges(pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return `Within.entry` and `Within.exit`, shape (rows, columns).
 
     Tractions that need no slip on a whole row of elements are those of a contact that ends 0.825
-    elements ahead of the middle of its first element. Where the edge is closer, particles adhere
-    for a part of the way only; with the slip s of the first element, over that of the element
-    ahead, the tractions are those of a contact that ends closer. The edge itself follows from the
-    pressure of the first element over that of the second, p: it is -0.175 + 0.93 p + 0.70 p^2
-    elements ahead of the middle. Both relations are those of line contacts on many elements; the
-    polynomial below is s(p), within 0.02.
+    elements ahead of the middle of its first element, and 0.326 behind the middle of its last one,
+    where they are singular. Where the edge is elsewhere, particles adhere for another part of the
+    way; with the slip s of the first element, over that of the element ahead, or with that of the
+    last element, over that of the element behind, the tractions are those of a contact that ends
+    there. The edge itself follows from the pressure of the outermost element over that of the
+    next, p: it is -0.175 + 0.93 p + 0.70 p^2 elements outward of the middle. These relations are
+    those of line contacts on many elements; the polynomials below are s(p), within 0.02 and 0.01.
     """
     columns = pressure.shape[1]
     rows = np.flatnonzero((pressure > 0.0).sum(axis=1) > 1)
+    last = np.argmax(pressure[rows] > 0.0, axis=1)
     first = columns - 1 - np.argmax(pressure[rows, ::-1] > 0.0, axis=1)
+    ahead, behind = np.zeros_like(pressure), np.zeros_like(pressure)
     ratio = pressure[rows, first] / pressure[rows, first - 1]
-    found = np.zeros_like(pressure)
-    found[rows, first] = np.maximum(0.623 - 0.164 * ratio - ratio**2, LEAST_ENTRY)
-    return found
+    ahead[rows, first] = np.maximum(0.623 - 0.164 * ratio - ratio**2, LEAST_ENTRY)
+    ratio = pressure[rows, last] / pressure[rows, last + 1]
+    behind[rows, last] = np.maximum(0.642 - 1.636 * ratio + 0.187 * ratio**2, LEAST_EXIT)
+    return ahead, behind
 
 
 def _turn(rolling: TangentialSolution, pressure: FloatArray) -> FloatArray:

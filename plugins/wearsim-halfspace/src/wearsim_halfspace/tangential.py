@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +32,8 @@ class TangentialSolution(NamedTuple):
     sticks: BoolArray
 
 
-class Within(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Within:
     """Positions within elements, with which steady rolling is of second order in their length.
 
     Parameters
@@ -38,20 +41,27 @@ class Within(NamedTuple):
     entry : ndarray, shape (rows, columns)
         Slip of the elements that particles enter first, while they adhere, over that of the
         elements ahead of them; zero elsewhere. Particles are outside for a part of the way.
+    exit : ndarray, shape (rows, columns)
+        The same of the elements that particles leave last, over that of the elements behind them.
+        It does not hold for elements that slide, see `solve_rolling`.
     turn : ndarray, shape (rows, columns)
         Angle from the slip at the leading end of an element to that in its middle [rad].
     """
 
     entry: FloatArray
+    exit: FloatArray
     turn: FloatArray
 
     def __call__(self, slip: FloatArray) -> FloatArray:
         """Return the slip that Coulomb's law opposes to the traction of each element."""
-        along, across = slip
-        along[:, :-1] -= self.entry[:, :-1] * along[:, 1:]
-        across[:, :-1] -= self.entry[:, :-1] * across[:, 1:]
-        cosine, sine = np.cos(self.turn), np.sin(self.turn)
+        slip[..., :-1] -= self.entry[:, :-1] * slip[..., 1:]
+        slip[..., 1:] -= self.exit[:, 1:] * slip[..., :-1]
+        (along, across), (cosine, sine) = slip, self._rotation
         return np.stack([cosine * along - sine * across, sine * along + cosine * across])
+
+    @cached_property
+    def _rotation(self) -> tuple[FloatArray, FloatArray]:
+        return np.cos(self.turn), np.sin(self.turn)
 
 
 def solve_tangential(
@@ -141,6 +151,41 @@ def solve_tangential(
         f"the tangential contact of half-spaces has not converged in {MAX_ITERATIONS} iterations"
         f" (last relative residual {error:.1e})"
     )
+
+
+def solve_rolling(
+    kernel: Convolution,
+    bound: FloatArray,
+    rigid_slip: FloatArray,
+    tolerance: float,
+    start: FloatArray | None,
+    within: Within,
+) -> TangentialSolution:
+    """Return traction and slip of steady rolling, of second order in the length of elements.
+
+    Particles slide before they leave the contact, unless friction is far greater than needed.
+    `Within.exit` is applied only to the elements that adhere both without and with it.
+
+    Parameters
+    ----------
+    kernel, bound, rigid_slip, tolerance, start
+        See `solve_tangential`.
+    within : Within
+
+    Raises
+    ------
+    ContactError
+        If Newton's method does not converge.
+    """
+    applied, left = np.zeros_like(within.exit), within.exit
+    while True:
+        found = solve_tangential(
+            kernel, bound, rigid_slip, tolerance, start, replace(within, exit=applied)
+        )
+        left = np.where(found.sticks, left, 0.0)
+        if np.array_equal(left, applied):
+            return found
+        applied, start = left, found.traction
 
 
 def _unchanged(slip: FloatArray) -> FloatArray:
