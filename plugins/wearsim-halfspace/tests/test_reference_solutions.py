@@ -271,6 +271,17 @@ def test_linear_theory_has_the_coefficients_of_kalker(row):
         assert further == pytest.approx(exact[name], rel=0.004 if name == "C33" else 0.002), name
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.5])
+@pytest.mark.parametrize("a_over_b", [row["a_over_b"] for row in SEVEN])
+def test_coefficients_are_exact_for_other_poisson_ratios(a_over_b, poisson_ratio):
+    exact = exact_coefficients(a_over_b, poisson_ratio)
+    # the smallest C33, 0.163 for 0.5 and a/b = 20, is a small difference
+    limit = 0.02 if (a_over_b, poisson_ratio) != (20.0, 0.5) else 0.036
+    for name, value in creepage_coefficients(a_over_b, poisson_ratio, 60).items():
+        assert value == pytest.approx(exact[name], rel=limit if name == "C33" else 0.0025), name
+
+
 def test_exact_coefficients_are_those_of_the_reference():
     for row in rows("kalker"):
         exact = exact_coefficients(row["a_over_b"], row["nu"], degree=20)
