@@ -32,7 +32,7 @@ def two_patches(y):
 def assert_law(model, gap, point):
     """Check the laws of contact and friction on each element, and the balances of the solution."""
     patch = model._patch(gap, CURVATURE, point, None, None)
-    found = model._rolled(patch)
+    _, found = model._rolled(patch, point.creepage)
     problem, pressure, rolling = found.problem, found.normal.pressure, found.rolling
     touching, area = pressure > 0.0, problem.dx * problem.dy
     assert pressure.sum() * area == pytest.approx(point.normal_force, rel=1e-9)

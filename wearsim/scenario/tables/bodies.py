@@ -36,7 +36,8 @@ from wearsim.types import FloatArray, Material, Profile
 from wearsim.units import ANGLE, INERTIA, QuantityError, shown
 
 _ROUNDING = 1e-9
-DUNDURS_LIMIT = 0.1
+DUNDURS_LIMIT = 0.01
+COUPLING_PRESSURE = 500e6  # Pa, for which a note gives the size of the coupling
 
 #: Handbook constants: phosphor bronze C51000, ductile iron of EN 1563.
 MATERIALS = {
@@ -309,13 +310,18 @@ def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | N
 
 
 def dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:
-    """Return a note if the coupling of pressure and traction is not negligible."""
-    dundurs = combine(cylinder.material, roller.material).dundurs
-    if abs(dundurs) <= DUNDURS_LIMIT:
+    """Return a note if the coupling of pressure and traction is not negligible.
+
+    In line contact a pressure p changes the slip by 2 beta p/E*, with Dundurs' constant beta.
+    """
+    pair = combine(cylinder.material, roller.material)
+    if abs(pair.dundurs) <= DUNDURS_LIMIT:
         return []
+    slip = 2.0 * abs(pair.dundurs) * COUPLING_PRESSURE / pair.contact_modulus
     return [
         (
-            f"the materials' Dundurs constant is {dundurs:.3g}: beyond {DUNDURS_LIMIT} the coupling"
-            " of pressure and traction, which is neglected, is no longer small"
+            f"the materials' Dundurs constant is {pair.dundurs:.3g}: a pressure of"
+            f" {COUPLING_PRESSURE / 1e6:.0f} MPa changes the slip by {slip:.1e}, which only"
+            " contact.model = 'halfspace' includes"
         )
     ]

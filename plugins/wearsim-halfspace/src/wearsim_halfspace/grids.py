@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.types import FloatArray
+from wearsim.types import Creepage, FloatArray
 from wearsim_halfspace.influence import Elements, inner
 from wearsim_halfspace.normal import NormalSolution, solve_normal
 from wearsim_halfspace.tangential import (
@@ -53,6 +53,8 @@ class Problem:
         Positions of the elements about the centre of the spin moment [m].
     order : int
         Of the elements along rolling: 1 as in CONTACT, or 2 by positions within elements.
+    difference : float
+        K of different bodies, see `Elements`. The opening of the gap by traction is part of `gap`.
     """
 
     dx: float
@@ -68,12 +70,14 @@ class Problem:
     x: FloatArray
     y: FloatArray
     order: int = 2
+    difference: float = 0.0
 
     @cached_property
     def elements(self) -> Elements:
         """Influence coefficients."""
         rows, columns = self.gap.shape
-        return Elements(rows, columns, self.dx, self.dy, self.shear_modulus, self.poisson_ratio)
+        constants = self.shear_modulus, self.poisson_ratio, self.difference
+        return Elements(rows, columns, self.dx, self.dy, *constants)
 
     @property
     def slip_ahead(self) -> FloatArray:
@@ -104,13 +108,28 @@ class Problem:
             halved(self.x, (0,)),
             halved(self.y, rows),
             self.order,
+            self.difference,
         )
+
+
+def with_slip(
+    problem: Problem, creepage: Creepage, y: FloatArray, load: FloatArray, strips: slice
+) -> Problem:
+    """Return a problem with its rigid slip; spin is about the centre of the line load."""
+    varies = -creepage.spin * y if creepage.variation is None else creepage.variation
+    along = creepage.longitudinal + varies - float(load @ varies) / float(load.sum())
+    rigid = problem.rigid_slip
+    rigid[0] = along[strips, None]
+    rigid[1] = creepage.lateral + creepage.spin * problem.x
+    centre = float(load @ y) / float(load.sum())
+    return replace(problem, rigid_slip=rigid, y=y[strips] - centre)
 
 
 class Work(NamedTuple):
     """Power over rolling velocity [N], forces [N], moment [N m], power of each row [N/m].
 
-    The power is the work of the rigid slip, to which the elastic energy contributes nothing.
+    The power is the work of the rigid slip, to which the elastic energy contributes nothing, and of
+    the slip by pressure, which the torque that moves the pressure ahead compensates.
     """
 
     power: float
@@ -132,7 +151,10 @@ class Solution(NamedTuple):
         """Return forces and power on this grid."""
         problem, traction = self.problem, self.rolling.traction
         area = problem.dx * problem.dy
-        power = -inner(traction, problem.rigid_slip) * area
+        slip = problem.rigid_slip
+        if problem.difference:
+            slip = slip + problem.elements.pressed_in_middle.each(self.normal.pressure)
+        power = -inner(traction, slip) * area
         force_x, force_y = (float(part.sum()) * area for part in traction)
         moment = float((problem.x * traction[1] - problem.y[:, None] * traction[0]).sum()) * area
         rows = densities(self.rolling).sum(axis=1) * problem.dx
@@ -190,7 +212,10 @@ def solve(
         If an iteration does not converge.
     """
     bound, finest = problem.friction * normal.pressure, normal.pressure.shape
-    if not bound.any() or not problem.rigid_slip.any():
+    slip = problem.slip_ahead
+    if problem.difference:
+        slip += problem.elements.pressed.each(normal.pressure)
+    if not bound.any() or not slip.any():
         nothing = np.zeros_like(problem.rigid_slip)
         return Solution(
             problem, normal, TangentialSolution(nothing, nothing, normal.pressure > 0.0), None
@@ -209,7 +234,7 @@ def solve(
         turn = doubled(_turn(coarser.rolling, found.pressure), 1, columns)
         if below:
             start, turn = doubled(start, 1, rows), doubled(turn, 0, rows)
-    given = problem.elements.rolling, bound, problem.slip_ahead, tolerance, start
+    given = problem.elements.rolling, bound, slip, tolerance, start
     if problem.order == 2:
         rolling = solve_rolling(*given, Within(*edges(normal.pressure), turn))
     else:

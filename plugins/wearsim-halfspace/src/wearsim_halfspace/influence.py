@@ -35,6 +35,18 @@ def _integrals(columns: int, rows: int, dx: float, dy: float) -> FloatArray:
     return np.asarray(np.diff(np.diff(corners, axis=1), axis=2))
 
 
+def _odd_integrals(columns: int, rows: int, dx: float, dy: float) -> FloatArray:
+    """Return the integrals of x/r^2 and y/r^2 over elements, shape (2, rows, columns).
+
+    Parameters are those of `_integrals`.
+    """
+    a = ((np.arange(columns + 1) - 0.5) * dx)[None, :]
+    b = ((np.arange(rows + 1) - 0.5) * dy)[:, None]
+    logarithm = np.log(np.hypot(a, b))
+    corners = np.stack([b * logarithm + a * np.arctan(b / a), a * logarithm + b * np.arctan(a / b)])
+    return np.asarray(np.diff(np.diff(corners, axis=1), axis=2))
+
+
 def inner(one: FloatArray, other: FloatArray) -> float:
     """Return the sum of the products of two fields.
 
@@ -80,6 +92,15 @@ class Convolution:
         """Return the convolution of a field, shape (rows, columns), with the first kernel."""
         return self._back(self._transforms[0] * self._forward(field))
 
+    def each(self, field: FloatArray) -> FloatArray:
+        """Return those of a field with every kernel, shape (kernels, rows, columns)."""
+        return self._back(np.asarray(self._transforms * self._forward(field)))
+
+    def total(self, fields: FloatArray) -> FloatArray:
+        """Return the sum of those of fields with one kernel each, shape (rows, columns)."""
+        parts = self._transforms * self._forward(fields)
+        return self._back(np.asarray(parts.sum(axis=0)))
+
     def of_vector(self, field: FloatArray) -> FloatArray:
         """Return that of a vector field, shape (2, rows, columns), with the kernels xx, yy, xy."""
         transform = self._forward(field)
@@ -107,7 +128,7 @@ class Convolution:
 class Elements:
     """Rectangular elements on two half-spaces of one material each.
 
-    The bodies are quasi-identical: normal pressure gives no relative tangential displacement, and
+    Of quasi-identical bodies, normal pressure gives no relative tangential displacement, and
     tangential traction no normal one.
 
     Parameters
@@ -118,6 +139,8 @@ class Elements:
         Sizes of an element [m].
     shear_modulus, poisson_ratio : float
         Of both bodies combined: 1/G = (1/G_1 + 1/G_2)/2, nu/G = (nu_1/G_1 + nu_2/G_2)/2.
+    difference : float
+        K = G/4 ((1 - 2 nu_1)/G_1 - (1 - 2 nu_2)/G_2), zero for quasi-identical bodies.
 
     Attributes
     ----------
@@ -133,9 +156,11 @@ class Elements:
         dy: float,
         shear_modulus: float,
         poisson_ratio: float,
+        difference: float = 0.0,
     ) -> None:
         self.rows, self.columns, self.dx, self.dy = rows, columns, dx, dy
         scale, self._poisson_ratio = 1.0 / (np.pi * shear_modulus), poisson_ratio
+        self._difference = scale * difference
         # for distances from 0 to one element more than there are columns
         self._integrals = scale * _integrals(columns + 1, rows, dx, dy)
         normal = (1.0 - poisson_ratio) * (self._integrals[0] + self._integrals[1])
@@ -154,6 +179,34 @@ class Elements:
         """
         found = self._displacements()
         return Convolution((found[..., 1:-1] - found[..., 2:]) / self.dx)
+
+    @cached_property
+    def opening(self) -> Convolution:
+        """Gap opened by traction, `Convolution.total` [m/Pa]."""
+        return Convolution(self._coupling()[..., 1:-1])
+
+    @cached_property
+    def pressed(self) -> Convolution:
+        """Slip by pressure in steady rolling, `Convolution.each`, where `rolling` is [1/Pa].
+
+        Pressure draws the surface towards it, and the more compressible one further.
+        """
+        found = self._coupling()
+        return Convolution((found[..., 2:] - found[..., 1:-1]) / self.dx)
+
+    @cached_property
+    def pressed_in_middle(self) -> Convolution:
+        """The same in the middle of elements [1/Pa]."""
+        found = self._coupling()
+        return Convolution((found[..., 2:] - found[..., :-2]) / (2.0 * self.dx))
+
+    def _coupling(self) -> FloatArray:
+        """Return gap by traction, and displacement towards pressure, kernels x and y [m/Pa]."""
+        shape = self.columns + 1, self.rows, self.dx, self.dy
+        found = _mirrored(self._difference * _odd_integrals(*shape))
+        found[0, :, : self.columns] *= -1.0  # odd along
+        found[1, : self.rows - 1] *= -1.0  # odd across
+        return found
 
     def _displacements(self) -> FloatArray:
         """Return displacements by traction, kernels xx, yy and xy (Cerruti) [m/Pa]."""

@@ -18,9 +18,15 @@ from wearsim.types import (
     Material,
     OperatingPoint,
 )
-from wearsim_halfspace.grids import Problem, Solution, densities, solve
+from wearsim_halfspace.grids import Problem, Solution, densities, solve, with_slip
 from wearsim_halfspace.normal import NormalSolution, solve_normal
-from wearsim_halfspace.strips import combined, half_width
+from wearsim_halfspace.strips import (
+    combined,
+    difference,
+    elliptic_pressure,
+    half_lengths,
+    half_width,
+)
 
 SAME = 1e-3  # relative difference of element lengths that are not corrected
 MARGIN = 0.05  # columns ahead of and behind the longest strip, over those across it
@@ -28,6 +34,8 @@ FEWEST = 0.8  # elements across the longest strip, relative to the requested num
 SPARE = 3  # rows and columns around the contact
 COARSER = 4  # elements across an element of the second coarser grid
 FREE_GRIDS, MAX_GRIDS = 3, 12  # tried until elements and solution agree; at most
+MAX_COUPLED = 50  # solutions of the normal and the tangential problem in turn
+COUPLED = 10.0  # change of the pressure at which these end, over the tolerance
 
 Elements_ = Annotated[int, ws.Field(ge=8, le=400)]
 
@@ -47,6 +55,9 @@ class HalfspaceOptions(ws.Options):
         2, description="of convergence with elements along rolling: 2, or 1 as in CONTACT"
     )
     tolerance: float = ws.Field(1e-6, gt=0.0, le=1e-2, description="of pressure and traction")
+    coupling: bool = ws.Field(
+        True, description="of pressure and traction, where the materials of the bodies differ"
+    )
 
 
 class Patch(NamedTuple):
@@ -64,7 +75,7 @@ class Patch(NamedTuple):
 
 
 class Halfspace(ws.SingleContactModel):
-    """Exact theory of elastic half-spaces, normal and tangential, for quasi-identical bodies.
+    """Exact theory of elastic half-spaces, normal and tangential.
 
     Parameters
     ----------
@@ -90,6 +101,7 @@ class Halfspace(ws.SingleContactModel):
         # an even number, so that the larger elements end at the ends of the longest strip too
         self._across = options.mx + options.mx % 2
         self.shear_modulus, self.poisson_ratio = combined(materials)
+        self._difference = difference(materials) if options.coupling else 0.0
         #: contact modulus E* of both bodies [Pa]
         self.contact_modulus = self.shear_modulus / (1.0 - self.poisson_ratio)
 
@@ -103,7 +115,7 @@ class Halfspace(ws.SingleContactModel):
     ) -> ContactSolution:
         """Solve one contact; see `SingleContactModel.solve_contact`."""
         patch = self._patch(gap, longitudinal_curvature, point, wear_compliance, warm)
-        return self._solution(patch, point, self._rolled(patch))
+        return self._solution(*self._rolled(patch, point.creepage), point)
 
     def friction_points(self, batch: ws.ContactBatch) -> tuple[FloatArray, FloatArray]:
         """Return the points of the friction coefficients: `mx` along each strip."""
@@ -125,7 +137,8 @@ class Halfspace(ws.SingleContactModel):
     ) -> ContactFields:
         """Return pressure, traction and slip, those of the element at each point."""
         patch = self._patch(gap, longitudinal_curvature, point, None, solution)
-        rolling, problem = self._rolled(patch).rolling, patch.problem
+        patch, solved = self._rolled(patch, point.creepage)
+        rolling, problem = solved.rolling, patch.problem
         length, columns = patch.half_length, len(problem.x)
         x = np.linspace(-1.0, 1.0, points_along)[:, None] * length
         place = np.rint((x - problem.x[0]) / problem.dx).astype(np.int64)
@@ -193,12 +206,13 @@ class Halfspace(ws.SingleContactModel):
                 x=x,
                 y=self.grid.y[strips],
                 order=self.options.order,
+                difference=self._difference,
             )
             normal = solve_normal(
                 problem.elements,
                 problem.gap,
                 force,
-                _elliptic(near[0][strips], near[1][strips], x),
+                elliptic_pressure(near[0][strips], near[1][strips], x),
                 self.options.tolerance,
                 problem.compliance,
             )
@@ -206,7 +220,7 @@ class Halfspace(ws.SingleContactModel):
             if suits and (
                 number >= FREE_GRIDS or abs(self._length(half_length) / problem.dx - 1.0) < SAME
             ):
-                problem = _with_slip(problem, creepage, self.grid.y, load, strips)
+                problem = with_slip(problem, creepage, self.grid.y, load, strips)
                 friction = self._friction(point, half_length, strips, x)
                 problem = replace(problem, friction=friction)
                 return Patch(problem, normal, strips, load, half_length)
@@ -290,19 +304,44 @@ class Halfspace(ws.SingleContactModel):
         pressure, dx = normal.pressure, float(x[1] - x[0])
         load, half_length = np.zeros(self.grid.strips), np.zeros(self.grid.strips)
         load[strips] = pressure.sum(axis=1) * dx
-        half_length[strips] = _half_lengths(pressure, x)
+        half_length[strips] = half_lengths(pressure, x)
         if load[0] > 0.0 or load[-1] > 0.0:
             raise ws.ContactError("the contact reaches the edge of its strips; raise contact.width")
         inside = not pressure[[0, -1]].any() or len(pressure) == self.grid.strips
+        inside &= not pressure[:, [0, -1]].any()
         across = int((pressure > 0.0).sum(axis=1).max())
         fits = FEWEST * self._across <= across <= pressure.shape[1] - 2
         return load, half_length, inside and fits
 
-    def _rolled(self, patch: Patch) -> Solution:
-        """Return the tangential solution."""
-        return solve(patch.problem, patch.normal, self.options.tolerance)
+    def _rolled(self, patch: Patch, creepage: Creepage) -> tuple[Patch, Solution]:
+        """Return normal and tangential solution.
 
-    def _solution(self, patch: Patch, point: OperatingPoint, solution: Solution) -> ContactSolution:
+        Tractions open the gap where the materials differ: both are then solved in turn.
+        """
+        tolerance, gap = self.options.tolerance, patch.problem.gap
+        solution = solve(patch.problem, patch.normal, tolerance)
+        if not self._difference:
+            return patch, solution
+        for _ in range(MAX_COUPLED):
+            opening = patch.problem.elements.opening.total(solution.rolling.traction)
+            problem = replace(patch.problem, gap=gap + opening)
+            before = patch.normal.pressure
+            known = problem.gap, problem.force, before, tolerance, problem.compliance
+            normal = solve_normal(problem.elements, *known)
+            load, half_length, suits = self._extent(normal, patch.strips, problem.x)
+            if not suits:
+                raise ws.ContactError("traction moves the contact of different materials too far")
+            problem = with_slip(problem, creepage, self.grid.y, load, patch.strips)
+            patch = Patch(problem, normal, patch.strips, load, half_length)
+            solution = solve(problem, normal, tolerance)
+            change = float(np.abs(normal.pressure - before).max() / before.max())
+            if change <= COUPLED * tolerance:
+                return patch, solution
+        raise ws.ContactError(
+            f"contact of different materials: no convergence (last relative change {change:.1e})"
+        )
+
+    def _solution(self, patch: Patch, solution: Solution, point: OperatingPoint) -> ContactSolution:
         """Return forces, powers and lengths of a solved contact."""
         work = solution.extrapolated() if self.options.extrapolate else solution.work()
         speed, load, pressure = point.rolling_speed, patch.load, patch.normal.pressure
@@ -327,45 +366,6 @@ class Halfspace(ws.SingleContactModel):
             longitudinal_creepage=point.creepage.longitudinal,
             iterations=patch.normal.iterations,
         )
-
-
-def _with_slip(
-    problem: Problem, creepage: Creepage, y: FloatArray, load: FloatArray, strips: slice
-) -> Problem:
-    """Return a problem with its rigid slip; spin is about the centre of the line load."""
-    varies = -creepage.spin * y if creepage.variation is None else creepage.variation
-    along = creepage.longitudinal + varies - float(load @ varies) / float(load.sum())
-    rigid = problem.rigid_slip
-    rigid[0] = along[strips, None]
-    rigid[1] = creepage.lateral + creepage.spin * problem.x
-    centre = float(load @ y) / float(load.sum())
-    return replace(problem, rigid_slip=rigid, y=y[strips] - centre)
-
-
-def _elliptic(load: FloatArray, half_length: FloatArray, x: FloatArray) -> FloatArray:
-    """Return the pressure of strips with elliptic distributions [Pa]."""
-    length = np.where(load > 0.0, np.maximum(half_length, x[1] - x[0]), 1.0)[:, None]
-    shape = np.sqrt(np.maximum(1.0 - (x / length) ** 2, 0.0))
-    return np.asarray(2.0 * load[:, None] / (np.pi * length) * shape)
-
-
-def _half_lengths(pressure: FloatArray, x: FloatArray) -> FloatArray:
-    """Return the half-length of each row [m].
-
-    The square of the pressure is linear near an edge; its zero is extrapolated from the two
-    outermost elements of both ends.
-    """
-    found, dx = np.zeros(len(pressure)), float(x[1] - x[0])
-    for row, values in enumerate(pressure):
-        touching = np.flatnonzero(values > 0.0)
-        if len(touching) == 0:
-            continue
-        ends = 0.5 * dx * (len(touching) - 1)
-        for outer, inner in ((touching[0], touching[0] + 1), (touching[-1], touching[-1] - 1)):
-            square, rise = values[outer] ** 2, values[inner] ** 2 - values[outer] ** 2
-            ends += 0.5 * dx * (min(square / rise, 1.0) if rise > 0.0 else 0.5)
-        found[row] = ends
-    return found
 
 
 def suggest_grid(
