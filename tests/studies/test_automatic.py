@@ -87,6 +87,12 @@ def test_cam_is_judged_at_all_stations():
     assert "has taken" in wearsim.study_cam(shipped_scenario("cam-eccentric", AUTO)).notes[-1]
 
 
+def test_exact_theory_is_taken_for_different_materials():
+    study = wearsim.study_contact(rig(roller__material="bronze"))
+    assert study.model == "halfspace"
+    assert "different materials" in study.notes[-1]
+
+
 @pytest.mark.usefixtures("_without_halfspace")
 @pytest.mark.parametrize(
     ("changes", "why", "estimated"),
@@ -95,6 +101,7 @@ def test_cam_is_judged_at_all_stations():
         ({"roller__crown_radius": "0.2 mm"}, "error is [0-9]", True),
         ({"creepage__differential_slip": True}, "creepage or friction that varies", False),
         ({"creepage__longitudinal": 1e-5}, "outside the calibrated contacts: ln of", False),
+        ({"roller__material": "bronze"}, "different materials .* are not calibrated", False),
     ],
 )
 def test_without_a_sufficient_model_the_refusal_names_the_remedy(changes, why, estimated):

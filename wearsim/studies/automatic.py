@@ -11,10 +11,12 @@ from wearsim.errors import CapabilityError, SolverError, WearsimError
 from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.observables import present_batch
 from wearsim.evolution.state import WearState
+from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.results import DISK
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.toml import apply_overrides
+from wearsim.scenario.tables.bodies import DUNDURS_LIMIT
 from wearsim.scenario.tables.plugin import AUTO, AutoTable, ChosenTable, ContactChoice
 from wearsim.studies.contact.comparison import INSTALL, REFERENCE, at_creepage
 from wearsim.studies.contact.estimate import (
@@ -79,7 +81,7 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     if field is not None:
         raise _refusal(scenario, f"{field} is a field, and no error is calibrated for it")
     states, where = _looked_at(scenario, test)
-    reason = _not_calibrated(table, states)
+    reason = _coupling(scenario) or _not_calibrated(table, states)
     every = [] if reason else [table.scaled(each) for state in states for each in state.indicators]
     known = [
         (max((model.error(scaled) for scaled in every), default=np.inf), model)
@@ -168,6 +170,14 @@ def _able(scenario: Scenario, choice: ContactChoice, states: list[_State], test:
     except WearsimError:
         return False
     return True
+
+
+def _coupling(scenario: Scenario) -> str:
+    """Return that pressure and traction are coupled, or nothing."""
+    pair = combine(scenario.cylinder.material, scenario.roller.material)
+    if abs(pair.dundurs) <= DUNDURS_LIMIT:
+        return ""
+    return f"different materials (Dundurs' constant {pair.dundurs:.3g}) are not calibrated"
 
 
 def _not_calibrated(table: Calibration, states: list[_State]) -> str:
