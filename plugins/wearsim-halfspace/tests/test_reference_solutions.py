@@ -56,7 +56,7 @@ def test_power_converges_with_the_order_of_the_extrapolation(order):
     )
     steps = np.abs(np.diff(powers, axis=1))
     measured = np.median(np.log2(steps[:, 0] / steps[:, 1]))
-    assert measured == pytest.approx(np.log2(1.0 + 1.0 / FURTHER[order]), abs=0.3)
+    assert measured == pytest.approx(np.log2(1.0 + 1.0 / FURTHER[order]), abs=0.4)
 
 
 def test_elements_of_second_order_are_closer_to_the_limit_of_contact():
@@ -226,18 +226,23 @@ def creepage_coefficients(a_over_b, poisson_ratio, n):
     along, across = (elliprd(0.0, *sizes) / 3.0 * peak * (1.0 - poisson_ratio)
                      for sizes in ((b**2, a**2), (a**2, b**2)))  # fmt: skip
     dx, dy = 2.0 * a / n, 2.0 * b / n
-    x, y = middles(n + 4) * dx, middles(n + 4)[:, None] * dy
-    elements = Elements(n + 4, n + 4, dx, dy, 1.0, poisson_ratio)
+    x, y = middles(n + 8) * dx, middles(n + 8)[:, None] * dy
+    elements = Elements(n + 8, n + 8, dx, dy, 1.0, poisson_ratio)
     start = np.sqrt(np.maximum(1.0 - (x / a) ** 2 - (y / b) ** 2, 0.0))
     gap, force = along * x**2 + across * y**2, 2.0 / 3.0 * np.pi * peak
     normal = solve_normal(elements, gap, force, start, 1e-8)
     slip_ahead = np.zeros((3, 2, *gap.shape))
     slip_ahead[0, 0], slip_ahead[1, 1] = 1.0, 1.0
     slip_ahead[2, 0], slip_ahead[2, 1] = -y, x + AHEAD[2] * dx
-    within = Within(*edges(normal.pressure), np.zeros_like(gap))
+    within = Within(*edges(normal), np.zeros_like(gap))
     along, across, spin = (
         solve_rolling(
-            elements.rolling, 1e9 * normal.pressure, slip, 1e-12, np.zeros_like(slip), within
+            elements.rolling_averaged,
+            1e9 * normal.pressure,
+            slip,
+            1e-12,
+            np.zeros_like(slip),
+            within,
         ).traction
         * (dx * dy)
         for slip in slip_ahead
@@ -267,19 +272,44 @@ def test_linear_theory_has_the_coefficients_of_kalker(row):
         known = row["rel_err"][name]  # of the reference
         assert value == pytest.approx(row[name], rel=0.02), name
         assert further == pytest.approx(row[name], rel=0.005 if known <= 0.003 else 0.01), name
-        assert value == pytest.approx(exact[name], rel=0.012 if name == "C33" else 0.002), name
-        assert further == pytest.approx(exact[name], rel=0.004 if name == "C33" else 0.002), name
+        assert value == pytest.approx(exact[name], rel=0.006 if name == "C33" else 0.001), name
+        assert further == pytest.approx(exact[name], rel=0.002 if name == "C33" else 0.001), name
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("poisson_ratio", [0.0, 0.5])
 @pytest.mark.parametrize("a_over_b", [row["a_over_b"] for row in SEVEN])
 def test_coefficients_are_exact_for_other_poisson_ratios(a_over_b, poisson_ratio):
-    exact = exact_coefficients(a_over_b, poisson_ratio)
+    case = a_over_b, poisson_ratio
+    coarse, fine = (creepage_coefficients(*case, n) for n in (30, 60))
+    exact = exact_coefficients(*case)
     # the smallest C33, 0.163 for 0.5 and a/b = 20, is a small difference
-    limit = 0.02 if (a_over_b, poisson_ratio) != (20.0, 0.5) else 0.036
-    for name, value in creepage_coefficients(a_over_b, poisson_ratio, 60).items():
+    limit = 0.015 if case != (20.0, 0.5) else 0.032
+    for name, value in fine.items():
+        further = value + FURTHER[2] * (value - coarse[name])
         assert value == pytest.approx(exact[name], rel=limit if name == "C33" else 0.0025), name
+        assert further == pytest.approx(exact[name], rel=0.008 if name == "C33" else 0.002), name
+
+
+def test_mixed_kernel_is_averaged_over_the_length_of_an_element():
+    dx, dy, nu, count = 2.0, 0.5, 0.3, 400
+    elements = Elements(3, 4, dx, dy, 1.0, nu)
+    field = np.zeros((2, 3, 4))
+    field[0, 0, 0] = 1.0  # lateral displacement by a longitudinal traction
+    found = elements.rolling_averaged.of_vector(field)[1]
+
+    def displacement(x, y):
+        corners = [
+            i * j * np.hypot(x + 0.5 * i * dx, y + 0.5 * j * dy) for i in (1, -1) for j in (1, -1)
+        ]
+        return -nu / np.pi * sum(corners)
+
+    within = middles(count) * dx / count
+    for row, column in np.ndindex(3, 4):
+        here, ahead = (
+            displacement(column * dx + shift + within, row * dy).mean() for shift in (0.0, dx)
+        )
+        assert found[row, column] == pytest.approx((here - ahead) / dx, abs=1e-6)
 
 
 def test_exact_coefficients_are_those_of_the_reference():

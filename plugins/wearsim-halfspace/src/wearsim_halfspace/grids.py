@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.types import Creepage, FloatArray
+from wearsim.types import Creepage, FloatArray, IntArray
 from wearsim_halfspace.influence import Elements, inner
 from wearsim_halfspace.normal import NormalSolution, solve_normal
 from wearsim_halfspace.tangential import (
@@ -20,7 +20,6 @@ from wearsim_halfspace.tangential import (
 
 FEWEST = 16  # rows or columns of a grid that is started from a coarser one
 LOOSE = 1e-4  # tolerance on coarser grids
-LEAST_ENTRY, LEAST_EXIT = -0.3, -0.5  # of `Within`
 #: Of the difference of two grids, added in an extrapolation: that of the orders 1.08 and 2.
 FURTHER = {1: 0.9, 2: 1.0 / 3.0}
 #: Where the rigid slip is taken, in elements ahead of the middle, for elements of each order.
@@ -234,36 +233,58 @@ def solve(
         turn = doubled(_turn(coarser.rolling, found.pressure), 1, columns)
         if below:
             start, turn = doubled(start, 1, rows), doubled(turn, 0, rows)
-    given = problem.elements.rolling, bound, slip, tolerance, start
+    given = bound, slip, tolerance, start
     if problem.order == 2:
-        rolling = solve_rolling(*given, Within(*edges(normal.pressure), turn))
+        within = Within(*edges(normal), turn)
+        rolling = solve_rolling(problem.elements.rolling_averaged, *given, within)
     else:
-        rolling = solve_tangential(*given)
+        rolling = solve_tangential(problem.elements.rolling, *given)
     return Solution(problem, normal, rolling, coarser)
 
 
-def edges(pressure: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return `Within.entry` and `Within.exit`, shape (rows, columns).
+def edges(normal: NormalSolution) -> tuple[FloatArray, FloatArray]:
+    """Return `Within.entry` and `Within.exit`, shapes (2, rows, columns) and (rows, columns).
 
-    Tractions that need no slip on a whole row of elements are those of a contact that ends 0.825
-    elements ahead of the middle of its first element, and 0.326 behind the middle of its last one,
-    where they are singular. Where the edge is elsewhere, particles adhere for another part of the
-    way; with the slip s of the first element, over that of the element ahead, or with that of the
-    last element, over that of the element behind, the tractions are those of a contact that ends
-    there. The edge itself follows from the pressure of the outermost element over that of the
-    next, p: it is -0.175 + 0.93 p + 0.70 p^2 elements outward of the middle. These relations are
-    those of line contacts on many elements; the polynomials below are s(p), within 0.02 and 0.01.
+    Particles that adhere touch for a part of the first element only. Next to this edge tractions
+    are a smooth function times the pressure, and slip ahead of it is a smooth function times the
+    increase of the separation from one element to the next. The ratio of the two is continued
+    linearly from the two elements ahead to the first one.
+
+    Where particles leave in adhesion, the traction is singular, and tractions that need no slip on
+    a whole row of elements are those of a contact that ends 0.326 elements behind the middle of the
+    last one. Where the edge is elsewhere, they are those with a slip of the last element. Over that
+    of the element behind, it is a function of the place of the edge in line contacts on many
+    elements, and the place follows from the increase of the separation behind the last element,
+    over that behind the next one. The polynomial below is this function, within 0.01.
     """
-    columns = pressure.shape[1]
-    rows = np.flatnonzero((pressure > 0.0).sum(axis=1) > 1)
-    last = np.argmax(pressure[rows] > 0.0, axis=1)
-    first = columns - 1 - np.argmax(pressure[rows, ::-1] > 0.0, axis=1)
-    ahead, behind = np.zeros_like(pressure), np.zeros_like(pressure)
-    ratio = pressure[rows, first] / pressure[rows, first - 1]
-    ahead[rows, first] = np.maximum(0.623 - 0.164 * ratio - ratio**2, LEAST_ENTRY)
-    ratio = pressure[rows, last] / pressure[rows, last + 1]
-    behind[rows, last] = np.maximum(0.642 - 1.636 * ratio + 0.187 * ratio**2, LEAST_EXIT)
+    touches = normal.pressure > 0.0
+    columns = touches.shape[1]
+    rows = np.flatnonzero(touches.sum(axis=1) > 1)
+    first = columns - 1 - np.argmax(touches[rows, ::-1], axis=1)
+    last = np.argmax(touches[rows], axis=1)
+    ahead, behind = np.zeros((2, *touches.shape)), np.zeros(touches.shape)
+    near, far = _increases(normal.separation, rows, first, 1)
+    # only the nearest where the grid ends
+    ahead[:, rows, first] = np.where(far > 0.0, 2.0 * near, near), -far
+    near, _ = _increases(normal.separation, rows, last, -1)
+    root = np.sqrt(np.maximum(0.63 - near, 0.0067))
+    behind[rows, last] = np.where(last > 1, 0.777 - 1.667 * root + 0.187 * root**2, 0.0)
     return ahead, behind
+
+
+def _increases(
+    separation: FloatArray, rows: IntArray, ends: IntArray, step: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return how fast the surfaces separate outside the ends of rows.
+
+    It is the increase of the separation to the first element outside, over that to the second one
+    and over that to the third one, and zero where the grid ends before these.
+    """
+    places = np.clip(ends[:, None] + step * np.arange(4), 0, separation.shape[1] - 1)
+    found = np.maximum(np.diff(separation[rows[:, None], places], axis=1), 0.0)
+    nearest, others = found[:, :1], found[:, 1:]
+    ratio = np.divide(nearest, others, out=np.zeros_like(others), where=others > nearest)
+    return ratio[:, 0], ratio[:, 1]
 
 
 def _turn(rolling: TangentialSolution, pressure: FloatArray) -> FloatArray:

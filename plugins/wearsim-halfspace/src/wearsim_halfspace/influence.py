@@ -47,6 +47,17 @@ def _odd_integrals(columns: int, rows: int, dx: float, dy: float) -> FloatArray:
     return np.asarray(np.diff(np.diff(corners, axis=1), axis=2))
 
 
+def _mean_along(columns: int, rows: int, dx: float, dy: float) -> FloatArray:
+    """Return the mean of the last kernel of `_integrals` over positions along one element.
+
+    See `_integrals` for the parameters; shape (rows, columns).
+    """
+    a = (np.arange(-1, columns + 1) * dx)[None, :]
+    b = ((np.arange(rows + 1) - 0.5) * dy)[:, None]
+    corners = -0.5 * (a * np.hypot(a, b) + b**2 * np.arcsinh(a / np.abs(b)))
+    return np.asarray(np.diff(np.diff(corners, axis=0), n=2, axis=1) / dx)
+
+
 def inner(one: FloatArray, other: FloatArray) -> float:
     """Return the sum of the products of two fields.
 
@@ -159,10 +170,10 @@ class Elements:
         difference: float = 0.0,
     ) -> None:
         self.rows, self.columns, self.dx, self.dy = rows, columns, dx, dy
-        scale, self._poisson_ratio = 1.0 / (np.pi * shear_modulus), poisson_ratio
-        self._difference = scale * difference
+        self._scale, self._poisson_ratio = 1.0 / (np.pi * shear_modulus), poisson_ratio
+        self._difference = self._scale * difference
         # for distances from 0 to one element more than there are columns
-        self._integrals = scale * _integrals(columns + 1, rows, dx, dy)
+        self._integrals = self._scale * _integrals(columns + 1, rows, dx, dy)
         normal = (1.0 - poisson_ratio) * (self._integrals[0] + self._integrals[1])
         self.normal = Convolution(_mirrored(normal[None, :, :-1]))
 
@@ -178,6 +189,17 @@ class Elements:
         It is the decrease of the displacement along x over one element.
         """
         found = self._displacements()
+        return Convolution((found[..., 1:-1] - found[..., 2:]) / self.dx)
+
+    @cached_property
+    def rolling_averaged(self) -> Convolution:
+        """`rolling`, with the mean of the mixed kernel over the length of an element.
+
+        Taken at the middle only, lateral tractions next to an edge oblique to rolling, which
+        change from one element to the next, add a longitudinal slip that decreases slowly.
+        """
+        rows, columns = self._integrals.shape[1:]
+        found = self._displacements(_mean_along(columns, rows, self.dx, self.dy) * self._scale)
         return Convolution((found[..., 1:-1] - found[..., 2:]) / self.dx)
 
     @cached_property
@@ -208,9 +230,10 @@ class Elements:
         found[1, : self.rows - 1] *= -1.0  # odd across
         return found
 
-    def _displacements(self) -> FloatArray:
+    def _displacements(self, mixed: FloatArray | None = None) -> FloatArray:
         """Return displacements by traction, kernels xx, yy and xy (Cerruti) [m/Pa]."""
-        along, across, mixed = self._integrals
+        along, across, middle = self._integrals
+        mixed = middle if mixed is None else mixed
         every = (1.0 - self._poisson_ratio) * (along + across)
         found = _mirrored(np.stack([every + self._poisson_ratio * along,
                                     every + self._poisson_ratio * across,

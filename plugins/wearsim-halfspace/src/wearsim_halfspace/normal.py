@@ -15,10 +15,11 @@ LEAST = 1e-3  # eigenvalue, relative to the influence of an element on itself
 
 
 class NormalSolution(NamedTuple):
-    """Pressure on the elements [Pa], approach [m] and number of iterations."""
+    """Pressure on the elements [Pa], approach [m], separation [m] and number of iterations."""
 
     pressure: FloatArray
     approach: float
+    separation: FloatArray
     iterations: int
 
 
@@ -116,7 +117,8 @@ def solve_normal(
         change = float(np.abs(moved - pressure).max())
         pressure = moved
         if change <= tolerance * float(pressure.max()) and not overlap.any():
-            return NormalSolution(pressure, approach, iteration)
+            separation = float(closed[inside].mean()) - closed
+            return NormalSolution(pressure, approach, separation, iteration)
     raise ContactError(
         f"the normal contact of half-spaces has not converged in {MAX_ITERATIONS} iterations"
         f" (last relative change {change / float(pressure.max()):.1e})"

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.plugins import ContactError
-from wearsim.types import BoolArray, FloatArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim_halfspace.influence import Convolution, inner
 
 MAX_ITERATIONS = 60  # of Newton's method
@@ -38,11 +38,12 @@ class Within:
 
     Parameters
     ----------
-    entry : ndarray, shape (rows, columns)
-        Slip of the elements that particles enter first, while they adhere, over that of the
-        elements ahead of them; zero elsewhere. Particles are outside for a part of the way.
+    entry : ndarray, shape (2, rows, columns)
+        Factors by which the slip of the elements that particles enter first, while they adhere,
+        follows from that one and two elements ahead; zero elsewhere. Particles are outside for a
+        part of the way.
     exit : ndarray, shape (rows, columns)
-        The same of the elements that particles leave last, over that of the elements behind them.
+        Slip of the elements that particles leave last, over that of the elements behind them.
         It does not hold for elements that slide, see `solve_rolling`.
     turn : ndarray, shape (rows, columns)
         Angle from the slip at the leading end of an element to that in its middle [rad].
@@ -54,10 +55,25 @@ class Within:
 
     def __call__(self, slip: FloatArray) -> FloatArray:
         """Return the slip that Coulomb's law opposes to the traction of each element."""
-        slip[..., :-1] -= self.entry[:, :-1] * slip[..., 1:]
-        slip[..., 1:] -= self.exit[:, 1:] * slip[..., :-1]
-        (along, across), (cosine, sine) = slip, self._rotation
-        return np.stack([cosine * along - sine * across, sine * along + cosine * across])
+        rows, first, (one, two) = self._first
+        slip[:, rows, first] -= one * slip[:, rows, first + 1] + two * slip[:, rows, first + 2]
+        rows, last, one = self._last
+        slip[:, rows, last] -= one * slip[:, rows, last - 1]
+        cosine, sine = self._rotation
+        found = cosine * slip
+        found[0] -= sine * slip[1]
+        found[1] += sine * slip[0]
+        return np.asarray(found)
+
+    @cached_property
+    def _first(self) -> tuple[IntArray, IntArray, FloatArray]:
+        rows, columns = np.nonzero(self.entry[0])
+        return rows, columns, self.entry[:, rows, columns]
+
+    @cached_property
+    def _last(self) -> tuple[IntArray, IntArray, FloatArray]:
+        rows, columns = np.nonzero(self.exit)
+        return rows, columns, self.exit[rows, columns]
 
     @cached_property
     def _rotation(self) -> tuple[FloatArray, FloatArray]:
