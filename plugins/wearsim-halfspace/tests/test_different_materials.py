@@ -82,7 +82,7 @@ def test_friction_dissipates_the_work_of_forces_and_torque(creepage):
     done = of_torque - (of_forces + creepage.spin * work.moment)
     assert work.power == pytest.approx(done, rel=2e-3)
     # by slip and traction of each element
-    assert float(work.rows.sum()) * problem.dy == pytest.approx(work.power, rel=2e-3)
+    assert float(work.rows.sum()) * problem.dy == pytest.approx(work.power, rel=3e-3)
     assert work.power > 0.0
 
 
