@@ -173,7 +173,7 @@ def _able(scenario: Scenario, choice: ContactChoice, states: list[_State], test:
 
 
 def _coupling(scenario: Scenario) -> str:
-    """Return that pressure and traction are coupled, or nothing."""
+    """Return why no error can be estimated for these materials, or an empty string."""
     pair = combine(scenario.cylinder.material, scenario.roller.material)
     if abs(pair.dundurs) <= DUNDURS_LIMIT:
         return ""

@@ -56,7 +56,7 @@ def exact_coefficients(a_over_b: float, poisson_ratio: float, degree: int = 60) 
             given[0, :, 2] = given[1, :, 3] = 0.5 * a  # x
         if l == 2:
             given[0, :, 4] = 0.25j * a * b * np.sign(m)  # -x y
-            given[1, :, 4] = 0.25 * a**2 * np.abs(np.sign(m))  # x^2 / 2, but for a function of y
+            given[1, :, 4] = 0.25 * a**2 * np.abs(np.sign(m))  # x^2 / 2, except for a function of y
         found = np.linalg.solve(matrix, given.reshape(-1, 5)).reshape(2, -1, 5)
         tractions.append(found)
         on_edge.append(np.einsum("em,cmk->kce", np.exp(1j * np.outer(edge, m)), found).real)

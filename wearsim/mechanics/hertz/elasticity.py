@@ -20,7 +20,7 @@ class ElasticPair:
     contact_modulus : float
         E* [Pa], 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; equals G/(1 - nu).
     dundurs : float
-        Dundurs' second constant beta; the normal-tangential coupling it causes is neglected.
+        Dundurs' second constant beta, a measure of the coupling of pressure and traction.
     """
 
     shear_modulus: float

@@ -66,9 +66,9 @@ class Kernel:
         """Dispatcher of numba, which compiled functions call."""
         with _LOCK:
             if self._dispatcher is None:
-                # before numba is imported, which takes half a second
-                if not_cached({self.__name__}):
-                    _call_elsewhere(_ALONGSIDE.pop(self.__name__, []))
+                functions = _ALONGSIDE.pop(self.__name__, [])
+                if functions and not_cached({self.__name__}):
+                    _call_elsewhere(functions)  # before numba is imported, for half a second
                 self._dispatcher = _compiled(self._function)
         return self._dispatcher
 
@@ -223,7 +223,7 @@ def compilation_reported(report: Callable[[str], None]) -> Iterator[None]:
 
 
 def compile_alongside(name: str, function: Callable[[], None], *, within: bool = False) -> None:
-    """Call a function that compiles kernels in another process, while this one compiles a kernel.
+    """Register a function that compiles kernels in another process, while this one compiles.
 
     This process reads from the cache what the other one has compiled by then, and compiles the
     rest. Nothing is started without a cache or a second processor.
@@ -231,11 +231,11 @@ def compile_alongside(name: str, function: Callable[[], None], *, within: bool =
     Parameters
     ----------
     name : str
-        The kernel that this process compiles, as it is not in the cache when it is first called.
+        Kernel whose first call starts the process, if the cache lacks it.
     function : callable
         Public function of a module.
     within : bool
-        Whether the kernel calls the kernels, which are then compiled before others.
+        Whether it calls the kernels that `function` compiles; these are then compiled first.
     """
     functions = _ALONGSIDE.setdefault(name, [])
     functions.insert(0 if within else len(functions), function)

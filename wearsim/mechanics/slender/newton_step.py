@@ -32,9 +32,9 @@ class NewtonState(NamedTuple):
     `unit_load_sum` is their sum. `diagonal` is the derivative of the displacement of each strip by
     its own load, `missing` the residual [m], `step` the step by row [N/m] and `change` the applied
     change of load by strip [N/m]. `surface` is the sum of gap and displacement above the least gap
-    `lowest` [m], complete for the followed strips. `softness` is the wear compliance of each
-    contact, with that of the strips of shared bodies it alone touches [m/(N/m)]; `weight` is work
-    space.
+    `lowest` [m], complete for the followed strips. `softness` is the wear compliance of the
+    strips of each contact, including that of shared bodies where no other contact touches them
+    [m/(N/m)]; `weight` is work space.
     """
 
     fresh: BoolArray

@@ -321,7 +321,7 @@ def dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:
     return [
         (
             f"the materials' Dundurs constant is {pair.dundurs:.3g}: a pressure of"
-            f" {COUPLING_PRESSURE / 1e6:.0f} MPa changes the slip by {slip:.1e}, which only"
-            " contact.model = 'halfspace' includes"
+            f" {COUPLING_PRESSURE / 1e6:.0f} MPa changes the slip by {slip:.1e} in line contact,"
+            " which all contact models except 'halfspace' neglect"
         )
     ]

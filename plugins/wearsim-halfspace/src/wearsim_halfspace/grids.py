@@ -37,7 +37,7 @@ class Problem:
     shear_modulus, poisson_ratio : float
         See `Elements`.
     gap : ndarray, shape (rows, columns)
-        Gap before deformation [m].
+        Gap before deformation by pressure [m].
     force : float
         Normal force [N].
     compliance : ndarray, shape (rows,)
@@ -91,7 +91,7 @@ class Problem:
         return slip
 
     def coarser(self, across: bool) -> Problem:
-        """Return the problem on elements of twice the length along, and also across if asked."""
+        """Return the problem on elements of twice the length, and width if `across`."""
         rows = (0,) if across else ()
         return Problem(
             2.0 * self.dx,
@@ -117,7 +117,7 @@ def with_slip(
     """Return a problem with its rigid slip; spin is about the centre of the line load."""
     varies = -creepage.spin * y if creepage.variation is None else creepage.variation
     along = creepage.longitudinal + varies - float(load @ varies) / float(load.sum())
-    rigid = problem.rigid_slip
+    rigid = np.empty_like(problem.rigid_slip)
     rigid[0] = along[strips, None]
     rigid[1] = creepage.lateral + creepage.spin * problem.x
     centre = float(load @ y) / float(load.sum())
@@ -127,8 +127,8 @@ def with_slip(
 class Work(NamedTuple):
     """Power over rolling velocity [N], forces [N], moment [N m], power of each row [N/m].
 
-    The power is the work of the rigid slip, to which the elastic energy contributes nothing, and of
-    the slip by pressure, which the torque that moves the pressure ahead compensates.
+    The power is the work of the tractions on the rigid slip and on the slip by pressure. Elastic
+    slip by traction contributes nothing.
     """
 
     power: float
@@ -250,12 +250,12 @@ def edges(normal: NormalSolution) -> tuple[FloatArray, FloatArray]:
     increase of the separation from one element to the next. The ratio of the two is continued
     linearly from the two elements ahead to the first one.
 
-    Where particles leave in adhesion, the traction is singular, and tractions that need no slip on
-    a whole row of elements are those of a contact that ends 0.326 elements behind the middle of the
-    last one. Where the edge is elsewhere, they are those with a slip of the last element. Over that
-    of the element behind, it is a function of the place of the edge in line contacts on many
-    elements, and the place follows from the increase of the separation behind the last element,
-    over that behind the next one. The polynomial below is this function, within 0.01.
+    Where particles leave in adhesion, the traction is singular. If the slip of a whole row of
+    elements is zero, the computed contact ends 0.326 elements behind the middle of the last one.
+    For other places of the edge the last element needs a slip. Its ratio to that of the element
+    behind is a function of the place, computed for line contacts on many elements, and the place
+    follows from the increase of the separation behind the last element, over that behind the next
+    one. The polynomial below is this function, within 0.01.
     """
     touches = normal.pressure > 0.0
     columns = touches.shape[1]
@@ -275,7 +275,7 @@ def edges(normal: NormalSolution) -> tuple[FloatArray, FloatArray]:
 def _increases(
     separation: FloatArray, rows: IntArray, ends: IntArray, step: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return how fast the surfaces separate outside the ends of rows.
+    """Return ratios of the increases of the separation outside the ends of rows.
 
     It is the increase of the separation to the first element outside, over that to the second one
     and over that to the third one, and zero where the grid ends before these.

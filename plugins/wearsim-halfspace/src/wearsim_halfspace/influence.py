@@ -104,11 +104,11 @@ class Convolution:
         return self._back(self._transforms[0] * self._forward(field))
 
     def each(self, field: FloatArray) -> FloatArray:
-        """Return those of a field with every kernel, shape (kernels, rows, columns)."""
+        """Return the convolutions of a field with all kernels, shape (kernels, rows, columns)."""
         return self._back(np.asarray(self._transforms * self._forward(field)))
 
     def total(self, fields: FloatArray) -> FloatArray:
-        """Return the sum of those of fields with one kernel each, shape (rows, columns)."""
+        """Return the sum of the convolutions of fields with one kernel each."""
         parts = self._transforms * self._forward(fields)
         return self._back(np.asarray(parts.sum(axis=0)))
 
@@ -139,8 +139,8 @@ class Convolution:
 class Elements:
     """Rectangular elements on two half-spaces of one material each.
 
-    Of quasi-identical bodies, normal pressure gives no relative tangential displacement, and
-    tangential traction no normal one.
+    Of quasi-identical bodies (K = 0), pressure causes no relative tangential displacement, and
+    traction no normal one.
 
     Parameters
     ----------
@@ -204,26 +204,29 @@ class Elements:
 
     @cached_property
     def opening(self) -> Convolution:
-        """Gap opened by traction, `Convolution.total` [m/Pa]."""
+        """Gap opened by traction [m/Pa]; applied by `Convolution.total`."""
         return Convolution(self._coupling()[..., 1:-1])
 
     @cached_property
     def pressed(self) -> Convolution:
-        """Slip by pressure in steady rolling, `Convolution.each`, where `rolling` is [1/Pa].
+        """Slip by pressure in steady rolling [1/Pa], over the same elements as `rolling`.
 
-        Pressure draws the surface towards it, and the more compressible one further.
+        It is applied by `Convolution.each`.
         """
         found = self._coupling()
         return Convolution((found[..., 2:] - found[..., 1:-1]) / self.dx)
 
     @cached_property
     def pressed_in_middle(self) -> Convolution:
-        """The same in the middle of elements [1/Pa]."""
+        """`pressed` in the middle of elements [1/Pa]."""
         found = self._coupling()
         return Convolution((found[..., 2:] - found[..., :-2]) / (2.0 * self.dx))
 
     def _coupling(self) -> FloatArray:
-        """Return gap by traction, and displacement towards pressure, kernels x and y [m/Pa]."""
+        """Return the kernels x and y of the gap opened by traction [m/Pa].
+
+        Those of the displacement by pressure have the opposite sign.
+        """
         shape = self.columns + 1, self.rows, self.dx, self.dy
         found = _mirrored(self._difference * _odd_integrals(*shape))
         found[0, :, : self.columns] *= -1.0  # odd along

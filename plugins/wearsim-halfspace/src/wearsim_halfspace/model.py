@@ -330,7 +330,7 @@ class Halfspace(ws.SingleContactModel):
             normal = solve_normal(problem.elements, *known)
             load, half_length, suits = self._extent(normal, patch.strips, problem.x)
             if not suits:
-                raise ws.ContactError("traction moves the contact of different materials too far")
+                raise ws.ContactError("traction shifts the contact beyond its elements")
             problem = with_slip(problem, creepage, self.grid.y, load, patch.strips)
             patch = Patch(problem, normal, patch.strips, load, half_length)
             solution = solve(problem, normal, tolerance)
@@ -349,7 +349,7 @@ class Halfspace(ws.SingleContactModel):
         dissipation[patch.strips] = np.maximum(work.rows, 0.0)
         dissipation[load == 0.0] = 0.0
         total = float(dissipation.sum()) * self.grid.spacing
-        if total > 0.0:  # the elastic energy returns: the total is the work of the rigid slip
+        if total > 0.0:  # the elastic energy is recovered: the total is that of `Work.power`
             dissipation *= power / total
         return ContactSolution(
             y=self.grid.y,

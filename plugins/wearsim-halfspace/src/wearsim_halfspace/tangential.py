@@ -39,9 +39,8 @@ class Within:
     Parameters
     ----------
     entry : ndarray, shape (2, rows, columns)
-        Factors by which the slip of the elements that particles enter first, while they adhere,
-        follows from that one and two elements ahead; zero elsewhere. Particles are outside for a
-        part of the way.
+        Factors of the slip one and two elements ahead, whose sum is the slip of the first element
+        of a row in adhesion; zero elsewhere. Particles are outside for a part of the way.
     exit : ndarray, shape (rows, columns)
         Slip of the elements that particles leave last, over that of the elements behind them.
         It does not hold for elements that slide, see `solve_rolling`.
@@ -179,8 +178,8 @@ def solve_rolling(
 ) -> TangentialSolution:
     """Return traction and slip of steady rolling, of second order in the length of elements.
 
-    Particles slide before they leave the contact, unless friction is far greater than needed.
-    `Within.exit` is applied only to the elements that adhere both without and with it.
+    Particles usually slide before they leave the contact. `Within.exit` is therefore applied only
+    to elements that adhere both without and with it.
 
     Parameters
     ----------
