@@ -20,6 +20,9 @@ demo: $(VENV)/.installed
 	$(BIN)/wearsim run scenarios/rig-450min.toml -o out/rig-450min.h5 --force
 	$(BIN)/wearsim plot out/rig-450min.h5 -o out/rig-450min.png --force
 
+# threads of BLAS in each of the test processes would wait for each other
+test test-slow: export OPENBLAS_NUM_THREADS = 1
+
 test: lint
 	$(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow"
 
