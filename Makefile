@@ -69,13 +69,16 @@ $(VENV)/bin/python:
 		|| { echo "wearsim needs Python 3.11 or newer; set PYTHON=/path/to/python3"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
+# bytecode is compiled here, as runs start a fifth slower without it where PYTHONDONTWRITEBYTECODE is set
 $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(BIN)/python -m compileall -q wearsim
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml $(wildcard plugins/*/pyproject.toml) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]' \
 		$(patsubst %/pyproject.toml,-e ./%,$(wildcard plugins/*/pyproject.toml))
+	$(BIN)/python -m compileall -q wearsim plugins/*/src
 	@touch $@ $(VENV)/.installed
 
 clean:
