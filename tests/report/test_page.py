@@ -1,17 +1,21 @@
 """The page on results: its content against the results, without a browser."""
 
 import re
+import shlex
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
+from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
 import pytest
+import tomlkit
 from bokeh.models import ColumnDataSource, Plot
 from made_up_ensembles import made_up
 
 import wearsim
+from wearsim.cli.app import app
 from wearsim.errors import WearsimError
 from wearsim.report.measured import Measured
 from wearsim.report.page.page import _part, page_of, save_report
@@ -19,6 +23,7 @@ from wearsim.report.page.run_plots import run_plots
 from wearsim.report.page.study_plots import comparison_plots, ensemble_plots
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.ensemble.compare import compare
+from wearsim.studies.identify.measurements import Measurement
 
 SHORT = {"operation.duration": "3 min", "outputs.records": 4}
 MEASURED = Measured("trace", np.array([-1e-3, 0.0, 1e-3]), np.array([0.0, -2e-6, 0.0]))
@@ -82,6 +87,16 @@ def test_page_states_question_answer_error_and_origin(result):
     assert "wearsim run rig-450min.toml" in page
     (saved,) = re.findall(r'href="data:text/plain;charset=utf-8,([^"]+)"', page)
     assert unquote(saved) == result.raw.scenario_text
+
+
+@pytest.mark.parametrize(
+    ("until", "written"), [("roller_depth=1um", "'roller depth 1um'"), ("1 min", "'1 min'")]
+)
+def test_command_of_a_run_has_its_limit(until, written):
+    rough = {**SHORT, "wear.roller.k_over_h": "1.1e-11 1/Pa"}
+    found = wearsim.run(shipped_scenario("rig-450min", rough), until=until)
+    page = unescape(page_of([found]))
+    assert f"wearsim run rig-450min.toml --until {written}" in page
 
 
 def test_page_loads_nothing(result):
@@ -198,3 +213,49 @@ def test_identification_shows_its_verdict_and_traces(tmp_path):
     assert f"K/H {1e12 * k:.3g}" in page
     (trace,) = data_of(titled(_part(found, []).plots, "Groove t1.csv").figure, "fitted")
     assert trace.data["fitted"].min() == pytest.approx(-1e6 * truth.depth[-1], rel=0.05)
+
+
+def repeated(page: str, folder: Path) -> list[str]:
+    """Save the files of a page in a folder, and return its command."""
+    pattern = r'download="([^"]+)" href="data:text/plain;charset=utf-8,([^"]+)"'
+    for name, text in re.findall(pattern, page):
+        (folder / unescape(name)).write_text(unquote(text))
+    (command,) = re.findall(r"<code>(wearsim .*)</code>", page)
+    return shlex.split(unescape(command))[1:]
+
+
+def test_identification_is_repeated_from_its_page(tmp_path, monkeypatch):
+    depth = {"depth": "5 um", "depth_std": "0.5 um", "at": "2 min", "group": "one"}
+    (tmp_path / "tables").mkdir()
+    y = np.arange(-10e-3, 10e-3, 100e-6)
+    noise = 0.05e-6 * np.random.default_rng(2).standard_normal(len(y))
+    short = shipped_scenario("rig-identify", {"operation.duration": "20 min"})
+    truth = wearsim.run(shipped_scenario("rig-450min", {"operation.duration": "20 min"}))
+    down = noise + np.interp(y, truth.y, truth.profiles[-1])
+    rows = [f"{1e3 * a:.4f},0,{1e6 * b:.4f}" for a, b in zip(y, down, strict=True)]
+    (tmp_path / "tables" / "t1.csv").write_text("\n".join(["place,z,Tiefe", *rows]))
+    profile = {"profile": "tables/t1.csv", "columns": ["place", "-Tiefe"], "units": ["mm", "um"]}
+    known = {"set": {"load": "310 N", "friction": 0.11}, "std": {"load": "5 N"}}
+    tests = {"test": [depth, {**profile, **known, "shoulders": "8 mm"}]}
+    (tmp_path / "tests.toml").write_text(tomlkit.dumps(tests))
+    found = wearsim.identify(short, tmp_path / "tests.toml", draws=16, negligible=0.3)
+    page = page_of([found])
+    assert "these files are needed too, beside rig-identify-tests.toml: t1.csv." in page
+    folder = tmp_path / "again"
+    folder.mkdir()
+    command = repeated(page, folder)
+    (tmp_path / "tables" / "t1.csv").rename(folder / "t1.csv")
+    monkeypatch.chdir(folder)
+    app([*command, "-o", "again.h5", "-q"], standalone_mode=False)
+    again = wearsim.open_results("again.h5")
+    assert again.summary == found.summary
+    for name in ("depth_m", "k_over_h_per_Pa", "passes"):
+        assert [test[name] for test in again.tests] == [test[name] for test in found.tests]
+
+
+def test_page_of_an_identification_without_its_measurements_claims_no_repetition():
+    depths = [Measurement("a.csv", depth=48e-6, depth_std=1e-6)]
+    found = wearsim.identify(shipped_scenario("rig-identify"), depths, draws=16)
+    page = unescape(page_of([replace(found, raw=replace(found.raw, measured=[]))]))
+    assert "add the options of the study" in page
+    assert "gives the same numbers" not in page

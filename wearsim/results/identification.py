@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -78,14 +78,24 @@ class IdentificationData(StudyData):
         Scatter, verdict and what would decide.
     variables : dict of str to ndarray
         Variables of `wearsim.results.identification`.
+    measured : list of dict
+        Tables of a tests file with the same measurements.
+    draws : int, optional
+        Required number of draws.
+    shared : bool
+        Whether both bodies have one unknown factor of their K/H.
     """
 
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored | {"variables"}
+    optional: ClassVar[frozenset[str]] = frozenset({"measured", "draws", "shared"})
 
     tests: list[dict[str, Any]]
     specimens: list[str]
     summary: dict[str, Any]
     variables: Arrays
+    measured: list[dict[str, Any]] = field(default_factory=list)
+    draws: int | None = None
+    shared: bool = False
 
     @property
     def schema(self) -> Schema:

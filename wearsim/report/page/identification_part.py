@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
+import tomlkit
 from bokeh.models.ranges import Range1d
 
-from wearsim.report.page.part import Part, command_of, files_of, tables_of
+from wearsim.report.page.part import SAME_NUMBERS, Part, command_of, files_of, tables_of
 from wearsim.report.page.plots import COLOURS, MM, UM, Plot, axes, columns, hover, legend
 from wearsim.report.parts import BLUE, GREY, ORANGE, evenly_spaced
 from wearsim.report.summary import with_range
@@ -57,9 +61,40 @@ def of_identification(result: IdentificationResult) -> Part:
         plots=[_factors(result), _scatter(result), *_traces(result)],
         tables=tables_of(result, ("Tests", tests), []),
         warnings=[*result.warnings, *result.notes],
-        files=files_of(result),
-        command=command_of(result, "identify", *(_name(test["file"]) for test in result.tests)),
+        **_repetition(result),
     )
+
+
+def _repetition(result: IdentificationResult) -> dict[str, Any]:
+    """Return files, command and remark that repeat a study."""
+    raw, files = result.raw, files_of(result)
+    if not raw.measured:
+        remark = (
+            "The results file holds neither the measured profiles nor the tests file and options,"
+            " such as --tests, --columns and --draws: put the profiles beside these files, and add"
+            " the options of the study. An identification that is repeated stores them."
+        )
+        names = (_name(test["file"]) for test in result.tests)
+        return {"files": files, "command": command_of(result, "identify", *names), "remark": remark}
+    profiles = dict.fromkeys(
+        test[key] for test in raw.measured for key in ("profile", "before") if key in test
+    )
+    tests, remark = f"{Path(raw.scenario_file).stem}-tests.toml", SAME_NUMBERS
+    if profiles:
+        remark = (
+            "The measured profiles are not stored in the results file; these files are needed too,"
+            f" beside {tests}: {', '.join(profiles)}. {remark}"
+        )
+    options = ["--tests", tests, "--negligible", f"{result.summary['negligible']!r}"]
+    if raw.draws is not None:
+        options += ["--draws", str(raw.draws)]
+    if raw.shared:
+        options += ["--share", "k=cylinder,roller"]
+    return {
+        "files": [*files, (tests, tomlkit.dumps({"test": raw.measured}))],
+        "command": command_of(result, "identify", *options),
+        "remark": remark,
+    }
 
 
 _NEXT = ("median_per_Pa", "low_per_Pa", "high_per_Pa")

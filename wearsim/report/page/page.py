@@ -136,7 +136,7 @@ def _of_run(result: Result, measured: Sequence[Measured]) -> Part:
         warnings=[*filter(None, [result.failure]), *result.warnings, *result.notes],
         steps=[_position(result, record) for record in records_of(result)],
         files=files_of(result),
-        command=command_of(result, "run"),
+        command=command_of(result, "run", *(("--until", raw.until) if raw.until else ())),
     )
 
 

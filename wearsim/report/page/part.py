@@ -26,6 +26,10 @@ SAMPLING = (
     "Intervals in brackets hold the true value with 95 % confidence for the stated scatter of the"
     " inputs. They do not contain the errors of the contact model or of the wear law."
 )
+SAME_NUMBERS = (
+    "The same version of wearsim gives the same numbers on the same kind of machine, for any number"
+    " of workers."
+)
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,8 @@ class Part:
         Name and text of the scenario and the input files.
     command : str
         Command that repeats the computation.
+    remark : str
+        What the command gives, and what it needs besides the files.
     """
 
     title: str
@@ -63,6 +69,7 @@ class Part:
     steps: list[str] = field(default_factory=list)
     files: list[tuple[str, str]] = field(default_factory=list)
     command: str = ""
+    remark: str = SAME_NUMBERS
 
 
 def tables_of(

@@ -23,6 +23,7 @@ from wearsim.studies.identify.measurements import (
     key_of,
     measurements_of,
     read_tests,
+    tables_of,
 )
 from wearsim.studies.identify.pooling import FEW_DRAWS, content, specimens_of
 from wearsim.studies.identify.traces import Trace, read_trace
@@ -127,9 +128,9 @@ def identify(
     with shown_progress(progress, "Counter", on_progress, scenario) as watch:
         rows = study.rows(watch)
     specimens = specimens_of(rows)
-    data = content(
-        study.scenario, specimens, negligible, study.notes, created, time.monotonic() - started
-    )
+    seconds = time.monotonic() - started
+    given = {"measured": tables_of(items), "draws": draws, "shared": shared}
+    data = content(study.scenario, specimens, negligible, study.notes, created, seconds, **given)
     if output is not None:
         write_results(Path(output), data)
     return IdentificationResult(data, Path(output) if output is not None else None)

@@ -11,6 +11,7 @@ from typing import Any
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
+from wearsim.scenario.parse.toml import as_toml
 
 #: Short names of inputs.
 SHORT = {
@@ -151,6 +152,51 @@ def read_tests(path: str | Path) -> list[Measurement]:
         found.append(_read_test(table, f"test {number}", file.parent, mistakes))
     if mistakes:
         raise ScenarioError(str(path), mistakes)
+    return found
+
+
+def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
+    """Return the tables of a tests file in the folder of its profiles.
+
+    Parameters
+    ----------
+    items : sequence of Measurement
+
+    Returns
+    -------
+    list of dict
+        Values as TOML and JSON can hold them.
+    """
+    files = {path for item in items for path in (item.profile, item.before) if path is not None}
+    unique = len({path.name for path in files}) == len(files)
+
+    def name(path: Path | None) -> str | None:
+        return None if path is None else path.name if unique else path.as_posix()
+
+    def length(value: float | None) -> str | None:
+        return None if value is None else f"{float(value)!r} m"
+
+    found = []
+    for item in items:
+        choice = item.choice
+        table: dict[str, Any] = {
+            "profile": name(item.profile),
+            "before": name(item.before),
+            "depth": length(None if item.profile else item.depth),
+            "depth_std": length(None if item.profile else item.depth_std),
+            "at": item.at,
+            "group": item.group,
+            "set": dict(item.values) or None,
+            "std": dict(item.errors) or None,
+            "body": item.body if item.body != "cylinder" else None,
+            "shoulders": length(item.shoulders),
+            "columns": choice.columns,
+            "units": choice.units,
+            "row": choice.row,
+            "mean_rows": choice.mean_rows,
+            "row_at": length(choice.at),
+        }
+        found.append({key: as_toml(value) for key, value in table.items() if value is not None})
     return found
 
 

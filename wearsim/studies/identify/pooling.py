@@ -123,6 +123,7 @@ def content(
     notes: Sequence[str],
     created: str,
     seconds: float,
+    **given: Any,
 ) -> IdentificationData:
     """Return the content of a results file.
 
@@ -137,6 +138,8 @@ def content(
         Start of the study, ISO 8601.
     seconds : float
         Its duration.
+    **given
+        Measurements and options, fields of `IdentificationData` that repeat the study.
     """
     kernels = [specimen.kernel for specimen in specimens]
     posterior = Posterior.of(kernels)
@@ -156,6 +159,7 @@ def content(
         tests=[_test(row, specimen) for specimen in specimens for t in specimen.tests for row in t],
         specimens=[specimen.name for specimen in specimens],
         summary=summary,
+        **given,
         variables={
             "scatter": posterior.t,
             "mean_ln_k": posterior.m,
