@@ -79,7 +79,7 @@ class Limit:
 
     @classmethod
     def parse(cls, text: str | float) -> Limit:
-        """Return the limit of a text such as "depth 50 um" or "lift_error=30um".
+        """Return the limit of a text: "depth 50 um", "lift_error 30 um" or "lift_error=30um".
 
         A number is a time [s].
 
@@ -91,8 +91,8 @@ class Limit:
         if not isinstance(text, str):
             text = f"{float(text)!r} s"
         named = re.fullmatch(r"\s*([A-Za-z_ ]+?)\s*=(.*)", text)
-        words = f"{named[1].replace('_', ' ')} {named[2]}" if named else text
-        words = " ".join(words.split())
+        words = f"{named[1]} {named[2]}" if named else text
+        words = " ".join(re.sub("(?<=[A-Za-z])_(?=[A-Za-z])", " ", words).split())
         parts = re.fullmatch(r"([A-Za-z ]*?) ?([^A-Za-z ].*)", words)
         kind = parts[1].lower().removeprefix("worn ") if parts else "nothing"
         passes = re.fullmatch(rf"({NUMBER.pattern}) ?(?:roller )?passes", words)

@@ -38,6 +38,8 @@ def path(tmp_path: Path) -> Path:
         ("Roller depth 5um", "roller depth", 5e-6),
         ("volume 12 mm^3", "volume", 12e-9),
         ("lift_error=30um", "lift error", 30e-6),
+        ("lift_error 5 um", "lift error", 5e-6),
+        ("peak_pressure 900 MPa", "peak pressure", 9e8),
         ("peak pressure 900 MPa", "peak pressure", 9e8),
         ("clearance = 60 um", "clearance", 60e-6),
         ("width=14mm", "width", 14e-3),

@@ -39,8 +39,9 @@ Until = Annotated[
     str | None,
     typer.Option(
         metavar="LIMIT",
-        help="Stop a wear test where it first reaches a limit: 'depth 50 um', 'roller depth 5 um',"
-        " 'volume 12 mm^3', '12 h' or '2e6 passes'. A shorter test is extended.",
+        help="Stop a wear test where it first reaches a limit: 'depth 50 um', 'roller_depth 5 um',"
+        " 'lift_error 30 um', 'volume 12 mm^3', 'width 14 mm', 'peak_pressure 900 MPa',"
+        " 'clearance 60 um', '12 h' or '2e6 passes'. A shorter test is extended.",
         show_default=False,
     ),
 ]
