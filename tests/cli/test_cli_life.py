@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -69,6 +72,39 @@ def test_two_designs_are_compared(command: Command, slim: Path, wide: Path) -> N
     text = command("life", "wide-life.h5", "slim-life.h5", *HERE).stdout
     assert "wide outlives slim on 100.0 %" in " ".join(text.split())
     assert "a specimen of wide outlives a specimen of slim" in " ".join(text.split())
+
+
+def test_stopped_comparison_states_how_to_go_on(
+    command: Command, slim: Path, wide: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = life_of(command, wide, slim, "-n", 8)
+    for file in ("wide-life.h5", "slim-life.h5"):
+        Path(file).unlink()
+    with monkeypatch.context() as patch:
+        patch.setattr(Event, "is_set", lambda _: True)
+        stopped = command("life", wide, slim, "-n", 8, *HERE)
+    assert stopped.exit_code == 130
+    refused = command("life", wide, slim, "-n", 8, *HERE)
+    assert refused.exit_code == 2
+    unfinished = (
+        "error: wide-life.h5: already exists and is unfinished; `wearsim resume wide-life.h5`"
+    )
+    assert refused.stderr.startswith(unfinished)
+    assert len(refused.stderr.splitlines()) == 1
+    for text in (stopped.stderr, refused.stderr):
+        resumed, other, both = re.findall(r"wearsim (resume [\w.-]+|life [^`\n]+)", text)
+        assert resumed == "resume wide-life.h5"
+    assert command(*shlex.split(resumed), *HERE).exit_code == 0
+    assert command(*shlex.split(other), "-n", 8, *HERE).exit_code == 0
+    again = json.loads(command(*shlex.split(both), "--json").stdout)
+    assert again["b10_ratio"] == whole["b10_ratio"]
+
+
+def test_wrong_limit_is_refused_before_an_existing_file(command: Command, slim: Path) -> None:
+    Path("slim-life.h5").write_text("kept")
+    refused = command("life", slim, "--limit", "depht=50um", *HERE)
+    assert "is not a limit of a life" in refused.stderr
+    assert "exists" not in refused.stderr
 
 
 def test_results_file_is_named_after_the_scenario(command: Command, slim: Path) -> None:

@@ -191,3 +191,17 @@ def test_export_writes_csv_with_units(command: Command, finished: Path) -> None:
     assert command("export", finished, "-o", "out").exit_code == 2
     assert command("export", finished).exit_code == 0
     assert Path("short/history.csv").read_text() == Path("out/history.csv").read_text()
+
+
+@pytest.mark.parametrize(
+    ("verb", "output"), [("plot", "rig.png"), ("report", "rig.html"), ("compare", "c.png")]
+)
+def test_wrong_input_is_refused_before_an_existing_output(
+    command: Command, verb: str, output: str
+) -> None:
+    Path("rig.toml").write_text("[roller]\n")
+    Path(output).write_text("kept")
+    more = ("rig.toml", "-o", output) if verb == "compare" else ()
+    refused = command(verb, "rig.toml", *more)
+    assert refused.exit_code == 2
+    assert "rig.toml: is not a results file" in refused.stderr

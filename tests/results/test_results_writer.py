@@ -160,6 +160,19 @@ def test_existing_file_is_replaced_only_with_force(tmp_path: Path) -> None:
     check_output(path, force=True)
 
 
+def test_unfinished_run_is_continued_rather_than_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    write_results(path, some_run(finished=False))
+    with pytest.raises(ResultsFileError) as caught:
+        check_output(path, force=False)
+    start = f"{path}: already exists and is unfinished; "
+    assert str(caught.value).startswith(f'{start}wearsim.resume("{path}") continues it, force=')
+    assert caught.value.at_shell.startswith(f"{start}`wearsim resume {path}` continues it, --force")
+    write_results(path, some_run(finished=True))
+    with pytest.raises(ResultsFileError, match=r"already exists; force=True"):
+        check_output(path, force=False)
+
+
 def test_unwritable_output_is_refused_before_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -226,6 +226,7 @@ def _run(
 ) -> list[LifeResult]:
     """Run the studies of all designs, and return their results."""
     from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
+    from wearsim.cli.render import life_table
     from wearsim.results import check_output
     from wearsim.studies.ensemble.sweep import path_of
     from wearsim.studies.kernels import kernels_of
@@ -241,9 +242,7 @@ def _run(
     else:
         paths = [path_of(base, label) for label in labels]
     checked = []
-    for scenario, path in zip(scenarios, paths, strict=True):
-        refuse_same_file(figure, path, scenario.paths)
-        check_output(path, options["force"], scenario.paths)
+    for scenario in scenarios:
         with checking("--limit"):
             checked.append(settings.with_limits(scenario, options["limits"]))
     for name, option in (("target", "--target"), ("most", "--max")):
@@ -259,12 +258,17 @@ def _run(
             )
             rare = (options[name] for name in ("rare", "precision", "rare_method"))
             settings.with_rare_events(scenario, chosen, *rare)
+    going_on = partial(life_table.going_on, labels, checked, paths, options["variable"])
+    for scenario, path in zip(checked, paths, strict=True):
+        refuse_same_file(figure, path, scenario.paths)
+        with going_on(path):
+            check_output(path, options["force"], scenario.paths)
     results = []
     for label, scenario, path in zip(labels, checked, paths, strict=True):
         if several and not quiet:
             note(f"{label}: {path}")
         watcher = EnsembleWatcher(quiet, kernels=partial(kernels_of, scenario))
-        with stop_on_signals(STOPPING) as stop, watcher as watch:
+        with going_on(path), stop_on_signals(STOPPING) as stop, watcher as watch:
             found = api.life(
                 scenario,
                 realisations,

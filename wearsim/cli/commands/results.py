@@ -74,7 +74,6 @@ def plot(
 ) -> None:
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
-    check_figure(path, force)
     from wearsim.results import (
         DissipationResult,
         IdentificationResult,
@@ -85,6 +84,7 @@ def plot(
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
     result = open_results(file)
+    check_figure(path, force)
     if measured and isinstance(result, DissipationResult | IdentificationResult):
         raise typer.BadParameter(
             f"requires wear tests; {file} holds {result.raw.schema.holds}", param_hint="--measured"
@@ -276,13 +276,13 @@ def compare(
         raise typer.BadParameter(
             f"there is one file, {files[0]}; give another one to compare", param_hint="FILE.h5"
         )
-    check_figure(figure, force)
     from wearsim.results import refuse_inputs
     from wearsim.studies.ensemble.compare import observables_of
 
     if figure is not None:
         refuse_inputs(figure, files, "the comparison")
     results = [_open(file) for file in files]
+    check_figure(figure, force)
     labels = _labels(files)
     for label, result in zip(labels, results, strict=True):
         known = observables_of(result)

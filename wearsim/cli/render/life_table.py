@@ -3,21 +3,67 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import typer
 
 from wearsim.cli.shared import write_list, write_table
+from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.report.lives import life_cells, rare_text
 from wearsim.report.summary import Rows, input_rows, limits_of
 from wearsim.report.text import NOTHING, count, lapse, part_with_interval, shown, too_few
 from wearsim.results.ensemble.life import LifeResult
 from wearsim.results.ensemble.life_settings import DesignVariable, LifeComparison
+from wearsim.scenario import Scenario
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.lives import least_survival
+
+
+@contextmanager
+def going_on(
+    labels: Sequence[str],
+    scenarios: Sequence[Scenario],
+    paths: Sequence[Path],
+    key: str,
+    path: Path,
+) -> Iterator[None]:
+    """Add the commands for the other designs to the error of a file that exists or was stopped.
+
+    Parameters
+    ----------
+    labels, scenarios, paths : sequence
+        Designs and their results files.
+    key : str
+        Key of a sweep, whose values are the labels; empty for scenarios.
+    path : Path
+        The file in question.
+
+    Raises
+    ------
+    ResultsFileError, Interrupted
+        Those within, with more text where several designs are compared.
+    """
+    try:
+        yield
+    except (ResultsFileError, Interrupted) as error:
+        if len(paths) == 1 or not path.exists():
+            raise
+        each = zip(labels, scenarios, paths, strict=True)
+        commands = []
+        for label, scenario, file in (item for item in each if not item[2].exists()):
+            swept = ["--set", f"{key}={label}"] if key else []
+            options = [*swept, "--seed", str(scenario.seed), "-o", str(file)]
+            commands.append(shlex.join(["wearsim", "life", scenario.file, *options]))
+        steps = [f"`{command}` with the other options" for command in commands]
+        steps.append(f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`")
+        text = f"{error.at_shell}; the comparison is finished by {', then '.join(steps)}"
+        raise type(error)(text) from error
 
 
 def write_life(result: LifeResult, more: Rows) -> None:

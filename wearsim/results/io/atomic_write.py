@@ -264,14 +264,33 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
         if not target.is_file():
             raise _refused(path, "is not a regular file", "choose another")
         if not force:
+            verb = _continuing(path)
+            known = "already exists and is unfinished" if verb else "already exists"
+            python = f'wearsim.{verb}("{path}") continues it, ' if verb else ""
+            shell = f"`wearsim resume {path}` continues it, " if verb else ""
             raise ResultsFileError(
-                f"{path}: already exists",
-                python="force=True replaces it, output=... chooses another",
-                shell="--force replaces it, -o chooses another",
+                f"{path}: {known}",
+                python=f"{python}force=True replaces it, output=... chooses another",
+                shell=f"{shell}--force replaces it, -o chooses another",
             )
         refuse_if_locked(path)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise _refused(path, f"the folder {folder} is not writable", "choose another")
+
+
+def _continuing(path: str | Path) -> str:
+    """Return the function that continues an unfinished study; "" for any other file."""
+    import h5py  # noqa: PLC0415  (takes 0.2 s to import)
+
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            if file.attrs.get("finished", 1):
+                return ""
+            # by a variable that only files of this kind have
+            verbs = {"step": "resume", "life": "resume_life", "realisation": "resume_ensemble"}
+            return next((verb for name, verb in verbs.items() if name in file), "")
+    except (OSError, RuntimeError, KeyError, ValueError):  # not a results file, or damaged
+        return ""
 
 
 def _refused(path: str | Path, what: str, remedy: str) -> ResultsFileError:
