@@ -94,6 +94,7 @@ def test_wrong_usage_is_bad_input(command: Command, arguments: list[str]) -> Non
             1,
             "error: lost contact\nstate at the failure: gap 1e+06 um, load 2\n",
         ),
+        (SolverError("no strip", {"contact_model": "hertz"}), 1, "error: no strip\n"),
         (FileNotFoundError(2, "No such file or directory", "x"), 1, "error: x: No such file"),
         (ZeroDivisionError("oh"), 1, "internal error: ZeroDivisionError: oh\n"),
         (KeyboardInterrupt(), 130, "interrupted\n"),

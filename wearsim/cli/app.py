@@ -237,8 +237,9 @@ def _message(error: BaseException) -> str:
     if isinstance(error, SolverError) and error.state:
         from wearsim.cli.render.failure import solver_state
 
-        text = f"error: {error.at_shell}\nstate at the failure: {solver_state(error.state)}"
-        return "\n".join([text, *getattr(error, "__notes__", ())])
+        state = solver_state(error.state)
+        lines = [f"error: {error.at_shell}", *([f"state at the failure: {state}"] if state else [])]
+        return "\n".join([*lines, *getattr(error, "__notes__", ())])
     if isinstance(error, ScenarioError | Interrupted):  # their messages start with file or progress
         return error.at_shell
     if isinstance(error, WearsimError):

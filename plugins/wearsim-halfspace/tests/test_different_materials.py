@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import wearsim
 from wearsim.errors import ContactError
+from wearsim.scenario.examples import shipped_scenario
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 from wearsim_halfspace import Halfspace, HalfspaceOptions
 from wearsim_halfspace.strips import combined, difference, half_width
@@ -120,3 +122,37 @@ def test_fields_are_those_of_the_coupled_contact():
 def test_contact_that_traction_moves_off_the_elements_is_an_error():
     with pytest.raises(ContactError, match="traction shifts the contact beyond"):
         solved((STEEL, HARD_PLASTIC), Creepage(0.5), friction=4.0, force=3.0)
+
+
+@pytest.mark.parametrize(
+    ("material", "mx", "creepages"),
+    [
+        ("aluminium", 24, (2.98e-4, 3e-4, 3.02e-4)),
+        ("bronze", 50, (2.1203e-4, 2.1356e-4, 2.1509e-4)),
+    ],
+)
+def test_row_that_alternates_between_states_ends_the_iteration(material, mx, creepages):
+    """In the contact at the middle creepage, near free rolling, the same row changes each time."""
+    changes = {
+        "contact.model": "halfspace",
+        "contact.mx": mx,
+        "roller.material": material,
+        "load.normal_force": "28.7 N",
+        "cylinder.radius": "20 mm",
+        "roller.radius": "25 mm",
+        "roller.crown_radius": "25 mm",
+    }
+    before, power, after = (
+        wearsim.solve_contact(
+            shipped_scenario("rig-450min", changes | {"creepage.longitudinal": creepage})
+        ).power
+        for creepage in creepages
+    )
+    assert power == pytest.approx(0.5 * (before + after), rel=5e-3)
+
+
+def test_note_on_neglected_coupling_is_left_out_where_it_is_included():
+    bronze = {"roller.material": "bronze", "contact.model": "halfspace"}
+    assert shipped_scenario("rig-450min", bronze).notes == ()
+    [note] = shipped_scenario("rig-450min", bronze | {"contact.coupling": False}).notes
+    assert "neglected" in note

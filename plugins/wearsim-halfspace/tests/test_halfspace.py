@@ -59,6 +59,18 @@ def test_stated_error_of_a_contact_includes_that_of_elements_along_rolling():
     finer = wearsim.solve_contact(shipped_scenario("rig-450min", {**raw, "contact.mx": 120}))
     true = abs(found.solution.power / finer.power - 1.0)
     assert 5e-5 < true < found.grid_error < 5.0 * true
+    # the changes with half the strips and with half the elements are added without their signs
+    bronze = {"roller.material": "bronze", "creepage.yaw": "0.2 mrad", "friction.coefficient": 0.3}
+    errors = [
+        wearsim.study_contact(
+            shipped_scenario(
+                "rig-450min", {"contact.model": "halfspace", "contact.mx": mx, **bronze}
+            ),
+            with_error=True,
+        ).grid_error
+        for mx in (12, 24)
+    ]
+    assert min(errors) > 5e-4
 
 
 def test_extrapolation_leaves_a_part_of_the_error():

@@ -67,7 +67,6 @@ from wearsim.units import shown
 #: Keys that exclude each other: an override of one removes the others.
 _ALTERNATIVES = {**ALTERNATIVES, "creepage": (("misalignment", "yaw"), ("misalignment", "tilt"))}
 
-
 PROFILE = "cylinder.profile"
 #: Name of the file that holds a profile given as arrays, among the files of a scenario.
 PROFILE_FILE = "profile-from-python.csv"
@@ -287,7 +286,7 @@ def parse_fields(
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)
     notes = (
-        *dundurs_note(sections["roller"], sections["cylinder"]),
+        *dundurs_note(sections["roller"], sections["cylinder"], sections["contact"]),
         *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
         *_unused_sampling_note(data, random),
         *mistakes.notes,
@@ -393,6 +392,7 @@ def keys_by_place() -> dict[str, set[str]]:
     for law in installed(MotionLawSpec):
         keys[f'an entry of cam.motion with law = "{law.name}"'] = set(law.options.model_fields)
     keys["an entry of cam.motion"] = set(MotionTable.model_fields)
+    keys['[contact] with model = "auto"'] = {"tolerance"}
     keys["a random input"] = set(RandomInputTable.model_fields)
     return keys | {
         f'a random input with distribution = "{spec.name}"': set(spec.options.model_fields)

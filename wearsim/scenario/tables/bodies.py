@@ -32,6 +32,7 @@ from wearsim.quantities import (
 )
 from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.parse.random_inputs import validate
+from wearsim.scenario.tables.plugin import ContactChoice
 from wearsim.types import FloatArray, Material, Profile
 from wearsim.units import ANGLE, INERTIA, QuantityError, shown
 
@@ -309,19 +310,20 @@ def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | N
     )
 
 
-def dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:
-    """Return a note if the coupling of pressure and traction is not negligible.
+def dundurs_note(roller: Roller, cylinder: Cylinder, contact: ContactChoice) -> list[str]:
+    """Return a note if the coupling of pressure and traction is neglected but not negligible.
 
     In line contact a pressure p changes the slip by 2 beta p/E*, with Dundurs' constant beta.
     """
     pair = combine(cylinder.material, roller.material)
-    if abs(pair.dundurs) <= DUNDURS_LIMIT:
+    coupled = getattr(contact.options, "coupling", False)
+    if coupled or abs(pair.dundurs) <= DUNDURS_LIMIT:
         return []
     slip = 2.0 * abs(pair.dundurs) * COUPLING_PRESSURE / pair.contact_modulus
     return [
         (
             f"the materials' Dundurs constant is {pair.dundurs:.3g}: a pressure of"
             f" {COUPLING_PRESSURE / 1e6:.0f} MPa changes the slip by {slip:.1e} in line contact,"
-            " which all contact models except 'halfspace' neglect"
+            " which is neglected; contact.model = 'halfspace' with coupling = true includes it"
         )
     ]

@@ -19,7 +19,7 @@ REFERENCE = "halfspace"  # the exact theory
 RESOLUTIONS = (3.0, 2.0, 1.5, 1.0)
 FEW = (1.0, 0.5)  # of a check during a run
 #: How to install models of the project's plugins.
-INSTALL = {"halfspace": "pip install 'wearsim[halfspace]'"}
+INSTALL = {"halfspace": "pip install ./plugins/wearsim-halfspace"}
 
 #: Builds a model with some options for strips.
 Build = Callable[[Options, Grid], ContactModel]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -57,9 +58,9 @@ class ContactStudy:
     described_model : str
         Name and options of the contact model.
     grid_error : float, optional
-        Relative change of the power with half as many strips, and half as many elements along
-        rolling in a reference model: an upper estimate of the error. None where it was not
-        requested, or the coarse grid has no solution.
+        Relative change of the power with half as many strips, plus that with half as many elements
+        along rolling in a reference model: an upper estimate of the error. None where it was not
+        requested, or a coarse grid has no solution.
     pressure_error : float, optional
         The same of the peak pressure.
     seconds : float, optional
@@ -234,34 +235,35 @@ def _reference(
     raise failure
 
 
-def _coarser(scenario: Scenario) -> Scenario:
-    """Return a scenario whose reference model has half as many elements along rolling."""
+def _coarser(scenario: Scenario) -> Iterator[tuple[Scenario, int]]:
+    """Yield the scenario with half as many strips, and with half as many elements along rolling.
+
+    The latter of reference models only. Each comes with the divisor of the number of strips.
+    """
+    yield scenario, 2
     choice = scenario.contact
-    if not (choice.spec.reference and hasattr(choice.options, "mx")):
-        return scenario
-    options = type(choice.options).model_validate(
-        {**choice.options.model_dump(), "mx": (choice.options.mx + 1) // 2}
-    )
-    return replace(scenario, contact=replace(choice, options=options))
+    if choice.spec.reference and (elements := getattr(choice.options, "mx", None)):
+        options = choice.options.model_copy(update={"mx": (elements + 1) // 2})
+        yield replace(scenario, contact=replace(choice, options=options)), 1
 
 
 def _grid_errors(
     scenario: Scenario, grid: Grid, solution: ContactSolution
 ) -> tuple[float | None, float | None]:
-    """Return the relative changes of power and peak pressure with half as many strips.
-
-    A reference model has half as many elements along rolling too.
-    """
+    """Return the relative changes of power and peak pressure on coarser grids, added up."""
     if grid.strips < 2 * _FEWEST:
         return None, None
+    power = pressure = 0.0
     try:
-        coarse = Grid.spanning(*grid.edges, (grid.strips + 1) // 2)
-        model, gap, curvature, point = _contact(_coarser(scenario), coarse)
-        other = model.solve_one(gap, curvature, point)
+        for coarser, divisor in _coarser(scenario):
+            strips = (grid.strips + divisor - 1) // divisor
+            model, gap, curvature, point = _contact(coarser, Grid.spanning(*grid.edges, strips))
+            other = model.solve_one(gap, curvature, point)
+            power += abs(other.power / solution.power - 1.0) if solution.power else 0.0
+            pressure += abs(other.peak_pressure / solution.peak_pressure - 1.0)
     except WearsimError:
         return None, None
-    power = abs(other.power / solution.power - 1.0) if solution.power else None
-    return power, abs(other.peak_pressure / solution.peak_pressure - 1.0)
+    return power if solution.power else None, pressure
 
 
 def _grid_dependence(

@@ -209,8 +209,8 @@ def _unchanged(slip: FloatArray) -> FloatArray:
 
 def _projected(traction: FloatArray, bound: FloatArray) -> FloatArray:
     """Return tractions with their sizes limited by the bound."""
-    size = np.maximum(np.hypot(*traction), TINY)
-    return np.asarray(traction * np.minimum(1.0, bound / size))
+    size = np.maximum(np.maximum(np.hypot(*traction), bound), TINY)
+    return np.asarray(traction * (bound / size))
 
 
 class _Rows:
