@@ -9,12 +9,15 @@ from matplotlib.figure import Figure
 
 from wearsim.errors import PluginError, ResultsFileError
 from wearsim.report.figures.contact import contact_figure
+from wearsim.report.figures.identification import identification_figure
 from wearsim.report.figures.run import run_figure
 from wearsim.report.measured import Measured
 from wearsim.report.parts import save_figure
 from wearsim.results import Result
 from wearsim.scenario import load_scenario
 from wearsim.studies.contact.single import ContactStudy, study_contact
+from wearsim.studies.identify.api import identify
+from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.run import run as study_run
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -158,3 +161,17 @@ def test_figure_is_written_completely_or_not_at_all(
     save_figure(figure, path)
     assert path.read_bytes().startswith(b"\x89PNG")
     assert path.stat().st_mode & 0o044  # readable by others, unlike a temporary file
+
+
+def test_wear_factors_within_a_decade_have_several_ticks() -> None:
+    depths = [Measurement("one", depth=1e-6 * depth, depth_std=1e-6) for depth in (46, 50, 53)]
+    found = identify(load_scenario(SCENARIOS / "rig-450min.toml"), depths)
+    for axes in identification_figure(found).axes:
+        low, high = axes.get_xlim()
+        assert high < 10.0 * low
+        places = [place for place in axes.get_xticks() if low < place < high]
+        assert len(places) >= 4
+        assert [axes.xaxis.get_major_formatter()(place) for place in places] == [
+            f"{place:g}" for place in places
+        ]
+        assert not len(axes.xaxis.get_ticklocs(minor=True))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, RED, name_axes, titled_figure
 from wearsim.results import IdentificationResult
@@ -102,9 +103,7 @@ def draw_factors(axes: Axes, result: IdentificationResult) -> None:
     low = min(grid[row.searchsorted(1e-3)] for row in below)
     high = max(grid[min(row.searchsorted(0.999), len(grid) - 1)] for row in below)
     axes.set_xlim(1e12 * 0.8 * low, 1e12 * 1.25 * high)
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter("{x:g}")
-    axes.tick_params(axis="x", which="minor", labelsize=6.5)
+    _set_ticks(axes)
     name_axes(axes, "K/H of each specimen, and of the next one", "K/H [1e-12 1/Pa]", "")
 
 
@@ -130,11 +129,20 @@ def _draw_density(axes: Axes, result: IdentificationResult) -> None:
         xlim=(0.9 * float(median[inside].min()), 1.1 * float(median[inside].max())),
     )
     axes.axhline(result.summary["negligible"], color=GREY, lw=0.8, ls="--")
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.xaxis.set_minor_formatter("{x:g}")
-    axes.tick_params(axis="x", which="minor", labelsize=6.5)
+    _set_ticks(axes)
     title = "Median and scatter of K/H: 50, 90 and 95 %"
     name_axes(axes, title, "median of K/H [1e-12 1/Pa]", "scatter t of ln K/H (dashed: negligible)")
+
+
+def _set_ticks(axes: Axes) -> None:
+    """Set round values as ticks of a logarithmic x axis."""
+    low, high = axes.get_xlim()
+    # powers of ten, twice and five times them are too few in less than a decade
+    narrow = high < 10.0 * low
+    locator = MaxNLocator(7, steps=[1, 2, 5, 10]) if narrow else LogLocator(subs=(1.0, 2.0, 5.0))
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _shades() -> list[str]:
