@@ -189,6 +189,19 @@ def test_life_shows_its_quantiles_and_survival(life):
     assert points.data["value"] == pytest.approx(life.lives, rel=1e-6)
 
 
+def test_command_of_a_life_has_its_options(life, tmp_path):
+    options = repeated(page_of([life.with_settings(target=1_234_567.0)]), tmp_path)
+    assert options[:2] == ["life", "rig-life.toml"]
+    given = dict(zip(options[2::2], options[3::2], strict=True))
+    assert (given["-n"], given["--b"], given["--target"]) == ("40", "1,10,50", "1234567")
+    assert float(given["--max"]) == life.most
+
+
+def test_command_of_an_ensemble_has_its_precision(tmp_path):
+    options = repeated(page_of([made_up(until="depth.mean 1%")]), tmp_path)
+    assert options[-2:] == ["--precision", "depth.mean 1%"]
+
+
 def test_two_lives_are_compared(life, tmp_path):
     scenario = shipped_scenario("rig-life", {"contact.strips": 61, "friction.coefficient": 0.15})
     other = wearsim.life(scenario, 40, tmp_path / "rough.h5", limits=["depth 5 um"])

@@ -41,9 +41,15 @@ def of_life(result: LifeResult) -> Part:
         ("95 % intervals", result.method if result.count else "-"),
         ("contact model", result.described_model),
     ]
-    options = ["-n", str(settings.plain), "--seed", str(result.raw.seed)]
+    shares = ",".join(f"{share:g}" for share in settings.shares)
+    options = ["-n", str(settings.plain), "--seed", str(result.raw.seed), "--b", shares]
+    options += ["--max", f"{result.most:.17g}"]
     if result.target is not None:
-        options += ["--target", f"{result.target:g}"]
+        options += ["--target", f"{result.target:.17g}"]
+    if result.raw.until:
+        options += ["--precision", result.raw.until]
+    if settings.rare:
+        options += ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
     return Part(
         title=result.title,
         question=f"How many {unit} does the design last, until the first of: {limits}?",

@@ -158,7 +158,8 @@ def _of_ensemble(result: EnsembleResult, measured: Sequence[Measured]) -> Part:
         ("stepper", f"{raw.stepper}, tolerance {raw.tolerance:g}"),
     ]
     failures = [f"test {number} failed: {text}" for number, text in list(result.errors.items())[:3]]
-    options = ("-n", str(result.requested), "--plan", raw.plan, "--seed", str(raw.seed))
+    options = ["-n", str(result.requested), "--plan", raw.plan, "--seed", str(raw.seed)]
+    options += ["--precision", raw.until] if raw.until else []
     return Part(
         title=result.title,
         question=f"How deep do {number_of_realisations(result.count)} of a test of"
