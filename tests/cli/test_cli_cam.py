@@ -105,3 +105,18 @@ def test_jump_of_the_follower_is_an_error_with_exit_code_2(command: Command) -> 
     refused = command("check", CAM, "--set", "load.preload=5 N")
     assert refused.exit_code == 2
     assert "the follower jumps" in refused.stderr
+
+
+def test_check_gives_the_greatest_pressure_of_a_turn_at_its_own_load(command: Command) -> None:
+    command("new", "cam", "cam.toml")
+    soft = '{youngs_modulus="210 GPa", poisson_ratio=0.3, yield_stress="160 MPa"}'
+    checked = command("check", "cam.toml", "--json", "--set", f"cam.material={soft}")
+    found = json.loads(checked.stdout)
+    patch = found["initial_patch"]
+    stations = data(command, "cam.toml", "--set", f"cam.material={soft}")["stations"]
+    pressures = stations["peak_pressure_Pa"]
+    assert patch["peak_pressure_Pa"] == pytest.approx(max(pressures))
+    place = pressures.index(max(pressures))
+    assert patch["load_N"] == pytest.approx(stations["normal_force_N"][place])
+    assert patch["load_N"] < max(stations["normal_force_N"])
+    assert any(text.startswith("cam.material: the peak pressure") for text in found["warnings"])

@@ -17,7 +17,7 @@ from wearsim.studies.contact.single import study_contact
 from wearsim.studies.plausibility import log_file, plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw, units_of
-from wearsim.studies.run.groove import fresh_patch
+from wearsim.studies.run.groove import hardest_patch
 from wearsim.studies.run.inputs import load_range
 from wearsim.units import in_engineers_unit
 
@@ -56,7 +56,8 @@ def dry_run(scenario: Scenario) -> Data:
     scenario, load = with_chosen_model(scenario, is_run), scenario.load.build()
     low, high = load_range(scenario, load, scenario.total_time if is_run else 0.0)
     roller, cylinder = scenario.roller, scenario.cylinder
-    pair, patch = combine(cylinder.material, roller.material), fresh_patch(scenario, high)
+    pair = combine(cylinder.material, roller.material)
+    patch, patch_load = hardest_patch(scenario, high)
     random = {key for item in scenario.random for key in item.keys}
     fixed_load = {} if "load.normal_force" in random else {"least_N": low, "greatest_N": high}
     data: Data = {
@@ -94,7 +95,7 @@ def dry_run(scenario: Scenario) -> Data:
             "length_m": 2.0 * patch.a,
             "width_m": 2.0 * patch.b,
             "peak_pressure_Pa": patch.peak_pressure,
-            "load_N": high,
+            "load_N": patch_load,
         },
     }
     if "friction.coefficient" in random:
@@ -382,8 +383,7 @@ def _random_rows(data: Data) -> TableRows:
 
 def _test_rows(data: Data) -> TableRows:
     if "test" not in data:
-        text = f"one contact, {data['strips']} strips (no duration or no wear law)"
-        return [("runs as", text)]
+        return [("runs as", f"one contact, {data['strips']} strips (no duration or no wear law)")]
     test = data["test"]
     identical = ", all identical" if test["rollers_solved"] == 1 < test["rollers"] else ""
     strips = (

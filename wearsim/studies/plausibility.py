@@ -13,7 +13,7 @@ from wearsim.quantities import InputFile
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.cam.checks import cam_warnings, skids_of
 from wearsim.studies.cam.turn import turn_of
-from wearsim.studies.run.groove import fresh_patch
+from wearsim.studies.run.groove import hardest_patch, widest_patch
 from wearsim.studies.run.roller_ends import (
     LEAST_PER_EDGE,
     STRIPS_BEYOND,
@@ -92,9 +92,11 @@ def _of_pressure(scenario: Scenario, load: Load) -> Iterator[str]:
     force = greatest_load(scenario, load)
     if force <= 0.0:
         return
-    pressure = fresh_patch(scenario, force).peak_pressure
+    patch, force = hardest_patch(scenario, force)
+    pressure = patch.peak_pressure
     text = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
-    for name, body in (("roller", scenario.roller), ("cylinder", scenario.cylinder)):
+    other = "cylinder" if scenario.cam is None else "cam"
+    for name, body in (("roller", scenario.roller), (other, scenario.cylinder)):
         strength, factor, what = body.material.yield_stress, YIELD_FACTOR, "yield stress"
         if strength is None:
             strength, factor, what = body.material.hardness, 1.0, "hardness"
@@ -135,7 +137,7 @@ def _of_width(scenario: Scenario, load: Load) -> Iterator[str]:
         yield from _of_edge(scenario, force)
     if scenario.contact.width or scenario.roller.width or force <= 0.0:
         return
-    half_width = fresh_patch(scenario, force).b
+    half_width = widest_patch(scenario, force).b
     if half_width > WIDEST * radius:
         yield (
             f"roller.crown_radius: a crown of {scenario.roller.crown_radius * 1e3:.4g} mm makes a"
@@ -148,7 +150,7 @@ def _of_edge(scenario: Scenario, force: float) -> Iterator[str]:
     width, edge = roller.width or 0.0, edge_in_contact(scenario, force)
     strips = choice.strips or strips_of_roller(scenario, 0, force)
     spacing = (choice.width / strips) if choice.width else width / (strips - 2 * STRIPS_BEYOND)
-    if edge >= LEAST_PER_EDGE * spacing or fresh_patch(scenario, force).b < 0.5 * width:
+    if edge >= LEAST_PER_EDGE * spacing or widest_patch(scenario, force).b < 0.5 * width:
         return
     key = "edge_radius" if roller.edge_radius else "chamfer" if roller.chamfer else "width"
     shape = f"the edge is in contact over about {edge * 1e3:.2g} mm" if edge else "a sharp edge"

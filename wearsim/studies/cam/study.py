@@ -29,7 +29,7 @@ from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import CamTurn, turn_of
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid
-from wearsim.studies.run.groove import fresh_patch
+from wearsim.studies.run.groove import patches_at
 from wearsim.types import FloatArray
 
 _MOST_TEETH = 12  # greatest denominator of a ratio at which the same points of the roller meet
@@ -141,12 +141,7 @@ def study_cam(
     else:
         chosen = np.asarray(angles, dtype=np.float64)
         point = turn.at_angles(chosen)
-    patches = [
-        fresh_patch(scenario, force, curvature)
-        for force, curvature in zip(
-            point.normal_force.tolist(), point.kinematics.relative_curvature.tolist(), strict=True
-        )
-    ]
+    patches = patches_at(scenario, point)
     problem = _fresh_problem(scenario, turn, chosen)
     contacts = problem.model.solve(unworn_contacts(problem))
     if problem.kinematics.cam is not None:
@@ -190,9 +185,7 @@ def study_cam(
 
 def peak_pressures(scenario: Scenario, point: Point) -> FloatArray:
     """Return the peak pressure of the fresh contact after Hertz, shape (points,) [Pa]."""
-    loads = point.normal_force.tolist()
-    each = zip(loads, point.kinematics.relative_curvature.tolist(), strict=True)
-    return np.array([fresh_patch(scenario, load, curve).peak_pressure for load, curve in each])
+    return np.array([patch.peak_pressure for patch in patches_at(scenario, point)])
 
 
 def _fresh_problem(scenario: Scenario, turn: CamTurn, angles: FloatArray | None) -> WearProblem:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
+from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.types import ContactSolution, FloatArray
@@ -34,6 +36,25 @@ def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None)
     half_length = math.sqrt(2.0 * line_load / (math.pi * modulus * along))
     pressure = 2.0 * line_load / (math.pi * half_length)
     return replace(patch, a=half_length, b=half, peak_pressure=max(pressure, patch.peak_pressure))
+
+
+def patches_at(scenario: Scenario, point: Point) -> list[HertzContact]:
+    """Return the patch of the unworn bodies at each point of a turn, with its load and curvature."""
+    loads, curvatures = point.normal_force.tolist(), point.kinematics.relative_curvature.tolist()
+    return list(map(partial(fresh_patch, scenario), loads, curvatures))
+
+
+def hardest_patch(scenario: Scenario, load: float) -> tuple[HertzContact, float]:
+    """Return the patch of the greatest peak pressure and its load [N].
+
+    It is that under `load` [N] on a cylinder, and one of those at the stations of a cam.
+    """
+    if scenario.cam is None:
+        return fresh_patch(scenario, load), load
+    turn = turn_of(scenario)
+    point = turn.at_stations(turn.stations)
+    each = zip(patches_at(scenario, point), point.normal_force.tolist(), strict=True)
+    return max(each, key=lambda pair: pair[0].peak_pressure)
 
 
 def widest_patch(scenario: Scenario, load: float) -> HertzContact:
