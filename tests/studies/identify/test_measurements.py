@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from wearsim.errors import ScenarioError
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.identify.api import identify
 from wearsim.studies.identify.inputs import fixed
 from wearsim.studies.identify.measurements import read_tests
 
@@ -66,7 +68,7 @@ body = "disc"
         "[test 1] profile or depth: exactly one",
         "[test 2] depth: ",
         "[test 2] depth_std: is needed with depth",
-        "[test 3] std.friction.coefficient: needs the measured value",
+        "[test 3] std.friction.coefficient: has no measured value in set",
         "[test 3] body: is unknown",
     ):
         assert part in message
@@ -85,3 +87,54 @@ def test_fixed_inputs_have_short_names():
     assert found == {"friction.coefficient": 0.1, "load.normal_force": "310 N"}
     with pytest.raises(ValueError, match="is not an input with a value"):
         fixed("friction")
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (
+            "set = {friction = 0.1}\nstd = {friction = -0.003}",
+            "std.friction.coefficient: must be above 0, got -0.003, expected a number above 0",
+        ),
+        (
+            "set = {friction = -0.12}",
+            "set.friction.coefficient: is out of range, got -0.12, expected a number above 0",
+        ),
+        (
+            'set = {creepage = 7e-4}\nstd = {creepage = "abc"}',
+            'std.creepage.longitudinal: is not a number, got "abc", expected a number above 0',
+        ),
+        (
+            "set = {creepag = 7e-4}",
+            "set.creepag: is unknown (did you mean 'creepage'?), got 0.0007, expected a key of",
+        ),
+        (
+            "set = {friction = 0.1}\nstd = {frction = 0.003}",
+            "std.frction: has no measured value in set (did you mean 'friction'?), got 0.003, exp",
+        ),
+        (
+            'set = {load = "310 N"}\nstd = {load = "10 mm"}',
+            'std.load.normal_force: wrong dimension, got "10 mm", expected a force above zero',
+        ),
+        (
+            'set = {yaw = "1 mrad"}\nstd = {yaw = "1 mrad"}',
+            "std.creepage.yaw: cannot be random by itself, but with creepage.misalignment, got",
+        ),
+        (
+            'set = {roller.radius = "20 mm"}\nstd = {roller.radius = "1 mm"}',
+            'std.roller.radius: cannot be random, got "1 mm", expected only a known value in set',
+        ),
+        ('at = "soon"', 'at: is not a quantity, got "soon", expected a time such as "100 min", or'),
+        ('at = "999 min"', "at: is not within the test, got 999 min, expected up to 450 min"),
+    ],
+)
+def test_mistake_of_an_input_names_the_tests_file_and_the_test(
+    tmp_path: Path, lines: str, message: str
+):
+    path = tmp_path / "tests.toml"
+    known = '[[test]]\ndepth = "48 um"\ndepth_std = "1 um"\n'
+    path.write_text(f"{known}\n{known}{lines}\n")
+    with pytest.raises(ScenarioError) as caught:
+        identify(shipped_scenario("rig-identify"), path)
+    assert str(caught.value).startswith(f"{path}: [test 2] {message}")
+    assert "\n" not in str(caught.value)

@@ -29,6 +29,7 @@ from wearsim.studies.identify.pooling import FEW_DRAWS, content, specimens_of
 from wearsim.studies.identify.traces import Trace, read_trace
 from wearsim.studies.identify.trajectories import Grower, Trajectories, check_law
 from wearsim.studies.progress import shown_progress
+from wearsim.units import QuantityError, shown
 from wearsim.uq.hierarchy.verdict import NEGLIGIBLE
 
 MOST_DRAWS = 768  # where a trace leaves few of the first ones
@@ -197,8 +198,8 @@ class _Study:
         if item.body == "roller" and not self.shared:
             what = "wear of the roller is measured, and its K/H is that of the scenario"
             expected = "share = cylinder, roller (--share k=cylinder,roller)"
-            raise ScenarioError(item.name, [Mistake("", "body", what, None, expected)])
-        scenario = with_known(self.scenario, item.values, item.errors, item.name)
+            raise item.refused(Mistake("", "body", what, None, expected))
+        scenario = with_known(self.scenario, item)
         require_run(scenario)
         passes = _passes(scenario, item)
         crown = scenario.roller.crown_radius
@@ -294,21 +295,10 @@ def _passes(scenario: Scenario, item: Measurement) -> float:
         else:
             found = quantity(text, "s") * scenario.pass_rate
     except ValueError as error:
-        expected = "a time such as '100 min', or '2e5 passes'"
-        raise ScenarioError(
-            item.name, [Mistake("", "at", str(error), repr(item.at), expected)]
-        ) from error
+        what = error.what if isinstance(error, QuantityError) else "is no number of passes"
+        expected = 'a time such as "100 min", or "2e5 passes"'
+        raise item.refused(Mistake("", "at", what, shown(item.at), expected)) from error
     if not 0.0 < found <= scenario.total_passes * (1.0 + 1e-9):
-        raise ScenarioError(
-            item.name,
-            [
-                Mistake(
-                    "",
-                    "at",
-                    "is not within the test",
-                    item.at,
-                    f"up to {scenario.total_time / 60.0:.6g} min",
-                )
-            ],
-        )
+        what, expected = "is not within the test", f"up to {scenario.total_time / 60.0:.6g} min"
+        raise item.refused(Mistake("", "at", what, item.at, expected))
     return found

@@ -13,7 +13,9 @@ from wearsim.errors import Mistake, ScenarioError
 from wearsim.models.random.distributions import TableDistribution
 from wearsim.quantities import quantity
 from wearsim.scenario import RandomInput, Scenario
-from wearsim.studies.identify.measurements import key_of
+from wearsim.scenario.parse.fields import amount, can_be_random
+from wearsim.studies.identify.measurements import Measurement, key_of
+from wearsim.units import QuantityError, shown
 
 _SPAN = 6.0  # standard deviations of a measured value that are considered
 _POINTS = 801
@@ -21,42 +23,52 @@ _EITHER_SIGN = {"creepage.yaw", "creepage.tilt", "roller.offset"}
 _LEAST = 1e-9  # probability of the values within that span by the scenario
 
 
-def with_known(
-    scenario: Scenario, values: Mapping[str, object], errors: Mapping[str, object], file: str
-) -> Scenario:
-    """Return the scenario of one test.
+def with_known(scenario: Scenario, test: Measurement) -> Scenario:
+    """Return the scenario of one test, with its known and measured inputs.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    values : mapping of str to object
-        Known or measured inputs by the scenario's key, "310 N".
-    errors : mapping of str to object
-        Standard deviations of the measured ones, "10 N". The distribution of the scenario and the
-        measurement are combined by Bayes' theorem.
-    file : str
-        Name of the test, for messages.
+    The distribution of the scenario and a measurement are combined by Bayes' theorem.
 
     Raises
     ------
     ScenarioError
         If a key or value is wrong, or a measured value is out of the distribution.
     """
-    if not values:
+    if not test.values:
         return scenario
     before = {key: item for item in scenario.random for key in item.keys}
-    found = scenario.changed(dict(values))
+    found = _changed(scenario, test.values, test, "set")
     random = list(found.random)
-    for key, error in errors.items():
-        value = _number(found, key)
-        std = _std(before.get(key), error, file, key)
+    for key, error in test.errors.items():
         item = before.get(key)
+        if not can_be_random(key) or (item is not None and item.role == "joint"):
+            by = f" by itself, but with {item.name}" if item is not None else ""
+            what, expected = f"cannot be random{by}", "only a known value in set"
+            raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
         if item is None:
-            changed = found.changed({key: _normal(key, values[key], error)})
+            changed = _changed(found, {key: _normal(key, test.values[key], error)}, test, "std")
             random += [one for one in changed.random if one.name == key]
         else:
-            random.append(_measured(item, value, std, file))
+            std = _std(item, error, key, test)
+            random.append(_measured(item, _number(found, key), std, test))
     return replace(found, random=tuple(sorted(random, key=lambda one: one.name)))
+
+
+def _changed(
+    scenario: Scenario, values: Mapping[str, object], test: Measurement, table: str
+) -> Scenario:
+    """Return a scenario with other values, whose mistakes are those of a table of the test."""
+    try:
+        return scenario.changed(values)
+    except ScenarioError as error:
+        mistakes = []
+        for mistake in error.mistakes:
+            place = ".".join(filter(None, (mistake.table, mistake.key)))
+            key = next((key for key in values if f"{place}.".startswith(f"{key}.")), None)
+            if key is None:
+                mistakes.append(Mistake("", table, str(mistake)))
+            else:
+                mistakes.append(replace(mistake, key=f"{table}.{key}"))
+        raise test.refused(*mistakes) from error
 
 
 def _normal(key: str, value: object, error: object) -> dict[str, object]:
@@ -79,19 +91,21 @@ def _number(scenario: Scenario, key: str) -> float:
     return float(value)
 
 
-def _std(item: RandomInput | None, error: object, file: str, key: str) -> float:
+def _std(item: RandomInput, error: object, key: str, test: Measurement) -> float:
     """Return a standard deviation in SI."""
-    unit = item.quantity.kind.unit if item is not None and item.quantity else "1"
+    kind = item.quantity.kind if item.quantity else None
+    found, what = 0.0, "must be above 0"
     try:
-        found = quantity(str(error), unit) if unit != "1" else float(str(error))
+        found = quantity(str(error), kind.unit) if kind else float(str(error))
     except ValueError as failure:
-        raise ScenarioError(file, [Mistake("std", key, str(failure), repr(error))]) from failure
-    if found <= 0.0:
-        raise ScenarioError(file, [Mistake("std", key, "must be above 0", repr(error))])
-    return found
+        what = failure.what if isinstance(failure, QuantityError) else "is not a number"
+    if 0.0 < found < math.inf:
+        return found
+    expected = kind.expected("positive") if kind else "a number above 0"
+    raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
 
 
-def _measured(item: RandomInput, value: float, std: float, file: str) -> RandomInput:
+def _measured(item: RandomInput, value: float, std: float, test: Measurement) -> RandomInput:
     """Return an input whose distribution is combined with a measurement."""
     uniform = 0.5 * (1.0 + np.tanh(np.linspace(-11.0, 11.0, 20001)))
     quantiles = item.scalar.quantile(uniform)
@@ -100,17 +114,10 @@ def _measured(item: RandomInput, value: float, std: float, file: str) -> RandomI
     middle = 0.5 * (grid[1:] + grid[:-1])
     weight = np.diff(below) * np.exp(-0.5 * ((middle - value) / std) ** 2)
     if below[-1] - below[0] < _LEAST:
-        raise ScenarioError(
-            file,
-            [
-                Mistake(
-                    "set",
-                    item.name,
-                    f"the measured value is out of the scenario's distribution: {item.describe()}",
-                    f"{value:.6g} with std {std:.3g} (SI)",
-                )
-            ],
-        )
+        what = f"the measured value is out of the scenario's distribution: {item.describe()}"
+        got = f"{amount(value, item.quantity)} with std {amount(std, item.quantity)}"
+        expected = "a value within it, or a wider distribution in the scenario"
+        raise test.refused(Mistake("", f"set.{item.name}", what, got, expected))
     probability = np.concatenate([[0.0], np.cumsum(weight)])
     inside = np.concatenate([[True], weight > 0.0])
     table = TableDistribution(probability[inside] / probability[-1], grid[inside])

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
+from wearsim.scenario.parse.mistakes import nearest
 from wearsim.scenario.parse.toml import as_toml
+from wearsim.units import QuantityError, shown
 
 #: Short names of inputs.
 SHORT = {
@@ -56,6 +58,8 @@ class Measurement:
         Body of which the wear was measured.
     shoulders : float, optional
         Distance from the middle of the groove beyond which the surface is unworn [m].
+    file, place : str
+        Tests file and "test 2", for messages; empty without such a file.
     """
 
     name: str
@@ -70,6 +74,13 @@ class Measurement:
     errors: Mapping[str, object] = field(default_factory=dict)
     body: str = "cylinder"
     shoulders: float | None = None
+    file: str = ""
+    place: str = ""
+
+    def refused(self, *mistakes: Mistake) -> ScenarioError:
+        """Return the error of mistakes in the test, which names the tests file and the test."""
+        placed = [replace(mistake, table=self.place) for mistake in mistakes]
+        return ScenarioError(self.file or self.name, placed)
 
 
 def key_of(name: str) -> str:
@@ -149,7 +160,7 @@ def read_tests(path: str | Path) -> list[Measurement]:
         raise ScenarioError(str(path), [*mistakes, Mistake("", "", "has no tests", None, _EXAMPLE)])
     found = []
     for number, table in enumerate(tests, 1):
-        found.append(_read_test(table, f"test {number}", file.parent, mistakes))
+        found.append(_read_test(table, f"test {number}", file, mistakes))
     if mistakes:
         raise ScenarioError(str(path), mistakes)
     return found
@@ -201,20 +212,20 @@ def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
 
 
 def _read_test(
-    table: dict[str, Any], place: str, folder: Path, mistakes: list[Mistake]
+    table: dict[str, Any], place: str, file: Path, mistakes: list[Mistake]
 ) -> Measurement:
     """Return one test, and add its mistakes."""
 
     def wrong(key: str, what: str, got: object, expected: str) -> None:
-        mistakes.append(Mistake(place, key, what, None if got is None else repr(got), expected))
+        mistakes.append(Mistake(place, key, what, None if got is None else shown(got), expected))
 
     def length(key: str) -> float | None:
         if key not in table:
             return None
         try:
             value = quantity(table[key], "m")
-        except ValueError as error:
-            wrong(key, str(error), None, "a length such as '48 um'")
+        except QuantityError as error:
+            wrong(key, error.what, table[key], "a length such as '48 um'")
             return None
         if value <= 0.0:
             wrong(key, "must be above 0", table[key], "a length such as '48 um'")
@@ -241,11 +252,19 @@ def _read_test(
     if table.get("body", "cylinder") not in {"cylinder", "roller"}:
         wrong("body", "is unknown", table["body"], '"cylinder" or "roller"')
     values, errors = _flat(table.get("set", {})), _flat(table.get("std", {}))
-    for key in errors:
-        if key not in values:
-            wrong(f"std.{key}", "needs the measured value", None, f"{key} in set")
+    for key, value in values.items():
+        if "." not in key and key not in SHORT:
+            expected = f"a key of the scenario such as load.normal_force, or {', '.join(SHORT)}"
+            wrong(f"set.{key}", f"is unknown{nearest(key, SHORT)}", value, expected)
+    for key, value in errors.items():
+        if key_of(key) not in map(key_of, values):
+            hint = nearest(key, values) or nearest(key, SHORT)
+            expected = "a key of set" if hint else f"{key} in set"
+            wrong(f"std.{key}", f"has no measured value in set{hint}", value, expected)
     names = {key: text(key) for key in ("profile", "before", "at", "group")}
-    profile, before = (folder / name if (name := names[k]) else None for k in ("profile", "before"))
+    profile, before = (
+        file.parent / name if (name := names[k]) else None for k in ("profile", "before")
+    )
     choice = ProfileChoice()
     try:
         choice = ProfileChoice(
@@ -266,19 +285,21 @@ def _read_test(
         length("depth_std"),
         names["at"],
         names["group"],
-        values,
-        errors,
+        {key_of(key): value for key, value in values.items()},
+        {key_of(key): value for key, value in errors.items()},
         str(table.get("body", "cylinder")),
         length("shoulders"),
+        str(file),
+        place,
     )
 
 
 def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, object]:
-    """Return values by the scenario's dotted key."""
+    """Return values by dotted key."""
     found: dict[str, object] = {}
     for key, value in table.items():
         if isinstance(value, dict):
             found |= _flat(value, f"{start}{key}.")
         else:
-            found[key_of(f"{start}{key}")] = value
+            found[f"{start}{key}"] = value
     return found
