@@ -73,6 +73,13 @@ def test_plain_numbers_need_no_unit() -> None:
             ["line 1: column 'load' is missing, got time [s], force [N], expected load [N]"],
         ),
         (
+            "Zeit;Kraft\ns;N\n0;1\n1;2\n",
+            [
+                "line 1: column 'time' is missing, got Zeit, Kraft, expected time [s]",
+                "line 1: column 'load' is missing, got Zeit, Kraft, expected load [N]",
+            ],
+        ),
+        (
             "time,load []\n0,1\n1,2\n",
             [
                 "line 1: column 'time' has no unit, got time, expected time [s]",

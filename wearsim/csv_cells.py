@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, TypeAlias
 
 from wearsim.quantities import DECIMAL_COMMA, NUMBER
+from wearsim.units import measure
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -60,6 +61,14 @@ def comma_number(text: str) -> float:
     if "." in text or not NUMBER.fullmatch(text := text.strip().replace(",", ".")):
         raise ValueError(text)
     return float(text)
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a cell is empty or holds a unit alone, such as mm or [mm]."""
+    try:
+        return not (unit := text.strip("[]() -")) or bool(measure(unit))
+    except ValueError:
+        return False
 
 
 def conversion_of(cells: Iterable[str], separator: str, unit: str) -> Conversion | None:

@@ -22,6 +22,7 @@ from wearsim.csv_cells import (
     comma_number,
     conversion_of,
     in_order,
+    is_unit,
     iso_time,
 )
 from wearsim.errors import Mistake, ScenarioError
@@ -209,10 +210,10 @@ def _find_header(
     """Return the header of a file and its separator.
 
     The header is the first line that names all columns, or a comment that does. In a file without
-    such a line it is the last line above the first numbers.
+    such a line it is the last line above the first numbers that holds more than units.
     """
     wanted = [{other.casefold() for other in accepted} for accepted in names.values()]
-    complete_comment, above_numbers = None, None
+    complete_comment, before, above = None, None, None
     for place, line in enumerate(lines[:HEAD_LINES]):
         text = line.strip().lstrip("#")
         if not text.strip():
@@ -225,11 +226,13 @@ def _find_header(
             complete_comment = complete_comment or ((row, separator) if complete else None)
         elif complete:
             return row, separator
-        elif above_numbers is None or not all(map(_starts_as_number, row.cells)):
-            above_numbers = row, separator
+        elif above is None or not all(map(_starts_as_number, row.cells)):
+            before, above = above, (row, separator)
         else:
             break
-    return complete_comment or above_numbers or (None, ",")
+    if before and above and len(before[0].cells) == len(above[0].cells):
+        above = before if all(map(is_unit, above[0].cells)) else above
+    return complete_comment or above or (None, ",")
 
 
 def _unit_line(header: _Row, sample: list[_Row]) -> list[str] | None:

@@ -32,7 +32,7 @@ MAX_POINTS = 1_000_000  # of a filtered profile
 ROW_CHOICES = ("row", "mean_rows", "at")
 _NAMES = (
     "choose other names with --columns Y,Z or, in a scenario, profile_columns"
-    ' = ["Y", "Z"]; a minus sign before Z makes it a depth'
+    ' = ["Y", "Z"] or, in a tests file, columns; a minus sign before Z makes it a depth'
 )
 _UNITS = (
     "its unit in the header, as in height [um], or by --units mm,um or, in a scenario,"
