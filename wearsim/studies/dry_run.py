@@ -14,11 +14,11 @@ from wearsim.scenario import Cylinder, RandomInput, Scenario, described_model
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.contact.single import study_contact
-from wearsim.studies.plausibility import log_file, plausibility_warnings, range_90
+from wearsim.studies.plausibility import plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw, units_of
 from wearsim.studies.run.groove import hardest_patch
-from wearsim.studies.run.inputs import load_range
+from wearsim.studies.run.inputs import load_file, load_range
 from wearsim.units import in_engineers_unit
 
 TableRows = list[tuple[str, str]]
@@ -166,7 +166,7 @@ def _log(scenario: Scenario, load: Load) -> Data | None:
         return None
     least, greatest = load.extremes(*load.span)
     return {
-        "file": log_file(scenario),
+        "file": file[1] if (file := load_file(scenario)) else None,
         "span_s": load.span,
         "least_N": least,
         "mean_N": load.mean(*load.span),

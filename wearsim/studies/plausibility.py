@@ -9,11 +9,11 @@ import numpy as np
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.models.loads import FollowerLoad, gap_text
 from wearsim.plugins import Load
-from wearsim.quantities import InputFile
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.cam.checks import cam_warnings, skids_of
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.groove import hardest_patch, widest_patch
+from wearsim.studies.run.inputs import load_file
 from wearsim.studies.run.roller_ends import (
     LEAST_PER_EDGE,
     STRIPS_BEYOND,
@@ -66,12 +66,6 @@ def plausibility_warnings(scenario: Scenario) -> list[str]:
     ]
 
 
-def log_file(scenario: Scenario) -> str | None:
-    """Return the name of the file that the load reads, if any."""
-    files = (value for _, value in scenario.load.options if isinstance(value, InputFile))
-    return next((file.path for file in files), None)
-
-
 def greatest_load(scenario: Scenario, load: Load) -> float:
     """Return the greatest load of the test, or of the start of a single contact [N]."""
     if isinstance(load, FollowerLoad):
@@ -108,8 +102,8 @@ def _of_pressure(scenario: Scenario, load: Load) -> Iterator[str]:
             )
     modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
     if pressure > ELASTIC_PART * modulus:
-        file = log_file(scenario)
-        remedy = f"is the unit of the load in {file} right?" if file else "is the load right?"
+        file = load_file(scenario)
+        remedy = f"is the unit of the load in {file[1]} right?" if file else "is the load right?"
         yield (
             f"load: {text} exceeds {ELASTIC_PART:.0%} of the contact modulus, more than hardened"
             f" steel bears; {remedy} A thousandth of it gives {pressure / 1e7:.4g} MPa"
@@ -169,10 +163,11 @@ def _of_cam(scenario: Scenario) -> list[str]:
 
 def _of_log(scenario: Scenario, load: Load) -> Iterator[str]:
     gaps: FloatArray = load.gaps
-    if len(gaps):
+    file = load_file(scenario)
+    if file and len(gaps):
         how = getattr(scenario.load.options, "gaps", "interpolate")
         done = "the last value is held" if how == "hold" else "the load is interpolated"
-        yield (f'{log_file(scenario)}: {gap_text(gaps)}; {done} (load.gaps = "{how}")')
+        yield (f'{file[1]}: {gap_text(gaps)}; {done} (load.gaps = "{how}")')
 
 
 def _of_model(scenario: Scenario) -> Iterator[str]:

@@ -146,8 +146,11 @@ def test_ensemble_passes_over_pauses(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("forces", "message"),
     [
-        ({0: 300, 60: -10, 130: 300}, "the load falls to zero or below, and contact is lost"),
-        ({0: 0, 60: 0, 130: 0}, "the load is never above zero up to 2 min"),
+        (
+            {0: 300, 60: -10, 130: 300},
+            "file: load.csv: the load falls to zero or below, and contact is lost, got -10 N at",
+        ),
+        ({0: 0, 60: 0, 130: 0}, "file: load.csv: the load is never above zero up to 2 min"),
     ],
 )
 def test_log_without_sense_is_refused(forces: dict[float, float], message: str) -> None:

@@ -261,8 +261,8 @@ def test_short_log_error_states_both_times(path: Path) -> None:
     with pytest.raises(ScenarioError) as caught:
         studies.run(short(**recorded, operation__duration="15 min"), path)
     assert str(caught.value) == (
-        "rig.toml: [load] recorded: the log does not cover the test, got 0 to 12 min,"
-        " expected 0 to 15 min; log longer or shorten operation.duration"
+        "rig.toml: [load] file: load.csv: the log does not cover the test, got 0 to 12 min,"
+        " expected 0 to 15 min: a longer log or a shorter operation.duration"
     )
     assert not path.exists()
 
