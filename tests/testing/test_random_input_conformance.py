@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from wearsim.errors import PluginError
 from wearsim.models.random.distributions import Disc, DiscOptions
 from wearsim.models.random.varying import (
     OrnsteinUhlenbeck,
@@ -59,6 +60,17 @@ for name, cases in TESTED.items():
 
 def test_all_installed_random_inputs_are_tested():
     assert set(TESTED) == set(registry().names(RandomInputSpec))
+
+
+def test_field_without_marginal_is_refused_by_the_name_of_the_argument():
+    with pytest.raises(TypeError, match=r"'white' is a field: give .* as marginal=\("):
+        random_input_tests("white")
+
+
+def test_values_with_units_need_a_kind():
+    disc = ConfiguredSpec(registry().get(RandomInputSpec, "disc"), {"radius": "2 mrad"})
+    with pytest.raises(PluginError, match="values with units need the argument kind"):
+        _ = disc.options
 
 
 class Flat(Distribution):

@@ -214,7 +214,9 @@ class ConfiguredSpec(Generic[S]):
         try:
             return self.spec.options.model_validate(dict(self.raw), context=context)
         except ValidationError as error:
-            raise PluginError(f"{self}: {described(error)}") from error
+            random = self.kind is None and isinstance(self.spec, RandomInputSpec)
+            remedy = "; values with units need the argument kind" if random else ""
+            raise PluginError(f"{self}: {described(error)}{remedy}") from error
 
     def __str__(self) -> str:
         options = ", ".join(f"{key} = {value!r}" for key, value in self.raw.items())

@@ -7,6 +7,7 @@ from functools import cache
 from typing import TypeVar
 
 from wearsim.plugins import ContactModelSpec, LoadSpec, MotionLawSpec, RandomInputSpec, WearLawSpec
+from wearsim.scenario.parse.fields import WITH_MARGINAL
 from wearsim.testing import random_inputs
 from wearsim.testing.checks import Check, Checks, ConfiguredSpec, resolve, spec_checks
 from wearsim.testing.contact_behaviour import BEHAVIOUR
@@ -117,11 +118,11 @@ def random_input_tests(
     options : mapping of str to object
         Its options as written in a scenario.
     kind : Kind, optional
-        Kind of quantity, which determines the unit; None for a plain number.
+        Kind of quantity of the values, needed for options with units; None for plain numbers.
     files : mapping of str to str
         Content of the files that the options name.
     marginal : tuple of spec and options, optional
-        Marginal distribution of a field or a process.
+        Distribution of one value of a field or a process, for which it is needed.
     without : mapping of str to str
         See `contact_model_tests`.
 
@@ -129,8 +130,18 @@ def random_input_tests(
     -------
     callable
         See `contact_model_tests`.
+
+    Raises
+    ------
+    TypeError
+        If a field or a process has no `marginal`.
     """
     resolved = resolve(RandomInputSpec, spec)
+    if marginal is None and resolved.role in WITH_MARGINAL:
+        raise TypeError(
+            f"random input '{resolved.name}' is a {resolved.role}: give the distribution of one"
+            ' value as marginal=("uniform", {"low": 0.08, "high": 0.12})'
+        )
 
     def build() -> RandomInputFixture:
         configured = ConfiguredSpec(resolved, options, kind, files)
