@@ -109,7 +109,28 @@ def test_foreign_file_among_the_parts_is_an_error(in_parts):
     shutil.copy(in_parts, part)
     assert _error_of(in_parts) == f"{part}: is not a part of an ensemble; remove it"
     part.write_bytes(b"")
-    assert _error_of(in_parts) == f"{part}: is empty"
+    assert _error_of(in_parts).startswith(f"{part}: is empty; copy it again, or remove it and all")
+
+
+@pytest.mark.parametrize("damaged", [True, False])
+def test_tests_of_removed_parts_are_repeated(in_parts, tmp_path, damaged):
+    whole = tmp_path / "whole.h5"
+    shutil.copy(in_parts, whole)
+    shutil.copytree(f"{in_parts}.parts", f"{whole}.parts")
+    second, third = (Path(f"{in_parts}.parts") / f"00000{number}.h5" for number in (2, 3))
+    if damaged:
+        second.write_bytes(second.read_bytes()[:-100])
+    else:
+        second.unlink()
+    assert "remove" in _error_of(in_parts)
+    assert "resume then repeats the tests that are lost" in _error_of(in_parts)
+    second.unlink(missing_ok=True)
+    third.unlink()
+    with EnsembleFile.open(in_parts) as file:
+        lost = set(read_ensemble(whole).done.tolist()) - set(file.data.done.tolist())
+        assert 0 < len(lost) < len(read_ensemble(whole).done)
+        file.put([some_outcome(number) for number in sorted(lost)])
+    assert differences(in_parts, whole) == []
 
 
 def test_part_with_unknown_realisations_is_an_error(in_parts, tmp_path):

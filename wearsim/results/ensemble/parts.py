@@ -49,6 +49,8 @@ if TYPE_CHECKING:
 PART = Schema(f"{ENSEMBLE.format}-part", ENSEMBLE.version, "rows of an ensemble", {}, {})
 NUMBER, STATE, RUN_ID = "number", "state", "run_id"
 
+_DAMAGED = ("is truncated", "is damaged", "is empty")
+_REMOVE = "remove all parts of greater numbers: resume then repeats the tests that are lost"
 _CUT = "…"  # ends a text that is too long
 
 
@@ -125,20 +127,22 @@ def read_parts(path: Path, data: EnsembleData) -> list[Part]:
     """
     folder = parts_folder(path)
     if not data.finished and not folder.is_dir():
-        raise _missing(path, folder)
+        raise ResultsFileError(
+            _without(path, folder),
+            python="move it there, or repeat the ensemble with force=True",
+            shell="move it there, or repeat the ensemble with --force",
+        )
     numbers = [number for number in part_numbers(path) if number > data.merged]
     for expected, number in enumerate(numbers, data.merged + 1):
         if number != expected:
-            raise _missing(path, part_path(path, expected))
+            missing = part_path(path, expected)
+            remedy = f"move it there, or {_REMOVE}"
+            raise ResultsFileError(f"{_without(path, missing)}; {remedy}")
     return [_read_part(part_path(path, number), path, data) for number in numbers]
 
 
-def _missing(path: Path, missing: Path) -> ResultsFileError:
-    return ResultsFileError(
-        f"{path}: is unfinished, and part of it is missing: there is no {missing}",
-        python="move it there, or repeat the ensemble with force=True",
-        shell="move it there, or repeat the ensemble with --force",
-    )
+def _without(path: Path, missing: Path) -> str:
+    return f"{path}: is unfinished, and part of it is missing: there is no {missing}"
 
 
 def _read_part(part: Path, path: Path, data: EnsembleData) -> Part:
@@ -165,7 +169,14 @@ def _read_part(part: Path, path: Path, data: EnsembleData) -> Part:
             json.loads(read_text(file[STATE])),
         )
 
-    return read_file(part, take)
+    try:
+        return read_file(part, take)
+    except ResultsFileError as error:
+        if not error.message.startswith(tuple(f"{part}: {what}" for what in _DAMAGED)):
+            raise
+        # without this part and the later ones, the ensemble is as it was before they were written
+        remedy = f"copy it again, or remove it and {_REMOVE.removeprefix('remove ')}"
+        raise ResultsFileError(f"{error.message}; {remedy}") from error
 
 
 def write_part(
