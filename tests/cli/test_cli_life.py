@@ -170,7 +170,9 @@ def test_extended_study_is_resumed(command: Command, slim: Path) -> None:
     result = open_results("one.h5")
     assert isinstance(result, LifeResult)
     assert result.count == 6
-    assert "B10" in command("resume", "one.h5", *HERE).stdout
+    again = command("resume", "one.h5", *HERE)
+    assert "B10" in again.stdout
+    assert again.stderr.startswith("note: nothing to do: the study of lives is finished")
 
 
 def test_figure_is_written(command: Command, slim: Path, wide: Path) -> None:

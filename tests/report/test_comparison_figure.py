@@ -129,9 +129,9 @@ def test_any_comparison_can_be_drawn(tmp_path, number):
         (Interval(1758.4, 1718.6, 1797.7), "J", "1758 J [1719, 1798]"),
         (Interval(-3e-7, -5e-7, 1e-7), "um", "-0.300 um [-0.500, 0.100]"),
         (Interval(3.0, 3.0, 3.0), "N", "3.000 N"),
-        (Interval(3.0, -math.inf, math.inf), "N", "3.000 N too few"),
+        (Interval(3.0, -math.inf, math.inf), "N", "3.000 N (too few for an interval)"),
         (Interval(2e-12, 1e-12, 3e-12), "um", "2.000e-06 um [1.000e-06, 3.000e-06]"),
-        (UNKNOWN, "N", "- too few"),
+        (UNKNOWN, "N", "- (too few for an interval)"),
     ],
 )
 def test_digits_of_an_estimate_follow_its_interval(found, unit, text):

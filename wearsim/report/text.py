@@ -210,7 +210,7 @@ def with_interval(found: Interval, unit: str) -> str:
     """Return "22.10 um [21.90, 22.31]"; parameters as of `cells`."""
     value, low, high = _numbers(found, unit)
     named = value if unit == "1" or value == NOTHING else f"{value} {unit}"
-    return f"{named} [{low}, {high}]" if high else f"{named} {low}".rstrip()
+    return named + (f" [{low}, {high}]" if high else low and f" ({low} for an interval)")
 
 
 def _numbers(found: Interval, unit: str) -> tuple[str, str, str]:

@@ -118,7 +118,7 @@ def test_fixed_inputs_have_short_names():
         ),
         (
             'set = {yaw = "1 mrad"}\nstd = {yaw = "1 mrad"}',
-            "std.creepage.yaw: cannot be random by itself, but with creepage.misalignment, got",
+            "std.creepage.yaw: cannot be random alone, since creepage.misalignment sets",
         ),
         (
             'set = {roller.radius = "20 mm"}\nstd = {roller.radius = "1 mm"}',

@@ -203,7 +203,10 @@ def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
 def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
     """Return why there is nothing to do, or an empty text."""
     if not failed:
-        return "the ensemble is finished" if before.finished else ""
+        from wearsim.results.ensemble.life import LifeResult
+
+        what = "study of lives" if isinstance(before, LifeResult) else "ensemble"
+        return f"the {what} is finished" if before.finished else ""
     if before.failed:
         return ""
     rest = "" if before.finished else f"; continue the others with: wearsim resume {before.path}"

@@ -182,9 +182,9 @@ class CamTurn:
                 self.panels, lambda p, x: self.drag(self.at(p, x)) / self._greatest_torque(p, x)
             )
             if ratio > 1.0:
-                at = f"{math.degrees(theta):.4g} deg"
-                what = "exceeds the torque that friction transmits: the roller stops at"
-                raise self._mistake("creepage", "bearing_torque", what, at, "a smaller torque")
+                what = "exceeds the torque that friction transmits, and the roller stops at"
+                what += f" {math.degrees(theta):.4g} deg"
+                raise self._mistake("creepage", "bearing_torque", what, None, "a smaller torque")
             return []
         scale = inertia * self.speed**2
 
@@ -360,15 +360,19 @@ class CamTurn:
         if sharpest >= 1.0 - 1e-9:
             flank = "inner flank" if self.at_angles(np.array([theta])).inner[0] else "cam"
             got = f"{1e3 * radius / sharpest:.4g} mm at {self.place(theta)}"
-            what = f"the {flank} is undercut: the radius of the pitch curve is"
-            expected = f"more than the roller's {1e3 * radius:.6g} mm; a greater base_radius,"
+            what = (
+                f"the {flank} is undercut: the pitch curve needs a greater radius than the roller"
+            )
+            expected = f"more than {1e3 * radius:.6g} mm, by a greater base_radius,"
             expected += " a smaller roller or a gentler motion"
             mistakes.append(Mistake("cam", "base_radius", what, got, expected))
         least, theta = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
         if -least <= 0.0 and not self.cam.groove:
             got = f"{-least:.4g} N at {self.place(theta)}"
-            what = "the follower jumps: the normal force is"
-            expected = "more than 0 N; a greater preload or stiffness, or a smaller speed or mass"
+            what = "the follower jumps, since the normal force falls to zero or below"
+            expected = (
+                "more than 0 N, by a greater preload or stiffness, or a smaller speed or mass"
+            )
             mistakes.append(Mistake("load", "preload", what, got, expected))
         if mistakes:
             raise ScenarioError(self.scenario.file, mistakes)

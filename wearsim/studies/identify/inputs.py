@@ -41,7 +41,7 @@ def with_known(scenario: Scenario, test: Measurement) -> Scenario:
     for key, error in test.errors.items():
         item = before.get(key)
         if not can_be_random(key) or (item is not None and item.role == "joint"):
-            by = f" by itself, but with {item.name}" if item is not None else ""
+            by = "" if item is None else f" alone, since {item.name} sets it with others"
             what, expected = f"cannot be random{by}", "only a known value in set"
             raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
         if item is None:

@@ -152,7 +152,9 @@ def check_law(scenario: Scenario) -> None:
         )
     if factors(scenario)[0] <= 0.0:
         what = "must be above 0: it is where the search begins"
-        mistake = Mistake("wear.cylinder", "k_over_h", what, "0", "such as '1e-11 1/Pa'")
+        mistake = Mistake(
+            "wear.cylinder", "k_over_h", what, "0", "a positive value such as '1e-11 1/Pa'"
+        )
         raise ScenarioError(scenario.file, [mistake])
 
 

@@ -39,7 +39,7 @@ def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None)
 
 
 def patches_at(scenario: Scenario, point: Point) -> list[HertzContact]:
-    """Return the patch of the unworn bodies at points of a turn, with their loads and curvatures."""
+    """Return the patch of the unworn bodies at the points of a turn, with its load there."""
     loads, curvatures = point.normal_force.tolist(), point.kinematics.relative_curvature.tolist()
     return list(map(partial(fresh_patch, scenario), loads, curvatures))
 
