@@ -98,7 +98,8 @@ def _from_laws(
     segments = []
     before = len(mistakes.entries)
     if not entries:
-        mistakes.add("cam", "motion", "has no entries", None, 'at least one, such as {law = "dwell", ...}')
+        example = 'at least one, such as {law = "dwell", ...}'
+        mistakes.add("cam", "motion", "has no entries", None, example)
         return None
     for number, raw in enumerate(entries, start=1):
         segment = _from_law(mistakes, f"cam.motion (entry {number})", raw, unit)

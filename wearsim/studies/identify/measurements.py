@@ -243,7 +243,7 @@ def _read_test(
             wrong(key, "is unknown", None, ", ".join(_KEYS))
     for key in ("set", "std"):
         if not isinstance(table.get(key, {}), dict):
-            wrong(key, "is not a table", table[key], 'a table such as {load.normal_force = "310 N"}')
+            wrong(key, "is not a table", table[key], 'a table such as {load = "310 N"}')
             return Measurement(place)
     if ("profile" in table) == ("depth" in table):
         wrong("profile or depth", "exactly one of them is needed", None, _EXAMPLE)
