@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 MODULES = sorted((ROOT / "wearsim").rglob("*.py"))
 PLUGIN_MODULES = sorted(ROOT.glob("plugins/*/src/**/*.py"))
 TESTS = sorted([*ROOT.glob("tests/**/*.py"), *ROOT.glob("plugins/*/tests/**/*.py")])
-MAX_LINES, MAX_FILES = 400, 15
+MAX_LINES, MAX_FILES = 500, 15
 EXEMPT = ROOT / "wearsim" / "cli" / "commands"  # one file per command
 
 
@@ -48,7 +48,7 @@ def test_every_module_has_a_docstring():
     assert not bare
 
 
-def test_no_file_is_longer_than_400_lines():
+def test_no_file_is_longer_than_500_lines():
     files = MODULES + PLUGIN_MODULES + TESTS
     assert len(TESTS) > 100
     lines = {path: len(path.read_text().splitlines()) for path in files}

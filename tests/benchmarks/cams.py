@@ -18,7 +18,7 @@ import numpy as np
 import wearsim
 from wearsim.errors import ScenarioError
 from wearsim.studies.cam.turn import turn_of
-from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
+from wearsim.studies.ensemble.realisation import RealisationRunner, profile_axis
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 LAWS = ("cycloidal", "modified-sine", "modified-trapezoid", "polynomial-345", "polynomial-4567")
@@ -82,7 +82,7 @@ def single(changes: dict[str, object]) -> float:
 def batched() -> float:
     """Return the time of a cam in a batch of cams with free rollers [s]."""
     scenario = wearsim.load_scenario(SCENARIOS / "cam-life.toml")
-    run = RealisationRunner(scenario, "monte-carlo", BATCH, shared_grid(scenario))
+    run = RealisationRunner(scenario, "monte-carlo", BATCH, profile_axis(scenario))
     run([0])
     start = time.perf_counter()
     run(range(BATCH))

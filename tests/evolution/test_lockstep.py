@@ -47,7 +47,7 @@ def problems_of(changes, each=EACH):
         if model is None:
             grid = assemble_problem(draw(scenario))[0].grid
             model = prepared_model(scenario, grid)
-        problem, stepper, _ = assemble_problem(draw(scenario), grid, model)
+        problem, stepper, _ = assemble_problem(draw(scenario), grid, lambda *_, model=model: model)
         problems.append(problem)
     return problems, stepper, float(scenario.total_passes)
 

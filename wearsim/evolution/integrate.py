@@ -14,6 +14,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located, relocated
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
+from wearsim.evolution.strips import grown, next_grids, on_grid, same_strips
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 T = TypeVar("T")
@@ -82,7 +83,8 @@ class Evolution:
     """Wear tests stepped to their ends together, each with its own step lengths.
 
     Iteration yields accepted steps. The results of a test are the same to the bit for any tests
-    that it is stepped with. A single test is one realisation.
+    that it is stepped with. A single test is one realisation. Tests whose strips grow wait until
+    the others have ended, and are then stepped on together.
 
     Parameters
     ----------
@@ -125,13 +127,51 @@ class Evolution:
         self._ended: set[int] = set()
         self._trials: dict[int, Trial] = {}
         self._scheme: Step
+        self._first = problem
+        self._waiting: list[tuple[IntArray, WearProblem, WearState]] = []
         self._end_finished()
 
     def __iter__(self) -> Iterator[Advance]:
-        while len(self.numbers):
-            advance = self._try_steps()
+        while len(self.numbers) or self._waiting:
+            if not len(self.numbers):
+                self._continue_waiting()
+            advance = self._try_steps() if len(self.numbers) else None
             if advance is not None:
                 yield advance
+
+    def _continue_waiting(self) -> None:
+        """Continue the tests that wait on the same strips as the first of them."""
+        grid = self._waiting[0][1].grid
+        chosen = [same_strips(problem.grid, grid) for _, problem, _ in self._waiting]
+        parts = [part for part, use in zip(self._waiting, chosen, strict=True) if use]
+        self._waiting = [part for part, use in zip(self._waiting, chosen, strict=True) if not use]
+        (self.numbers, self.problem, self.state), *others = parts
+        if others:
+            numbers = np.concatenate([part for part, _, _ in parts])
+            order = np.argsort(numbers)
+            self.numbers = numbers[order]
+            self.problem = on_grid(self._first.at(self.numbers), grid)
+            self.state = joined_states([state for _, _, state in parts]).at(order)
+        self._end_finished()
+
+    def _grow(self) -> None:
+        """Continue on wider strips with tests whose contacts are close to the outer strips."""
+        grids = next_grids(self.problem, self.state)
+        moving = [place for place, grid in enumerate(grids) if grid is not None]
+        while moving:
+            grid = grids[moving[0]]
+            assert grid is not None
+            places = np.array([k for k in moving if same_strips(grids[k] or grid, grid)])
+            moving = [place for place in moving if place not in places]
+            one = self.problem.at(places), self.state.at(places)
+            self._waiting.append((self.numbers[places], *grown(*one, grid)))
+        kept = np.array([k for k, grid in enumerate(grids) if grid is None], dtype=np.int64)
+        if len(kept) < len(grids):
+            self.numbers = self.numbers[kept]
+            if kept.size:
+                self.problem, self.state = self.problem.at(kept), self.state.at(kept)
+            else:
+                self._continue_waiting()
 
     def fail(self, failures: dict[int, Exception]) -> None:
         """End tests, by number, with the errors given."""
@@ -159,6 +199,7 @@ class Evolution:
 
     def _try_steps(self) -> Advance | None:
         """Try one step of every test in progress; return the accepted ones, if any."""
+        self._grow()
         self._relocate()
         lengths = self._lengths()
         if not len(self.numbers):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import cycle
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from wearsim.evolution.quantities import (
 )
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import FloatArray, Grid, IntArray
+
+if TYPE_CHECKING:
+    from wearsim.evolution.strips import Growth
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,8 @@ class WearProblem:
         Relative change of wear and loads below which an implicit step has converged.
     passes_per_draw : float
         Passes that share one draw of the inputs drawn at every pass.
+    growth : tuple of Growth
+        How the strips of each realisation grow with its groove; none where they do not.
     """
 
     grid: Grid
@@ -91,6 +96,7 @@ class WearProblem:
     varying: tuple[Varying, ...] = ()
     iteration_tolerance: float = 1e-8
     passes_per_draw: float = 1.0
+    growth: tuple[Growth, ...] = ()
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -143,6 +149,7 @@ class WearProblem:
         return replace(
             self,
             laws=tuple(self.laws[number] for number in numbers),
+            growth=tuple(self.growth[number] for number in numbers) if self.growth else (),
             loads=tuple(self.loads[number] for number in numbers),
             kinematics=self.kinematics.at(realisations),
             flat_gap=np.take(self.flat_gap, realisations, axis=2),

@@ -283,45 +283,6 @@ def separated(depths: FloatArray, stations: int) -> Depths:
     return depths[:stations, None], depths[None, stations:]
 
 
-def widened(array: FloatArray, strips: int) -> FloatArray:
-    """Return `array` with `strips` zeros added at both ends of its last axis."""
-    return np.pad(array, [(0, 0)] * (array.ndim - 1) + [(strips, strips)])
-
-
-def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
-    """Return a state with strips added on both sides, unworn and without load.
-
-    Parameters
-    ----------
-    state : WearState
-    y : ndarray, shape (strips of the wider grid,)
-        Position of all strips [m].
-    strips : int
-        Number of strips added on each side.
-    """
-    contacts = state.contacts
-    optional = {
-        name: widened(values, strips)
-        for name in ("loop_strips", "past_wear", "wear_exponents", "stepping_error")
-        if (values := getattr(state, name)) is not None
-    }
-    if "wear_exponents" in optional:  # zero on the added strips
-        optional["wear_exponents"][optional["wear_exponents"] == 0.0] = 1.0
-    return state.replaced(
-        cylinder_depth=widened(state.cylinder_depth, strips),
-        roller_depth=widened(state.roller_depth, strips),
-        contacts=replace(
-            contacts,
-            y=y,
-            half_length=widened(contacts.half_length, strips),
-            line_load=widened(contacts.line_load, strips),
-            dissipation=widened(contacts.dissipation, strips),
-        ),
-        **optional,
-        **{name: widened_state(part, y, strips) for name, part in state.auxiliary.items()},
-    )
-
-
 def fresh_state(problem: WearProblem) -> WearState:
     """Return the state before the first pass, with the contacts of the unworn bodies solved."""
     stations, contacts, realisations = problem.shape

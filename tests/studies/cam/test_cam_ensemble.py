@@ -11,7 +11,7 @@ from wearsim.evolution.observables import peak_to_peak
 from wearsim.results import export_csv
 from wearsim.studies.ensemble.api import parse_target
 from wearsim.studies.ensemble.batch import batch_groups, joined_problem
-from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
+from wearsim.studies.ensemble.realisation import RealisationRunner, profile_axis
 
 RANDOM = {
     "coefficient = 0.1": 'coefficient = {distribution = "uniform", low = 0.08, high = 0.12}',
@@ -27,7 +27,7 @@ def runner(name: str, **changes: str) -> RealisationRunner:
         assert old in text
         text = text.replace(old, new)
     scenario = wearsim.Scenario.from_toml(f"{text}\n[contact]\nstrips = 41\n")
-    return RealisationRunner(scenario, "monte-carlo", 4, shared_grid(scenario))
+    return RealisationRunner(scenario, "monte-carlo", 4, profile_axis(scenario))
 
 
 @pytest.mark.parametrize("name", ["cycloidal", "swinging"])

@@ -12,7 +12,7 @@ from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
 from wearsim.studies.ensemble import realisation
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, observe
-from wearsim.studies.ensemble.realisation import shared_grid
+from wearsim.studies.ensemble.realisation import profile_axis
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import strips_of_run
@@ -41,7 +41,7 @@ def runs_of(count, **changes):
     half = max(float(np.abs(grid.y).max() + grid.spacing) for grid in grids)
     grid = Grid.spanning(-half, half, 71)
     model = prepared_model(scenario, grid)
-    built = [assemble_problem(one, grid, model)[:2] for one in draws]
+    built = [assemble_problem(one, grid, lambda *_, model=model: model)[:2] for one in draws]
     return [RealisationRun(k, one.values, one, *built[k]) for k, one in enumerate(draws)]
 
 
@@ -144,6 +144,6 @@ def test_missing_kernels_are_compiled_by_one_step(missing, monkeypatch):
         realisation.Evolution, "_try_steps", lambda self: taken.append(1) or advance(self)
     )
     scenario = scenario_of(1000, load__normal_force=LOAD)
-    runner = realisation.RealisationRunner(scenario, "monte-carlo", 4, shared_grid(scenario))
+    runner = realisation.RealisationRunner(scenario, "monte-carlo", 4, profile_axis(scenario))
     runner.compile_kernels()
     assert bool(taken) == bool(missing)

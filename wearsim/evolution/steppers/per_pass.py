@@ -17,6 +17,7 @@ from wearsim.evolution.state import HERTZ, WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.loads import APPROACH_EXPONENT
 from wearsim.evolution.steppers.single_step import MAX_LOAD_ITERATIONS, solve_at_record
+from wearsim.evolution.strips import on_grid
 from wearsim.plugins import BODIES, PassLoop
 from wearsim.types import ContactSolution, FloatArray, IntArray, OperatingPoint
 
@@ -49,7 +50,12 @@ class PerPassStepper(Stepper):
 
     def recorded(self, problem: WearProblem) -> WearProblem:
         """Return the problem with quadrature nodes where inputs are drawn at every pass."""
-        return self._expectation or problem
+        nodes = self._expectation
+        if nodes is None:
+            return problem
+        if nodes.grid is not problem.grid:  # the strips have grown
+            nodes = self._expectation = on_grid(nodes, problem.grid)
+        return nodes
 
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the number of passes between checks for records, progress and interruption."""

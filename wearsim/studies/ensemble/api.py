@@ -34,7 +34,7 @@ from wearsim.studies.ensemble.designs import (
     whole_count,
 )
 from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
-from wearsim.studies.ensemble.realisation import RealisationRunner, control_of, shared_grid
+from wearsim.studies.ensemble.realisation import RealisationRunner, control_of, profile_axis
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.preparation import (
     changed_origins,
@@ -148,7 +148,7 @@ def ensemble(
             realisations=request.realisations,
         ) as pool,
     ):
-        grid = shared_grid(scenario)
+        grid = profile_axis(scenario)
         content = ensemble_content(scenario, request, grid)
         with EnsembleFile.create(path, *content, storage) as file:
             runner = RealisationRunner(scenario, request.plan, request.realisations, grid)

@@ -20,7 +20,7 @@ from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import Due, due_records, history_row, states_at
 from wearsim.studies.run.schedule import RecordSchedule
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray, Grid, IntArray
 
 _RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
 _ARRAYS = ("from_apex", "roller", "weight", "slip_profile")
@@ -62,6 +62,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
         and (first.cam is None or second.cam is None or first.cam.matches(second.cam))
         and varying[0] == varying[1]
         and (one.constant_load is None) == (other.constant_load is None)
+        and [item.most for item in one.growth] == [item.most for item in other.growth]
     )
 
 
@@ -83,6 +84,7 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
         loads=tuple(load for problem in problems for load in problem.loads),
         flat_gap=np.concatenate([problem.flat_gap for problem in problems], axis=2),
         inputs=ContactInputs(*columns),
+        growth=tuple(item for problem in problems for item in problem.growth),
         varying=tuple(
             replace(items[0], paths=tuple(path for item in items for path in item.paths))
             for items in zip(*(problem.varying for problem in problems), strict=True)
@@ -156,11 +158,14 @@ class RunObservations:
     curves : dict of str to ndarray
         At the end: "depth_profile", the worn depth of the cylinder or of the deepest station of a
         cam, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
+    grid : Grid
+        Strips at the end.
     """
 
     rows: list[Observables]
     scalars: dict[str, float]
     curves: dict[str, FloatArray]
+    grid: Grid
 
 
 def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
@@ -260,7 +265,8 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
         for place, number, found in zip(over.tolist(), numbers, curves, strict=True):
             scalars = {name: float(getattr(end, name)[place]) for name in SCALARS}
-            results[number] = RunObservations(rows[number], scalars, found)
+            grid = advance.problem.grid
+            results[number] = RunObservations(rows[number], scalars, found, grid)
     results |= tests.failures
     return [results[number] for number in range(len(runs))]
 

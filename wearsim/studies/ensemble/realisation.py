@@ -13,6 +13,7 @@ import numpy as np
 from wearsim.errors import WearsimError, failure_text
 from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.strips import averaged, same_strips
 from wearsim.mechanics.numerics.jit import not_cached
 from wearsim.plugins import ContactModel
 from wearsim.results import Outcome
@@ -22,7 +23,8 @@ from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, sources
 from wearsim.studies.kernels import kernels_of
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
-from wearsim.studies.run.grid import strips_of_run
+from wearsim.studies.run.grid import extent_of, lattice, shared_strips, start_of, strips_of_run
+from wearsim.studies.run.roller_ends import ends_roller
 from wearsim.types import FloatArray, Grid
 
 DRAWS = 1_000_000  # draws from which the mean of the control variate is computed
@@ -149,15 +151,15 @@ def _inverse(t: FloatArray) -> FloatArray:
     return np.asarray(x)
 
 
-GRID_REALISATIONS = 64  # realisations that determine the strips, whatever the ensemble's size
-WIDTH_MARGIN = 1.05  # width of the strips over that of the widest of these realisations
+AXIS_REALISATIONS = 64  # realisations that determine the axis, whatever the ensemble's size
+WIDTH_MARGIN = 1.05  # width of the axis over that of the widest of these realisations
 
 
-def shared_grid(scenario: Scenario) -> Grid:
-    """Return strips for the realisations of an ensemble, independent of their number.
+def profile_axis(scenario: Scenario) -> Grid:
+    """Return the strips on which the final profiles of an ensemble are stored.
 
-    The strips cover those of the first realisations and have their median width. A realisation
-    that needs wider coverage is run on separate strips.
+    They are in line with those that realisations share, and cover the grooves predicted for the
+    first realisations. The strips of the tests are other ones, see `shared_strips`.
 
     Parameters
     ----------
@@ -169,26 +171,21 @@ def shared_grid(scenario: Scenario) -> Grid:
     WearsimError
         If no strips fit any of the first realisations; the error is that of the first one.
     """
-    drawer, grids, error = Drawer(scenario, "monte-carlo"), [], None
-    for number in range(GRID_REALISATIONS):
+    drawer, reach, error = Drawer(scenario, "monte-carlo"), [], None
+    for number in range(AXIS_REALISATIONS):
         try:
-            grids.append(strips_of_run(drawer.draw(number)))
+            draws = drawer.draw(number)
+            extent = extent_of(draws)
+            strips_of_run(draws, extent)
+            reach.append(abs(extent.centre) + extent.final)
         except WearsimError as failure:
             error = error or failure
-    if not grids:
+    if not reach:
         raise error or AssertionError
-    if (
-        scenario.roller.width is not None
-        and len({(grid.edges, grid.strips) for grid in grids}) == 1
-    ):
-        return grids[0]  # its strips end with the roller
-    spacing = float(np.median([grid.spacing for grid in grids]))
-    edges = np.array([grid.edges for grid in grids])
-    low, high = float(edges[:, 0].min()), float(edges[:, 1].max())
-    strips = int(np.ceil(WIDTH_MARGIN * (high - low) / spacing))
-    strips += (strips + 1) % 2
-    middle, half = 0.5 * (low + high), 0.5 * strips * spacing
-    return Grid.spanning(middle - half, middle + half, strips)
+    grid = shared_strips(scenario)
+    fixed = scenario.contact.width is not None or ends_roller(scenario, *grid.edges)
+    half = max(WIDTH_MARGIN * max(reach), 0.5 * grid.strips * grid.spacing)
+    return grid if fixed else lattice(grid, half)
 
 
 class RealisationRunner:
@@ -202,19 +199,19 @@ class RealisationRunner:
     total : int
         Realisations of the whole ensemble.
     grid : Grid
-        Strips of all realisations that fit on them.
+        Strips of the profiles that are kept.
     """
 
     def __init__(self, scenario: Scenario, plan: EnsemblePlan, total: int, grid: Grid) -> None:
         self.text, self.file, self.files = scenario.text, scenario.file, dict(scenario.files)
         self.plan, self.total, self.grid = plan, total, grid
-        self._prepared: tuple[object, ContactModel] | None = None
+        self._prepared: dict[object, ContactModel] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes to be sent, without those that each process derives from them."""
-        derived = {"scenario", "drawer", "_prepared"}
+        derived = {"scenario", "drawer", "start", "_prepared"}
         kept = {name: value for name, value in self.__dict__.items() if name not in derived}
-        return {**kept, "_prepared": None}
+        return {**kept, "_prepared": {}}
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -225,6 +222,11 @@ class RealisationRunner:
     def drawer(self) -> Drawer:
         """Sampler of the random inputs."""
         return Drawer(self.scenario, BASE_PLANS[self.plan], self.total)
+
+    @cached_property
+    def start(self) -> Grid:
+        """Strips with which all realisations start that fit on them."""
+        return shared_strips(self.scenario)
 
     def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
         """Run realisations; the outcome of one that fails holds its error.
@@ -255,13 +257,8 @@ class RealisationRunner:
         """Return the run of a realisation, and add the values of its random inputs to `drawn`."""
         draws = self.drawer.draw(number, *sources(self.plan, self.drawer.groups, number))
         drawn.update({**draws.values, **draws.time_means})
-        grid = strips_of_run(draws)
-        (low, high), (first, last) = self.grid.edges, grid.edges
-        margin = 1e-9 * self.grid.spacing
-        if low <= first + margin and high >= last - margin:
-            grid = self.grid
-        model = self._model(draws.scenario, grid)
-        problem, stepper, _ = assemble_problem(draws, grid, model)
+        grid = start_of(draws, self.start)
+        problem, stepper, _ = assemble_problem(draws, grid, self._model)
         return RealisationRun(number, drawn, draws, problem, stepper)
 
     def compile_kernels(self) -> None:
@@ -280,13 +277,13 @@ class RealisationRunner:
             next(iter(test), None)
 
     def _model(self, scenario: Scenario, grid: Grid) -> ContactModel:
-        """Return the contact model prepared for the strips, shared by realisations if possible."""
-        if grid is not self.grid:
+        """Return the contact model prepared for strips, shared by realisations if possible."""
+        if grid is not self.start:
             return prepared_model(scenario, grid)
         key = scenario.contact, (scenario.cylinder.material, scenario.roller.material)
-        if self._prepared is None or self._prepared[0] != key:
-            self._prepared = key, prepared_model(scenario, grid)
-        return self._prepared[1]
+        if key not in self._prepared:
+            self._prepared = {key: prepared_model(scenario, grid)}
+        return self._prepared[key]
 
     def outcome(self, run: RealisationRun, observations: RunObservations | Exception) -> Outcome:
         """Return the outcome of a realisation with its observations, or the error of its test."""
@@ -305,10 +302,10 @@ class RealisationRunner:
         if self.plan == "control-variate":
             columns = {key: value[None] for key, value in run.draws.values.items()}
             scalars["control"] = float(closed_form_depths(self.scenario, columns, 1)[0])
-        curves, grid = dict(observations.curves), run.problem.grid
-        if grid is not self.grid:
+        curves = dict(observations.curves)
+        if not same_strips(observations.grid, self.grid):
             profile = curves["depth_profile"]
-            curves["depth_profile"] = np.interp(self.grid.y, grid.y, profile, left=0.0, right=0.0)
+            curves["depth_profile"] = averaged(profile, observations.grid, self.grid)
         courses = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         values = {**drawn, **courses, **scalars, **curves}
         return Outcome(number=run.number, values=values)

@@ -16,12 +16,14 @@ import numpy as np
 from wearsim.errors import CapabilityError, Mistake, ScenarioError, SolverError
 from wearsim.evolution.integrate import Evolution, bisect_failures
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.strips import averaged, same_strips
+from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, joined_problem
 from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.run.assemble import assemble_problem, prepared_model, start_height
 from wearsim.studies.run.draws import Drawer, Draws
-from wearsim.studies.run.grid import strips_of_run
+from wearsim.studies.run.grid import Extent, extent_of, lattice, strips_of_run
 from wearsim.studies.run.recorder import due_records, states_at
 from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import FloatArray, Grid, IntArray
@@ -317,18 +319,26 @@ class Grower:
             scenario = replace(scenario, operation=table, evolution=evolution)
             ready.append(replace(draws, scenario=scenario))
         last = {number: place for place, (number, _) in enumerate(tests)}  # of the greatest wear
-        grids = [strips_of_run(ready[place]) for place in last.values()]
-        self._grid = grid = _covering(grids)
+        extents = [extent_of(ready[place]) for place in last.values()]
+        grids = [
+            strips_of_run(ready[place], extent)
+            for place, extent in zip(last.values(), extents, strict=True)
+        ]
+        self._grid = grid = _covering(grids, extents)
         model = prepared_model(self.scenario, grid)
+
+        def models(scenario: Scenario, strips: Grid) -> ContactModel:
+            return model if strips is grid else prepared_model(scenario, strips)
+
         schedule = ListedPasses(0.0, 1.0, 1.0, tuple(passes))
         runs, results = [], {}
         for number, draws in enumerate(ready):
-            problem, stepper, _ = assemble_problem(draws, grid, model)
+            problem, stepper, _ = assemble_problem(draws, grid, models)
             runs.append(RealisationRun(number, {}, draws, problem, stepper))
         failures: dict[int, Exception] = {}
         done = 0
         for group in batch_groups(runs):
-            found, failed = _step(group, schedule)
+            found, failed = _step(group, schedule, grid)
             results.update(found)
             failures.update(failed)
             done += len(group)
@@ -343,21 +353,23 @@ class Grower:
         return kept, [results[n] for n, (draw, _) in enumerate(tests) if draw not in lost]
 
 
-def _covering(grids: Sequence[Grid]) -> Grid:
-    """Return strips that cover others, of their median width."""
-    spacing = float(np.median([grid.spacing for grid in grids]))
+def _covering(grids: Sequence[Grid], extents: Sequence[Extent]) -> Grid:
+    """Return strips of the median width that cover others and the predicted grooves."""
     low = min(grid.edges[0] for grid in grids)
     high = max(grid.edges[1] for grid in grids)
-    strips = int(np.ceil((high - low) / spacing - 1e-9))
-    strips += (strips + 1) % 2
-    middle, half = 0.5 * (low + high), 0.5 * strips * spacing
-    return Grid.spanning(middle - half, middle + half, strips)
+    middle, spacing = 0.5 * (low + high), float(np.median([grid.spacing for grid in grids]))
+    half = max(abs(one.centre - middle) + one.final for one in extents)
+    one = Grid.spanning(middle - 0.5 * spacing, middle + 0.5 * spacing, 1)
+    return lattice(one, max(half, 0.5 * (high - low)))
 
 
 def _step(
-    group: Sequence[RealisationRun], schedule: ListedPasses
+    group: Sequence[RealisationRun], schedule: ListedPasses, grid: Grid
 ) -> tuple[dict[int, list[Any]], dict[int, Exception]]:
-    """Step through a group of tests; return their states at the records, and errors."""
+    """Step through a group of tests; return their states at the records, and errors.
+
+    The profiles are on the strips of `grid`.
+    """
     results: dict[int, list[Any]] = {run.number: [] for run in group}
     failures: dict[int, Exception] = {}
 
@@ -373,13 +385,21 @@ def _step(
             due = due_records(advance, schedule, stop, stepper.pass_by_pass)
             # tests that are not stepped together have individual steppers, and one record each
             for part in [due] if len(runs) > 1 else [[one] for one in due]:
-                _, states = states_at(stepper, advance, part) if part else (None, advance.end)
+                if not part:
+                    continue
+                present, states = states_at(stepper, advance, part)
+                profiles = [
+                    depths
+                    if same_strips(present.grid, grid)
+                    else averaged(depths, present.grid, grid)
+                    for depths in states.depths
+                ]
                 for row, (_, place, _) in enumerate(part):
                     number = runs[int(advance.numbers[place])].number
                     results[number].append(
                         (
-                            states.cylinder_depth[:, 0, row].mean(axis=0),
-                            states.roller_depth[0, :, row].mean(axis=0),
+                            profiles[0][:, 0, row].mean(axis=0),
+                            profiles[1][0, :, row].mean(axis=0),
                             float(states.energy[row]),
                         )
                     )

@@ -25,7 +25,7 @@ from wearsim.scenario import Scenario, as_scenario, parse_scenario
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.api import PRELOAD, Watcher, checked_request, ensemble_content
 from wearsim.studies.ensemble.driver import EnsembleWork
-from wearsim.studies.ensemble.realisation import shared_grid
+from wearsim.studies.ensemble.realisation import profile_axis
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.life.rare import next_stage
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
@@ -258,7 +258,7 @@ def _prepared(
         scenario = with_length(scenario, settings.most)
     base = first_length(scenario, fixed, settings.most)
     first = with_length(scenario, base)
-    grid = shared_grid(first)
+    grid = profile_axis(first)
     request = checked_request(first, settings.plain, "monte-carlo", None)
     header, static = ensemble_content(first, request, grid)
     header = replace(

@@ -225,7 +225,7 @@ class _Group:
             "limit_angle": self._angle(test.limit, problem, state),
         }
         (curves,) = curves_at_end(problem, state, [self.runs[number].draws.scenario])
-        test.found = LifeRun(rows, scalars, curves)
+        test.found = LifeRun(rows, scalars, curves, problem.grid)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:
         """Return the angle of a cam at which the limited quantity is greatest [rad]."""

@@ -16,7 +16,7 @@ from wearsim.results import Outcome
 from wearsim.results.ensemble.life_settings import LifeSettings
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
-from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths, shared_grid
+from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths
 from wearsim.studies.life.batch import LifeRun, observe_lives
 from wearsim.studies.life.factor import ExactFactor, exact_factor
 from wearsim.studies.life.rare import changes_of, log_weight
@@ -180,11 +180,10 @@ class LifeRunner(RealisationRunner):
         if (level, stage) not in self._levels:
             passes = min(self.base * EXTENSION**level, self.longest)
             scenario = with_length(self.scenario, passes)
-            grid = shared_grid(scenario) if level else self.grid
             shift = self.settings.stages[stage - 1]["shift"] if stage else {}
             changes = changes_of(self.settings.stages[:stage])
             self._levels[level, stage] = LevelRunner(
-                scenario, self.total, grid, self.fixed, shift, changes
+                scenario, self.total, self.grid, self.fixed, shift, changes
             )
         return self._levels[level, stage]
 

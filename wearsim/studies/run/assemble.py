@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,12 +19,13 @@ from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
+from wearsim.evolution.strips import StripArrays
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.stations import cam_stations
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
-from wearsim.studies.run.grid import strips_of_run
+from wearsim.studies.run.grid import growth_of, strips_of_run
 from wearsim.studies.run.inputs import (
     MAX_NODES,
     contact_inputs,
@@ -35,6 +37,9 @@ from wearsim.types import FloatArray, Grid
 
 ITERATION_FRACTION = 1e-3  # convergence criterion of a step's iterations, over the tolerance
 ITERATION_RANGE = 1e-8, 1e-5
+
+#: Returns the contact model of a scenario for strips.
+ModelBuilder: TypeAlias = Callable[[Scenario, Grid], ContactModel]
 
 PARABOLA = {"hertz", "hertz-fastsim", "semi-hertzian"}  # models that fit one to the gap
 
@@ -107,7 +112,7 @@ def start_height(scenario: Scenario, grid: Grid) -> FloatArray:
 
 
 def assemble_problem(
-    draws: Draws, grid: Grid | None = None, model: ContactModel | None = None
+    draws: Draws, grid: Grid | None = None, models: ModelBuilder | None = None
 ) -> tuple[WearProblem, Stepper, str]:
     """Return the problem of a run, its stepper and the stepper's name.
 
@@ -116,9 +121,10 @@ def assemble_problem(
     draws : Draws
         The scenario, with the values of its random inputs.
     grid : Grid, optional
-        Strips of an earlier part of the run, instead of the scenario's choice.
-    model : ContactModel, optional
-        A model from `prepared_model`; requires `grid`.
+        Strips of an earlier part of the run, or those that realisations share, instead of the
+        scenario's choice.
+    models : callable, optional
+        Returns the contact model of a scenario for strips, by default `prepared_model`.
 
     Raises
     ------
@@ -129,7 +135,8 @@ def assemble_problem(
     """
     scenario = draws.scenario
     grid = grid if grid is not None else strips_of_run(draws)
-    chosen = model or prepared_model(scenario, grid)
+    build = models or prepared_model
+    chosen = build(scenario, grid)
     first, multiplicity = merged_rollers(draws)
     several = len(first) > 1 or draws.passes or scenario.cam
     name = chosen_stepper(scenario, chosen, 2 if several else 1)
@@ -145,12 +152,13 @@ def assemble_problem(
             [Mistake("evolution", "nodes", "has no meaning without an expectation over passes")],
         )
     place = {number: k for k, number in enumerate(first)}
+    drawn = {name: values[first][:, None] for name, values in draws.rollers.items()}
     problem = replace(
         build_problem(
             scenario,
             chosen,
             grid,
-            {name: values[first][:, None] for name, values in draws.rollers.items()},
+            drawn,
             rollers=first,
             multiplicity=multiplicity,
         ),
@@ -160,6 +168,12 @@ def assemble_problem(
             for item in draws.varying
         ),
     )
+    offsets = contact_inputs(scenario, first, drawn)["offset"]
+
+    def arrays(strips: Grid) -> StripArrays:
+        return StripArrays(build(scenario, strips), *surfaces(scenario, offsets, strips))
+
+    problem = replace(problem, growth=growth_of(draws, grid, arrays))
     if draws.passes and stepper.pass_by_pass:
         nodes = with_nodes(problem, scenario, draws.passes, minimum_nodes(draws.passes))
         stepper = PerPassStepper(redrawing(scenario, draws.passes), nodes)
@@ -252,11 +266,7 @@ def build_problem(
     cam = None
     if scenario.cam is not None:
         cam = cam_stations(turn_of(scenario), angles)
-    s, height = grid.y - values.pop("offset")[..., None], start_height(scenario, grid)
-    gap = s * s / (2.0 * roller.crown_radius) - height
-    if roller.width is not None:
-        gap = gap + roller.edge_drop(s)
-    slip = s * s / (2.0 * roller.crown_radius * roller.radius) + height / cylinder.radius
+    gap, s, slip = surfaces(scenario, values.pop("offset"), grid)
     tolerance = np.clip(ITERATION_FRACTION * scenario.evolution.tolerance, *ITERATION_RANGE)
     return WearProblem(
         grid=grid,
@@ -281,6 +291,33 @@ def build_problem(
         weight=np.ones(count),
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
-        slip_profile=slip if creepage.differential_slip else None,
+        slip_profile=slip,
         iteration_tolerance=float(tolerance),
     )
+
+
+def surfaces(
+    scenario: Scenario, offset: FloatArray, grid: Grid
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Return the gap of rollers without tilt, the distance from their apexes and their slip.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    offset : ndarray, shape (rollers, realisations or 1)
+        Axial positions of the rollers [m].
+    grid : Grid
+
+    Returns
+    -------
+    gap, from_apex, slip_profile : ndarray, shape (rollers, realisations or 1, strips)
+        See `WearProblem`; the last is None without differential slip.
+    """
+    roller, cylinder = scenario.roller, scenario.cylinder
+    s, height = grid.y - offset[..., None], start_height(scenario, grid)
+    gap = s * s / (2.0 * roller.crown_radius) - height
+    if roller.width is not None:
+        gap = gap + roller.edge_drop(s)
+    if not scenario.creepage.differential_slip:
+        return gap, s, None
+    return gap, s, s * s / (2.0 * roller.crown_radius * roller.radius) + height / cylinder.radius

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.evolution.strips import JOINED, Growth, StripArrays, same_strips
+from wearsim.mechanics.hertz.ellipse import HertzContact
 from wearsim.scenario import Scenario
+from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
@@ -21,8 +25,14 @@ STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is 
 FEWEST_PER_HALF_WIDTH = 5  # error below 1e-2, proportional to the square of the strip width
 STRIPS_PER_GROOVE = 30  # of half a groove: at its end, a coarse start has been worn away
 MOST_STRIPS = 801
+STRIPS_AT_START = 241  # at most, unless the contacts of the unworn bodies require more
+STRIPS_BEFORE_JOINING = 401  # of a growing groove
+STRIPS_OF_MANY_CONTACTS = 141  # the same where the contacts of a turn are solved together
+COARSER = 1.3  # width of strips that realisations share over that of the strips of one
+LEAST_CHOSEN = 2.5  # strips per half-width of a patch; with fewer chosen ones, strips grow
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
+DRAWN = {"scalar", "joint"}  # roles of random inputs with a range
 _MARGIN = 1e-9  # of a patch, against rounding at the outer edges
 _ROUNDING = 1e-12
 
@@ -145,24 +155,48 @@ def strips_over(width: float, half_width: float, tolerance: float, groove: float
     groove : float
         Half-width of the final groove, where that of the start need not be resolved [m].
     """
-    per_half_width = float(STRIPS_PER_HALF_WIDTH)
-    if groove > 0.0:
-        per_half_width = min(per_half_width, STRIPS_PER_GROOVE * half_width / groove)
-    per_half_width *= np.sqrt(DEFAULT_TOLERANCE / tolerance)
-    per_half_width = float(np.clip(per_half_width, FEWEST_PER_HALF_WIDTH, STRIPS_PER_HALF_WIDTH))
+    per_half_width = strips_per_half_width(half_width, tolerance, groove)
     strips = int(np.ceil(width / half_width * per_half_width))
     return min(strips + (strips + 1) % 2, MOST_STRIPS)
 
 
-def strips_of_run(draws: Draws) -> Grid:
-    """Return the strips for the random inputs and the final groove of a run.
+def strips_per_half_width(half_width: float, tolerance: float, groove: float = 0.0) -> float:
+    """Return the number of strips of the half-width of a patch; parameters as of `strips_over`."""
+    per_half_width = float(STRIPS_PER_HALF_WIDTH)
+    if groove > 0.0:
+        per_half_width = min(per_half_width, STRIPS_PER_GROOVE * half_width / groove)
+    per_half_width *= np.sqrt(DEFAULT_TOLERANCE / tolerance)
+    return float(np.clip(per_half_width, FEWEST_PER_HALF_WIDTH, STRIPS_PER_HALF_WIDTH))
 
-    Raises
-    ------
-    ScenarioError
-        If the contact does not fit on the strips that the scenario defines.
+
+class Extent(NamedTuple):
+    """Extent of the contacts and of the final groove of a run.
+
+    Parameters
+    ----------
+    patch : HertzContact
+        Widest patch of the unworn bodies.
+    centre : float
+        Middle of the contacts [m].
+    shift, fresh, final : float
+        Distance from the middle of the contacts' middles, of the edges of the contacts of the
+        unworn bodies, and of those of the groove predicted for full slip, the last two with a
+        margin [m].
+    load : float
+        Greatest load [N].
     """
-    scenario, choice = draws.scenario, draws.scenario.contact
+
+    patch: HertzContact
+    centre: float
+    shift: float
+    fresh: float
+    final: float
+    load: float
+
+
+def extent_of(draws: Draws) -> Extent:
+    """Return the extent of the contacts of a run."""
+    scenario = draws.scenario
     load = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
     load += draws.range_of("normal_force_offset")[1]
     patch, rollers = widest_patch(scenario, load), range(scenario.operation.rollers)
@@ -172,18 +206,44 @@ def strips_of_run(draws: Draws) -> Grid:
     if scenario.creepage.tilt_shifts_contact:
         tilt = max(abs(angle) for angle in draws.range_of("tilt"))
         shift += scenario.roller.crown_radius * tilt
-    groove = predicted_half_width(draws, load)
-    half = shift + 1.1 * groove + 1.3 * patch.b
+    fresh = shift + 1.3 * patch.b
+    final = fresh + 1.1 * predicted_half_width(draws, load)
+    return Extent(patch, centre, shift, fresh, final, load)
+
+
+def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
+    """Return the strips with which a run starts, for its random inputs.
+
+    They resolve the contact of the unworn bodies and cover it, and the final groove as far as it is
+    predicted and takes no more than `STRIPS_AT_START`; see `growth_of`.
+
+    Raises
+    ------
+    ScenarioError
+        If the contact does not fit on the strips that the scenario defines.
+    """
+    scenario, choice = draws.scenario, draws.scenario.contact
+    patch, centre, shift, fresh, half, load = extent or extent_of(draws)
+    tolerance = scenario.evolution.tolerance
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
-        least = strips_over(scenario.roller.width or 0.0, patch.b, scenario.evolution.tolerance)
-        return roller_grid(scenario, choice.strips or strips_of_roller(scenario, least, load))
+        least = strips_over(scenario.roller.width or 0.0, patch.b, tolerance)
+        inside = not ends_roller(scenario, centre - fresh, centre + fresh)
+        if choice.strips or not inside or least < STRIPS_AT_START:
+            return roller_grid(scenario, choice.strips or strips_of_roller(scenario, least, load))
     width = choice.width if choice.width is not None else 2.0 * half
+    many = scenario.cam is not None and turn_of(scenario).stations.count > 1
     resolved = 0.0
-    if scenario.cam is not None and turn_of(scenario).stations.count > 1:  # many contacts
+    if many:
         resolved = predicted_half_width(draws, load, full_slip=False)
         depth = scenario.limit.depth or math.inf
         resolved = min(resolved, math.sqrt(2.0 * scenario.roller.crown_radius * depth))
-    strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance, resolved)
+    if choice.width is None:  # strips grow from here
+        per_half_width = strips_per_half_width(patch.b, tolerance, resolved)
+        at_start = STRIPS_OF_MANY_CONTACTS if many else STRIPS_AT_START
+        if choice.strips is not None:
+            per_half_width, at_start = LEAST_CHOSEN, choice.strips
+        width = min(width, max(2.0 * fresh, patch.b / per_half_width * at_start))
+    strips = choice.strips or strips_over(width, patch.b, tolerance, resolved)
     if width < 2.0 * (shift + patch.b):
         raise ScenarioError(
             scenario.file,
@@ -198,6 +258,96 @@ def strips_of_run(draws: Draws) -> Grid:
             ],
         )
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, strips)
+
+
+def shared_strips(scenario: Scenario) -> Grid:
+    """Return the strips with which the realisations of a scenario start that fit on them.
+
+    They are those with every input that is drawn for a test at its mean, wider by its scatter.
+    """
+    redrawn = tuple(item for item in scenario.random if item.is_redrawn)
+    grid = strips_of_run(Draws(scenario, {}, (), redrawn, {}, {}))
+    fixed = scenario.contact.width is not None or scenario.contact.strips is not None
+    if fixed or not scenario.random or ends_roller(scenario, *grid.edges):
+        return grid
+    ranged = (item for item in scenario.random if item.role in DRAWN)
+    tilting = tuple(item for item in ranged if CONTACT_FIELDS.keys() >= set(item.keys))
+    drawn = Draws(scenario, {}, (), tilting, {}, {})
+    tilts = scenario.roller.crown_radius * np.ptp(drawn.range_of("tilt"))
+    wider = 0.5 * (1.25 * grid.strips * grid.spacing + tilts)
+    return lattice(grid, wider)
+
+
+def lattice(grid: Grid, half: float) -> Grid:
+    """Return strips in line with others that reach a distance `half` [m] from their middle.
+
+    Strips are joined until there are at most `MOST_STRIPS`.
+    """
+    middle, spacing = 0.5 * (grid.edges[0] + grid.edges[1]), grid.spacing
+    while 2.0 * half / spacing > MOST_STRIPS:
+        spacing *= JOINED
+    strips = math.ceil(2.0 * half / spacing - _MARGIN)
+    strips += (strips - grid.strips) % 2
+    return Grid.spanning(middle - 0.5 * strips * spacing, middle + 0.5 * strips * spacing, strips)
+
+
+def start_of(draws: Draws, shared: Grid) -> Grid:
+    """Return the strips with which a realisation starts: the shared ones if its contacts fit.
+
+    They must cover the contacts of the unworn bodies, and resolve them nearly as well as its own.
+    """
+    scenario, extent = draws.scenario, extent_of(draws)
+    own = strips_of_run(draws, extent)
+    if scenario.contact.width is not None or ends_roller(scenario, *own.edges):
+        return shared if same_strips(own, shared) else own
+    reach = abs(extent.centre - 0.5 * (shared.edges[0] + shared.edges[1])) + extent.fresh
+    covers = 2.0 * reach <= shared.strips * shared.spacing
+    resolves = scenario.contact.strips or shared.spacing <= COARSER * own.spacing
+    return shared if covers and resolves else own
+
+
+def start_of_run(scenario: Scenario, draws: Draws) -> Grid:
+    """Return the strips with which the run of a scenario starts, those of its realisation."""
+    if not scenario.random:
+        return strips_of_run(draws)
+    return start_of(draws, shared_strips(scenario))
+
+
+def growth_of(
+    draws: Draws, grid: Grid, arrays: Callable[[Grid], StripArrays]
+) -> tuple[Growth, ...]:
+    """Return how the strips of a run grow; they do not where the scenario defines their width.
+
+    Parameters
+    ----------
+    draws : Draws
+    grid : Grid
+        The present strips.
+    arrays : callable
+        Returns the parts of the problem on other strips.
+
+    Raises
+    ------
+    ScenarioError
+        If the load is not defined for the whole test.
+    """
+    scenario, choice, load = draws.scenario, draws.scenario.contact, draws.scenario.load.build()
+    greatest = load_range(scenario, load, scenario.total_time)[
+        1
+    ]  # an error beyond the end of a log
+    greatest += draws.range_of("normal_force_offset")[1]
+    if choice.width is not None or ends_roller(scenario, *grid.edges):
+        return (Growth(arrays, 0),)
+    many = scenario.cam is not None and turn_of(scenario).stations.count > 1
+    most = choice.strips or (STRIPS_OF_MANY_CONTACTS if many else STRIPS_BEFORE_JOINING)
+    last, margin = None, 0.0
+    if draws.varying or draws.passes or not load.constant:
+        margin = 0.5 * widest_patch(scenario, greatest).b
+    if scenario.creepage.tilt_shifts_contact:
+        margin += scenario.roller.crown_radius * max(map(abs, draws.range_of("tilt")))
+    if scenario.roller.width is not None:
+        last = roller_grid(scenario, strips_of_roller(scenario, STRIPS_AT_START, greatest))
+    return (Growth(arrays, most, margin, last),)
 
 
 def realisation_grid(

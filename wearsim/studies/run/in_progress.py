@@ -14,8 +14,10 @@ from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.observables import present_batch
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
+from wearsim.evolution.strips import on_grid
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.results import (
     Result,
@@ -31,6 +33,7 @@ from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
 from wearsim.studies.run.continuation import earlier_warnings
 from wearsim.studies.run.draws import Draws, units_of
+from wearsim.studies.run.grid import start_of_run
 from wearsim.studies.run.recorder import (
     Checkpointed,
     Event,
@@ -68,7 +71,9 @@ class RunInProgress:
         limit: Limit | None = None,
     ) -> None:
         self.limit, self.reached = limit, False
-        grid = None if data is None else Grid(data.static["y"], float(data.checkpoint["spacing"]))
+        grid = start_of_run(scenario, draws)
+        if data is not None:
+            grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
         self.scenario, self.path, self.storage = scenario, path, storage
         self.problem, self.stepper, self.stepper_name = assemble_problem(draws, grid)
         self.on_event: Watcher = on_event or (lambda event: None)
@@ -150,7 +155,7 @@ class RunInProgress:
     def _check_errors(self) -> None:
         """Warn if estimated errors exceed the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        problem = located(self.problem, state)
+        problem = located(self._present, state)
         sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
         errors = state.depth_error, state.volume_error
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
@@ -225,8 +230,9 @@ class RunInProgress:
         if choice.auto is None or choice.model == REFERENCE or not (due and known):
             return
         materials = self.scenario.cylinder.material, self.scenario.roller.material
-        batch = present_batch(self.problem, state)
-        tolerance, grid = choice.auto.tolerance, self.problem.grid
+        problem = self._present
+        batch = present_batch(problem, state)
+        tolerance, grid = choice.auto.tolerance, problem.grid
         if text := excess(REFERENCE, choice, grid, materials, batch, tolerance):
             self._warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
 
@@ -251,6 +257,12 @@ class RunInProgress:
         ) from None
 
     @property
+    def _present(self) -> WearProblem:
+        """The problem on the present strips."""
+        grid = self.recorder.grid
+        return self.problem if grid is self.problem.grid else on_grid(self.problem, grid)
+
+    @property
     def _passes(self) -> float:
         """Roller passes done."""
         return float(self.recorder.state.passes[0])
@@ -268,7 +280,7 @@ class RunInProgress:
 
     def data(self, finished: bool) -> RunData:
         """Return the content of the results file."""
-        scenario, problem = self.scenario, self.problem
+        scenario, problem = self.scenario, self._present
         kinematics = problem.kinematics
         checkpoint = self.recorder.state.to_arrays()
         checkpoint["record_base"] = np.asarray(self.record_base)

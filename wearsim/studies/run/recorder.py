@@ -19,10 +19,11 @@ from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem
+from wearsim.evolution.strips import averaged, same_strips
 from wearsim.results.run_schema import ALL_VARIABLES
 from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
 from wearsim.studies.run.schedule import RecordSchedule
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, Grid
 
 
 @dataclass(frozen=True)
@@ -217,25 +218,25 @@ class Recorder:
         history: Mapping[str, FloatArray] | None = None,
         records: Mapping[str, FloatArray] | None = None,
     ) -> None:
-        self.problem = problem
         self.stepper = stepper
         self.schedule = schedule
         self.threshold = threshold
         self._history = _rows(history or {}) or [
             _single(history_row(stepper, problem, state, None, threshold))
         ]
-        self._records = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
-        self._kept = len(self._history), len(self._records), state
+        rows = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
+        self._records = [(problem.grid, row) for row in rows]
+        self._kept = len(self._history), len(self._records), state, problem.grid
 
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
         stepper, end = self.stepper, advance.end
         for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
-            self._records.append(_single(record_row(stepper, *states_at(stepper, advance, [one]))))
+            self._record(advance, *states_at(stepper, advance, [one]))
         row = history_row(stepper, advance.problem, end, advance.path[0], self.threshold)
         self._history.append(_single(row))
         # a single assignment: an interrupt before it leaves the previous step current
-        self._kept = len(self._history), len(self._records), end
+        self._kept = len(self._history), len(self._records), end, advance.problem.grid
 
     def end_at(self, advance: Advance, state: WearState, stop: float) -> None:
         """Record a state within a step as the end of the run, which resumes from the step's start.
@@ -252,12 +253,15 @@ class Recorder:
         stepper, start = self.stepper, advance.path[0]
         for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
             if one[2] < state.passes[0]:
-                row = record_row(stepper, *states_at(stepper, advance, [one]))
-                self._records.append(_single(row))
-        self._records.append(_single(record_row(stepper, advance.problem, state)))
+                self._record(advance, *states_at(stepper, advance, [one]))
+        self._record(advance, advance.problem, state)
         row = history_row(stepper, advance.problem, state, start, self.threshold)
         self._history.append(_single(row))
-        self._kept = len(self._history), len(self._records), start
+        self._kept = len(self._history), len(self._records), start, advance.problem.grid
+
+    def _record(self, advance: Advance, problem: WearProblem, state: WearState) -> None:
+        row = _single(record_row(self.stepper, problem, state))
+        self._records.append((advance.problem.grid, row))
 
     def drop_unfinished(self) -> None:
         """Remove the rows of an interrupted `add`."""
@@ -269,19 +273,35 @@ class Recorder:
         return self._kept[2]
 
     @property
+    def grid(self) -> Grid:
+        """Strips of the state and of all records."""
+        return self._kept[3]
+
+    @property
     def history(self) -> dict[str, FloatArray]:
         """The history as arrays, first axis step."""
         return _columns(self._history)
 
     @property
     def records(self) -> dict[str, FloatArray]:
-        """The records as arrays, first axis record."""
-        return _columns(self._records)
+        """The records as arrays, first axis record.
+
+        Those made before the strips have grown are averages over the present strips.
+        """
+        return _columns([_on_grid(row, grid, self.grid) for grid, row in self._records])
 
 
 def _single(row: Variables) -> Variables:
     """Return the row of a single test in the form of the results file."""
     return {n: v[0] if n in _WITHOUT_REALISATION else v for n, v in row.items()}
+
+
+def _on_grid(row: Variables, old: Grid, new: Grid) -> Variables:
+    """Return a record on the strips of a later one."""
+    if old is new or same_strips(old, new):
+        return row
+    along = {name for name in row if ALL_VARIABLES[name].dims[-1:] == ("y",)}
+    return {n: averaged(v, old, new) if n in along else v for n, v in row.items()}
 
 
 def _rows(columns: Mapping[str, FloatArray]) -> list[Variables]:

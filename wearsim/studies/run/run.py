@@ -26,7 +26,6 @@ from wearsim.studies.run.continuation import (
     is_at_limit,
     last_value,
     stored_scenario,
-    widened_run,
     with_end,
     without_limit_rows,
     written_value,
@@ -166,8 +165,7 @@ def resume(
     at_end = not data.until and scenario.total_passes == float(state.passes[0])
     if data.finished and (reached or (at_end and limit is None)):
         return Result(data, path)
-    draws = draw(scenario)
-    data, state = widened_run(draws, without_limit_rows(data, state), state)
+    draws, data = draw(scenario), without_limit_rows(data, state)
     with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
         return _run_to_limit(
             RunInProgress(scenario, draws, path, storage, watch, stop_requested, data, state, limit)
@@ -194,7 +192,7 @@ def _run_to_limit(run: RunInProgress) -> Result:
             try:
                 scenario = stored_scenario(data, 2.0 * data.total_passes)
                 draws = draw(scenario)
-                longer = run.extended(scenario, draws, *widened_run(draws, data, state))
+                longer = run.extended(scenario, draws, data, state)
             except ScenarioError as error:
                 reason = "it cannot be extended: " + "; ".join(map(str, error.mistakes))
         if reason:

@@ -24,7 +24,7 @@ from wearsim.studies.ensemble.realisation import (
     RealisationRunner,
     closed_form_depths,
     control_of,
-    shared_grid,
+    profile_axis,
 )
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.run.draws import Drawer
@@ -194,7 +194,7 @@ def _warm() -> None:
 @lru_cache(maxsize=1)
 def _grid() -> Grid:
     """Return the strips of all studies; they are identical so that the reference is common."""
-    return shared_grid(rig(0))
+    return profile_axis(rig(0))
 
 
 def run_jobs(

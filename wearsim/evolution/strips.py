@@ -1,0 +1,215 @@
+"""Strips that grow with the groove during a test.
+
+A test begins on strips that resolve the contact of the unworn bodies. Before a step that starts
+close to the outer strips, strips of the same width are added on both sides. Where that would be
+more than a greatest number, every three strips are joined to one first: their wear is averaged, so
+that the worn volume is kept, and the groove is then resolved as well as the fresh contact was.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wearsim.evolution.error_estimates import half_quadrature
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.single_step import carried_loads, solve_present
+from wearsim.plugins import ContactModel
+from wearsim.types import FloatArray, Grid
+
+FREE = 0.075  # part of all strips that is without load on each side, at least
+WIDER = 1.5  # width after growing over that before
+JOINED = 3  # strips joined to one; an odd number keeps symmetric strips symmetric
+LEAST_LOADED = 24  # strips of each contact after joining, as of a fresh contact
+MOST_OF_ALL = 1601  # strips above which they are joined although a contact has fewer
+_ALIGNED = 1e-9  # part of a strip by which edges that coincide may differ
+
+
+class StripArrays(NamedTuple):
+    """Parts of the problem of one realisation that depend on the strips.
+
+    Parameters
+    ----------
+    model : ContactModel
+        Built for the strips.
+    gap : ndarray, shape (rollers, 1, strips)
+        Gap of rollers without tilt before wear [m].
+    from_apex : ndarray, shape (rollers, 1, strips)
+    slip_profile : ndarray, shape (rollers, 1, strips), optional
+        As in `WearProblem`.
+    """
+
+    model: ContactModel
+    gap: FloatArray
+    from_apex: FloatArray
+    slip_profile: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """How the strips of one realisation grow.
+
+    Parameters
+    ----------
+    arrays : callable
+        Returns the `StripArrays` on a grid.
+    most : int
+        Number of strips above which strips are joined; 0 where the strips do not grow.
+    margin : float
+        Least distance of a contact from the outer edges at the start of a step, where its load and
+        position vary in time [m].
+    last : Grid, optional
+        Strips over the whole width of rollers that have ends, which grow no further.
+    least_loaded : int
+        Strips of each contact after joining, at least.
+    """
+
+    arrays: Callable[[Grid], StripArrays]
+    most: int
+    margin: float = 0.0
+    last: Grid | None = None
+    least_loaded: int = LEAST_LOADED
+
+
+def next_grids(problem: WearProblem, state: WearState) -> list[Grid | None]:
+    """Return the wider strips of each realisation that needs them, else None.
+
+    Strips grow if a contact is loaded close to the outer ones.
+    """
+    realisations, strips = len(state.passes), problem.grid.strips
+    unchanged: list[Grid | None] = [None] * realisations
+    if not any(one.most for one in problem.growth):
+        return unchanged
+    load, least = state.contacts.line_load, max(3, math.ceil(FREE * strips))
+    free = [max(least, math.ceil(one.margin / problem.grid.spacing)) for one in problem.growth]
+    widest = min(max(free), strips)
+    # counted, since any() takes three times as long on short arrays
+    if not np.count_nonzero(load[:, :widest]) and not np.count_nonzero(load[:, -widest:]):
+        return unchanged
+    loaded = (load > 0.0).reshape(-1, realisations, strips)
+    counts = loaded.sum(axis=2).min(axis=0).tolist()
+    found = []
+    for v, (growth, width, count) in enumerate(zip(problem.growth, free, counts, strict=True)):
+        outer = loaded[:, v, :width].any() or loaded[:, v, -width:].any()
+        found.append(_next(problem.grid, growth, count) if outer and growth.most else None)
+    return found
+
+
+def _next(grid: Grid, growth: Growth, loaded: int) -> Grid | None:
+    """Return the strips that follow, None after the last; `loaded` are those of a contact."""
+    last = growth.last
+    if last is not None and same_strips(grid, last):
+        return None
+    strips, spacing = grid.strips, grid.spacing
+    wide = math.ceil(WIDER * strips)
+    resolved = loaded >= JOINED * growth.least_loaded
+    if wide > growth.most and (resolved or wide > MOST_OF_ALL):
+        wide, spacing = math.ceil(wide / JOINED), JOINED * spacing
+    wide += (wide - strips) % 2  # a strip or an edge stays in the middle
+    middle = 0.5 * (grid.edges[0] + grid.edges[1])
+    wider = Grid.spanning(middle - 0.5 * wide * spacing, middle + 0.5 * wide * spacing, wide)
+    ends = last is not None and (wider.edges[0] < last.edges[0] or wider.edges[1] > last.edges[1])
+    return last if ends else wider
+
+
+def same_strips(one: Grid, other: Grid) -> bool:
+    """Return whether two grids have the same strips, apart from round-off."""
+    near = _ALIGNED * one.spacing
+    return one.strips == other.strips and bool(np.abs(one.y - other.y).max() <= near)
+
+
+def on_grid(problem: WearProblem, grid: Grid) -> WearProblem:
+    """Return a problem on other strips."""
+    parts = [one.arrays(grid) for one in problem.growth]
+    gap = np.concatenate([part.gap for part in parts], axis=1)
+    slip, shared = parts[0].slip_profile, problem.from_apex.shape[1] == 1
+    if slip is not None and not shared:
+        slip = np.concatenate([np.asarray(part.slip_profile) for part in parts], axis=1)
+    apexes = [part.from_apex for part in parts]
+    return replace(
+        problem,
+        grid=grid,
+        model=parts[0].model,
+        flat_gap=np.broadcast_to(gap, (problem.shape[0], *gap.shape)),
+        from_apex=apexes[0] if shared else np.concatenate(apexes, axis=1),
+        slip_profile=slip,
+    )
+
+
+def grown(problem: WearProblem, state: WearState, grid: Grid) -> tuple[WearProblem, WearState]:
+    """Return problem and state of some realisations on wider strips."""
+    wider = on_grid(problem, grid)
+    return wider, state_on_grid(wider, state, problem.grid)
+
+
+def shares(old: Grid, new: Grid) -> FloatArray:
+    """Return the part of each old strip that lies in each new one, shape (new, old strips)."""
+    edges = [np.append(grid.y - 0.5 * grid.spacing, grid.edges[1]) for grid in (old, new)]
+    low = np.maximum(edges[1][:-1, None], edges[0][None, :-1])
+    high = np.minimum(edges[1][1:, None], edges[0][None, 1:])
+    part = np.clip((high - low) / old.spacing, 0.0, 1.0)
+    nearest = np.round(part)
+    return np.asarray(np.where(np.abs(part - nearest) < _ALIGNED, nearest, part))
+
+
+def averaged(values: FloatArray, old: Grid, new: Grid) -> FloatArray:
+    """Return the averages over new strips of values on old ones, last axis; zero outside.
+
+    The integral over the strips is kept where the new ones cover the old ones.
+    """
+    weights = shares(old, new) * (old.spacing / new.spacing)
+    rows = values.reshape(-1, old.strips)
+    # row by row, so that the round-off does not depend on the number of rows
+    found = [(weights * row).sum(axis=-1) for row in rows]
+    return np.array(found).reshape(*values.shape[:-1], new.strips)
+
+
+def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearState:
+    """Return a state on the strips of a problem, with the same worn volume of each body.
+
+    Parameters
+    ----------
+    problem : WearProblem
+        On the new strips.
+    state : WearState
+    old : Grid
+        Strips of the state.
+    """
+    new, contacts = problem.grid, state.contacts
+    names = "past_wear", "stepping_error", "wear_exponents", "cylinder_depth", "roller_depth"
+    arrays = {
+        name: averaged(values, old, new)
+        for name in names
+        if (values := getattr(state, name)) is not None
+    }
+    if "wear_exponents" in arrays:  # zero on strips without wear so far
+        arrays["wear_exponents"][arrays["wear_exponents"] == 0.0] = 1.0
+    if state.loop_strips is not None:  # line loads; without a factorisation the loop begins again
+        arrays["loop_strips"] = averaged(state.loop_strips, old, new)
+        arrays["loop_strips"][1:] = 0.0
+    columns: dict[str, Any] = {
+        name: averaged(getattr(contacts, name), old, new)
+        for name in ("line_load", "half_length", "dissipation")
+    }
+    state = state.replaced(
+        **arrays, contacts=replace(contacts, y=new.y, **columns), **_auxiliary(problem, state, old)
+    )
+    if abs(new.spacing / old.spacing - 1.0) < _ALIGNED:
+        return state  # the added strips are without load
+    solved = solve_present(problem, state, carried_loads(problem, state.contacts))
+    return state.replaced(contacts=solved, solves=state.solves + problem.contacts_each)
+
+
+def _auxiliary(problem: WearProblem, state: WearState, old: Grid) -> dict[str, WearState]:
+    """Return the auxiliary solutions of a state on the strips of a problem."""
+    found = {}
+    for name, part in state.auxiliary.items():
+        halved = name == "half_quadrature_solution"
+        own = half_quadrature(problem, state)[0] if halved else problem
+        found[name] = state_on_grid(own, part, old)
+    return found
