@@ -63,6 +63,7 @@ def test_ensemble_of_this_layout_opens(name):
         ("run", 3),
         ("run", 4),
         ("run", 5),
+        ("run", 6),
         ("dissipation", 1),
         ("ensemble", 1),
     ],

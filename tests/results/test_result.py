@@ -42,7 +42,7 @@ def test_result_properties_return_their_variables() -> None:
             np.testing.assert_array_equal(
                 getattr(result, name), result.raw.variables[variables.get(name, name)].squeeze()
             )
-    assert len([name for name in VARIABLES if hasattr(Result, name)]) == 26
+    assert len([name for name in VARIABLES if hasattr(Result, name)]) == 32
     np.testing.assert_array_equal(
         result.values("half_length"), result.raw.records["half_length"].squeeze()
     )

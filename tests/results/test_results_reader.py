@@ -208,14 +208,14 @@ def _with_about(text: str) -> Callable[[h5py.File], None]:
         (
             _newer,
             (
-                "has layout 7 of wearsim-run, and this wearsim reads layout 6; update wearsim to"
+                "has layout 8 of wearsim-run, and this wearsim reads layout 7; update wearsim to"
                 " read it"
             ),
         ),
         (
             _older,
             (
-                "has layout 5 of wearsim-run, and this wearsim reads layout 6; repeat the"
+                "has layout 6 of wearsim-run, and this wearsim reads layout 7; repeat the"
                 " computation, or read it with the version of wearsim that wrote it"
             ),
         ),

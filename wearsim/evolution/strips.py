@@ -30,21 +30,17 @@ MOST_OF_ALL = 1601  # strips above which they are joined although a contact has 
 _ALIGNED = 1e-9  # part of a strip by which edges that coincide may differ
 
 
-class StripArrays(NamedTuple):
-    """Parts of the problem of one realisation that depend on the strips.
+class Surfaces(NamedTuple):
+    """Surfaces of the unworn bodies of one realisation on strips.
 
     Parameters
     ----------
-    model : ContactModel
-        Built for the strips.
-    gap : ndarray, shape (rollers, 1, strips)
-        Gap of rollers without tilt before wear [m].
-    from_apex : ndarray, shape (rollers, 1, strips)
+    gap, from_apex : ndarray, shape (rollers, 1, strips)
+        Gap of rollers without tilt before wear, and distance from their apexes [m].
     slip_profile : ndarray, shape (rollers, 1, strips), optional
         As in `WearProblem`.
     """
 
-    model: ContactModel
     gap: FloatArray
     from_apex: FloatArray
     slip_profile: FloatArray | None
@@ -52,12 +48,16 @@ class StripArrays(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """How the strips of one realisation grow.
+    """Construction of the problem of one realisation on other strips, and how its strips grow.
 
     Parameters
     ----------
-    arrays : callable
-        Returns the `StripArrays` on a grid.
+    model : callable
+        Returns the contact model for strips.
+    surfaces : callable
+        Returns the surfaces on strips.
+    coarse : callable
+        Returns strips of about twice the width over the same range.
     most : int
         Number of strips above which strips are joined; 0 where the strips do not grow.
     margin : float
@@ -69,7 +69,9 @@ class Growth:
         Strips of each contact after joining, at least.
     """
 
-    arrays: Callable[[Grid], StripArrays]
+    model: Callable[[Grid], ContactModel]
+    surfaces: Callable[[Grid], Surfaces]
+    coarse: Callable[[Grid], Grid]
     most: int
     margin: float = 0.0
     last: Grid | None = None
@@ -125,7 +127,7 @@ def same_strips(one: Grid, other: Grid) -> bool:
 
 def on_grid(problem: WearProblem, grid: Grid) -> WearProblem:
     """Return a problem on other strips."""
-    parts = [one.arrays(grid) for one in problem.growth]
+    parts = [one.surfaces(grid) for one in problem.growth]
     gap = np.concatenate([part.gap for part in parts], axis=1)
     slip, shared = parts[0].slip_profile, problem.from_apex.shape[1] == 1
     if slip is not None and not shared:
@@ -134,11 +136,25 @@ def on_grid(problem: WearProblem, grid: Grid) -> WearProblem:
     return replace(
         problem,
         grid=grid,
-        model=parts[0].model,
+        model=problem.growth[0].model(grid),
         flat_gap=np.broadcast_to(gap, (problem.shape[0], *gap.shape)),
         from_apex=apexes[0] if shared else np.concatenate(apexes, axis=1),
         slip_profile=slip,
     )
+
+
+def coarse_problem(problem: WearProblem) -> WearProblem:
+    """Return a problem on strips of twice the width."""
+    growth = tuple(
+        replace(
+            one,
+            most=math.ceil(0.5 * one.most),
+            last=one.last and one.coarse(one.last),
+            least_loaded=math.ceil(0.5 * one.least_loaded),
+        )
+        for one in problem.growth
+    )
+    return replace(on_grid(problem, problem.growth[0].coarse(problem.grid)), growth=growth)
 
 
 def grown(problem: WearProblem, state: WearState, grid: Grid) -> tuple[WearProblem, WearState]:

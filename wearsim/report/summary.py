@@ -279,16 +279,27 @@ def run_line(result: Result) -> str:
     """Return the footer of a run, with the estimated errors of its stepping."""
     used = [result.described_model, f"{len(result.y)} strips", result.stepper]
     error = "no stepping error"
+    known = bool(np.isfinite(result.profile_error_by_strips[-1]).all())
     if result.stepper != "per-pass":
         used.append(f"tolerance {result.raw.tolerance:g}")
+    if result.stepper != "per-pass" or known:
         depth = max(np.max(result.depth[-1]), np.max(result.roller_depth[-1]))
         volume = np.max(result.worn_volume[-1])
-        depth = _within("depth", np.max(result.depth_error[-1]), depth)
-        volume = _within("worn volume", np.max(result.volume_error[-1]), volume)
+        text = _within("depth", np.max(result.depth_error[-1]), depth)
+        parts = "steps"
+        if known:
+            parts = "steps and strips"
+            by = (
+                np.max(part[-1])
+                for part in (result.depth_error_by_steps, result.depth_error_by_strips)
+            )
+            steps, strips = (_percent(part / depth if depth > 0.0 else 0.0) for part in by)
+            text += f" (steps {steps}, strips {strips})"
+        volume_text = _within("worn volume", np.max(result.volume_error[-1]), volume)
         profile = _within("profile", np.max(result.profile_error[-1]), 1.0)
         error = (
-            f"{depth}, {profile}, {volume} (estimated numerical error of the steps, not of model or"
-            " inputs)"
+            f"{text}, {profile}, {volume_text} (estimated numerical error of the {parts}, not of"
+            " model or inputs)"
         )
     return _line(used, error, lapse(result.raw.wall_seconds))
 

@@ -149,6 +149,26 @@ class Result(StudyResult[RunData]):
         "Estimated error of the profiles of all bodies after each step: its root mean square over"
         " the strips, relative to that of the depths.",
     )
+    depth_error_by_steps = Stored(
+        "depth_error_by_steps", "Part of `depth_error` that is due to the steps [m]."
+    )
+    volume_error_by_steps = Stored(
+        "volume_error_by_steps", "Part of `volume_error` that is due to the steps [m^3]."
+    )
+    profile_error_by_steps = Stored(
+        "profile_error_by_steps", "Part of `profile_error` that is due to the steps."
+    )
+    depth_error_by_strips = Stored(
+        "depth_error_by_strips",
+        "Part of `depth_error` that is due to the strips [m]; not a number where it is not"
+        " estimated.",
+    )
+    volume_error_by_strips = Stored(
+        "volume_error_by_strips", "Part of `volume_error` that is due to the strips [m^3]."
+    )
+    profile_error_by_strips = Stored(
+        "profile_error_by_strips", "Part of `profile_error` that is due to the strips."
+    )
     rejected = Stored("rejected", "Rejected steps so far, after each step.")
     solves = Stored("solves", "Contact solves of accepted steps so far, after each step.")
     full_solves = Stored("full_solves", "Roller passes solved in full so far, after each step.")

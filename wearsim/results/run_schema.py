@@ -26,6 +26,14 @@ _CYLINDER_PROFILE = ("record", "station", "realisation", "y")
 _ROLLER_PROFILE = ("record", "roller", "realisation", "y")
 _CONTACT = ("record", "station", "roller", "realisation", "y")
 
+_ERRORS = {
+    "depth": ("m", "the depth of either body"),
+    "volume": ("m^3", "the volume worn off both bodies"),
+    "profile": ("1", "all profiles, root mean square over that of the depths"),
+}
+#: ends of the names of errors, the sum first, and what they are due to
+ERROR_PARTS = {"": "", "_by_steps": " due to the steps", "_by_strips": " due to the strips"}
+
 VARIABLES: Mapping[str, Variable] = by_name(
     (
         Variable("y", ("y",), "m", "axial position", "static"),
@@ -81,22 +89,10 @@ VARIABLES: Mapping[str, Variable] = by_name(
         Variable(
             "adhesion_fraction", _ROLLER, "1", "part of the contact area that adheres", "history"
         ),
-        Variable(
-            "depth_error", _TEST, "m", "estimated error of the depth of either body", "history"
-        ),
-        Variable(
-            "volume_error",
-            _TEST,
-            "m^3",
-            "estimated error of the volume worn off both bodies",
-            "history",
-        ),
-        Variable(
-            "profile_error",
-            _TEST,
-            "1",
-            "estimated root mean square error of all profiles, over that of the depths",
-            "history",
+        *(
+            Variable(f"{name}_error{end}", _TEST, unit, f"estimated error of {what}{by}", "history")
+            for end, by in ERROR_PARTS.items()
+            for name, (unit, what) in _ERRORS.items()
         ),
         Variable("rejected", _STEP, "1", "rejected steps so far", "history"),
         Variable("solves", _STEP, "1", "contact solves of accepted steps so far", "history"),
@@ -166,5 +162,5 @@ CAM_VARIABLES: Mapping[str, Variable] = by_name(
 )
 ALL_VARIABLES: Mapping[str, Variable] = {**VARIABLES, **CAM_VARIABLES}
 
-RUN = Schema("wearsim-run", 6, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Schema("wearsim-run", 7, "a wear test, from `wearsim run`", AXES, VARIABLES)
 CAM_RUN = replace(RUN, variables=ALL_VARIABLES)

@@ -83,6 +83,8 @@ def test_interrupt_in_a_step_keeps_the_previous_step(
     assert not stopped.finished
     rows = len(stopped.passes)
     for variable, array in stopped.raw.history.items():
+        if variable.endswith(("_error", "_by_strips")):
+            continue  # the error due to the strips is estimated at the end
         np.testing.assert_array_equal(array, unbroken.raw.history[variable][:rows])
     assert stopped.record_passes[-1] <= stopped.passes[-1] == stopped.raw.checkpoint["passes"]
     assert stopped.steps == rows - 1
@@ -180,7 +182,7 @@ def test_run_of_too_many_steps_keeps_the_steps(path: Path) -> None:
 def test_failure_after_resume_keeps_the_steps(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     unbroken = studies.run(short())
     with pytest.raises(Interrupted):
-        studies.run(short(), path, stop_requested=lambda: True)
+        studies.run(short(**changes), path, stop_requested=lambda: True)
     steps = iter(range(100))
     proposed = implicit.ImplicitStepper.proposed
 
@@ -275,9 +277,9 @@ def test_test_cannot_be_extended_past_its_log(path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def _stopped(path: Path) -> None:
+def _stopped(path: Path, **changes: object) -> None:
     with pytest.raises(Interrupted):
-        studies.run(short(), path, stop_requested=lambda: True)
+        studies.run(short(**changes), path, stop_requested=lambda: True)
 
 
 def _warnings(path: Path) -> list[str]:
@@ -289,12 +291,12 @@ def _warnings(path: Path) -> list[str]:
 
 
 def test_same_software_resumes_without_warning(path: Path) -> None:
-    _stopped(path)
+    _stopped(path, evolution__strip_error=False)  # no warning of its size
     assert _warnings(path) == []
 
 
 def test_changed_software_causes_one_warning_each(path: Path) -> None:
-    _stopped(path)
+    _stopped(path, evolution__strip_error=False)  # no warning of its size
     data = read_results(path)
     older = data.software | {"numpy": "1.0", "wearsim": "0.0.1"}
     write_results(path, replace(data, software=older))
@@ -311,7 +313,7 @@ def test_changed_software_causes_one_warning_each(path: Path) -> None:
 def test_changed_plugin_of_same_name_causes_a_warning(
     distribution: str, number: str, path: Path
 ) -> None:
-    _stopped(path)
+    _stopped(path, evolution__strip_error=False)  # no warning of its size
     data = read_results(path)
     rows = [dict(row) for row in data.plugins]
     rows[0] |= {"distribution": distribution, "version": number}

@@ -139,6 +139,8 @@ def test_finished_test_can_be_extended(overrides: dict[str, object], path: Path)
     assert after.raw.total_passes == 10_000
     rows = len(before.passes)
     for name, array in before.raw.history.items():  # the earlier history is unchanged
+        if name.endswith(("_error", "_by_strips")):
+            continue  # estimated again for the whole test
         np.testing.assert_array_equal(after.raw.history[name][:rows], array)
     kept = len(before.record_passes)
     np.testing.assert_array_equal(after.record_passes[:kept], before.record_passes)

@@ -140,6 +140,11 @@ class EvolutionTable(Options):
         " automatically by default.",
     )
     max_steps: int = Field(default=1_000_000, gt=0, description="Maximum number of steps.")
+    strip_error: bool = Field(
+        default=True,
+        description="Estimate the error due to the strips, by a second test on strips of twice the"
+        " width.",
+    )
 
 
 class OutputsTable(Options):

@@ -13,10 +13,12 @@ from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_orde
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
+from wearsim.evolution.strip_errors import Course, add_step, coarse_courses, strip_errors
 from wearsim.plugins import BODIES
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import cam_observables, lift_curves
 from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.run.assemble import coarse_stepper
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import Due, due_records, history_row, states_at
 from wearsim.studies.run.schedule import RecordSchedule
@@ -254,7 +256,9 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
     tests = Evolution(problem, state, stepper, stop, steps, schedule.next_record)
     rows = [[row] for row in observables_of(stepper, problem, state, threshold)]
     results: dict[int, RunObservations | Exception] = {}
+    courses = [Course() for _ in runs]
     for advance in tests:
+        add_step(courses, advance)
         due = due_records(advance, schedule, stop, stepper.pass_by_pass)
         for part in [due] if runs[0].can_be_batched else [[one] for one in due]:
             tests.fail(_record(stepper, advance, part, threshold, rows))
@@ -267,8 +271,51 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
             scalars = {name: float(getattr(end, name)[place]) for name in SCALARS}
             grid = advance.problem.grid
             results[number] = RunObservations(rows[number], scalars, found, grid)
+    add_strip_errors(runs, problem, courses, results)
     results |= tests.failures
     return [results[number] for number in range(len(runs))]
+
+
+def add_strip_errors(
+    runs: Sequence[RealisationRun],
+    problem: WearProblem,
+    courses: Sequence[Course],
+    results: Mapping[int, RunObservations | Exception],
+) -> dict[int, FloatArray]:
+    """Add the errors due to the strips to those of the results, by the same tests on coarse ones.
+
+    Parameters
+    ----------
+    runs : sequence of RealisationRun
+    problem : WearProblem
+        Of all tests, on the strips with which they start.
+    courses : sequence of Course
+        Of each test.
+    results : mapping of int to RunObservations or Exception
+
+    Returns
+    -------
+    dict of int to ndarray, shape (3,)
+        Added errors of depth [m], volume [m^3] and profile by number; none where they are not
+        estimated.
+    """
+    stepper = coarse_stepper(runs[0].draws, problem)
+    ended = [number for number, course in enumerate(courses) if course.passes and number in results]
+    if stepper is None or not ended:
+        return {}
+    places, steps = np.array(ended), runs[0].draws.scenario.evolution.max_steps
+    needed = np.array([courses[number].passes[-1] for number in ended])
+    added = {}
+    coarse = coarse_courses(problem.at(places), stepper, runs[0].stop, needed, steps)
+    for number, other in zip(ended, coarse, strict=True):
+        course, result = courses[number], results[number]
+        passes, sizes = np.array(course.passes), np.array(course.sizes).T
+        errors = strip_errors(other, passes, sizes, course)[:, -1]
+        if isinstance(result, RunObservations) and np.isfinite(errors).all():
+            added[number] = errors
+            result.scalars["depth_error"] += float(errors[0])
+            result.scalars["volume_error"] += float(errors[1])
+    return added
 
 
 def _record(

@@ -14,11 +14,13 @@ from wearsim.evolution.limits import Crossings, Limit, first_crossings, ratios, 
 from wearsim.evolution.observables import depth
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.strip_errors import Course, add_step
 from wearsim.studies.ensemble.batch import (
     SCALARS,
     Observables,
     RealisationRun,
     RunObservations,
+    add_strip_errors,
     curves_at_end,
     joined_problem,
     observables_of,
@@ -50,13 +52,15 @@ class _Test:
     """A test in progress.
 
     It has its quantities over their limits after each step, its result, the number of its limit,
-    and the level of that quantity, over the limit, up to which it is followed.
+    the level of that quantity, over the limit, up to which it is followed, and the log-slopes of
+    the limited quantity and of the depth.
     """
 
     history: list[tuple[float, FloatArray]] = field(default_factory=list)
     found: LifeRun | None = None
     limit: int = -1
     level: float = 1.0
+    slopes: tuple[float, float] = (1.0, 1.0)
 
 
 def observe_lives(
@@ -105,9 +109,16 @@ class _Group:
             chosen = np.array([number])
             self._finish(number, self.problem.at(chosen), self.state.at(chosen), life)
         self.evolution.end(at_once.tolist())
+        courses = [Course() for _ in self.tests]
         for advance in self.evolution:
+            add_step(courses, advance)
             self._take(advance)
         failures = self.evolution.failures
+        reached = {k: test.found for k, test in enumerate(self.tests) if test.found is not None}
+        added = add_strip_errors(self.runs, self.problem, courses, reached)
+        for number, errors in added.items():
+            cylinder, roller, volume = courses[number].sizes[-1].tolist()
+            self._widen(number, errors[0] / max(cylinder, roller), errors[1] / volume)
         return [failures.get(k) or test.found or _missing() for k, test in enumerate(self.tests)]
 
     def _take(self, advance: Advance) -> None:
@@ -157,6 +168,7 @@ class _Group:
                 error = float(state.volume_error[place]) / limit.value
             else:  # by way of the passes that correspond to the error of the depth
                 error = float(depth_error[place] * abs(slope[place]) / max(of_depth[place], FLAT))
+            test.slopes = float(slope[place]), float(of_depth[place])
             if slope[place] >= FLAT:
                 part = error / float(slope[place])
                 low, high = passes * max(1.0 - part, 0.0), passes * (1.0 + part)
@@ -165,6 +177,19 @@ class _Group:
                 test.level = 1.0 + error
             life = {"life": passes, "life_low": low, "life_high": high}
             self._finish(number, problem.at(chosen), state.at(chosen), life)
+
+    def _widen(self, number: int, depth: float, volume: float) -> None:
+        """Add the relative errors of depth and volume due to the strips to the bounds of a life."""
+        test = self.tests[number]
+        if test.found is None or test.limit < 0:
+            return
+        scalars, limit, (slope, of_depth) = test.found.scalars, self.limits[test.limit], test.slopes
+        error = volume if limit.quantity == "volume" else depth
+        if limit.quantity == "width" or limit.unit not in {"m", "m^3"}:
+            error = depth * abs(slope) / max(of_depth, FLAT)
+        added = scalars["life"] * error / max(slope, FLAT)
+        scalars["life_low"] = max(scalars["life_low"] - added, 0.0)
+        scalars["life_high"] += added
 
     def _is_over(self, number: int) -> bool:
         """Return whether the life of a test and its numerical bounds are known.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -19,7 +20,8 @@ from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
-from wearsim.evolution.strips import StripArrays
+from wearsim.evolution.strip_errors import LOOSER, LOOSEST
+from wearsim.evolution.strips import Surfaces
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.stations import cam_stations
@@ -89,6 +91,21 @@ def build_stepper(scenario: Scenario, name: str) -> Stepper:
     if name == "explicit":
         return ExplicitStepper(evolution.tolerance, forced, evolution.allow_unstable)
     return PerPassStepper()
+
+
+def coarse_stepper(draws: Draws, problem: WearProblem) -> Stepper | None:
+    """Return the stepper of the test on coarse strips, None where its error is not estimated.
+
+    The test of single passes has inputs drawn at every pass, and no other test has the same.
+    """
+    evolution = draws.scenario.evolution
+    if not evolution.strip_error or (draws.passes and evolution.stepper == "per-pass"):
+        return None
+    free = replace(draws.scenario, evolution=evolution.model_copy(update={"stepper": "auto"}))
+    tolerance = min(LOOSER * evolution.tolerance, LOOSEST)
+    if chosen_stepper(free, problem.model, problem.contacts_each) == "implicit":
+        return ImplicitStepper(tolerance)
+    return StabilisedStepper(tolerance)
 
 
 def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
@@ -170,10 +187,12 @@ def assemble_problem(
     )
     offsets = contact_inputs(scenario, first, drawn)["offset"]
 
-    def arrays(strips: Grid) -> StripArrays:
-        return StripArrays(build(scenario, strips), *surfaces(scenario, offsets, strips))
-
-    problem = replace(problem, growth=growth_of(draws, grid, arrays))
+    problem = replace(
+        problem,
+        growth=growth_of(
+            draws, grid, partial(build, scenario), partial(surfaces, scenario, offsets)
+        ),
+    )
     if draws.passes and stepper.pass_by_pass:
         nodes = with_nodes(problem, scenario, draws.passes, minimum_nodes(draws.passes))
         stepper = PerPassStepper(redrawing(scenario, draws.passes), nodes)
@@ -296,10 +315,8 @@ def build_problem(
     )
 
 
-def surfaces(
-    scenario: Scenario, offset: FloatArray, grid: Grid
-) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """Return the gap of rollers without tilt, the distance from their apexes and their slip.
+def surfaces(scenario: Scenario, offset: FloatArray, grid: Grid) -> Surfaces:
+    """Return the surfaces of the unworn bodies on strips.
 
     Parameters
     ----------
@@ -307,11 +324,6 @@ def surfaces(
     offset : ndarray, shape (rollers, realisations or 1)
         Axial positions of the rollers [m].
     grid : Grid
-
-    Returns
-    -------
-    gap, from_apex, slip_profile : ndarray, shape (rollers, realisations or 1, strips)
-        See `WearProblem`; the last is None without differential slip.
     """
     roller, cylinder = scenario.roller, scenario.cylinder
     s, height = grid.y - offset[..., None], start_height(scenario, grid)
@@ -319,5 +331,6 @@ def surfaces(
     if roller.width is not None:
         gap = gap + roller.edge_drop(s)
     if not scenario.creepage.differential_slip:
-        return gap, s, None
-    return gap, s, s * s / (2.0 * roller.crown_radius * roller.radius) + height / cylinder.radius
+        return Surfaces(gap, s, None)
+    slip = s * s / (2.0 * roller.crown_radius * roller.radius) + height / cylinder.radius
+    return Surfaces(gap, s, slip)

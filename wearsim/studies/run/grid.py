@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.evolution.strips import JOINED, Growth, StripArrays, same_strips
+from wearsim.evolution.strips import JOINED, Growth, Surfaces, same_strips
 from wearsim.mechanics.hertz.ellipse import HertzContact
+from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
@@ -18,7 +20,12 @@ from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
 from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
-from wearsim.studies.run.roller_ends import ends_roller, roller_grid, strips_of_roller
+from wearsim.studies.run.roller_ends import (
+    STRIPS_BEYOND,
+    ends_roller,
+    roller_grid,
+    strips_of_roller,
+)
 from wearsim.types import FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
@@ -314,7 +321,10 @@ def start_of_run(scenario: Scenario, draws: Draws) -> Grid:
 
 
 def growth_of(
-    draws: Draws, grid: Grid, arrays: Callable[[Grid], StripArrays]
+    draws: Draws,
+    grid: Grid,
+    model: Callable[[Grid], ContactModel],
+    surfaces: Callable[[Grid], Surfaces],
 ) -> tuple[Growth, ...]:
     """Return how the strips of a run grow; they do not where the scenario defines their width.
 
@@ -323,8 +333,8 @@ def growth_of(
     draws : Draws
     grid : Grid
         The present strips.
-    arrays : callable
-        Returns the parts of the problem on other strips.
+    model, surfaces : callable
+        See `Growth`.
 
     Raises
     ------
@@ -332,12 +342,11 @@ def growth_of(
         If the load is not defined for the whole test.
     """
     scenario, choice, load = draws.scenario, draws.scenario.contact, draws.scenario.load.build()
-    greatest = load_range(scenario, load, scenario.total_time)[
-        1
-    ]  # an error beyond the end of a log
+    greatest = load_range(scenario, load, scenario.total_time)[1]  # raises beyond a log
     greatest += draws.range_of("normal_force_offset")[1]
+    coarse = partial(coarse_grid, scenario)
     if choice.width is not None or ends_roller(scenario, *grid.edges):
-        return (Growth(arrays, 0),)
+        return (Growth(model, surfaces, coarse, 0),)
     many = scenario.cam is not None and turn_of(scenario).stations.count > 1
     most = choice.strips or (STRIPS_OF_MANY_CONTACTS if many else STRIPS_BEFORE_JOINING)
     last, margin = None, 0.0
@@ -347,7 +356,17 @@ def growth_of(
         margin += scenario.roller.crown_radius * max(map(abs, draws.range_of("tilt")))
     if scenario.roller.width is not None:
         last = roller_grid(scenario, strips_of_roller(scenario, STRIPS_AT_START, greatest))
-    return (Growth(arrays, most, margin, last),)
+    return (Growth(model, surfaces, coarse, most, margin, last),)
+
+
+def coarse_grid(scenario: Scenario, grid: Grid) -> Grid:
+    """Return strips of about twice the width over the same range; ends of a roller are edges."""
+    if ends_roller(scenario, *grid.edges) and scenario.contact.width is None:
+        strips = math.ceil(0.5 * (scenario.roller.width or 0.0) / grid.spacing - _MARGIN)
+        return roller_grid(scenario, strips + 2 * STRIPS_BEYOND)
+    strips, middle = math.ceil(0.5 * grid.strips), 0.5 * (grid.edges[0] + grid.edges[1])
+    half = strips * grid.spacing
+    return Grid.spanning(middle - half, middle + half, strips)
 
 
 def realisation_grid(

@@ -17,7 +17,8 @@ from wearsim.evolution.observables import present_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
-from wearsim.evolution.strips import on_grid
+from wearsim.evolution.strip_errors import Course, coarse_courses, strip_errors
+from wearsim.evolution.strips import on_grid, same_strips
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.results import (
     Result,
@@ -30,7 +31,7 @@ from wearsim.studies.cam.observables import at_every_station, station_columns
 from wearsim.studies.contact.comparison import REFERENCE, excess
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
-from wearsim.studies.run.assemble import assemble_problem, start_height
+from wearsim.studies.run.assemble import assemble_problem, coarse_stepper, start_height
 from wearsim.studies.run.continuation import earlier_warnings
 from wearsim.studies.run.draws import Draws, units_of
 from wearsim.studies.run.grid import start_of_run
@@ -74,7 +75,7 @@ class RunInProgress:
         grid = start_of_run(scenario, draws)
         if data is not None:
             grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
-        self.scenario, self.path, self.storage = scenario, path, storage
+        self.scenario, self.draws, self.path, self.storage = scenario, draws, path, storage
         self.problem, self.stepper, self.stepper_name = assemble_problem(draws, grid)
         self.on_event: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
@@ -122,6 +123,7 @@ class RunInProgress:
         )
         try:
             self._step_to_end()
+            self._estimate_strip_errors()
             self._check_errors()
             self._write(finished=True)
         except KeyboardInterrupt:
@@ -152,17 +154,56 @@ class RunInProgress:
         self._write(finished=True)
         return Result(self.data(finished=True), self.path)
 
+    def _estimate_strip_errors(self) -> None:
+        """Estimate the errors due to the strips by the same test on coarse ones."""
+        problem = self._present
+        stepper = coarse_stepper(self.draws, problem)
+        if stepper is None or self._passes == 0.0:
+            return
+        start = start_of_run(self.scenario, self.draws)
+        first = self.problem
+        if not same_strips(first.grid, start):
+            first = assemble_problem(self.draws, start)[0]
+        history = self.recorder.history
+        passes, count = history["passes"], problem.kinematics.multiplicity
+        rollers = history["roller_worn_volume"][..., 0] @ count
+        sizes = [
+            history["depth"][:, 0],
+            history["roller_depth"][..., 0].max(axis=1),
+            history["worn_volume"][:, 0] + rollers,
+        ]
+        last, most = passes[-1:], self.scenario.evolution.max_steps
+        (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most)
+        if coarse is None:
+            self._warn(
+                "error by strips: not estimated, as the test fails on strips of twice the width"
+            )
+        records = self.recorder.records
+        profiles = [records[f"{body}_depth_profile"][-1][:, 0] for body in ("cylinder", "roller")]
+        end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
+        self.recorder.strip_errors = strip_errors(coarse, passes, np.array(sizes), end)
+
     def _check_errors(self) -> None:
         """Warn if estimated errors exceed the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
         problem = located(self._present, state)
         sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
         errors = state.depth_error, state.volume_error
+        by_strips = (
+            np.nan_to_num(self.recorder.strip_errors)[:, -1:]
+            if (self.recorder.strip_errors is not None)
+            else np.zeros((3, 1))
+        )
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, name in enumerate(("depth", "worn volume")):
-            parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]
+            parts = [
+                errors[kind] + by_strips[kind],
+                state.quadrature[kind],
+                SIGMAS * np.sqrt(state.scatter[kind]),
+                by_strips[kind],
+            ]
             size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
-            relative, quadrature, scatter = (float((part / size).max()) for part in parts)
+            relative, quadrature, scatter, strips = (float((part / size).max()) for part in parts)
             if relative <= tolerance:
                 continue
             remedy = "a lower evolution.tolerance or evolution.step decreases it"
@@ -171,6 +212,9 @@ class RunInProgress:
                 if scatter > quadrature:
                     part = scatter / relative
                     remedy = f"{part:.0%} of it is sampling scatter of the small number of passes"
+            elif strips > 0.5 * relative:
+                strips_here = self._present.grid.strips
+                remedy = f"more contact.strips than {strips_here} decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
         for remedy, found in beyond.items():
             names, errors_text = map(" and ".join, zip(*found, strict=True))

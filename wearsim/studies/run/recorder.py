@@ -72,6 +72,7 @@ class Finished:
     wall_seconds: float
 
 
+ERRORS = "depth_error", "volume_error", "profile_error"
 Event: TypeAlias = Started | Stepped | Warned | Checkpointed | Finished
 Variables = dict[str, FloatArray]
 _WITHOUT_REALISATION = {n for n, item in ALL_VARIABLES.items() if "realisation" not in item.dims}
@@ -108,9 +109,9 @@ def history_row(
         "dissipated_energy": state.energy,
         "power": problem.total_power(problem.values_of(state.contacts, "power")),
         "normal_force": problem.mean_over_turn(problem.per_roller(loads))[0],
-        "depth_error": state.depth_error,
-        "volume_error": state.volume_error,
-        "profile_error": state.profile_error,
+        "depth_error_by_steps": state.depth_error,
+        "volume_error_by_steps": state.volume_error,
+        "profile_error_by_steps": state.profile_error,
         "rejected": state.rejected,
         "solves": state.solves,
         "full_solves": state.full_solves,
@@ -221,9 +222,13 @@ class Recorder:
         self.stepper = stepper
         self.schedule = schedule
         self.threshold = threshold
-        self._history = _rows(history or {}) or [
+        sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
+        steps = {name: column for name, column in (history or {}).items() if name not in sums}
+        self._history = _rows(steps) or [
             _single(history_row(stepper, problem, state, None, threshold))
         ]
+        #: errors of the finished test due to its strips, see `strip_errors.strip_errors`
+        self.strip_errors: FloatArray | None = None
         rows = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
         self._records = [(problem.grid, row) for row in rows]
         self._kept = len(self._history), len(self._records), state, problem.grid
@@ -279,8 +284,21 @@ class Recorder:
 
     @property
     def history(self) -> dict[str, FloatArray]:
-        """The history as arrays, first axis step."""
-        return _columns(self._history)
+        """The history as arrays, first axis step.
+
+        Errors are sums of those due to steps and, where they are known, due to strips.
+        """
+        columns = _columns(self._history)
+        for name, part in zip(ERRORS, self._strip_errors(), strict=True):
+            by_steps = columns[f"{name}_by_steps"]
+            columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
+            columns[name] = by_steps + np.nan_to_num(part)[:, None]
+        return columns
+
+    def _strip_errors(self) -> FloatArray:
+        """Return the errors due to the strips, shape (3, steps); nan where they are not known."""
+        unknown = np.full((len(ERRORS), len(self._history)), np.nan)
+        return unknown if self.strip_errors is None else self.strip_errors
 
     @property
     def records(self) -> dict[str, FloatArray]:

@@ -1,0 +1,197 @@
+"""Error of wear tests due to the width of their strips.
+
+A test is repeated on strips of twice the width, with a greater tolerance of its steps: the error
+accumulates in it as in the test, which contacts solved on coarse strips at a few times do not show.
+The error estimate is the difference of the two tests times a safety factor, less a quarter of the
+error estimate of the steps of the coarse test, which is usually several times its true error. A
+difference is three times the error of the test where that is proportional to the square of the
+width of the strips, and equal to it where strips that enter the contact one by one dominate, as
+they do in a fresh contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wearsim.evolution.error_estimates import volume_of
+from wearsim.evolution.integrate import Advance, Evolution
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.steppers.base import Stepper
+from wearsim.evolution.steppers.loads import elastic_approaches
+from wearsim.evolution.strips import averaged, coarse_problem
+from wearsim.types import FloatArray, Grid
+
+LOOSER = 5.0  # tolerance of the coarse test over that of the test
+LOOSEST = 0.1  # greatest tolerance of a coarse test
+COVER = 0.5  # safety factor on the difference
+FRESH_COVER = 2.0  # the same before wear: later, wear reduces errors of the shape of a groove
+STEPS = 0.25  # part of the error estimate of the coarse steps that is subtracted from it
+LEAST = 0.1  # estimate over the difference, at least
+OF_PROFILE = 0.1  # estimate of depth and volume over that of the profile, both relative, at least
+BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
+COARSE_TOLERANCE = 1e-5  # of the iterations of a step
+
+
+@dataclass
+class Course:
+    """Depths and volume of one test after each of its steps, and its profiles at the end.
+
+    Parameters
+    ----------
+    passes : list of float
+        Roller passes.
+    sizes : list of ndarray, shape (3,)
+        Greatest depth of the cylinder and of the rollers [m], volume worn off both [m^3].
+    by_steps : list of ndarray, shape (3,)
+        Estimated errors of depth [m], volume [m^3] and profile due to the steps.
+    profiles : ndarray, shape (bodies, strips)
+        Depths at the end, of the cylinder at the stations of the unworn cam [m].
+    grid : Grid
+        Strips at the end.
+    approach : float
+        Greatest elastic approach of the contacts at the end [m].
+    """
+
+    passes: list[float] = field(default_factory=list)
+    sizes: list[FloatArray] = field(default_factory=list)
+    by_steps: list[FloatArray] = field(default_factory=list)
+    profiles: FloatArray | None = None
+    grid: Grid | None = None
+    approach: float = 0.0
+
+
+def sizes_of(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return greatest depth of cylinder and rollers [m] and volume [m^3], (3, realisations)."""
+    depths = (worn.max(axis=(0, 1, 3)) for worn in state.depths)
+    return np.array([*depths, volume_of(problem, state.depths)])
+
+
+def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the depths of all bodies, shape (bodies, realisations, strips) [m]."""
+    cam, cylinder = problem.kinematics.cam, state.cylinder_depth[:, 0]
+    if cam is not None:
+        cylinder = cam.at_unworn(cylinder)
+    return np.concatenate([cylinder, state.roller_depth[0]])
+
+
+def add_step(courses: Sequence[Course], advance: Advance) -> None:
+    """Add a step of some tests to their courses, which are numbered as the tests."""
+    problem, end = advance.problem, advance.end
+    sizes, profiles = sizes_of(problem, end), profiles_of(problem, end)
+    errors = np.array([end.depth_error, end.volume_error, end.profile_error])
+    approaches = elastic_approaches(problem, end).max(axis=(0, 1))
+    for place, number in enumerate(advance.numbers.tolist()):
+        course = courses[number]
+        course.approach = float(approaches[place])
+        course.passes.append(float(end.passes[place]))
+        course.sizes.append(sizes[:, place])
+        course.by_steps.append(errors[:, place])
+        course.profiles, course.grid = profiles[:, place], problem.grid
+
+
+def coarse_courses(
+    problem: WearProblem, stepper: Stepper, stop: float, needed: FloatArray, max_steps: int
+) -> list[Course | None]:
+    """Return the courses of tests on strips of twice the width.
+
+    Parameters
+    ----------
+    problem : WearProblem
+        Of the tests, on the strips with which they start.
+    stepper : Stepper
+        With the greater tolerance.
+    stop : float
+        Passes at the end of the tests.
+    needed : ndarray, shape (realisations,)
+        Passes to which the course of each test is needed, at most to their end.
+    max_steps : int
+
+    Returns
+    -------
+    list of Course or None
+        None for a test that fails on the coarse strips.
+    """
+    coarse, courses = coarse_problem(problem), [Course() for _ in needed]
+    try:
+        tests = Evolution(coarse, fresh_state(coarse), stepper, stop, max_steps, lambda _: np.inf)
+        for advance in tests:
+            add_step(courses, advance)
+            done = advance.end.passes >= needed[advance.numbers]
+            if done.any():
+                tests.end(advance.numbers[done].tolist())
+    except Exception:  # a test fails for its own reasons, and the others are repeated without it
+        if len(needed) == 1:
+            return [None]
+        each = (np.array([number]) for number in range(len(needed)))
+        parts = (coarse_courses(problem.at(n), stepper, stop, needed[n], max_steps) for n in each)
+        return [course for part in parts for course in part]
+    return [None if n in tests.failures else course for n, course in enumerate(courses)]
+
+
+def strip_errors(
+    coarse: Course | None, passes: FloatArray, sizes: FloatArray, end: Course
+) -> FloatArray:
+    """Return the estimated errors of a test due to its strips, shape (3, points).
+
+    Parameters
+    ----------
+    coarse : Course or None
+        The test on strips of twice the width; without it the errors are not known, nan.
+    passes : ndarray, shape (points,)
+        Rising, from the start of the test.
+    sizes : ndarray, shape (3, points)
+        Sizes of the test at these passes, see `Course`.
+    end : Course
+        With the profiles of the test at its end.
+
+    Returns
+    -------
+    ndarray, shape (3, points)
+        Errors of the greatest depth of either body [m] and of the volume [m^3]; Euclidean norm of
+        that of the profiles over that of the depths.
+    """
+    if coarse is None:
+        return np.full((3, len(passes)), np.nan)
+    steps, last = np.array(coarse.passes), float(passes[-1])
+    there = np.append(steps[steps < last], last)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = [
+            np.interp(np.log(there), np.log(points), np.log(size))
+            for points, both in ((steps, np.array(coarse.sizes).T), (passes, sizes))
+            for size in both
+        ]
+        ratio = np.abs(np.expm1(np.array(logs[:3]) - np.array(logs[3:])))
+    ratio = np.where(np.isfinite(ratio), ratio, 0.0)
+    # the error at a point is the greatest of the last steps, as it may cross zero
+    recent = (there[None, :] > there[:, None] / BACK) & (there[None, :] <= there[:, None])
+    decay = np.sqrt(there[None, :] / there[:, None])
+    relative = (np.where(recent, decay, 0.0)[None] * ratio[:, None, :]).max(axis=2)
+    part = [np.interp(passes, there, one) for one in relative]
+    depth = np.maximum(part[0] * sizes[0], part[1] * sizes[1])
+    profile = np.zeros(len(passes))
+    if steps[-1] == last:
+        profile = profile + _profile_error(coarse, end)
+    if relative[0, -1] > 0.0:
+        profile = profile * np.maximum(part[0] / relative[0, -1], 1.0)
+    differences = np.array([depth, part[2] * sizes[2], profile])
+    by_steps = [np.interp(passes, steps, one) for one in np.array(coarse.by_steps).T]
+    deepest = np.maximum(sizes[0], sizes[1])
+    fresh = coarse.approach / (coarse.approach + 3.0 * deepest) if coarse.approach > 0.0 else 0.0
+    cover = COVER + (FRESH_COVER - COVER) * fresh
+    found = np.maximum(LEAST * differences, cover * (differences - STEPS * np.array(by_steps)))
+    # the differences of depth and volume may be small by chance
+    found[:2] = np.maximum(found[:2], OF_PROFILE * found[2] * np.array([deepest, sizes[2]]))
+    return np.asarray(found)
+
+
+def _profile_error(coarse: Course, end: Course) -> float:
+    """Return the norm of the difference of two tests at their end, over that of the depths."""
+    if coarse.grid is None or coarse.profiles is None or end.grid is None or end.profiles is None:
+        return 0.0
+    fine = averaged(end.profiles, end.grid, coarse.grid)
+    size = float(np.linalg.norm(fine))
+    return float(np.linalg.norm(fine - coarse.profiles)) / size if size > 0.0 else 0.0
