@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -164,7 +165,7 @@ def worn_at_end(
     stepper, method = prepared.stepper, f"{prepared.name}, {tolerance:g}"
     if np.isfinite(longest):
         every = PreparedTest(test.scenario(evolution__stepper=EVERY_PASS), grid)
-        few = prepared.stop <= EACH_PASS if is_compiled(every.problem) else FEW_PASSES[1]
+        few = EACH_PASS if is_compiled(every.problem) else FEW_PASSES[1]
         if prepared.stop <= few:
             prepared, stepper, method = every, every.stepper, EVERY_PASS
         elif isinstance(stepper, ImplicitStepper):
@@ -257,7 +258,7 @@ def reference_of(test: RandomTest, folder: Path | None) -> Reference:
     return Reference(**kept(path, lambda: vars(computed_reference(test))))
 
 
-def kept(path: Path | None, compute: Callable[[], dict[str, object]]) -> dict[str, object]:
+def kept(path: Path | None, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """Return the arrays of a file, or compute them and write it."""
     if path is not None and path.exists():
         try:
@@ -311,7 +312,7 @@ def on_strips(test: RandomTest, grid: Grid, folder: Path | None) -> Worn:
     shape = hashlib.sha256(np.array([*grid.edges, grid.strips]).tobytes()).hexdigest()[:8]
     path = None if folder is None else folder / f"{test.name}-{test.digest}-{shape}.npz"
 
-    def compute() -> dict[str, object]:
+    def compute() -> dict[str, Any]:
         _, problem, state = worn_at_end(test, grid, TRUE_TOLERANCE, LONGEST_STEP)
         return vars(worn_of(problem, state))
 

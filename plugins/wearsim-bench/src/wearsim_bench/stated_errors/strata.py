@@ -154,13 +154,15 @@ def _cylinder(draws: Draws, stratum: str, share: float) -> str:
     elif load == "recorded":
         set_recorded_load(draws, sizes.load, duration)
     elif load == "process":
-        spread = rounded(sizes.load * draws.log_uniform(0.03, 0.2))
-        changes["load.normal_force"] = process(draws, f"{sizes.load!r} N", f"{spread} N", duration)
+        spread = f"{sizes.load * draws.log_uniform(0.03, 0.2):.4g} N"
+        changes["load.normal_force"] = process(draws, f"{sizes.load!r} N", spread, duration)
     elif ordinary and draws.chance(0.15):
         time, gain = draws.log_uniform(0.02, 1.0) * duration, draws.log_uniform(0.01, 0.3)
         power = sizes.friction * sizes.load * slip * 100.0 * sizes.cylinder  # W, at 100 rad/s
-        value = f"{gain * sizes.load / power:.4g} N/W"
-        changes["load.thermal"] = {"gain": value, "time_constant": f"{time:.4g} s"}
+        changes["load.thermal"] = {
+            "gain": f"{gain * sizes.load / power:.4g} N/W",
+            "time_constant": f"{time:.4g} s",
+        }
     if kind == "per-pass":
         changes["friction.coefficient"] = {
             "distribution": "maxent",
@@ -225,7 +227,9 @@ def _set_wear(
     depth = min(max(depth, DEPTH[0]), DEPTH[1], 0.05 * sizes.roller)
     half = math.sqrt(patch.b**2 + 2.0 * sizes.crown * depth)
     if differs:
-        slip = math.hypot(slip, 0.2 * half**2 / (2.0 * sizes.crown) * sizes.curvature)
+        across = 0.2 * half**2 / (2.0 * sizes.crown) * sizes.curvature
+        adhering = min(across / sizes.saturation, 1.0)
+        slip = math.hypot(slip, across * adhering * (2.0 - adhering))
     both = 1.0 + ratio * sizes.cylinder / sizes.roller
     per_factor = sizes.friction * slip * 0.75 * sizes.load * both  # depth per pass times width
     work = (half**3 - patch.b**3) / (3.0 * sizes.crown) / per_factor  # K/H times passes

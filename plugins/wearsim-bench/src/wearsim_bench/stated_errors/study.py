@@ -14,6 +14,7 @@ from wearsim.results import Result
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import strips_of_run
 from wearsim.studies.run.run import run
+from wearsim.types import FloatArray
 from wearsim_bench.contact.worn_profiles import failure_reason
 from wearsim_bench.measure.measurement import Measurement
 from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE, RandomTest
@@ -64,7 +65,7 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
         **_named(STEPS, own.changes_from(same)),
         **_named(STRIPS, same.changes_from(reference)),
     }
-    counts = {
+    counts: dict[str, float] = {
         "tolerance": test.tolerance,
         "steps": result.steps,
         "solves": int(np.max(result.solves[-1])),
@@ -83,7 +84,7 @@ def _failed(row: Measurement, kind: str, error: Exception) -> Measurement:
     return Measurement(row.group, row.method, row.setting, failed=kind + failure_reason(error))
 
 
-def _named(prefix: str, values: Sequence[float] | np.ndarray) -> dict[str, float]:
+def _named(prefix: str, values: FloatArray) -> dict[str, float]:
     """Return absolute values of the quantities by name."""
     return {
         prefix + name: abs(float(value)) for name, value in zip(QUANTITIES, values, strict=True)
@@ -181,7 +182,11 @@ class Coverage:
     def counts(self) -> dict[str, float]:
         """The statistics by name."""
         ratios = self.ratios
-        numbers = {"tests": len(self.true), "covered": self.covered, "met": self.met}
+        numbers: dict[str, float] = {
+            "tests": len(self.true),
+            "covered": self.covered,
+            "met": self.met,
+        }
         if self.true:
             numbers |= {"greatest": max(self.true), "greatest_step": self.greatest_step}
         quantiles = np.quantile(ratios, list(QUANTILES.values())) if ratios else ()
