@@ -192,7 +192,7 @@ def test_requirements_state_what_is_met():
     ended = [Measurement("tests", str(k), SPRING, failed=CLEAR + "lost") for k in range(6)]
     lacking = Measurement("tests", "7", SPRING, failed=LACKS + "slow")
     assert "NOT MET: 6 of 107 end with an error" in requirements([*good, *ended, lacking])
-    assert "not judged: 1" in requirements([*good, lacking])
+    assert "not counted: 1" in requirements([*good, lacking])
 
 
 def test_coverage_counts_small_true_errors_as_covered():

@@ -46,6 +46,7 @@ ERRORS = {
 }
 COUNTS = {
     "tests": "tests",
+    "failed": "without result",
     "covered": "covered",
     "q05": "ratio, 5 %",
     "q25": "25 %",
@@ -160,27 +161,27 @@ def measured_tests(
 
 def requirements(rows: Sequence[Measurement]) -> str:
     """Return which requirements the stated errors meet, one per line."""
-    judged = [row for row in rows if not row.failed.startswith((CLEAR, LACKS))]
+    counted = [row for row in rows if not row.failed.startswith((CLEAR, LACKS))]
     lines = []
     for name in QUANTITIES:
-        found = coverage(judged, name)
-        part = found.covered / max(len(judged), 1)
+        found = coverage(counted, name)
+        part = found.covered / max(len(counted), 1)
         lines.append(_verdict(part >= COVERED, f"{name} covered in {part:.1%} of the tests"))
         median = found.counts.get("median", 0.0)
         lines.append(_verdict(median < MOST_RATIO, f"{name}: median of stated/true {median:.3g}"))
-        for stratum in dict.fromkeys(row.setting for row in judged):
-            some = [row for row in judged if row.setting == stratum]
+        for stratum in dict.fromkeys(row.setting for row in counted):
+            some = [row for row in counted if row.setting == stratum]
             part = coverage(some, name).covered / len(some)
             if part < COVERED_IN_STRATUM:
                 lines.append(_verdict(False, f"{name} covered in {part:.1%} of '{stratum}'"))
-    steps = max(coverage(judged, name).greatest_step for name in QUANTITIES)
+    steps = max(coverage(counted, name).greatest_step for name in QUANTITIES)
     lines.append(_verdict(steps <= MOST_BY_STEPS, f"errors by steps up to {steps:.3g} tolerances"))
     clear = sum(row.failed.startswith(CLEAR) for row in rows)
     lines.append(
         _verdict(clear <= MOST_CLEAR * len(rows), f"{clear} of {len(rows)} end with an error")
     )
     lacking = sum(row.failed.startswith(LACKS) for row in rows)
-    lines.append(f"- not judged: {lacking} without a reference")
+    lines.append(f"- not counted: {lacking} without a reference")
     return "\n".join(lines)
 
 
@@ -203,13 +204,14 @@ def statistics(rows: Sequence[Measurement]) -> dict[str, list[Measurement]]:
     for tolerance in sorted(tolerances, reverse=True):
         same = [row for row in rows if row.counts.get("tolerance") == tolerance]
         tests[TOLERANCE.format(tolerance)] = same
-    groups = {
-        group: [
-            Measurement(group, name, "", counts=coverage(some, name).counts) for name in QUANTITIES
-        ]
-        for group, some in tests.items()
-        if some
-    }
+    groups = {}
+    for group, some in tests.items():
+        lost = {"failed": sum(bool(row.failed) for row in some)}
+        if some:
+            groups[group] = [
+                Measurement(group, name, "", counts=coverage(some, name).counts | lost)
+                for name in QUANTITIES
+            ]
     for name in QUANTITIES:
         group = UNCOVERED.format(name)
         groups[group] = [
