@@ -155,7 +155,7 @@ def test_reference_is_kept_in_the_folder(tmp_path, monkeypatch):
 
 
 def test_unreadable_reference_is_an_error(tmp_path):
-    (tmp_path / f"small-{TEST.digest}.npz").write_bytes(b"PK")
+    (tmp_path / f"small-{TEST.digest}-{references.SETTINGS}.npz").write_bytes(b"PK")
     with pytest.raises(ResultsFileError, match="delete it"):
         reference_of(TEST, tmp_path)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -19,6 +19,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState, fresh_state
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import is_compiled
+from wearsim.evolution.strips import same_strips
 from wearsim.results.io.atomic_write import os_errors_converted, replacement
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import contact_centre, contact_positions
@@ -36,10 +37,16 @@ LONGEST_STEP = 0.02  # of the passes done: error estimates cannot miss what happ
 #: strips per half-width of the fresh patch, and of a groove that is much wider, and the greatest
 #: number for the contacts of a cylinder, of a cam with a few and with many contacts
 PER_PATCH, PER_GROOVE = 72.0, 160.0
+LEAST_STRIPS = 241  # for the contacts of a cylinder
 MOST_STRIPS = ((3, 601), (8, 321), (10_000, 161))
 PILOT_TOLERANCE, PILOT_STRIPS, WIDENED = 1e-2, 8.0, 1.6
 MOST_PILOTS = 14
 SECONDS = 300.0  # limit on the time of one solution
+SETTINGS = hashlib.sha256(
+    repr(
+        (EACH_PASS, LOOSE_FROM, LONGEST_STEP, PER_PATCH, PER_GROOVE, LEAST_STRIPS, MOST_STRIPS)
+    ).encode()
+).hexdigest()[:4]  # in the names of files, so that those of other settings are not read
 
 
 @dataclass(frozen=True)
@@ -141,7 +148,12 @@ class CappedStepper(ImplicitStepper):
 
 
 def worn_at_end(
-    test: RandomTest, grid: Grid, tolerance: float, longest: float = np.inf
+    test: RandomTest,
+    grid: Grid,
+    tolerance: float,
+    longest: float = np.inf,
+    *,
+    grows: bool = False,
 ) -> tuple[str, WearProblem, WearState]:
     """Return method, problem and final state of a test on given strips.
 
@@ -155,6 +167,8 @@ def worn_at_end(
         Tolerance of the steps; tests with few passes are solved pass by pass for any.
     longest : float
         Greatest ratio of an implicit step to the passes done.
+    grows : bool
+        Whether the strips grow with the groove, from the given ones.
 
     Raises
     ------
@@ -170,16 +184,15 @@ def worn_at_end(
             prepared, stepper, method = every, every.stepper, EVERY_PASS
         elif isinstance(stepper, ImplicitStepper):
             stepper = CappedStepper(tolerance, longest)
-    state = fresh_state(prepared.problem)
+    problem = prepared.problem if grows else replace(prepared.problem, growth=())
+    state = fresh_state(problem)
     begin = time.perf_counter()
     most = test.scenario().evolution.max_steps
-    for advance in evolve(
-        prepared.problem, state, stepper, prepared.stop, lambda _: np.inf, 10 * most
-    ):
-        state = advance.end
+    for advance in evolve(problem, state, stepper, prepared.stop, lambda _: np.inf, 10 * most):
+        state, final = advance.end, advance.problem
         if time.perf_counter() - begin > SECONDS:
             raise SolverError(f"the reference takes longer than {SECONDS:g} s")
-    return method, prepared.problem, state
+    return method, final, state
 
 
 def worn_of(problem: WearProblem, state: WearState) -> Worn:
@@ -233,7 +246,8 @@ def fine_grid(coarse: Grid, patch: float, groove: float, contacts: int) -> Grid:
     width = coarse.edges[1] - coarse.edges[0]
     spacing = max(patch / PER_PATCH, groove / PER_GROOVE)
     most = next(strips for number, strips in MOST_STRIPS if contacts <= number)
-    strips = min(int(np.ceil(width / spacing)), most)
+    least = LEAST_STRIPS if contacts <= MOST_STRIPS[0][0] else 0
+    strips = min(max(int(np.ceil(width / spacing)), least), most)
     return Grid.spanning(*coarse.edges, strips + (strips + 1) % 2)
 
 
@@ -254,7 +268,7 @@ def reference_of(test: RandomTest, folder: Path | None) -> Reference:
     ResultsFileError
         If the file cannot be read or written.
     """
-    path = None if folder is None else folder / f"{test.name}-{test.digest}.npz"
+    path = None if folder is None else folder / f"{test.name}-{test.digest}-{SETTINGS}.npz"
     return Reference(**kept(path, lambda: vars(computed_reference(test))))
 
 
@@ -307,13 +321,26 @@ def computed_reference(test: RandomTest) -> Reference:
     )
 
 
-def on_strips(test: RandomTest, grid: Grid, folder: Path | None) -> Worn:
-    """Return the end of a test on the strips of a run, without stepping error."""
-    shape = hashlib.sha256(np.array([*grid.edges, grid.strips]).tobytes()).hexdigest()[:8]
-    path = None if folder is None else folder / f"{test.name}-{test.digest}-{shape}.npz"
+def on_strips(test: RandomTest, start: Grid, end: Grid, folder: Path | None) -> Worn:
+    """Return the end of a test on the strips of a run, without stepping error.
+
+    Parameters
+    ----------
+    test : RandomTest
+        The test.
+    start, end : Grid
+        Strips at the start and end of the run; they grow if these differ.
+    folder : Path, optional
+        Folder of the references.
+    """
+    sizes = [value for grid in (start, end) for value in (*grid.edges, grid.strips)]
+    shape = hashlib.sha256(np.array(sizes).tobytes()).hexdigest()[:8]
+    path = None if folder is None else folder / f"{test.name}-{test.digest}-{SETTINGS}-{shape}.npz"
 
     def compute() -> dict[str, Any]:
-        _, problem, state = worn_at_end(test, grid, TRUE_TOLERANCE, LONGEST_STEP)
+        grows = not same_strips(start, end)
+        steps = TRUE_TOLERANCE, LONGEST_STEP
+        _, problem, state = worn_at_end(test, start, *steps, grows=grows)
         return vars(worn_of(problem, state))
 
     return Worn(**kept(path, compute))

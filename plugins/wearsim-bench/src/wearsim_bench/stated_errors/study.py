@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.errors import WearsimError
+from wearsim.evolution.strips import same_strips
 from wearsim.results import Result
 from wearsim.studies.run.draws import draw
-from wearsim.studies.run.grid import strips_of_run
+from wearsim.studies.run.grid import start_of_run
 from wearsim.studies.run.run import run
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, Grid
 from wearsim_bench.contact.worn_profiles import failure_reason
 from wearsim_bench.measure.measurement import Measurement
-from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE, RandomTest
+from wearsim_bench.stated_errors.random_tests import RandomTest
 from wearsim_bench.stated_errors.references import Worn, on_strips, reference_of, stacked
 
 QUANTITIES = ("depth", "profile", "volume")
@@ -134,10 +135,9 @@ def _without_stepping_error(
     test: RandomTest, result: Result, folder: Path | None
 ) -> tuple[Worn, bool]:
     """Return the end of a test on the strips of its run, and whether these grew with the groove."""
-    grid = strips_of_run(draw(test.scenario()))
-    if np.array_equal(grid.y, result.y):
-        return on_strips(test, grid, folder), False
-    return worn_of_result(timed_run(test, evolution__tolerance=TRUE_TOLERANCE)[0]), True
+    scenario, y = test.scenario(), np.asarray(result.y)
+    start, end = start_of_run(scenario, draw(scenario)), Grid(y, float(y[1] - y[0]))
+    return on_strips(test, start, end, folder), not same_strips(start, end)
 
 
 @dataclass(frozen=True)
