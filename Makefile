@@ -39,7 +39,7 @@ MEASURED := docs/measurements
 bench-docs: $(VENV)/.installed-dev
 	mkdir -p out
 	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
-	$(BIN)/wearsim bench stated-errors --tests 200 --seed 3 --references out/references -o out/bench --force \
+	$(BIN)/wearsim bench stated-errors --tests 200 --seed 3 --references out/references -j $$(nproc) -o out/bench --force \
 		&& cp out/bench/stated-errors.json $(MEASURED)
 	-$(BIN)/wearsim bench --hard -o out/bench --force
 	cp out/bench/hard.json $(MEASURED)

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -78,13 +79,18 @@ def test_options_of_random_tests_reach_their_topic(command, monkeypatch, tmp_pat
 
     def measure(effort, on_progress, **given):
         options.append(given)
-        return artificial("stated-errors")(effort, on_progress)
+        topic = artificial("stated-errors")(effort, on_progress)
+        return replace(topic, files={"1-0.toml": 'title = "missed"'})
 
     monkeypatch.setattr("wearsim_bench.stated_errors.topic.stated_errors", measure)
     topic = "bench", "stated-errors", "-q"
-    assert command(*topic, "--tests", 7, "--seed", 2, "--references", "kept").exit_code == 0
+    assert (
+        command(*topic, "--tests", 7, "--seed", 2, "--references", "kept", "-j", 2).exit_code == 0
+    )
     assert command(*topic, "--force").exit_code == 0
-    assert options == [{"number": 7, "seed": 2, "references": Path("kept")}, {}]
+    assert options == [{"number": 7, "seed": 2, "references": Path("kept"), "jobs": 2}, {}]
+    written = tmp_path / "bench" / "stated-errors" / "1-0.toml"
+    assert written.read_text() == 'title = "missed"'
     assert (tmp_path / "bench" / "stated-errors.json").exists()
     refused = command("bench", "growth", "--seed", 2, "-q")
     assert refused.exit_code == 2

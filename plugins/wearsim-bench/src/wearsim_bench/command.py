@@ -88,6 +88,18 @@ References: TypeAlias = Annotated[
     ),
 ]
 
+Jobs: TypeAlias = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs",
+        "-j",
+        metavar="N",
+        min=1,
+        help="Processes that run the random tests, by default 1.",
+        show_default=False,
+    ),
+]
+
 
 app = typer.Typer(
     add_completion=False,
@@ -106,6 +118,7 @@ def bench(
     tests: Tests = None,
     seed: Seed = None,
     references: References = None,
+    jobs: Jobs = None,
     output: Folder = Path("bench"),
     show_all: All = False,
     json: Json = False,
@@ -118,12 +131,12 @@ def bench(
     selected = list(dict.fromkeys(topics or ([] if hard else TopicName)))
     if plugin is not None:
         selected = _topics_of_model(selected, topics, plugin)
-    options = {"number": tests, "seed": seed, "references": references}
+    options = {"number": tests, "seed": seed, "references": references, "jobs": jobs}
     study = {name: value for name, value in options.items() if value is not None}
     if study and TopicName.stated_errors not in selected:
         raise typer.BadParameter(
             f"applies to the topic {TopicName.stated_errors.value}, which is not selected",
-            param_hint="--tests, --seed or --references",
+            param_hint="--tests, --seed, --references or --jobs",
         )
     endings = (".json", ".md", ".png")
     paths = [output / (topic.value + ending) for topic in selected for ending in endings]

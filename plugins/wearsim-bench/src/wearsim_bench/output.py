@@ -72,6 +72,10 @@ class Output:
         figure = self.folder / f"{topic.name}.png"
         save_figure(bench_figure(topic, self.machine, self.effort), figure)
         self._files.append(figure)
+        if topic.files:
+            (self.folder / topic.name).mkdir(exist_ok=True)
+        for name, text in topic.files.items():
+            self._write_text(f"{topic.name}/{name}", text)
         if not self.as_json:
             self._show(topic)
 

@@ -126,6 +126,8 @@ class Topic:
         Sentence on the measurements of a group, by group.
     timing : str
         How times were obtained, if not as the smallest of all repetitions.
+    files : mapping of str to str
+        Content of further files by name, written to a folder with the name of the topic.
     """
 
     name: str
@@ -140,6 +142,7 @@ class Topic:
     details: tuple[str, ...] = ()
     conclusions: Mapping[str, str] = field(default_factory=dict)
     timing: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def groups(self) -> list[str]:

@@ -9,23 +9,34 @@ from pathlib import Path
 
 import numpy as np
 
-from wearsim.evolution.error_estimates import greatest_depth, volume_of
-from wearsim.evolution.state import fresh_state
+from wearsim.errors import WearsimError
+from wearsim.evolution.strips import same_strips
+from wearsim.results import Result
+from wearsim.studies.run.draws import draw
+from wearsim.studies.run.grid import start_of_run
+from wearsim.studies.run.run import run
+from wearsim.types import FloatArray, Grid
 from wearsim_bench.contact.worn_profiles import failure_reason
 from wearsim_bench.measure.measurement import Measurement
 from wearsim_bench.stated_errors.random_tests import RandomTest
-from wearsim_bench.stated_errors.references import reference_of
-from wearsim_bench.stepping.runs import EndState, PreparedTest, errors_of
+from wearsim_bench.stated_errors.references import Worn, on_strips, reference_of, stacked
 
 QUANTITIES = ("depth", "profile", "volume")
 STATED = "stated_"  # prefix of the stated error of a quantity
+STEPS, STRIPS = "steps_", "strips_"  # prefixes of the true errors by steps and by strips alone
+OWN = "reference_"  # prefix of the change of the reference by half its strips
 TESTS = "tests"  # group of the measurements of single tests
 SMALL = 1e-6  # true errors below it count as covered, and have no ratio
 QUANTILES = {"q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95}
+CLEAR, SLOW, LACKS = "ends with an error: ", "is stopped: ", "has no reference: "
+SECONDS = 300.0  # limit on the time of a run
 
 
 def measured(test: RandomTest, folder: Path | None) -> Measurement:
     """Return time, true and stated errors of a random test, or the reason of its failure.
+
+    The reason begins with `CLEAR` if the run ends with an error of wearsim, with `SLOW` if it was
+    stopped after `SECONDS`, and with `LACKS` if the reference cannot be computed.
 
     Parameters
     ----------
@@ -34,46 +45,99 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
     folder : Path, optional
         Folder of the references, see `reference_of`.
     """
-    row = Measurement(TESTS, test.name, f"tolerance {test.tolerance:g}")
+    row = Measurement(TESTS, test.name, test.stratum)
+    try:
+        result, seconds = timed_run(test)
+    except WearsimError as error:
+        return _failed(row, CLEAR, error)
+    except TimeoutError as error:
+        return _failed(row, SLOW, error)
+    except Exception as error:  # a fault of wearsim
+        return _failed(row, "", error)
     try:
         reference = reference_of(test, folder)
-        prepared = PreparedTest(test.scenario(), reference.grid)
-        start = time.perf_counter()
-        end = prepared.stepped(prepared.stop)
-        seconds = time.perf_counter() - start
-        true = errors_of(end, reference.as_end_of(end))
-        errors = {**true, **{STATED + name: value for name, value in stated(end).items()}}
+        same, grew = _without_stepping_error(test, result, folder)
     except Exception as error:
-        return Measurement(TESTS, row.method, row.setting, failed=failure_reason(error))
-    counts = {
+        return _failed(row, LACKS, error)
+    own = worn_of_result(result)
+    errors = {
+        **_named("", own.changes_from(reference)),
+        **{STATED + name: value for name, value in stated(result).items()},
+        **_named(STEPS, own.changes_from(same)),
+        **_named(STRIPS, same.changes_from(reference)),
+    }
+    counts: dict[str, float] = {
         "tolerance": test.tolerance,
-        "steps": int(end.state.steps[0]),
-        "solves": int(end.state.solves[0]),
-        "first": first_pass(prepared, end),
+        "steps": result.steps,
+        "solves": int(np.max(result.solves[-1])),
+        "strips": len(own.y),
+        "strips_grew": int(grew),
+        "final_depth": own.depth,
+        "reference_strips": len(reference.y),
         "reference_seconds": float(reference.seconds),
+        **_named(OWN, reference.by_strips),
+        **_named(OWN + STEPS, reference.by_steps),
     }
     return row.with_results(seconds, errors, counts)
 
 
-def stated(end: EndState) -> dict[str, float]:
-    """Return the stated relative errors of a final state, by quantity."""
-    state, depths = end.state, end.state.depths
-    depth = float((state.depth_error / greatest_depth(depths))[0])
-    volume = float((state.volume_error / volume_of(end.problem, depths))[0])
-    # without an estimate of the profile that of the depth is taken
-    profile = float(getattr(state, "profile_error", [depth])[0])
-    return {"depth": depth, "profile": profile, "volume": volume}
+def _failed(row: Measurement, kind: str, error: Exception) -> Measurement:
+    return Measurement(row.group, row.method, row.setting, failed=kind + failure_reason(error))
 
 
-def first_pass(prepared: PreparedTest, end: EndState) -> float:
-    """Return the depth that the first pass wears off over the final depth.
+def _named(prefix: str, values: FloatArray) -> dict[str, float]:
+    """Return absolute values of the quantities by name."""
+    return {
+        prefix + name: abs(float(value)) for name, value in zip(QUANTITIES, values, strict=True)
+    }
 
-    Half of it bounds the difference between passes solved individually and wear as a continuous
-    function of the passes, which no step estimates.
+
+def timed_run(test: RandomTest, **others: object) -> tuple[Result, float]:
+    """Return the result of a test with further changes of its scenario, and its time [s].
+
+    Raises
+    ------
+    WearsimError
+        As `wearsim.run`.
+    TimeoutError
+        After `SECONDS`.
     """
-    problem, state = prepared.problem, fresh_state(prepared.problem)
-    rates = problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))
-    return float((greatest_depth(rates) / greatest_depth(end.state.depths))[0])
+    start = time.perf_counter()
+
+    def is_late() -> bool:
+        if time.perf_counter() - start > SECONDS:
+            raise TimeoutError(f"the run takes longer than {SECONDS:g} s")
+        return False
+
+    result = run(test.scenario(**others), stop_requested=is_late)
+    return result, time.perf_counter() - start
+
+
+def worn_of_result(result: Result) -> Worn:
+    """Return the depths at the end of a run."""
+    raw = result.raw
+    last = {name: values[-1] for name, values in {**raw.history, **raw.records}.items()}
+    rollers = raw.static["multiplicity"] @ last["roller_worn_volume"]
+    return Worn(
+        np.asarray(result.y),
+        stacked(last["cylinder_depth_profile"], last["roller_depth_profile"]),
+        float(max(last["depth"].max(), last["roller_depth"].max())),
+        float(np.ravel(last["worn_volume"] + rollers)[0]),
+    )
+
+
+def stated(result: Result) -> dict[str, float]:
+    """Return the stated relative errors at the end of a run, by quantity."""
+    return {name: float(np.max(result.final[f"relative_{name}_error"])) for name in QUANTITIES}
+
+
+def _without_stepping_error(
+    test: RandomTest, result: Result, folder: Path | None
+) -> tuple[Worn, bool]:
+    """Return the end of a test on the strips of its run, and whether these grew with the groove."""
+    scenario, y = test.scenario(), np.asarray(result.y)
+    start, end = start_of_run(scenario, draw(scenario)), Grid(y, float(y[1] - y[0]))
+    return on_strips(test, start, end, folder), not same_strips(start, end)
 
 
 @dataclass(frozen=True)
@@ -84,11 +148,14 @@ class Coverage:
     ----------
     true, stated, tolerances : sequence of float
         Relative errors of every test, and its tolerance.
+    by_steps : sequence of float
+        True errors by steps alone.
     """
 
     true: Sequence[float]
     stated: Sequence[float]
     tolerances: Sequence[float]
+    by_steps: Sequence[float] = ()
 
     @property
     def covered(self) -> int:
@@ -106,10 +173,22 @@ class Coverage:
         return [s / t for s, t in zip(self.stated, self.true, strict=True) if t > SMALL]
 
     @property
+    def greatest_step(self) -> float:
+        """Greatest true error by steps alone over the tolerance."""
+        each = zip(self.by_steps, self.tolerances, strict=False)
+        return max((error / limit for error, limit in each), default=0.0)
+
+    @property
     def counts(self) -> dict[str, float]:
         """The statistics by name."""
         ratios = self.ratios
-        numbers = {"tests": len(self.true), "covered": self.covered, "met": self.met}
+        numbers: dict[str, float] = {
+            "tests": len(self.true),
+            "covered": self.covered,
+            "met": self.met,
+        }
+        if self.true:
+            numbers |= {"greatest": max(self.true), "greatest_step": self.greatest_step}
         quantiles = np.quantile(ratios, list(QUANTILES.values())) if ratios else ()
         return {**numbers, **dict(zip(QUANTILES, map(float, quantiles), strict=False))}
 
@@ -121,6 +200,7 @@ def coverage(rows: Sequence[Measurement], quantity: str) -> Coverage:
         [row.errors[quantity] for row in done],
         [row.errors[STATED + quantity] for row in done],
         [row.counts["tolerance"] for row in done],
+        [row.errors[STEPS + quantity] for row in done],
     )
 
 

@@ -4,32 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+from wearsim.scenario import Scenario
+from wearsim.studies.execution.factory import executor
 from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic
-from wearsim_bench.stated_errors.random_tests import random_test
+from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE
+from wearsim_bench.stated_errors.strata import STRATA, random_test
 from wearsim_bench.stated_errors.study import (
+    CLEAR,
+    LACKS,
     QUANTITIES,
     SMALL,
     STATED,
+    STEPS,
+    STRIPS,
     TESTS,
     coverage,
     measured,
     worst,
 )
-from wearsim_bench.stepping.groups import CONVERGED
 
-NUMBER, QUICK_NUMBER = 40, 6  # of tests
+NUMBER, QUICK_NUMBER = 40, 5  # of tests
 QUICK_SHARE = 0.02  # of the passes
-UNCOVERED = "not covered, {}"
+UNCOVERED, FAILED = "not covered, {}", "without a result"
+ALL, STRATUM, TOLERANCE = "all tests", "stratum {}", "tolerance {:g}"
 WORST = 5  # tests listed for each quantity
+#: required parts of the tests that are covered, of all tests and in each stratum; greatest true
+#: error by steps over the tolerance; greatest median ratio; greatest part of clear errors
+COVERED, COVERED_IN_STRATUM, MOST_BY_STEPS, MOST_RATIO, MOST_CLEAR = 0.93, 0.9, 2.0, 10.0, 0.05
 ERRORS = {
     prefix + name: head.format(name)
     for name in QUANTITIES
-    for prefix, head in (("", "{}, true"), (STATED, "{}, stated"))
+    for prefix, head in (
+        ("", "{}, true"),
+        (STATED, "{}, stated"),
+        (STEPS, "{}, by steps"),
+        (STRIPS, "{}, by strips"),
+    )
 }
 COUNTS = {
     "tests": "tests",
+    "failed": "without result",
     "covered": "covered",
     "q05": "ratio, 5 %",
     "q25": "25 %",
@@ -37,23 +54,27 @@ COUNTS = {
     "q75": "75 %",
     "q95": "95 %",
     "met": "tolerance met",
+    "greatest": "greatest true",
+    "greatest_step": "by steps / tolerance",
     "steps": "steps",
     "solves": "contact solves",
-    "first": "first pass",
+    "strips": "strips",
 }
 ABOUT = (
-    "Random wear tests of the default stepper: passes, load, crown radius, wear factors, friction,"
-    " creepage, angles, springs, thermal terms, logged and random loads, wear laws, wear of both"
-    " bodies, several rollers, free rollers, and inputs drawn at every pass, each with a tolerance"
-    " of 1e-2, 1e-3 or 1e-4. True errors are relative to individually solved passes on the same"
-    " strips. If the loop over passes is not compiled and the passes are many, the reference is"
-    f" LSODA of scipy at a tolerance of {CONVERGED:g}. Stated errors are the estimates at the end"
-    " of a test. Depth is the greatest depth, profile the L2 norm over all bodies. A test is"
+    "Random wear tests of the default stepper on automatic strips, in five strata: ordinary ones,"
+    " adhesion (a creepage far below full slip, small rollers, light loads), loads with a spring,"
+    " cams, and free rollers; with wide ranges of radii, loads, friction, creepage, wear factors,"
+    " wear of both bodies, angles, offsets and durations, and tolerances of 1e-2, 1e-3 and 1e-4."
+    f" True errors are relative to a solution with steps at a tolerance of {TRUE_TOLERANCE:g}, none"
+    " longer than a fiftieth of the passes done, or with each pass solved individually where they"
+    " are few, on strips at least four times finer. Stated errors are the estimates at the end of"
+    " a run. Depth is the greatest depth, profile the L2 norm over all bodies. A test is"
     f" covered if the stated error is at least the true one, or the true one is below {SMALL:g}."
     f" Ratios, of stated to true errors, are those of tests with a true error above {SMALL:g}."
-    " First pass is the depth that it wears off, relative to the final depth: half of it bounds the"
-    " difference between individual passes and continuous wear. The tests whose true error exceeds"
-    " the stated one most are listed with their settings."
+    " The true errors by steps alone, on the strips of the run, and by strips alone, without"
+    " stepping error, are given for every test. Tests that end with a clear error are counted"
+    " apart. The tests whose true error exceeds the stated one most are listed with their settings,"
+    " and their scenarios are written to files."
 )
 
 
@@ -63,6 +84,7 @@ def stated_errors(
     seed: int = 1,
     number: int | None = None,
     references: Path | None = None,
+    jobs: int = 1,
 ) -> Topic:
     """Compare stated with true errors of random tests.
 
@@ -78,21 +100,29 @@ def stated_errors(
         Number of tests.
     references : Path, optional
         Folder in which references are kept; they do not depend on the stepper.
+    jobs : int
+        Processes in which tests are run.
     """
     number = number or (QUICK_NUMBER if effort.quick else NUMBER)
     share = QUICK_SHARE if effort.quick else 1.0
     tests = [random_test(seed, place, share) for place in range(number)]
-    rows = []
-    for test in tests:
-        rows.append(measured(test, references))
-        on_progress(f"test {len(rows)} of {number}", len(rows) / number)
-    summary = statistics(rows)
+    rows: dict[int, Measurement] = {}
+    work = partial(measured_tests, seed=seed, share=share, references=references)
+    scheduler = "serial" if jobs == 1 else "processes"
+    with executor(scheduler, None if jobs == 1 else jobs, realisations=number) as processes:
+        for places, found in processes.results(work, iter([place] for place in range(number))):
+            rows |= dict(zip(places, found, strict=True))
+            on_progress(f"test {len(rows)} of {number}", len(rows) / number)
+    summary = statistics([rows[place] for place in range(number)])
     settings = {test.name: test.settings for test in tests}
     described = {
         group: "\n".join(f"- {row.method}: {settings[row.method]}" for row in summary[group])
-        for group in (*map(UNCOVERED.format, QUANTITIES), TESTS)
+        for group in (*map(UNCOVERED.format, QUANTITIES), FAILED, TESTS)
         if group in summary
     }
+    described[ALL] = requirements(list(rows.values()))
+    missed = [group for group in described if group not in (ALL, TESTS)]
+    listed = {row.method for group in missed for row in summary[group]}
     return Topic(
         name="stated-errors",
         title=f"Stated and true errors of {number} random wear tests, seed {seed}",
@@ -105,7 +135,58 @@ def stated_errors(
         details=(TESTS,),
         conclusions=described,
         timing="timed once",
+        files={
+            f"{test.name}-{name}" if name != "toml" else f"{test.name}.toml": text
+            for test in tests
+            if test.name in listed
+            for name, text in _scenario_files(test.name, test.scenario())
+        },
     )
+
+
+def _scenario_files(name: str, scenario: Scenario) -> list[tuple[str, str]]:
+    """Return the text of a scenario as "toml", and its files, which carry the name of the test."""
+    text = scenario.text
+    for file in scenario.files:
+        text = text.replace(f'"{file}"', f'"{name}-{file}"')
+    return [("toml", text), *scenario.files.items()]
+
+
+def measured_tests(
+    places: Sequence[int], seed: int, share: float, references: Path | None
+) -> list[Measurement]:
+    """Return the measurements of some tests, by number."""
+    return [measured(random_test(seed, place, share), references) for place in places]
+
+
+def requirements(rows: Sequence[Measurement]) -> str:
+    """Return which requirements the stated errors meet, one per line."""
+    counted = [row for row in rows if not row.failed.startswith((CLEAR, LACKS))]
+    lines = []
+    for name in QUANTITIES:
+        found = coverage(counted, name)
+        part = found.covered / max(len(counted), 1)
+        lines.append(_verdict(part >= COVERED, f"{name} covered in {part:.1%} of the tests"))
+        median = found.counts.get("median", 0.0)
+        lines.append(_verdict(median < MOST_RATIO, f"{name}: median of stated/true {median:.3g}"))
+        for stratum in dict.fromkeys(row.setting for row in counted):
+            some = [row for row in counted if row.setting == stratum]
+            part = coverage(some, name).covered / len(some)
+            if part < COVERED_IN_STRATUM:
+                lines.append(_verdict(False, f"{name} covered in {part:.1%} of '{stratum}'"))
+    steps = max(coverage(counted, name).greatest_step for name in QUANTITIES)
+    lines.append(_verdict(steps <= MOST_BY_STEPS, f"errors by steps up to {steps:.3g} tolerances"))
+    clear = sum(row.failed.startswith(CLEAR) for row in rows)
+    lines.append(
+        _verdict(clear <= MOST_CLEAR * len(rows), f"{clear} of {len(rows)} end with an error")
+    )
+    lacking = sum(row.failed.startswith(LACKS) for row in rows)
+    lines.append(f"- not counted: {lacking} without a reference")
+    return "\n".join(lines)
+
+
+def _verdict(holds: bool, what: str) -> str:
+    return f"- {'met' if holds else 'NOT MET'}: {what}"
 
 
 def statistics(rows: Sequence[Measurement]) -> dict[str, list[Measurement]]:
@@ -116,23 +197,25 @@ def statistics(rows: Sequence[Measurement]) -> dict[str, list[Measurement]]:
     rows : sequence of Measurement
         Results of `measured`.
     """
-    tests = {"all tests": list(rows)}
+    tests = {ALL: list(rows)}
+    for stratum in STRATA:
+        tests[STRATUM.format(stratum)] = [row for row in rows if row.setting == stratum]
     tolerances = {row.counts["tolerance"] for row in rows if not row.failed}
     for tolerance in sorted(tolerances, reverse=True):
         same = [row for row in rows if row.counts.get("tolerance") == tolerance]
-        tests[f"tolerance {tolerance:g}"] = same
-    groups = {
-        group: [
-            Measurement(group, name, "", counts=coverage(some, name).counts) for name in QUANTITIES
-        ]
-        for group, some in tests.items()
-    }
+        tests[TOLERANCE.format(tolerance)] = same
+    groups = {}
+    for group, some in tests.items():
+        lost = {"failed": sum(bool(row.failed) for row in some)}
+        if some:
+            groups[group] = [
+                Measurement(group, name, "", counts=coverage(some, name).counts | lost)
+                for name in QUANTITIES
+            ]
     for name in QUANTITIES:
         group = UNCOVERED.format(name)
         groups[group] = [
             replace(row, group=group, seconds=None) for row in worst(rows, name, WORST)
         ]
-    failed = [replace(row, group="failed") for row in rows if row.failed]
-    return {group: items for group, items in (groups | {"failed": failed}).items() if items} | {
-        TESTS: list(rows)
-    }
+    groups[FAILED] = [replace(row, group=FAILED) for row in rows if row.failed]
+    return {group: items for group, items in groups.items() if items} | {TESTS: list(rows)}

@@ -101,12 +101,12 @@ class PreparedTest:
 
     def stepped(self, passes: float) -> EndState:
         """Step from fresh bodies over a number of passes, without records."""
-        state = fresh_state(self.problem)
+        problem, state = self.problem, fresh_state(self.problem)
         for advance in evolve(
             self.problem, state, self.stepper, passes, lambda _: np.inf, self._max_steps
         ):
-            state = advance.end
-        return EndState(self.problem, state)
+            problem, state = advance.problem, advance.end  # the strips grow with the groove
+        return EndState(problem, state)
 
 
 def errors_of(approximate: EndState, exact: EndState) -> dict[str, float]:
