@@ -42,7 +42,7 @@ def test_no_strip_gains_energy_and_the_balance_holds(curvatures, flexibility):
 def test_no_strip_of_a_batch_gains_energy(options):
     xi, eta, phi = opposed(np.random.default_rng(6), CONTACTS)
     points = replace(draws(), longitudinal=xi, lateral=eta, spin=phi)
-    model, contacts, found = batch(points, **options)
+    _, contacts, found = batch(points, **options)
     work = xi * found.force_x + eta * found.force_y + phi * found.spin_moment
     power = found.dissipation.sum(axis=-1) * (found.y[1] - found.y[0])
     assert found.dissipation.min() >= 0.0

@@ -201,7 +201,9 @@ def _never_negative(depths: FloatArray) -> FloatArray:
         return depths
     positive = np.maximum(depths, 0.0)
     totals = depths.sum(axis=-1, keepdims=True), positive.sum(axis=-1, keepdims=True)
-    return np.asarray(positive * np.divide(*totals, out=np.ones_like(totals[0]), where=totals[1] > 0))
+    return np.asarray(
+        positive * np.divide(*totals, out=np.ones_like(totals[0]), where=totals[1] > 0)
+    )
 
 
 def _sum(*terms: tuple[float, Change]) -> Change:
