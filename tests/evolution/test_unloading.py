@@ -103,7 +103,7 @@ def test_roller_lifted_by_the_wear_of_others_ends_the_run_with_its_cause():
 
 def test_record_does_not_decide_whether_a_run_survives():
     problem, stepper, stop = built(load__kind="spring", load__stiffness="2e5 N/mm")
-    state, steps = stepped(problem, stepper, stop)
+    _, steps = stepped(problem, stepper, stop)
     for advance in steps[-20:]:
         start, length = advance.path[0], advance.end.passes - advance.path[0].passes
         for part in (0.1, 0.5, 0.9):

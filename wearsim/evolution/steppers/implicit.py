@@ -100,8 +100,9 @@ class ImplicitStepper(StepDoublingStepper):
             past.wear, past.spans, depths, past.order, part, aim, KEEP, own, order
         )
         # without half a pass, the wear of a pass is that after it instead of before it
-        own *= np.where(step > WHOLE_PASSES, 1.0, 2.0)[:, None]
-        displaced = np.zeros_like(over)
+        if step.min() <= WHOLE_PASSES:
+            own *= np.where(step > WHOLE_PASSES, 1.0, 2.0)[:, None]
+        displaced = None
         if problem.has_spring:
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, part, aim, KEEP)
             order = np.where(of_loads[1] < ratio, their_order, order)
@@ -155,7 +156,7 @@ def _estimates(
     depths: FloatArray,
     added: FloatArray,
     passes: FloatArray,
-    displaced: FloatArray,
+    displaced: FloatArray | None,
 ) -> dict[str, FloatArray]:
     """Return the error estimates at the end of a step, by their names in `WearState`.
 
@@ -168,7 +169,7 @@ def _estimates(
         Depths of the end, and error that the step adds to them, as `WearState.stacked` [m].
     passes : ndarray, shape (realisations,)
         Length of the step.
-    displaced : ndarray, shape (realisations,)
+    displaced : ndarray, shape (realisations,), optional
         Displacement of a roller that the error of its load corresponds to [m].
     """
     contacts, shape = end.contacts, end.contacts.line_load.shape
@@ -189,9 +190,9 @@ def _estimates(
         problem.grid.spacing,
         problem.volume_weights,
     )
-    # a stiff spring holds the depth, and errors of its load remain
-    sizes[0] += displaced
-    sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
+    if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
+        sizes[0] += displaced
+        sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
     found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
     depth, volume, profile = found + end.irreducible

@@ -48,12 +48,12 @@ class _Slope:
 
     Parameters
     ----------
-    loads : ndarray, shape (stations, contacts, realisations)
-        Loads of the first iterate [N].
+    shape : tuple of int
+        Shape of the loads: stations, contacts, realisations.
     """
 
-    def __init__(self, loads: FloatArray) -> None:
-        self._exponent = np.full(loads.shape, APPROACH_EXPONENT)
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._exponent = np.full(shape, APPROACH_EXPONENT)
         self._last: tuple[FloatArray, FloatArray] | None = None
 
     def exponent(self, loads: FloatArray, approach: FloatArray) -> FloatArray:
@@ -129,11 +129,10 @@ class EndOfStep:
         problem, start = self.problem, self.start
         prescribed = with_feedback(problem, self.force, np.zeros(()), ())
         loads = checked_loads(start, prescribed)
-        before = carried_loads(problem, start.contacts)
         if feedback is not None:
-            least = LEAST_GUESS * np.minimum(prescribed, before)
-            loads = np.maximum(prescribed + feedback, least)
-        target, slope = loads, _Slope(loads)
+            before, slope = carried_loads(problem, start.contacts), _Slope(loads.shape)
+            loads = np.maximum(prescribed + feedback, LEAST_GUESS * np.minimum(prescribed, before))
+        target = loads
         stations, depths, contacts = problem.shape[0], guess, start.contacts
         gap = problem.gap(*separated(self.base, stations))
         # line loads and wear about which the wear is linearised
