@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +20,19 @@ SMALLEST_STEP = 1e-6  # passes; with a great wear factor ten passes wear a whole
 _SMALLEST_PART = 1e-8  # of the passes done; with shorter steps a test would not end
 SAFETY = 0.7  # part of its allowance that the next step aims at
 SHRINK, GROW = 0.2, 5.0  # bounds on the ratio of successive steps
+LENGTHS = 32  # of steps, in a range of a factor of two
+
+
+def rounded_length(passes: float) -> float:
+    """Return the nearest of the lengths that a controlled step may have [passes].
+
+    Their ratio is 2^(1/32). A length that followed the error to the last bit would also follow its
+    round-off, and later steps would amplify the difference: two runs that are equal but for the
+    order of their sums, as a run and its mirror image, would differ by as much as their errors.
+    """
+    if not 0.0 < passes < math.inf:
+        return passes
+    return float(2.0 ** (round(LENGTHS * math.log2(passes)) / LENGTHS))
 
 
 class Trial:
@@ -43,7 +57,7 @@ class Trial:
     """
 
     def __init__(self, proposed: float, forced: bool, taper: float = 1.0) -> None:
-        self.proposed, self.rejected = proposed, 0
+        self.proposed, self.rejected = proposed if forced else rounded_length(proposed), 0
         self._forced, self._taper = forced, taper
         self._cause: StepError | ContactError | None = None
 
@@ -90,7 +104,7 @@ class Trial:
         """
         if self._forced:
             return True
-        chosen = step * max(SHRINK, ratio)
+        chosen = rounded_length(step * max(SHRINK, ratio))
         if excess <= 1.0:
             # a step shortened by the stop does not limit the length of the next one
             self.proposed = max(chosen, self.proposed) if step < self.proposed else chosen

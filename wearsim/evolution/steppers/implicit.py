@@ -20,6 +20,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
+from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
 from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
@@ -98,12 +99,20 @@ class ImplicitStepper(StepDoublingStepper):
         over, ratio = next_steps(
             past.wear, past.spans, depths, past.order, part, aim, KEEP, own, order
         )
+        # without half a pass, the wear of a pass is that after it instead of before it
+        if step.min() <= WHOLE_PASSES:
+            own *= np.where(step > WHOLE_PASSES, 1.0, 2.0)[:, None]
+        displaced = None
+        if problem.has_spring:
+            of_loads, their_order, displaced = next_steps_of_loads(problem, end, part, aim, KEEP)
+            order = np.where(of_loads[1] < ratio, their_order, order)
+            over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
             steps=state.steps + 1,
             order=order,
-            **_estimates(problem, state, end, depths, own, step),
+            **_estimates(problem, state, end, depths, own, step, displaced),
             **others,
         )
         return Attempt((end,), over, ratio)
@@ -147,6 +156,7 @@ def _estimates(
     depths: FloatArray,
     added: FloatArray,
     passes: FloatArray,
+    displaced: FloatArray | None,
 ) -> dict[str, FloatArray]:
     """Return the error estimates at the end of a step, by their names in `WearState`.
 
@@ -159,6 +169,8 @@ def _estimates(
         Depths of the end, and error that the step adds to them, as `WearState.stacked` [m].
     passes : ndarray, shape (realisations,)
         Length of the step.
+    displaced : ndarray, shape (realisations,), optional
+        Displacement of a roller that the error of its load corresponds to [m].
     """
     contacts, shape = end.contacts, end.contacts.line_load.shape
     stiffness = np.zeros(shape[0])
@@ -178,6 +190,9 @@ def _estimates(
         problem.grid.spacing,
         problem.volume_weights,
     )
+    if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
+        sizes[0] += displaced
+        sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
     found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
     depth, volume, profile = found + end.irreducible
@@ -202,6 +217,8 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and state.skid_loads is not None:  # a worn cam
         loads = carried_loads(here, state.contacts)
         past_feedback[0] = loads - with_feedback(here, force, np.zeros(()), ())
+    if past_feedback is not None and problem.has_spring:
+        past_feedback[1] = unloading(here, state, exposure)
     wear, energy = _wear_per_pass(here, state.contacts)
     return state.replaced(
         past_wear=_starting(wear, exposure),

@@ -12,13 +12,14 @@ from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.loads import (
+    APPROACH_EXPONENT,
     advanced_terms,
     checked_loads,
     corrected_loads,
     fresh_approach,
     with_feedback,
 )
-from wearsim.evolution.steppers.single_step import REALISATION
+from wearsim.evolution.steppers.single_step import REALISATION, carried_loads
 from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
 from wearsim.plugins import SharedWear
 from wearsim.types import BoolArray, FloatArray
@@ -26,11 +27,45 @@ from wearsim.types import BoolArray, FloatArray
 MAX_FIXED_POINT = 60
 DAMPED_FROM = 10  # iterations; far fewer are usual
 CONVERGED = 500.0  # change of wear over the whole depth, relative to the tolerance of iterations
-LEAST_GUESS = 0.1  # first guess of a load over that without feedback; ratio of its iterates
-LOST = 1e-9  # load over that without feedback, below which contact is lost
+LEAST_GUESS = 0.1  # first guess of a load over the one before; ratio of its iterates
+# relative change of loads with a spring: part of that in the step, at most this over the tolerance
+# of iterations
+RESOLVED, LOADS_CONVERGED = 0.1, 100.0
+# relative change of a load below which the exponent of the approach is round-off
+MIN_LOAD_CHANGE = 1e-4
+EXPONENTS = 0.3, 1.2  # bounds of the exponent of the approach as a power of the load
+LOST = 1e-6  # load over that before the step, below which contact is lost
+# load over that without feedback, below which a step takes off at most a known part: displacements
+# of the roller are then not resolved by the depths
+UNLOADED = 1e-10
 RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten
 MAX_LINEAR_EXPONENT = 1.0  # of dissipation as a power of line load; 1 in full sliding
 MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
+
+
+class _Slope:
+    """Exponent of the approach of each contact as a power of its load, from two iterates.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Shape of the loads: stations, contacts, realisations.
+    """
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._exponent = np.full(shape, APPROACH_EXPONENT)
+        self._last: tuple[FloatArray, FloatArray] | None = None
+
+    def exponent(self, loads: FloatArray, approach: FloatArray) -> FloatArray:
+        """Return the exponent for an iterate with these loads [N] and approaches [m]."""
+        if self._last is not None:
+            rise = np.log(loads / self._last[0])
+            usable = (np.abs(rise) > MIN_LOAD_CHANGE) & (approach > 0.0) & (self._last[1] > 0.0)
+            ratio = np.divide(approach, self._last[1], out=np.ones_like(loads), where=usable)
+            found = np.log(ratio) / np.where(usable, rise, 1.0)
+            self._exponent = np.where(usable, np.clip(found, *EXPONENTS), self._exponent)
+        self._last = loads, approach
+        return self._exponent
 
 
 @dataclass(frozen=True)
@@ -95,7 +130,8 @@ class EndOfStep:
         prescribed = with_feedback(problem, self.force, np.zeros(()), ())
         loads = checked_loads(start, prescribed)
         if feedback is not None:
-            loads = np.maximum(prescribed + feedback, LEAST_GUESS * prescribed)
+            before, slope = carried_loads(problem, start.contacts), _Slope(loads.shape)
+            loads = np.maximum(prescribed + feedback, LEAST_GUESS * np.minimum(prescribed, before))
         target = loads
         stations, depths, contacts = problem.shape[0], guess, start.contacts
         gap = problem.gap(*separated(self.base, stations))
@@ -137,18 +173,22 @@ class EndOfStep:
                 worn,
             )
             used, depths, change = depths, self.base + worn, rest
+            # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
+            relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
             if feedback is not None:
                 # loads of realisations that have converged must not depend on the others
-                target = np.where(active, self._equilibrium(solved, loads, gap), target)
+                found = self._equilibrium(solved, loads, before, gap, slope)
+                target = np.where(active, found, target)
                 moved = np.abs(target / loads - 1.0).max(axis=(0, 1))
                 change = np.maximum(change, opening * moved)
-                # far from equilibrium, or without one if the spring is unloaded
-                change[(target <= LEAST_GUESS * loads).any(axis=(0, 1))] = np.inf
+                if problem.has_spring:
+                    # later loads follow this one, also where the wear of the step is small
+                    least, most = problem.iteration_tolerance * np.array([1.0, LOADS_CONVERGED])
+                    part = RESOLVED * np.abs(target / before - 1.0).max(axis=(0, 1))
+                    change[moved > np.clip(part, least, most) * relaxation] = np.inf
             if problem.slip_profile is not None:
                 moved = np.abs(depths - used).max(axis=(0, 2))
                 change = np.maximum(change, opening * (moved / depth))
-            # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
-            relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
             converged = CONVERGED * problem.iteration_tolerance * relaxation
             active &= ~(change <= converged * depth)
             if not np.count_nonzero(active):
@@ -179,9 +219,17 @@ class EndOfStep:
         return parts.reshape(2, *contacts.line_load.shape)
 
     def _equilibrium(
-        self, solved: ContactBatchSolution, loads: FloatArray, gap: FloatArray
+        self,
+        solved: ContactBatchSolution,
+        loads: FloatArray,
+        before: FloatArray,
+        gap: FloatArray,
+        slope: _Slope,
     ) -> FloatArray:
-        """Return loads closer to equilibrium than those of a solution, shape (S, C, N) [N]."""
+        """Return loads closer to equilibrium than those of a solution, shape (S, C, N) [N].
+
+        `before` are the loads before the step.
+        """
         problem, displacement, approach = self.problem, np.zeros(()), np.zeros(())
         if problem.has_spring:
             # worn descent less the recovery of the elastic approach
@@ -189,10 +237,15 @@ class EndOfStep:
             fresh = fresh_approach(problem, self.start, self.force)
             displacement = approach - problem.nominal_least_gap - fresh
         target = with_feedback(problem, self.force, displacement, self._terms(solved))
-        if problem.has_spring:
-            target = corrected_loads(problem, loads, target, approach - gap.min(axis=-1))
-        if (target < LOST * loads).any():
-            checked_loads(self.start, np.where(loads < LOST * self.force, target, 1.0))
+        if not problem.has_spring:
+            return np.maximum(target, LEAST_GUESS * loads)
+        pressed = approach - gap.min(axis=-1)
+        exponent = slope.exponent(loads, pressed)
+        target = corrected_loads(problem, loads, target, pressed, exponent)
+        unloaded = before < UNLOADED * with_feedback(problem, self.force, np.zeros(()), ())
+        target = np.maximum(target, np.where(unloaded, LEAST_GUESS * before, -np.inf))
+        if not (target > 0.0).all():
+            checked_loads(self.start, np.where(loads < LOST * before, target, 1.0))
         return np.maximum(target, LEAST_GUESS * loads)
 
     def _terms(self, solved: ContactBatchSolution) -> FloatArray:

@@ -166,11 +166,12 @@ def corrected_loads(
     loads: FloatArray,
     target: FloatArray,
     approach: FloatArray,
+    exponent: FloatArray | float = APPROACH_EXPONENT,
 ) -> FloatArray:
     """Return loads closer to those at which a spring and the contact are in equilibrium.
 
     One step of Newton's method for each contact, with the slope of the displacement estimated as
-    that of a power of the load.
+    that of a power of the load. If there is no equilibrium, a load may not be positive.
 
     Parameters
     ----------
@@ -181,8 +182,10 @@ def corrected_loads(
         Loads by the spring at the displacement of that solution [N].
     approach : ndarray
         Part of the displacement that depends on the load [m].
+    exponent : float or ndarray
+        Exponent of that part as a power of the load.
     """
-    slope = APPROACH_EXPONENT * np.maximum(approach, 0.0) / loads
+    slope = exponent * np.maximum(approach, 0.0) / loads
     return np.asarray(loads + (target - loads) / (1.0 + problem.stiffness * slope))
 
 

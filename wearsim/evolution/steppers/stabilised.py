@@ -135,7 +135,8 @@ def stabilised_step(
         changes = zip(weights, (change, before, rate, first), strict=True)
         before, change = change, _sum(*changes)
     begun = state.replaced(contacts=contacts, decay=decay)
-    worn = worn_state(here, begun.with_added(change[:2]), passes, change[2])
+    depths = _never_negative(change[0]), _never_negative(change[1])
+    worn = worn_state(here, begun.with_added(depths), passes, change[2])
     contacts, _, more = solve_at_present_loads(problem, worn, elastic)
     done = state.solves + (solves + more) * problem.contacts_each
     return worn.replaced(contacts=contacts, solves=done)
@@ -188,6 +189,21 @@ def _rate(
         elastic = elastic_approaches(here, stage.replaced(contacts=contacts))
     wear = WearIncrement(here, contacts, passes)
     return contacts, (*wear.depths, here.values_of(contacts, "power")), elastic, solves
+
+
+def _never_negative(depths: FloatArray) -> FloatArray:
+    """Return the depths worn in a step without negative ones, with the same sum over the strips.
+
+    Stages have negative weights, which a strip at the edge of the contact that is loaded in one
+    stage alone would follow.
+    """
+    if not (depths < 0.0).any():
+        return depths
+    positive = np.maximum(depths, 0.0)
+    totals = depths.sum(axis=-1, keepdims=True), positive.sum(axis=-1, keepdims=True)
+    return np.asarray(
+        positive * np.divide(*totals, out=np.ones_like(totals[0]), where=totals[1] > 0)
+    )
 
 
 def _sum(*terms: tuple[float, Change]) -> Change:

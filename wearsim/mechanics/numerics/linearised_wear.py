@@ -10,7 +10,9 @@ from wearsim.types import FloatArray, IntArray
 LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a steady wear rate
 DEEP = 0.5  # depths are compared where a groove is deeper than this part of its greatest depth
 FOUNDATION = 0.5  # elastic compliance of a strip, over approach per greatest line load
-MIN_LOG_CHANGE = 1e-7  # least relative change of a line load for the estimate of an exponent
+# least relative change of a line load for the estimate of an exponent; over a much smaller one the
+# estimate would be round-off, which later steps amplify
+MIN_LOG_CHANGE = 1e-3
 LEAST = 0.15  # error of the greatest depth, relative to that of the profile, as it crosses zero
 
 

@@ -367,6 +367,7 @@ def _fill_results(
     eta, phi, speed = inputs.lateral[k], inputs.spin[k], inputs.rolling_speed[k]
     centre = _load_weighted_mean(bodies.y, results.line_load[k])
     force_x, force_y, moment, power, sticking, length = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    positive = 0.0
     for j in range(len(bodies.y)):
         part = work.coverage[j]
         tx, ty, turning = total[FORCE_X, j], total[FORCE_Y, j], total[MOMENT, j]
@@ -374,11 +375,16 @@ def _fill_results(
         dissipation = part * (speed * total[WORK, j] if theory.element_sum else -speed * rigid_work)
         results.dissipation[k, j] = dissipation
         power += dissipation
+        positive += max(dissipation, 0.0)
         force_x += part * tx
         force_y += part * ty
         moment += part * turning - (bodies.y[j] - centre) * (part * tx)
         sticking += total[ADHESION, j]
         length += results.half_length[k, j]
+    if positive > power:  # as of `spread_work`, with the work of three flexibilities
+        power = max(power, 0.0)
+        for j in range(len(bodies.y)):
+            results.dissipation[k, j] = max(results.dissipation[k, j], 0.0) * (power / positive)
     results.force_x[k], results.force_y[k] = force_x * bodies.spacing, force_y * bodies.spacing
     results.spin_moment[k], results.power[k] = moment * bodies.spacing, power * bodies.spacing
     results.adhesion_fraction[k] = sticking / (2.0 * length)

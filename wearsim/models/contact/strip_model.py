@@ -247,9 +247,11 @@ class SemiHertzian(StripModel, SingleContactModel):
         """Solve one contact; `warm` is not used."""
         line_load, half_length = np.zeros(len(gap)), np.zeros(len(gap))
         compliance = np.zeros(len(gap)) if wear_compliance is None else own_array(wear_compliance)
+        # the depths under a vanishing load would be lost in the rounding of a deep groove
+        lowest = float(gap.min())
         status, iterations, approach = kernels.solve_semi_hertzian(
             self._variant,
-            own_array(gap),
+            own_array(gap - lowest),
             compliance,
             float(point.normal_force),
             self._grid.spacing,
@@ -260,6 +262,7 @@ class SemiHertzian(StripModel, SingleContactModel):
             line_load,
             half_length,
         )
+        approach += lowest
         state = {
             "gap": gap,
             "line_load": line_load,

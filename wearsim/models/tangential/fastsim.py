@@ -87,7 +87,8 @@ class FastsimTheory(TangentialTheory):
     of the rig, a/b = 0.09, with down to -8 % of the maximum P_l; one in 200 on a circle, to -1 %.
     For log-uniform creepages up to 3e-3 and a spin up to 10/m it is up to one contact in six, with
     down to -20 % for a/b = 5; with one flexibility up to one in 50, to -0.7 %. The power of a whole
-    contact was never negative.
+    contact was never negative. The dissipation of such strips is set to zero, and that of the
+    others scaled (`spread_work`): the power remains the work of the rigid slip.
     """
 
     knows_ellipses: ClassVar[bool] = True
@@ -170,6 +171,7 @@ class FastsimTheory(TangentialTheory):
             work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
             dissipation[:] = -rolling_speed * work
         out[[0, 1, 2, 4]] *= covered_share(strips)
+        dissipation[:] = spread_work(dissipation)
         return Tractions(force_x, force_y, moment, dissipation, adhesion)
 
     def fields(

@@ -1,0 +1,74 @@
+"""Loads by springs in the step-size control: their error, and their change at the start."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import HERTZ, WearState
+from wearsim.evolution.steppers.loads import elastic_approaches, with_feedback
+from wearsim.evolution.steppers.single_step import WearIncrement
+from wearsim.mechanics.numerics.multistep import ROWS, next_steps
+from wearsim.types import FloatArray, IntArray
+
+LEAST_LOAD = 0.01  # of the load without feedback; the error of smaller loads is compared with it
+
+
+def next_steps_of_loads(
+    problem: WearProblem, end: WearState, part: FloatArray, aim: float, keep: float
+) -> tuple[FloatArray, IntArray, FloatArray]:
+    """Choose the next step by the error of the loads.
+
+    A stiff spring multiplies the error of the depth: its load, which decays as the roller descends,
+    is a small difference. The error is relative to each load, or to a small part of the load
+    without feedback where it has decayed; root mean square over the contacts.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    end : WearState
+        State after the step.
+    part, aim, keep
+        As of `next_steps`.
+
+    Returns
+    -------
+    ndarray, shape (2, realisations)
+        Excess of error and ratio of the next step, as of `next_steps`.
+    order : ndarray of int, shape (realisations,)
+        Its order.
+    displaced : ndarray, shape (realisations,)
+        Greatest displacement of a roller that the error of its load corresponds to [m].
+    """
+    feedback, spans, orders = end.past_feedback, end.past_spans, end.order
+    assert problem.constant_load is not None
+    assert feedback is not None
+    assert spans is not None
+    assert orders is not None
+    whole = with_feedback(problem, problem.constant_load, np.zeros(()), ())
+    scale = np.maximum(whole + feedback[0], LEAST_LOAD * whole)
+    relative = (feedback / scale).reshape(ROWS, -1, scale.shape[-1], 1)
+    order, own = np.empty_like(orders), np.empty(relative.shape[1:])
+    ones = np.ones_like(own)
+    found = next_steps(relative, spans, ones, orders, part, aim, keep, own, order)
+    errors = np.abs(own.reshape(scale.shape) * scale)
+    springs = np.broadcast_to(problem.stiffness, scale.shape)
+    displaced = np.divide(errors, springs, out=np.zeros_like(errors), where=springs > 0.0)
+    # after the first step the differences hang on the estimated slope of the loads at its start
+    known = spans[1] > spans[0]
+    return found, order, np.where(known, displaced.max(axis=(0, 1)), 0.0)
+
+
+def unloading(here: WearProblem, state: WearState, exposure: FloatArray) -> FloatArray:
+    """Return the change of the loads by springs over the exposure, shape (S, C, N).
+
+    By the work of the line load on the wear, the approach under a constant load increases by the
+    mean of the wear weighted with the line load; the elastic approach is that of unworn bodies.
+    """
+    cylinder, roller = WearIncrement(here, state.contacts, 1.0).depths
+    line_load = here.values_of(state.contacts, "line_load")
+    total = line_load.sum(axis=-1)
+    descent = (line_load * (cylinder + here.at_contacts(roller))).sum(axis=-1) / total
+    loads = total * here.grid.spacing
+    slope = HERTZ * np.maximum(elastic_approaches(here, state), 0.0) / loads
+    return np.asarray(-here.feedback(descent) / (1.0 + here.stiffness * slope) / exposure)
