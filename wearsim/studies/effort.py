@@ -10,16 +10,17 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from wearsim.errors import ContactError, SolverError
+from wearsim.errors import ContactError
 from wearsim.evolution.problem import WearProblem
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
-from wearsim.studies.failures import explained, length_key, too_deep
+from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
 from wearsim.studies.forecast import WearForecast
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.schedule import RecordSchedule
 
 DEEP = 1e-3  # m, a depth of which `check` warns
+FEWEST_LOADED = 5  # strips in contact, with which the error is about 2 %
 LONG = 600.0  # s, a time of which it warns
 _STEPS, _STEPS_POWER = 20.0, 0.42  # at the default tolerance, of 1 + depth over elastic rise
 _TOLERANCE_POWER = -0.33
@@ -30,7 +31,7 @@ _EXPLICIT = 0.7  # time of an explicit step
 _WHOLE = 0.95  # of the width of a roller
 _BISECTIONS = 5  # for the pass of a failure
 _OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn contacts
-_PASS = 0.5  # time of a pass in compiled code, over that of a solve
+_PASS = 0.06  # time of a pass in compiled code, over that of a solve
 _STABLE = 0.03  # wear of the longest stable step, over the line load through pi E*
 _START = 1.0  # of the process: imports and kernels read from the disk [s]
 _MEMORY = 210e6  # of a process with its kernels [bytes]
@@ -78,10 +79,8 @@ def forecast_data(
     """
     scenario = draws.scenario
     passes = float(scenario.total_passes)
-    try:
+    with failures_explained(scenario):
         forecast = WearForecast(draws, problem)
-    except SolverError as error:
-        raise explained(error, scenario) from error
     wear = forecast.at(passes)
     if forecast.failure is not None and forecast.failure.cause == "skid":
         raise explained(forecast.failure, scenario, forecast.passes_solved, forecast=True)
@@ -124,6 +123,12 @@ def _warnings(
 ) -> Iterator[str]:
     """Return warnings of deep or wide grooves, of contacts that fail, and of a long run."""
     roller, depth = scenario.roller, max(wear["depth"], wear["roller_depth"])
+    if scenario.contact.strips is not None and forecast.loaded_strips < FEWEST_LOADED:
+        yield (
+            f"contact.strips: {forecast.loaded_strips} of {scenario.contact.strips} strips are in"
+            f" contact before wear, which needs {FEWEST_LOADED}; raise contact.strips or leave it"
+            " out"
+        )
     if text := too_deep(scenario, depth):
         yield f"forecast: {text}; the run ends there"
     elif depth > DEEP:
@@ -170,7 +175,8 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     relative = wear["clearance"] / forecast.elastic
     steps = _STEPS * (1.0 + relative) ** _STEPS_POWER
     steps *= (scenario.evolution.tolerance / DEFAULT_TOLERANCE) ** _TOLERANCE_POWER
-    records = len(RecordSchedule.of(scenario, passes).all_records(passes, stepper == "per-pass"))
+    schedule = RecordSchedule.of(scenario, passes)
+    records = (passes / schedule.interval if schedule.interval else schedule.count) + 1.0
     if stepper == "stabilised":
         steps /= 3.0
     if stepper == "explicit":
@@ -178,21 +184,25 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     if scenario.evolution.step is not None:
         steps = passes / scenario.evolution.step
     if stepper == "per-pass":
-        steps = records
+        steps = passes
     steps = max(min(steps, passes), 1.0)
-    each = {"stabilised": _STAGES, "per-pass": passes / steps}.get(stepper, 1.0)
-    solves = _OF_REFERENCE if scenario.contact.spec.reference else 2.0
-    per_step = {
-        "stabilised": _STAGES * max(_STAGE * forecast.seconds_of_groove, forecast.seconds),
-        "explicit": _EXPLICIT * forecast.seconds_of_groove + forecast.seconds,
-        "per-pass": _PASS * each * forecast.seconds / problem.contacts_each,
-    }.get(stepper, _STEP * forecast.seconds_of_groove + solves * forecast.seconds)
-    if stepper == "per-pass" and not problem.model.capabilities.pass_loop:
-        per_step = each * forecast.seconds_of_groove
+    groove, solve = forecast.seconds_of_groove, forecast.seconds
+    each = _STAGES if stepper == "stabilised" else 1.0
+    if stepper == "stabilised":
+        per_step = each * max(_STAGE * groove, solve)
+    elif stepper == "explicit":
+        per_step = _EXPLICIT * groove + solve
+    elif stepper == "per-pass":
+        compiled = problem.model.capabilities.pass_loop
+        per_step = (_PASS * solve if compiled else groove) / problem.contacts_each
+    else:
+        per_step = _STEP * groove
+        per_step += (_OF_REFERENCE if scenario.contact.spec.reference else 2.0) * solve
     stations, contacts, _ = problem.shape
     numbers = stations * contacts * problem.grid.strips
     bodies = (stations + problem.rollers) * problem.grid.strips
-    rows = steps * (_ROW + 25.0 * stations * contacts * (stations > 1))
+    row = _ROW + 25.0 * stations * contacts * (stations > 1)
+    rows = row * (records if stepper == "per-pass" else steps)
     size = _FILE + 8.0 * (records * (3.0 * numbers + bodies) + _CHECKPOINT * numbers + rows)
     system = (contacts * problem.grid.strips) ** 2 if stepper == "implicit" else 0.0
     return Effort(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from wearsim.errors import SolverError
 from wearsim.mechanics.slender.influence import HIGHEST
@@ -36,6 +38,15 @@ def explained(
         when = f"forecast after about {passes:.2g} of {scenario.total_passes:.3g} passes: "
     message, remedy = remedies[error.cause](error, scenario)
     return type(error)(f"{when}{message}", error.state, remedy=remedy, cause=error.cause)
+
+
+@contextmanager
+def failures_explained(scenario: Scenario) -> Iterator[None]:
+    """Explain the failures of contacts of unworn bodies in the context."""
+    try:
+        yield
+    except SolverError as error:
+        raise explained(error, scenario) from error.__cause__
 
 
 def too_deep(scenario: Scenario, depth: float) -> str:
@@ -78,7 +89,7 @@ def _edge(error: SolverError, scenario: Scenario) -> tuple[str, str]:
             f"check the wear factors and {length_key(scenario)}",
         )
     return (
-        f"{error.message}, chosen for the groove that is predicted",
+        f"{error.message}, chosen automatically",
         "set contact.width to a greater value",
     )
 

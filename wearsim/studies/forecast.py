@@ -18,7 +18,7 @@ import math
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import TypeAlias
 
 import numpy as np
@@ -65,8 +65,11 @@ class WearForecast:
     ----------
     elastic : float
         Rise of the gap of the unworn bodies at the sides of their contact [m].
+    loaded_strips : int
+        Strips in contact before wear, the least number of all contacts.
     seconds, seconds_of_groove : float
-        Measured time of one solution of all contacts on the strips of the run, and of a groove [s].
+        Measured time of one solution of all contacts on the strips of the run, and of a groove, as
+        processor time, which other processes change little [s].
     failure : SolverError or None
         Failure of the contacts on a groove, with which the course ends.
 
@@ -91,14 +94,17 @@ class WearForecast:
             problem = replace(problem, model=prepared_model(self._scout, problem.grid))
         self.problem = problem
         fresh_state(problem)  # reads the kernels from the disk
-        start = perf_counter()
+        start = process_time()
         self._fresh = fresh_state(problem)
-        self.seconds = seconds if choice.spec.reference else perf_counter() - start
+        self.seconds = seconds if choice.spec.reference else process_time() - start
         self.seconds_of_groove = np.inf
         self.failure: SolverError | None = None
         loaded = problem.values_of(self._fresh.contacts, "line_load") > 0.0
         rise = problem.nominal_gap - problem.nominal_least_gap[..., None]
-        self.elastic = float(rise.max(initial=0.0, where=loaded))
+        self.loaded_strips = int(loaded.sum(axis=-1).min())
+        half_strip = 0.5 * problem.grid.spacing  # where strips are wider than the contact
+        least = half_strip**2 / (2.0 * self._scout.roller.crown_radius)
+        self.elastic = float(rise.max(initial=least, where=loaded))
         lowest = problem.nominal_gap.argmin(axis=-1)
         self._centres = problem.grid.y[[lowest.min(), lowest.max()]]
         self._depths: list[float] = []
@@ -218,12 +224,12 @@ class WearForecast:
 
     def _add(self, depth: float) -> None:
         """Solve the contacts on grooves of a depth."""
-        start = perf_counter()
+        start = process_time()
         problem, state = self._grooves(depth)
         self._rates.append(self._rates_on(problem, state, depth))
         self._depths.append(depth)
         if depth:
-            self.seconds_of_groove = min(self.seconds_of_groove, perf_counter() - start)
+            self.seconds_of_groove = min(self.seconds_of_groove, process_time() - start)
 
     def _grooves(self, depth: float, grid: Grid | None = None) -> tuple[WearProblem, WearState]:
         """Return problem and state with grooves of a depth in both bodies.

@@ -166,7 +166,7 @@ def study_contact(
     except ContactError as error:
         wider = wider_grid(scenario, grid, force)
         if wider is None:
-            raise explained(error, scenario) from error
+            raise explained(error, scenario) from error.__cause__
         model, gap, curvature, point = _contact(scenario, wider)
         solution, grid = model.solve_one(gap, curvature, point), wider
         span = f"{1e3 * grid.edges[0]:.4g} to {1e3 * grid.edges[1]:.4g} mm"

@@ -28,7 +28,7 @@ from wearsim.results import (
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, station_columns
 from wearsim.studies.contact.comparison import REFERENCE, excess
-from wearsim.studies.failures import explained, length_key, too_deep
+from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
@@ -112,10 +112,8 @@ class RunInProgress:
 
     def _fresh(self) -> WearState:
         """Return the state before the first pass."""
-        try:
+        with failures_explained(self.scenario):
             return fresh_state(self.problem)
-        except SolverError as error:
-            raise explained(error, self.scenario) from error
 
     def finish(self) -> Result:
         """Step to the end of the test and return the result."""
