@@ -34,6 +34,7 @@ _OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn c
 _PASS = 0.06  # time of a pass in compiled code, over that of a solve
 _STABLE = 0.03  # wear of the longest stable step, over the line load through pi E*
 _START = 1.0  # of the process: imports and kernels read from the disk [s]
+_SYSTEM = 4.0  # bytes of a coefficient between two strips, few of which are in contact
 _MEMORY = 210e6  # of a process with its kernels [bytes]
 _CHECKPOINT, _ROW, _FILE = 25, 40, 60e3  # arrays, numbers of a row, bytes besides
 
@@ -199,16 +200,16 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
         per_step = _STEP * groove
         per_step += (_OF_REFERENCE if scenario.contact.spec.reference else 2.0) * solve
     stations, contacts, _ = problem.shape
-    numbers = stations * contacts * problem.grid.strips
-    bodies = (stations + problem.rollers) * problem.grid.strips
+    strips, rollers = problem.grid.strips, problem.rollers
+    record = (3.0 * stations * rollers + stations + rollers) * strips
     row = _ROW + 25.0 * stations * contacts * (stations > 1)
     rows = row * (records if stepper == "per-pass" else steps)
-    size = _FILE + 8.0 * (records * (3.0 * numbers + bodies) + _CHECKPOINT * numbers + rows)
-    system = (contacts * problem.grid.strips) ** 2 if stepper == "implicit" else 0.0
+    size = _FILE + 8.0 * (records * record + _CHECKPOINT * stations * contacts * strips + rows)
+    system = (contacts * strips) ** 2 if stepper == "implicit" else 0.0
     return Effort(
         steps=math.ceil(steps),
         solves=math.ceil(steps * each) * problem.contacts_each,
         seconds=_START + steps * per_step,
-        memory=_MEMORY + 5.0 * size + 48.0 * system,
+        memory=_MEMORY + 5.0 * size + _SYSTEM * system,
         file_size=size,
     )
