@@ -94,3 +94,11 @@ def test_deep_and_wide_grooves_give_warnings(changes: dict[str, object], message
     scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", changes)
     warnings = dry_run(scenario)["warnings"]
     assert re.search(message, "\n".join(warnings))
+
+
+def test_strips_that_suffice_for_the_run_are_not_refused() -> None:
+    rig = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", LOOSE)
+    narrowest = {"contact.width": f"{1.06 * wearsim.run(rig).width[-1] * 1e3:.3f} mm"}
+    narrow = rig.changed(narrowest)
+    assert wearsim.run(narrow).finished
+    assert dry_run(narrow)["forecast"]["depth_m"] > 0.0

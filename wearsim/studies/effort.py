@@ -29,6 +29,7 @@ _STAGE = 0.35  # time of such a solve, over that of a groove
 _STEP = 1.3  # time of an implicit step
 _EXPLICIT = 0.7  # time of an explicit step
 _WHOLE = 0.95  # of the width of a roller
+_CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
 _BISECTIONS = 5  # for the pass of a failure
 _OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn contacts
 _PASS = 0.06  # time of a pass in compiled code, over that of a solve
@@ -83,10 +84,11 @@ def forecast_data(
     with failures_explained(scenario):
         forecast = WearForecast(draws, problem)
     wear = forecast.at(passes)
-    if forecast.failure is not None and forecast.failure.cause == "skid":
-        raise explained(forecast.failure, scenario, forecast.passes_solved, forecast=True)
+    failure = forecast.failure
+    if failure and failure.cause == "skid" and forecast.passes_solved < _CERTAIN * passes:
+        raise explained(failure, scenario, forecast.passes_solved, forecast=True)
     if scenario.contact.width is not None:
-        _check_strips(forecast, passes)
+        _check_strips(forecast, _CERTAIN * passes)
     effort = effort_of(scenario, forecast, stepper)
     data: dict[str, float | None] = {
         "depth_m": wear["depth"],
@@ -106,7 +108,7 @@ def forecast_data(
 
 
 def _check_strips(forecast: WearForecast, passes: float) -> None:
-    """Raise an error if the predicted groove does not fit on the strips that a scenario sets."""
+    """Raise an error if the groove predicted after some passes does not fit on the strips."""
     early, late, error = 0.0, passes, forecast.failure_on_strips(passes)
     if error is None or error.cause != "edge":
         return
@@ -148,17 +150,16 @@ def _warnings(
             f" roller.crown_radius = {roller.crown_radius * 1e3:.6g} mm, and half-spaces are not"
             " valid; set roller.width"
         )
+    solved = forecast.passes_solved
     # the load of a spring tends to zero, and a step without load is no failure of the run
-    if isinstance(forecast.failure, ContactError):
-        after = f"after about {forecast.passes_solved:.2g} passes"
-        yield f"forecast of the contacts: {after} {forecast.failure.message}"
+    if isinstance(forecast.failure, ContactError) and solved < scenario.total_passes:
+        what = forecast.failure.message
+        yield f"forecast of the contacts: after about {solved:.2g} passes {what}"
     if effort.seconds > LONG:
-        yield (
-            f"forecast of the time: about {effort.seconds / 60.0:.2g} min; a higher"
-            f" evolution.tolerance than {scenario.evolution.tolerance:g}"
-            + " takes less" * (scenario.contact.model == "slender")
-            + ", or another contact.model, takes less" * (scenario.contact.model != "slender")
-        )
+        less = f"a higher evolution.tolerance than {scenario.evolution.tolerance:g}"
+        if scenario.contact.model != "slender":
+            less += " or contact.model = 'slender'"
+        yield f"forecast of the time: about {effort.seconds / 60.0:.2g} min; {less} takes less"
 
 
 def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effort:
