@@ -199,9 +199,14 @@ class SolverError(WearsimError):
     Parameters
     ----------
     message : str
-        Failure, where it happened, and possible remedies.
+        Failure, and where it happened.
     state : dict
         State before the failure: numbers and arrays by name.
+    remedy : str
+        What to do about it; a study that knows the scenario may name another.
+    cause : str
+        "edge" (the contact reaches the edge of its strips), "too fine" (strips that are too narrow
+        for the length of the contact), "skid" (friction cannot transmit the torque) or empty.
 
     Examples
     --------
@@ -213,9 +218,16 @@ class SolverError(WearsimError):
     3 steps have reached pass ...; raise evolution.max_steps or evolution.tolerance
     """
 
-    def __init__(self, message: str, state: dict[str, Any] | None = None) -> None:
-        self.state = state or {}
-        super().__init__(message)
+    def __init__(
+        self,
+        message: str,
+        state: dict[str, Any] | None = None,
+        *,
+        remedy: str = "",
+        cause: str = "",
+    ) -> None:
+        self.state, self.remedy, self.cause = state or {}, remedy, cause
+        super().__init__(message, python=remedy, shell=remedy)
 
 
 class ContactError(SolverError):

@@ -91,13 +91,13 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     accepted = f"{100.0 * options.tolerance:g} %"
     for error, model in sorted(known, key=lambda item: preference(*item)):
         choice = _choice(scenario, model.model, model.options)
-        if error <= options.tolerance and _able(scenario, choice, states, test):
+        if error <= options.tolerance and not _hindrance(scenario, choice, states, test):
             estimate = f"estimated error of P_l(y) {100.0 * error:.2g} %, tolerance {accepted}"
             return _with(scenario, choice, model, f"{estimate}, {where}")
     able = [
         (error, model)
         for error, model in known
-        if _able(scenario, _choice(scenario, model.model, model.options), states, test)
+        if not _hindrance(scenario, _choice(scenario, model.model, model.options), states, test)
     ]
     if not reason and able:
         least, best = min(able, key=lambda item: item[0])
@@ -106,6 +106,10 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     if not finest:
         missing = REFERENCE not in registry().names(ContactModelSpec)
         remedies = [f"install '{REFERENCE}' ({INSTALL[REFERENCE]})"] if missing else []
+        if not missing:
+            why = _hindrance(scenario, _choice(scenario, REFERENCE, {}), states, test)
+            why = why.partition(";")[0]
+            reason += f"; the exact theory, '{REFERENCE}', is not possible: {why}"
         raise _refusal(scenario, reason, *remedies, *(["raise the tolerance"] if every else []))
     error, model = finest[0]
     own = "cannot be estimated" if error == np.inf else f"is estimated as {100.0 * error:.2g} %"
@@ -152,13 +156,15 @@ def _with(
     )
 
 
-def _able(scenario: Scenario, choice: ContactChoice, states: list[_State], test: bool) -> bool:
-    """Return whether a model is installed, supports a scenario and solves all its contacts.
+def _hindrance(scenario: Scenario, choice: ContactChoice, states: list[_State], test: bool) -> str:
+    """Return why a model does not support a scenario or solve all its contacts, or nothing.
 
     Tests take models that step implicitly: others need several times as many solutions.
     """
-    if choice.model == AUTO or (test and not choice.spec.capabilities.wear_compliance):
-        return False
+    if choice.model == AUTO:
+        return "it is not installed"
+    if test and not choice.spec.capabilities.wear_compliance:
+        return f"contact model '{choice.model}' takes no wear compliance"
     changed = replace(scenario, contact=choice)
     try:
         for state in states:
@@ -167,9 +173,9 @@ def _able(scenario: Scenario, choice: ContactChoice, states: list[_State], test:
                 chosen_stepper(changed, model, scenario.operation.rollers)
             if choice.model != REFERENCE:
                 model.solve(state.batch)
-    except WearsimError:
-        return False
-    return True
+    except WearsimError as error:
+        return error.message.removeprefix(f"{scenario.file}: ")
+    return ""
 
 
 def _coupling(scenario: Scenario) -> str:
@@ -186,8 +192,10 @@ def _not_calibrated(table: Calibration, states: list[_State]) -> str:
         if not state.indicators:
             return "no cheap model solves the contact"
         batch = state.batch
-        if batch.friction.ndim > 1 or batch.variation is not None:
-            return "creepage or friction that varies across the track is not calibrated"
+        if batch.variation is not None:
+            return "creepage.differential_slip = true is not calibrated"
+        if batch.friction.ndim > 1:
+            return "friction that varies across the track is not calibrated"
         for each in state.indicators:
             if outside := table.outside(each):
                 return f"outside the calibrated contacts: {outside}"

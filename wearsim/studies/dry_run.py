@@ -1,27 +1,26 @@
-"""Dry run: description of a run and of the inputs that it reads, in SI units and as a table."""
+"""Dry run: description of a run, of the inputs that it reads, and its forecast, in SI units."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from wearsim.csv_tables import column_names
+from wearsim.evolution.problem import WearProblem
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import Load
 from wearsim.scenario import Cylinder, RandomInput, Scenario, described_model
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.contact.single import study_contact
+from wearsim.studies.effort import forecast_data
 from wearsim.studies.plausibility import plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw, units_of
+from wearsim.studies.run.grid import start_of_run
 from wearsim.studies.run.groove import hardest_patch
 from wearsim.studies.run.inputs import load_file, load_range
-from wearsim.units import in_engineers_unit
 
-TableRows = list[tuple[str, str]]
 Data = dict[str, Any]
 
 
@@ -42,6 +41,8 @@ def dry_run(scenario: Scenario) -> Data:
     ------
     ScenarioError, CapabilityError
         If it cannot run.
+    SolverError
+        If its first contact, or that of the predicted groove, has no solution.
 
     Examples
     --------
@@ -107,11 +108,16 @@ def dry_run(scenario: Scenario) -> Data:
             "realisation": table.realisation,
             "correlation": table.correlation,
         }
+    warnings = plausibility_warnings(scenario)
     if is_run:
-        data["test"] = _test(scenario)
+        draws = draw(scenario)
+        problem, _, stepper = assemble_problem(draws, start_of_run(scenario, draws))
+        data["test"] = _test(scenario, problem, stepper)
+        data["forecast"], further = forecast_data(draws, problem, stepper)
+        warnings += further
     else:
         data["strips"] = study_contact(scenario).grid.strips
-    return data | {"notes": scenario.notes, "warnings": plausibility_warnings(scenario)}
+    return data | {"notes": scenario.notes, "warnings": warnings}
 
 
 def _cam(scenario: Scenario) -> Data | None:
@@ -212,8 +218,7 @@ def _random(item: RandomInput, units: dict[str, str]) -> Data:
     }
 
 
-def _test(scenario: Scenario) -> Data:
-    problem, _, stepper = assemble_problem(draw(scenario))
+def _test(scenario: Scenario, problem: WearProblem, stepper: str) -> Data:
     grid, law, counts = problem.grid, scenario.wear, problem.kinematics.multiplicity
     return {
         "rollers": int(counts.sum()),
@@ -228,173 +233,3 @@ def _test(scenario: Scenario) -> Data:
         "stepper": stepper,
         "tolerance": scenario.evolution.tolerance,
     }
-
-
-def plan(data: Data) -> TableRows:
-    """Return the description from `dry_run` as rows of name and value, in engineering units."""
-    roller, patch = data["roller"], data["initial_patch"]
-    radii = f"radius {roller['radius_m'] * 1e3:.6g} mm"
-    radii += f", crown radius {roller['crown_radius_m'] * 1e3:.6g} mm"
-    if roller["width_m"] is not None:
-        radii += f", width {roller['width_m'] * 1e3:.6g} mm"
-    for key, name in (("edge_radius_m", "edge radius"), ("chamfer_m", "chamfer")):
-        if roller[key]:
-            radii += f", {name} {roller[key] * 1e3:.6g} mm"
-    if any(roller["offset_m"] or ()):
-        radii += ", offset " + " / ".join(f"{y * 1e3:.4g}" for y in roller["offset_m"]) + " mm"
-    moduli = (
-        f"contact modulus {data['contact_modulus_Pa'] / 1e9:.4g} GPa,"
-        f" shear modulus {data['shear_modulus_Pa'] / 1e9:.4g} GPa"
-    )
-    size = (
-        f"{1e3 * patch['length_m']:.4g} x {1e3 * patch['width_m']:.4g} mm,"
-        f" peak pressure {patch['peak_pressure_Pa'] / 1e6:.4g} MPa at {patch['load_N']:.4g} N"
-    )
-    return [
-        ("roller", radii),
-        _body_row(data),
-        *profile_rows(data["profile"]),
-        ("elasticity", moduli),
-        ("rolling speed", _speed_text(data)),
-        ("load", _load_text(data["load"])),
-        *_log_rows(data["log"]),
-        *([("friction", f"{data['friction']:.4g}")] if "friction" in data else []),
-        *_creepage_rows(data["creepage"]),
-        *_random_rows(data),
-        ("contact model", f"{data['contact_model']}: {data['contact_model_summary']}"),
-        ("initial patch (Hertz)", size),
-        *_test_rows(data),
-    ]
-
-
-def _body_row(data: Data) -> tuple[str, str]:
-    """Return the row of the cylinder or the cam."""
-    cam = data["cam"]
-    if cam is None:
-        return "cylinder", f"radius {data['cylinder']['radius_m'] * 1e3:.6g} mm"
-    kind = f"{cam['follower']} follower" + (" in a groove" if cam["groove"] else "")
-    count, radius = len(cam["stations"]["angle_rad"]), cam["base_radius_m"]
-    return "cam", f"base radius {radius * 1e3:.6g} mm, {kind}, {count} stations"
-
-
-def _speed_text(data: Data) -> str:
-    if data["cam"] is None:
-        return f"{data['rolling_speed_m_per_s']:.4g} m/s"
-    speeds = data["cam"]["stations"]["rolling_speed_m_per_s"]
-    return _range((speeds.min(), speeds.max()), "m/s", 1.0)
-
-
-def station_table(data: Data) -> tuple[list[str], list[list[str]]] | None:
-    """Return heads and rows of the table of a cam's stations, in engineering units."""
-    stations = (data["cam"] or {}).get("stations")
-    if stations is None:
-        return None
-    heads = ["angle [deg]", "weight [deg]", "V [m/s]", "curvature [1/mm]", "N [N]"]
-    sizes = [np.degrees(1.0), np.degrees(1.0), 1.0, 1e-3, 1.0]
-    columns = [values * size for values, size in zip([*stations.values()][1:], sizes, strict=True)]
-    rows = [[f"{value:.4g}" for value in row] for row in zip(*columns, strict=True)]
-    named = [[*row, name] for row, name in zip(rows, stations["segment"], strict=True)]
-    return [*heads, "segment"], named
-
-
-def _range(bounds: Sequence[float], unit: str, size: float) -> str:
-    """Return the text of two values in a unit of `size` in SI."""
-    low, high = (value + 0.0 for value in bounds)  # no -0
-    return f"{low / size:.4g} to {high / size:.4g} {unit}"
-
-
-def profile_rows(profile: Data | None) -> TableRows:
-    """Return a row on a profile, from `profile_data`."""
-    if profile is None:
-        return []
-    text = (
-        f"{profile['file']}: {profile['points']} points, y {_range(profile['y_m'], 'mm', 1e-3)},"
-        f" height {_range(profile['height_m'], 'um', 1e-6)} (worn is negative"
-    )
-    text += "; read from the column depth)" if profile["column"] == "depth" else ")"
-    if profile["filter_m"] is not None:
-        text += f", filtered with {profile['filter_m'] * 1e3:.4g} mm"
-    return [("profile", text)]
-
-
-def _load_text(load: Data) -> str:
-    text = f"{load['kind']}"
-    if "least_N" in load:
-        low, high = load["least_N"], load["greatest_N"]
-        text += f", {low:.4g} N" if low == high else f", {low:.4g} to {high:.4g} N"
-    if load["stiffness_N_per_m"] > 0.0:
-        text += f", less {load['stiffness_N_per_m'] / 1e3:.4g} N/mm of descent"
-    if load["feedback"] is not None:
-        text += f", feedback {load['feedback']}"
-    return text + "".join(f", plus {term}" for term in load["terms"])
-
-
-def _log_rows(log: Data | None) -> TableRows:
-    if log is None:
-        return []
-    text = (
-        f"{log['file']}: {_range(log['span_s'], 'min', 60.0)}, {log['least_N']:.4g} to"
-        f" {log['greatest_N']:.4g} N, mean {log['mean_N']:.4g} N"
-    )
-    for name in ("gap", "pause"):
-        spans = log[f"{name}s_s"]
-        if len(spans):
-            total = float(np.diff(spans, axis=1).sum()) / 60.0
-            text += f", {len(spans)} {name}{'s' * (len(spans) > 1)} of {total:.4g} min"
-    return [("log", text if len(log["gaps_s"]) else f"{text}, no gaps")]
-
-
-def _creepage_rows(creepage: Data) -> TableRows:
-    words = []
-    if "longitudinal" in creepage:
-        words.append(f"longitudinal {creepage['longitudinal']:.4g}")
-    if creepage["drive"] == "free":
-        torque = creepage.get("bearing_torque_N_m")
-        text = "" if torque is None else f", bearing torque {torque * 1e3:.4g} N mm"
-        words.append(f"free{text}")
-    for name in ("yaw", "tilt"):
-        angles = creepage.get(f"{name}_rad", ())
-        if any(angles):
-            words.append(f"{name} " + " / ".join(f"{a * 1e3:.4g}" for a in angles) + " mrad")
-    words += ["differential slip"] if creepage["differential_slip"] else []
-    return [("creepage", ", ".join(words))] if words else []
-
-
-def _random_rows(data: Data) -> TableRows:
-    """Return a row per random input and, where there are any, one for the sampling."""
-    rows = []
-    for item in data["random"]:
-        ranges = [
-            (f"{value['key'].rsplit('.', 1)[1]} " if len(item["values"]) > 1 else "")
-            + " to ".join(in_engineers_unit(bound, value["unit"], 4) for bound in value["range_90"])
-            for value in item["values"]
-        ]
-        rows.append(
-            (f"random {item['name']}", f"{item['description']}; 90 % range {', '.join(ranges)}")
-        )
-    table = data["sampling"]
-    if table is None:
-        return []
-    pairs = [f"{first} with {second} {rank:g}" for first, second, rank in table["correlation"]]
-    words = [table["plan"], f"realisation {table['realisation']}"]
-    words += [f"rank correlation of {', '.join(pairs)}"] if pairs else []
-    return [*rows, ("sampling", ", ".join(words))]
-
-
-def _test_rows(data: Data) -> TableRows:
-    if "test" not in data:
-        return [("runs as", f"one contact, {data['strips']} strips (no duration or no wear law)")]
-    test = data["test"]
-    identical = ", all identical" if test["rollers_solved"] == 1 < test["rollers"] else ""
-    strips = (
-        f"{test['strips']} of {test['strip_width_m'] * 1e3:.4g} mm,"
-        f" {_range(test['y_m'], 'mm', 1e-3)}"
-    )
-    rollers = f"{test['rollers']} ({test['rollers_solved']} solved{identical})"
-    return [
-        ("rollers", rollers if test["rollers"] > 1 else "1"),
-        ("duration", f"{test['duration_s'] / 60.0:.6g} min, {test['passes']:,} roller passes"),
-        ("wear law", f"{test['wear_law']} ({test['wear_law_summary']})"),
-        ("strips", strips),
-        ("stepper", f"{test['stepper']}, tolerance {test['tolerance']:.1e}"),
-    ]

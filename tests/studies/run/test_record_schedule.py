@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from study_examples import short
 
-from wearsim.studies.run.schedule import RecordSchedule
+from wearsim.studies.run.schedule import MOST_RECORDS, RecordSchedule
+
+LONG = 1e12  # passes of a first run that is not prolonged
 
 
 def _all(schedule: RecordSchedule, stop: float) -> list[float]:
@@ -56,14 +58,14 @@ def test_next_record_is_within_one_interval(
             ratio = base ** (1.0 / count)
             assert due <= max(passes, 1.0) * ratio * (1.0 + 1e-8)
         else:
-            assert due <= passes + interval * (1.0 + 1e-8)
+            assert due <= passes + schedule.interval_at(passes) * (1.0 + 1e-8)
         passes = due
 
 
 @given(interval=st.floats(0.1, 1e5), skipped=st.integers(1, 10**6))
 @settings(deadline=None)
 def test_equal_intervals_do_not_drift(interval: float, skipped: int) -> None:
-    schedule = RecordSchedule(interval, 1.0, 1)
+    schedule = RecordSchedule(interval, LONG, 1)
     passes = skipped * interval
     for number in range(skipped + 1, skipped + 30):
         passes = schedule.next_record(passes)
@@ -73,7 +75,7 @@ def test_equal_intervals_do_not_drift(interval: float, skipped: int) -> None:
 @given(interval=st.floats(1.0, 1e5), places=st.lists(st.floats(0.0, 1e5), min_size=1))
 @settings(deadline=None)
 def test_next_record_does_not_depend_on_position(interval: float, places: list[float]) -> None:
-    schedule = RecordSchedule(interval, 1.0, 1)
+    schedule = RecordSchedule(interval, LONG, 1)
     for place in places:
         due = schedule.next_record(place)
         before = place + 0.5 * (due - place)
@@ -114,8 +116,31 @@ def test_test_of_one_pass_has_a_schedule() -> None:
 @pytest.mark.parametrize("speed", ["1000 rpm", "990 rpm", "333 rpm", "1234.5 rpm"])
 @pytest.mark.parametrize("every", ["1 s", "1 min", "7.5 s"])
 def test_whole_passes_are_recorded_without_round_off(speed: str, every: str) -> None:
-    schedule = RecordSchedule.of(short(operation__speed=speed, outputs__every=every), 1.0)
+    schedule = RecordSchedule.of(short(operation__speed=speed, outputs__every=every), LONG)
     passes = 0.0
     for _ in itertools.repeat(None, 2000):
         passes = schedule.next_record(passes)
         assert passes == round(passes) or abs(passes - round(passes)) > 1e-9
+
+
+@given(
+    interval=st.floats(0.5, 1e4),
+    base=st.floats(10.0, 1e6),
+    longer=st.floats(1.0, 1e5),
+    pass_by_pass=st.booleans(),
+)
+@settings(deadline=None, max_examples=50)
+def test_records_of_a_prolonged_test_are_bounded(
+    interval: float, base: float, longer: float, pass_by_pass: bool
+) -> None:
+    schedule = RecordSchedule(interval, base, 1)
+    end = longer * base
+    most = max(MOST_RECORDS, 2.0 * base / interval)
+    assert end / schedule.interval_at(end) <= most * (1.0 + 1e-9)
+    doublings = math.log2(schedule.interval_at(end) / interval)
+    assert doublings == round(doublings)
+    # records that are due before the end, and kept then, are due in any longer interval
+    due = schedule.due_after(0.0, pass_by_pass)
+    multiple = math.ceil(schedule.interval_at(end)) if pass_by_pass else schedule.interval_at(end)
+    assert schedule.is_kept(multiple, end)
+    assert schedule.is_kept(due, end) == (due == multiple)

@@ -97,7 +97,8 @@ def contact(
     from wearsim.results import refuse_inputs
     from wearsim.studies.contact.comparison import reference_spec
     from wearsim.studies.contact.single import study_contact
-    from wearsim.studies.dry_run import profile_data, profile_rows
+    from wearsim.studies.dry_run import profile_data
+    from wearsim.studies.dry_run_table import profile_rows
     from wearsim.studies.kernels import kernels_of
 
     if against is not None:

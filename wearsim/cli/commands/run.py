@@ -105,6 +105,13 @@ More = Annotated[
         show_default=False,
     ),
 ]
+AllowDeep = Annotated[
+    bool,
+    typer.Option(
+        "--allow-deep",
+        help="Continue a wear test beyond a depth of a tenth of the roller's radius.",
+    ),
+]
 Failed = Annotated[
     bool, typer.Option("--failed", help="Repeat the failed realisations of an ensemble.")
 ]
@@ -113,6 +120,7 @@ Failed = Annotated[
 def resume(
     file: ResultsFile,
     until: Until = None,
+    allow_deep: AllowDeep = False,
     failed: Failed = False,
     realisations: More = None,
     workers: Workers = None,
@@ -126,6 +134,8 @@ def resume(
     if kind_of(file) == "ensemble":
         if until is not None:
             raise typer.BadParameter("only wear tests can be extended", param_hint="--until")
+        if allow_deep:
+            raise typer.BadParameter("is an option for wear tests only", param_hint="--allow-deep")
         if failed and realisations is not None:
             raise typer.BadParameter("extend the ensemble first", param_hint="--failed")
         chosen = checked_scheduler(scheduler, workers)
@@ -168,7 +178,7 @@ def resume(
     ):
         if is_given:
             raise typer.BadParameter("is an option for ensembles only", param_hint=option)
-    _resume_run(file, until, json, quiet)
+    _resume_run(file, until, allow_deep, json, quiet)
 
 
 def check_limit(until: str | None) -> None:
@@ -186,7 +196,7 @@ def check_limit(until: str | None) -> None:
             Limit.parse(until)
 
 
-def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
+def _resume_run(file: Path, until: str | None, allow_deep: bool, json: bool, quiet: bool) -> None:
     check_limit(until)
     from wearsim.cli.commands.run import report
     from wearsim.cli.progress import RunWatcher, stop_on_signals
@@ -196,7 +206,9 @@ def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
 
     watcher = RunWatcher(quiet, kernels=lambda: kernels_of(open_results(file).scenario))
     with stop_on_signals() as stop, watcher as watch:
-        result = study.resume(file, until, on_event=watch, stop_requested=stop.is_set)
+        result = study.resume(
+            file, until, allow_deep=allow_deep, on_event=watch, stop_requested=stop.is_set
+        )
     report(result, json)
 
 

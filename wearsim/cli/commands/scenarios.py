@@ -27,7 +27,8 @@ def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False)
     """Check a scenario: print all mistakes, or the inputs and a summary of the run."""
     loaded = read_scenario(scenario, settings)
     from wearsim.cli.progress import Display
-    from wearsim.studies.dry_run import dry_run, plan, station_table
+    from wearsim.studies.dry_run import dry_run
+    from wearsim.studies.dry_run_table import plan, station_table
     from wearsim.studies.kernels import kernels_of
 
     def kernels() -> set[str]:

@@ -225,8 +225,10 @@ class HertzModel(SingleContactModel):
         return ContactError(
             f"the Hertz patch, {(centre - b) * 1e3:.4g} to {(centre + b) * 1e3:.4g} mm, extends"
             f" beyond its strips, which span {(y[0] - half) * 1e3:.4g} to"
-            f" {(y[-1] + half) * 1e3:.4g} mm; raise contact.width or move contact.centre",
+            f" {(y[-1] + half) * 1e3:.4g} mm",
             dict(state),
+            remedy="raise contact.width or move contact.centre",
+            cause="edge",
         )
 
 

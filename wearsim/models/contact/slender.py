@@ -15,7 +15,12 @@ from wearsim.mechanics.slender import newton as kernels
 from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, no_table
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS
-from wearsim.models.contact.strip_model import StripModel, check_edges, grid_about_hertz
+from wearsim.models.contact.strip_model import (
+    StripModel,
+    check_edges,
+    grid_about_hertz,
+    normal_failure,
+)
 from wearsim.models.contact.strip_tractions import (
     strip_tractions,
     with_balanced_creepage,
@@ -147,11 +152,9 @@ class NormalContacts(NamedTuple):
         )
 
 
-_REMEDY = {
+_FAILURE = {
     kernels.SINGULAR: "its equations are singular: check the gap, the load and the materials",
-    kernels.TOO_FINE: (
-        f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths: lower contact.strips"
-    ),
+    kernels.TOO_FINE: f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths",
     kernels.NO_CONVERGENCE: "Newton's method did not converge on the strips in contact",
     kernels.NOT_FINITE: "a value is not finite",
 }
@@ -290,7 +293,8 @@ class Slender(StripModel):
     ) -> None:
         state = {"gap": gap, "line_load": line_load, "approach": approach, "normal_force": loads}
         if status != kernels.CONVERGED:
-            raise ContactError(f"the slender contact failed: {_REMEDY[status]}", state)
+            too_fine = status == kernels.TOO_FINE
+            raise normal_failure("slender", _FAILURE[status], too_fine, state)
         check_edges(self._grid, line_load, state)
 
     def pass_loop(self, loop: PassLoop) -> int:

@@ -170,9 +170,30 @@ def check_edges(grid: Grid, line_load: FloatArray, state: Mapping[str, Any]) -> 
         y = grid.y
         raise ContactError(
             f"the contact reaches the edge of its strips, which span {y[0] * 1e3:.4g} to"
-            f" {y[-1] * 1e3:.4g} mm; raise contact.width or move contact.centre",
+            f" {y[-1] * 1e3:.4g} mm",
             dict(state),
+            remedy="raise contact.width or move contact.centre",
+            cause="edge",
         )
+
+
+def normal_failure(kind: str, what: str, too_fine: bool, state: Mapping[str, Any]) -> ContactError:
+    """Return the error of a normal problem without solution.
+
+    Parameters
+    ----------
+    kind : str
+        Name of the contact in the message.
+    what : str
+        What failed.
+    too_fine : bool
+        Whether a half-length exceeds the greatest number of strip widths.
+    state : mapping
+        State of the error.
+    """
+    message = f"the {kind} contact failed: {what}"
+    remedy, cause = ("lower contact.strips", "too fine") if too_fine else ("", "")
+    return ContactError(message, dict(state), remedy=remedy, cause=cause)
 
 
 Variant = Literal["kik-piotrowski", "ayasse-chollet", "analyn"]
@@ -183,8 +204,8 @@ _VARIANTS: dict[Variant, int] = {
     "analyn": kernels.ANALYN,
 }
 
-_REMEDY = {
-    TOO_FINE: f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths: lower contact.strips",
+_FAILURE = {
+    TOO_FINE: f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths",
     NO_CONVERGENCE: "the contact and the gap that its wear opens did not converge",
     NOT_FINITE: "a value is not finite, or the load is not positive",
 }
@@ -270,7 +291,7 @@ class SemiHertzian(StripModel, SingleContactModel):
             "normal_force": point.normal_force,
         }
         if status != CONVERGED:
-            raise ContactError(f"the semi-Hertzian contact failed: {_REMEDY[status]}", state)
+            raise normal_failure("semi-Hertzian", _FAILURE[status], status == TOO_FINE, state)
         check_edges(self._grid, line_load, state)
         return self._complete(
             line_load, half_length, longitudinal_curvature, approach, iterations, point

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
-from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.roots import bracketed_roots, secant_roots
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
+from wearsim.models.tangential.base import skidding
 from wearsim.types import FloatArray, Grid
 
 
@@ -150,11 +150,10 @@ def _bracketed_creepage(
     if len(lost):
         k = int(lost[0])
         carried = torque[k] + (high[k] if torque[k] > 0.0 else low[k])
-        raise ContactError(
-            f"the roller skids: the torque of {torque[k]:.4g} N m exceeds the"
-            f" {abs(carried):.4g} N m that friction can transmit at a load of"
-            f" {batch.normal_force[k]:.4g} N; lower creepage.bearing_torque or roller.inertia, or"
-            " raise the friction",
+        raise skidding(
+            float(torque[k]),
+            abs(float(carried)),
+            float(batch.normal_force[k]),
             {"line_load": line_load[k], "half_length": half_length[k]},
         )
     return bracketed_roots(excess, -reach, reach, first)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -176,13 +177,36 @@ def _balanced_creepage(
     low, high = excess(-reach), excess(reach)
     if low >= 0.0 or high <= 0.0:
         carried = torque + (high if torque > 0.0 else low)
-        raise ContactError(
-            f"the roller skids: its bearing torque of {torque:.4g} N m exceeds the"
-            f" {abs(carried):.4g} N m that friction can transmit at a load of"
-            f" {point.normal_force:.4g} N; lower creepage.bearing_torque or raise the friction",
+        raise skidding(
+            torque,
+            abs(carried),
+            point.normal_force,
             {"line_load": strips.line_load, "half_length": strips.half_length},
         )
     return float(brentq(excess, -reach, reach, xtol=1e-16, rtol=1e-14))
+
+
+def skidding(
+    torque: float, carried: float, normal_force: float, state: Mapping[str, Any]
+) -> ContactError:
+    """Return the error of a free roller whose torque friction cannot transmit.
+
+    Parameters
+    ----------
+    torque, carried : float
+        The torque and the greatest that friction transmits [N m].
+    normal_force : float
+        Load [N].
+    state : mapping
+        State of the error.
+    """
+    return ContactError(
+        f"the roller skids: its torque of {1e3 * torque:.4g} N mm exceeds the"
+        f" {1e3 * carried:.4g} N mm that friction can transmit at a load of {normal_force:.4g} N",
+        {"torque": torque, "carried": carried, "normal_force": normal_force, **state},
+        remedy="lower creepage.bearing_torque, or raise friction.coefficient or the load",
+        cause="skid",
+    )
 
 
 def spread_work(work: FloatArray) -> FloatArray:

@@ -131,6 +131,11 @@ class EvolutionTable(Options):
     allow_unstable: bool = Field(
         default=False, description="Allow a fixed explicit step size beyond the stability limit."
     )
+    allow_deep: bool = Field(
+        default=False,
+        description="Allow grooves deeper than a tenth of the roller's radius, beyond the validity"
+        " of the contact models; a run ends there otherwise.",
+    )
     nodes: int | None = Field(
         default=None,
         ge=4,

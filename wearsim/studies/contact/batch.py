@@ -22,6 +22,7 @@ from wearsim.evolution.contacts import unworn_contacts
 from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
 from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.studies.contact.single import study_contact
+from wearsim.studies.failures import explained
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.draws import Drawer, units_of
 from wearsim.studies.run.grid import contact_positions, realisation_grid, wider_grid
@@ -281,7 +282,8 @@ class Realisations:
             for (key, values), unit in zip(self.values.items(), self.units.values(), strict=True)
         )
         return ContactError(
-            f"realisation {number} of seed {self.scenario.seed} has no solution: {error}"
+            f"realisation {number} of seed {self.scenario.seed} has no solution:"
+            f" {explained(error, self.scenario)}"
             f"\nits inputs: {drawn or 'none except the friction field'}",
             error.state,
         )

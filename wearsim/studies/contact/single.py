@@ -22,6 +22,7 @@ from wearsim.studies.contact.comparison import (
     reference_spec,
     solve_reference,
 )
+from wearsim.studies.failures import explained
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid, wider_grid
@@ -162,10 +163,10 @@ def study_contact(
     model, gap, curvature, point = _contact(scenario, grid)
     try:
         solution = model.solve_one(gap, curvature, point)
-    except ContactError:
+    except ContactError as error:
         wider = wider_grid(scenario, grid, force)
         if wider is None:
-            raise
+            raise explained(error, scenario) from error.__cause__
         model, gap, curvature, point = _contact(scenario, wider)
         solution, grid = model.solve_one(gap, curvature, point), wider
         span = f"{1e3 * grid.edges[0]:.4g} to {1e3 * grid.edges[1]:.4g} mm"

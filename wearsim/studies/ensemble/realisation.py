@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import WearsimError, failure_text
+from wearsim.errors import SolverError, WearsimError, failure_text
 from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.strips import averaged, same_strips
@@ -20,6 +20,7 @@ from wearsim.results import Outcome
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, sources
+from wearsim.studies.failures import explained
 from wearsim.studies.kernels import kernels_of
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
@@ -288,6 +289,8 @@ class RealisationRunner:
     def outcome(self, run: RealisationRun, observations: RunObservations | Exception) -> Outcome:
         """Return the outcome of a realisation with its observations, or the error of its test."""
         drawn = dict(run.drawn)
+        if isinstance(observations, SolverError):
+            observations = explained(observations, run.draws.scenario)
         if isinstance(observations, Exception):
             return Outcome(number=run.number, values=drawn, error=failure_text(observations))
         rows, scalars = observations.rows, dict(observations.scalars)

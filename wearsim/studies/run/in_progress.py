@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wearsim.errors import Interrupted, ResultsFileError, failure_text
+from wearsim.errors import Interrupted, ResultsFileError, SolverError, StepError, failure_text
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
@@ -29,6 +29,7 @@ from wearsim.results import (
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, station_columns
 from wearsim.studies.contact.comparison import REFERENCE, excess
+from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, coarse_stepper, start_height
@@ -98,17 +99,22 @@ class RunInProgress:
             self.stepper,
             RecordSchedule.of(scenario, self.record_base),
             scenario.outputs.width_threshold,
-            fresh_state(self.problem) if state is None else state,
+            self._fresh() if state is None else state,
             None if data is None else data.history,
             None if data is None else data.records,
         )
         if data is None:
             for text in plausibility_warnings(scenario):
-                self._warn(text)
+                self.warn(text)
             self._write()
         else:
             for text in changed_origins(data, scenario):
-                self._warn(text)
+                self.warn(text)
+
+    def _fresh(self) -> WearState:
+        """Return the state before the first pass."""
+        with failures_explained(self.scenario):
+            return fresh_state(self.problem)
 
     def finish(self) -> Result:
         """Step to the end of the test and return the result."""
@@ -133,10 +139,15 @@ class RunInProgress:
         except Exception as error:
             # the file keeps the last accepted step, the history before the failure, and its cause
             self.recorder.drop_unfinished()
-            self.failure = failure_text(error)
+            failure: Exception = error
+            if isinstance(error, SolverError):
+                failure = explained(error, self.scenario, self._passes)
+            self.failure = failure_text(failure)
             self.failed_at = datetime.now(UTC).isoformat(timespec="seconds")
             self._write()
-            raise
+            if failure is error:
+                raise
+            raise failure from error
         self.on_event(Finished(self._wall()))
         return Result(self.data(finished=True), self.path)
 
@@ -150,7 +161,7 @@ class RunInProgress:
     def end_before_limit(self, reason: str) -> Result:
         """Return the result of a run that does not reach its limit, with a warning."""
         text = "" if self.limit is None else self.limit.text
-        self._warn(f"limit {text} is not reached: {reason}")
+        self.warn(f"limit {text} is not reached: {reason}")
         self._write(finished=True)
         return Result(self.data(finished=True), self.path)
 
@@ -218,13 +229,14 @@ class RunInProgress:
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
         for remedy, found in beyond.items():
             names, errors_text = map(" and ".join, zip(*found, strict=True))
-            self._warn(
+            self.warn(
                 f"estimated error of {names}: {errors_text}, above the tolerance of"
                 f" {100.0 * tolerance:.2g} %; {remedy}"
             )
 
     def _step_to_end(self) -> None:
         written = time.monotonic()
+        self._check_depth()
         for advance in evolve(
             self.problem,
             self.recorder.state,
@@ -242,7 +254,7 @@ class RunInProgress:
             state = advance.end
             self._verify_model(float(advance.path[0].passes[0]))
             if advance.warning is not None:
-                self._warn(advance.warning)
+                self.warn(advance.warning)
             self.on_event(
                 Stepped(
                     passes=self._passes,
@@ -254,6 +266,7 @@ class RunInProgress:
                     wall_seconds=self._wall(),
                 )
             )
+            self._check_depth()
             if self.stop_requested() and self._passes < self.stop:
                 self._interrupt()
             # with a slow disk, at most 2 % of the time is spent on writing
@@ -261,6 +274,15 @@ class RunInProgress:
             if time.monotonic() - written > every:
                 self._write()
                 written = time.monotonic()
+
+    def _check_depth(self) -> None:
+        """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
+        depth = max(float(worn.max()) for worn in self.recorder.state.depths)
+        if text := too_deep(self.scenario, depth):
+            less = f"the limit {self.limit.text}" if self.limit else length_key(self.scenario)
+            remedy = f"lower {less}, or set evolution.allow_deep = true"
+            resuming = "; with the option allow_deep, resume continues" if self.path else ""
+            raise StepError(f"after pass {self._passes:.0f} {text}", remedy=remedy + resuming)
 
     def _verify_model(self, start: float) -> None:
         """Compare an automatically chosen contact model with exact theory, where it is installed.
@@ -278,9 +300,9 @@ class RunInProgress:
         batch = present_batch(problem, state)
         tolerance, grid = choice.auto.tolerance, problem.grid
         if text := excess(REFERENCE, choice, grid, materials, batch, tolerance):
-            self._warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
+            self.warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
 
-    def _warn(self, message: str) -> None:
+    def warn(self, message: str) -> None:
         """Report and store a warning, the first of each kind only."""
         kind = message.split(":", maxsplit=1)[0]
         if not any(known.split(":")[0] == kind for known in self.warnings):

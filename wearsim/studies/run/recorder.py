@@ -242,6 +242,7 @@ class Recorder:
         self._history.append(_single(row))
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end, advance.problem.grid
+        self._thin(float(end.passes[0]))
 
     def end_at(self, advance: Advance, state: WearState, stop: float) -> None:
         """Record a state within a step as the end of the run, which resumes from the step's start.
@@ -267,6 +268,18 @@ class Recorder:
     def _record(self, advance: Advance, problem: WearProblem, state: WearState) -> None:
         row = _single(record_row(self.stepper, problem, state))
         self._records.append((advance.problem.grid, row))
+
+    def _thin(self, passes: float) -> None:
+        """Drop the records that a prolonged test does not keep after some passes."""
+        schedule = self.schedule
+        if schedule.interval_at(passes) > schedule.interval:
+            self._records = [
+                (grid, row)
+                for grid, row in self._records
+                if schedule.is_kept(float(row["record_passes"]), passes)
+            ]
+            # an interrupt before this leaves a number beyond the end, and no row is unfinished
+            self._kept = (self._kept[0], len(self._records), *self._kept[2:])
 
     def drop_unfinished(self) -> None:
         """Remove the rows of an interrupted `add`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from wearsim.results import (
     read_results,
 )
 from wearsim.scenario import Scenario, as_scenario
+from wearsim.scenario.parse.toml import apply_overrides
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.preparation import check_plugins
 from wearsim.studies.progress import shown_progress
@@ -32,8 +34,7 @@ from wearsim.studies.run.continuation import (
 )
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.in_progress import RunInProgress, Watcher
-
-EXTENSIONS = 10  # of a test that ends before its limit, each to twice its length
+from wearsim.studies.run.plausible_limits import EXTENSIONS, limit_warnings
 
 
 def run(
@@ -98,18 +99,21 @@ def run(
     if path is not None:
         check_output(path, force, scenario.paths)
     scenario, limit = with_end(scenario, limit)
+    warnings = limit_warnings(scenario, limit) if limit else []
     with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
-        return _run_to_limit(
-            RunInProgress(
-                scenario, draw(scenario), path, storage, watch, stop_requested, limit=limit
-            )
+        started = RunInProgress(
+            scenario, draw(scenario), path, storage, watch, stop_requested, limit=limit
         )
+        for text in warnings:
+            started.warn(text)
+        return _run_to_limit(started)
 
 
 def resume(
     file: str | Path,
     until: str | float | None = None,
     *,
+    allow_deep: bool = False,
     progress: bool = False,
     on_event: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
@@ -124,6 +128,9 @@ def resume(
     until : str or float, optional
         Limit at which the run stops, as in `run`. By default an interrupted run continues to its
         limit, and a run that has reached its limit to the end of the scenario.
+    allow_deep : bool
+        Set evolution.allow_deep = true, to continue a run that ended at a depth beyond the validity
+        of the contact models.
     progress, on_event, stop_requested, storage
         As in `run`.
 
@@ -155,11 +162,16 @@ def resume(
             " a single wear test"
         )
     data = read_results(path)
+    if allow_deep:
+        text = apply_overrides(data.scenario_text, str(path), {"evolution.allow_deep": True})
+        data = replace(data, scenario_text=text)
     check_plugins(path, data)
     limit = None if until is None else Limit.parse(until)
     if limit is None and data.until and not data.finished:
         limit = Limit.parse(data.until)
     reached = is_at_limit(path, data, limit)
+    if limit is not None and not reached and until is not None:
+        limit_warnings(stored_scenario(data), limit)
     state = WearState.from_arrays(data.checkpoint)
     scenario, limit = with_end(stored_scenario(data), limit)
     at_end = not data.until and scenario.total_passes == float(state.passes[0])

@@ -11,6 +11,7 @@ from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
 from wearsim.types import FloatArray
 
+MOST_RECORDS = 500  # of a prolonged test
 _ROUND_OFF = 1e-9
 
 
@@ -45,10 +46,30 @@ class RecordSchedule:
         even = outputs.spacing == "even" or base <= 1.0
         return cls(base / count if even else 0.0, base, count)
 
+    def interval_at(self, passes: float) -> float:
+        """Return the interval of the records that are kept after some passes, 0 if geometric.
+
+        Where a test has been prolonged to more than `MOST_RECORDS` intervals, and to more than
+        twice its first length, the interval is doubled as often as needed.
+        """
+        if passes <= 2.0 * self.base or passes <= MOST_RECORDS * self.interval or not self.interval:
+            return self.interval
+        longest = max(2.0 * self.base, MOST_RECORDS * self.interval)
+        return float(self.interval * 2.0 ** math.ceil(math.log2(passes / longest)))
+
+    def is_kept(self, record: float, passes: float) -> bool:
+        """Return whether a record is still kept after `passes`, as tests are prolonged."""
+        interval = self.interval_at(passes)
+        if interval == self.interval or record == passes:
+            return True
+        due = math.floor(record / interval + _ROUND_OFF) * interval
+        # records of passes that are solved one by one are at the next whole pass
+        return abs(record - due) <= _ROUND_OFF * record or record == math.ceil(due)
+
     def next_record(self, passes: float) -> float:
         """Return the passes of the first record after `passes`."""
-        if self.interval > 0.0:
-            due = (math.floor(passes / self.interval + _ROUND_OFF) + 1) * self.interval
+        if interval := self.interval_at(passes):
+            due = (math.floor(passes / interval + _ROUND_OFF) + 1) * interval
         else:
             number = self.count * math.log(max(passes, 1.0)) / math.log(self.base)
             due = float(self.base ** ((math.floor(number + _ROUND_OFF) + 1) / self.count))

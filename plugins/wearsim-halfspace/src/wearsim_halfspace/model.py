@@ -306,7 +306,7 @@ class Halfspace(ws.SingleContactModel):
         load[strips] = pressure.sum(axis=1) * dx
         half_length[strips] = half_lengths(pressure, x)
         if load[0] > 0.0 or load[-1] > 0.0:
-            raise ws.ContactError("the contact reaches the edge of its strips; raise contact.width")
+            raise ws.ContactError("the contact reaches the edge of its strips", cause="edge")
         inside = not pressure[[0, -1]].any() or len(pressure) == self.grid.strips
         inside &= not pressure[:, [0, -1]].any()
         across = int((pressure > 0.0).sum(axis=1).max())

@@ -1,0 +1,216 @@
+"""Forecast of what a run takes: steps, contact solves, time, memory and size of its file.
+
+The numbers of steps and solves, and the time of a step over that of a groove of the forecast, are
+fits to measured runs, which they meet within a factor of three.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from wearsim.errors import ContactError
+from wearsim.evolution.problem import WearProblem
+from wearsim.scenario import Scenario
+from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
+from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
+from wearsim.studies.forecast import WearForecast
+from wearsim.studies.run.draws import Draws
+from wearsim.studies.run.schedule import RecordSchedule
+
+DEEP = 1e-3  # m, a depth of which `check` warns
+FEWEST_LOADED = 5  # strips in contact, with which the error is about 2 %
+LONG = 600.0  # s, a time of which it warns
+_STEPS, _STEPS_POWER = 20.0, 0.42  # at the default tolerance, of 1 + depth over elastic rise
+_TOLERANCE_POWER = -0.33
+_STAGES = 12.0  # solves of a stabilised step
+_STAGE = 0.35  # time of such a solve, over that of a groove
+_STEP = 1.3  # time of an implicit step
+_EXPLICIT = 0.7  # time of an explicit step
+_WHOLE = 0.95  # of the width of a roller
+_CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
+_BISECTIONS = 5  # for the pass of a failure
+_OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn contacts
+_PASS = 0.06  # time of a pass in compiled code, over that of a solve
+_STABLE = 0.03  # wear of the longest stable step, over the line load through pi E*
+_START = 1.0  # of the process: imports and kernels read from the disk [s]
+_SYSTEM = 4.0  # bytes of a coefficient between two strips, few of which are in contact
+_MEMORY = 210e6  # of a process with its kernels [bytes]
+_CHECKPOINT, _ROW, _FILE = 25, 40, 60e3  # arrays, numbers of a row, bytes besides
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a run takes, within a factor of three.
+
+    Parameters
+    ----------
+    steps, solves : int
+        Steps, and solutions of all contacts together.
+    seconds : float
+        Wall time [s].
+    memory, file_size : float
+        Memory of the process and size of the results file [bytes].
+    """
+
+    steps: int
+    solves: int
+    seconds: float
+    memory: float
+    file_size: float
+
+
+def forecast_data(
+    draws: Draws, problem: WearProblem, stepper: str
+) -> tuple[dict[str, float | None], list[str]]:
+    """Return the forecast of a run in SI units, and warnings.
+
+    Parameters
+    ----------
+    draws : Draws
+        The scenario, with the values of its random inputs.
+    problem : WearProblem
+    stepper : str
+        Name of the stepper.
+
+    Raises
+    ------
+    SolverError
+        If the contacts of the unworn bodies have no solution, or those of the predicted groove.
+    """
+    scenario = draws.scenario
+    passes = float(scenario.total_passes)
+    with failures_explained(scenario):
+        forecast = WearForecast(draws, problem)
+    wear = forecast.at(passes)
+    failure = forecast.failure
+    if failure and failure.cause == "skid" and forecast.passes_solved < _CERTAIN * passes:
+        raise explained(failure, scenario, forecast.passes_solved, forecast=True)
+    if scenario.contact.width is not None:
+        _check_strips(forecast, _CERTAIN * passes)
+    effort = effort_of(scenario, forecast, stepper)
+    data: dict[str, float | None] = {
+        "depth_m": wear["depth"],
+        "roller_depth_m": wear["roller_depth"],
+        "width_m": wear["width"],
+        "peak_pressure_Pa": wear["peak_pressure"],
+        "worn_volume_m3": wear["volume"],
+        "dissipated_energy_J": wear["energy"],
+        "lift_error_m": wear.get("lift_error"),
+        "steps": effort.steps,
+        "contact_solves": effort.solves,
+        "wall_time_s": effort.seconds,
+        "memory_bytes": effort.memory,
+        "file_bytes": effort.file_size,
+    }
+    return data, list(_warnings(scenario, forecast, wear, effort))
+
+
+def _check_strips(forecast: WearForecast, passes: float) -> None:
+    """Raise an error if the groove predicted after some passes does not fit on the strips."""
+    early, late, error = 0.0, passes, forecast.failure_on_strips(passes)
+    if error is None or error.cause != "edge":
+        return
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (early + late)
+        if failure := forecast.failure_on_strips(middle):
+            late, error = middle, failure
+        else:
+            early = middle
+    raise explained(error, forecast.draws.scenario, late, forecast=True)
+
+
+def _warnings(
+    scenario: Scenario, forecast: WearForecast, wear: dict[str, float], effort: Effort
+) -> Iterator[str]:
+    """Return warnings of deep or wide grooves, of contacts that fail, and of a long run."""
+    roller, depth = scenario.roller, max(wear["depth"], wear["roller_depth"])
+    if scenario.contact.strips is not None and forecast.loaded_strips < FEWEST_LOADED:
+        yield (
+            f"contact.strips: {forecast.loaded_strips} of {scenario.contact.strips} strips are in"
+            f" contact before wear, which needs {FEWEST_LOADED}; raise contact.strips or leave it"
+            " out"
+        )
+    if text := too_deep(scenario, depth):
+        yield f"forecast: {text}; the run ends there"
+    elif depth > DEEP:
+        yield (
+            f"forecast: a depth of {depth * 1e3:.3g} mm at the end; are the wear factors and"
+            f" {length_key(scenario)} right?"
+        )
+    if roller.width is not None and wear["width"] > _WHOLE * roller.width:
+        yield (
+            f"forecast of the width: the groove grows as wide as the roller (roller.width ="
+            f" {roller.width * 1e3:.6g} mm)"
+        )
+    elif wear["width"] > roller.crown_radius:
+        yield (
+            f"forecast of the width: a groove {wear['width'] * 1e3:.4g} mm wide exceeds"
+            f" roller.crown_radius = {roller.crown_radius * 1e3:.6g} mm, and half-spaces are not"
+            " valid; set roller.width"
+        )
+    solved = forecast.passes_solved
+    # the load of a spring tends to zero, and a step without load is no failure of the run
+    if isinstance(forecast.failure, ContactError) and solved < scenario.total_passes:
+        what = forecast.failure.message
+        yield f"forecast of the contacts: after about {solved:.2g} passes {what}"
+    if effort.seconds > LONG:
+        less = f"a higher evolution.tolerance than {scenario.evolution.tolerance:g}"
+        if scenario.contact.model != "slender":
+            less += " or contact.model = 'slender'"
+        yield f"forecast of the time: about {effort.seconds / 60.0:.2g} min; {less} takes less"
+
+
+def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effort:
+    """Return what a run takes.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    forecast : WearForecast
+    stepper : str
+        Name of the stepper.
+    """
+    problem, passes = forecast.problem, float(scenario.total_passes)
+    wear = forecast.at(passes)
+    relative = wear["clearance"] / forecast.elastic
+    steps = _STEPS * (1.0 + relative) ** _STEPS_POWER
+    steps *= (scenario.evolution.tolerance / DEFAULT_TOLERANCE) ** _TOLERANCE_POWER
+    schedule = RecordSchedule.of(scenario, passes)
+    records = (passes / schedule.interval if schedule.interval else schedule.count) + 1.0
+    if stepper == "stabilised":
+        steps /= 3.0
+    if stepper == "explicit":
+        steps = forecast.stable_steps(passes, _STABLE)
+    if scenario.evolution.step is not None:
+        steps = passes / scenario.evolution.step
+    if stepper == "per-pass":
+        steps = passes
+    steps = max(min(steps, passes), 1.0)
+    groove, solve = forecast.seconds_of_groove, forecast.seconds
+    each = _STAGES if stepper == "stabilised" else 1.0
+    if stepper == "stabilised":
+        per_step = each * max(_STAGE * groove, solve)
+    elif stepper == "explicit":
+        per_step = _EXPLICIT * groove + solve
+    elif stepper == "per-pass":
+        compiled = problem.model.capabilities.pass_loop
+        per_step = (_PASS * solve if compiled else groove) / problem.contacts_each
+    else:
+        per_step = _STEP * groove
+        per_step += (_OF_REFERENCE if scenario.contact.spec.reference else 2.0) * solve
+    stations, contacts, _ = problem.shape
+    strips, rollers = problem.grid.strips, problem.rollers
+    record = (3.0 * stations * rollers + stations + rollers) * strips
+    row = _ROW + 25.0 * stations * contacts * (stations > 1)
+    rows = row * (records if stepper == "per-pass" else steps)
+    size = _FILE + 8.0 * (records * record + _CHECKPOINT * stations * contacts * strips + rows)
+    system = (contacts * strips) ** 2 if stepper == "implicit" else 0.0
+    return Effort(
+        steps=math.ceil(steps),
+        solves=math.ceil(steps * each) * problem.contacts_each,
+        seconds=_START + steps * per_step,
+        memory=_MEMORY + 5.0 * size + _SYSTEM * system,
+        file_size=size,
+    )

@@ -1,0 +1,132 @@
+"""Failures of contacts in terms of a scenario: the pass, what it sets, and what to change."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from wearsim.errors import SolverError
+from wearsim.mechanics.slender.influence import HIGHEST
+from wearsim.scenario import Scenario
+from wearsim.studies.plausibility import greatest_load
+from wearsim.studies.run.groove import widest_patch
+
+DEEPEST = 0.1  # worn depth over the radius of the roller, up to which the surfaces are shallow
+
+
+def explained(
+    error: SolverError, scenario: Scenario, passes: float = 0.0, forecast: bool = False
+) -> SolverError:
+    """Return the failure of a contact with the pass, and the remedy for what a scenario sets.
+
+    Parameters
+    ----------
+    error : SolverError
+        Those without a cause are returned as they are.
+    scenario : Scenario
+    passes : float
+        Passes done before the failure.
+    forecast : bool
+        Whether they are forecast.
+    """
+    remedies = {"edge": _edge, "too fine": _too_fine, "skid": _skid}
+    if error.cause not in remedies:
+        return error
+    when = f"after pass {passes:.0f}: " if passes else ""
+    if forecast:
+        when = f"forecast after about {passes:.2g} of {scenario.total_passes:.3g} passes: "
+    message, remedy = remedies[error.cause](error, scenario)
+    return type(error)(f"{when}{message}", error.state, remedy=remedy, cause=error.cause)
+
+
+@contextmanager
+def failures_explained(scenario: Scenario) -> Iterator[None]:
+    """Explain the failures of contacts of unworn bodies in the context."""
+    try:
+        yield
+    except SolverError as error:
+        raise explained(error, scenario) from error.__cause__
+
+
+def too_deep(scenario: Scenario, depth: float) -> str:
+    """Return that a worn depth [m] is beyond the validity of the models, or an empty text."""
+    radius = scenario.roller.radius
+    if depth <= DEEPEST * radius or scenario.evolution.allow_deep:
+        return ""
+    return (
+        f"the worn depth of {depth * 1e3:.4g} mm exceeds a tenth of roller.radius ="
+        f" {radius * 1e3:.6g} mm, up to which the contact models hold"
+    )
+
+
+def length_key(scenario: Scenario) -> str:
+    """Return the key that sets the length of the test, with its table."""
+    given = (key for key in ("duration", "passes", "turns") if getattr(scenario.operation, key))
+    return f"operation.{next(given, 'duration')}"
+
+
+def _edge(error: SolverError, scenario: Scenario) -> tuple[str, str]:
+    choice, roller = scenario.contact, scenario.roller
+    if choice.width is not None:
+        given = f"contact.width = {choice.width * 1e3:.6g} mm"
+        where = ""
+        if choice.centre is not None:
+            where = f", move contact.centre = {choice.centre * 1e3:.6g} mm"
+        remedy = f"raise {given}{where}, or leave it out, and the strips follow the groove"
+        return error.message, remedy
+    if choice.centre is not None:
+        return error.message, f"move contact.centre = {choice.centre * 1e3:.6g} mm or leave it out"
+    if scenario.cylinder.profile is not None:
+        file = scenario.cylinder.profile_file
+        return error.message, f"set contact.width, since {file or 'the profile'} is narrower"
+    if roller.width is not None:
+        return (
+            (
+                f"{error.message}, beyond the ends of the roller (roller.width ="
+                f" {roller.width * 1e3:.6g} mm): it is as deep as the roller"
+            ),
+            f"check the wear factors and {length_key(scenario)}",
+        )
+    return (
+        f"{error.message}, chosen automatically",
+        "set contact.width to a greater value",
+    )
+
+
+def _too_fine(error: SolverError, scenario: Scenario) -> tuple[str, str]:
+    choice = scenario.contact
+    patch = widest_patch(scenario, greatest_load(scenario, scenario.load.build()))
+    size = f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm"
+    if patch.a > patch.b:
+        what = (
+            f"{error.message}: the contact, {size} along and across rolling, is longer than wide,"
+            f" and '{choice.model}' assumes the opposite"
+        )
+        return what, "use contact.model = 'halfspace', or 'hertz-fastsim' for a single contact"
+    if choice.strips is None:
+        return error.message, "set a lower number contact.strips than the automatic one"
+    width = choice.width or 2.4 * patch.b
+    most = math.floor(math.exp(HIGHEST) * width / patch.a)
+    return error.message, f"lower contact.strips = {choice.strips} to at most {most}"
+
+
+def _skid(error: SolverError, scenario: Scenario) -> tuple[str, str]:
+    creepage, friction = scenario.creepage, scenario.friction.coefficient
+    load, carried = error.state["normal_force"], error.state["carried"]
+    reason, remedies = "", []
+    start = greatest_load(scenario, scenario.load.build())
+    if scenario.cam is None and load < 0.99 * start:
+        reason = f"; the load has fallen from {start:.4g} N"
+    if any(scenario.per_roller(creepage.yaw)):
+        reason += "; creepage.yaw takes a part of the friction"
+    if creepage.bearing_torque:
+        torque = 1e3 * creepage.bearing_torque
+        most = f" to below {1e3 * carried:.4g} N mm" if scenario.cam is None else ""
+        remedies.append(f"lower creepage.bearing_torque = {torque:.6g} N mm{most}")
+    if scenario.cam is not None:
+        remedies.append("lower roller.inertia")
+    if creepage.bearing_friction:
+        remedies.append(f"lower creepage.bearing_friction = {creepage.bearing_friction:.4g}")
+    remedies.append(f"raise friction.coefficient = {friction:.4g} or the load")
+    return f"{error.message}{reason}", ", or ".join(remedies)
