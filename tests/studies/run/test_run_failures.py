@@ -182,7 +182,7 @@ def test_run_of_too_many_steps_keeps_the_steps(path: Path) -> None:
 def test_failure_after_resume_keeps_the_steps(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     unbroken = studies.run(short())
     with pytest.raises(Interrupted):
-        studies.run(short(**changes), path, stop_requested=lambda: True)
+        studies.run(short(), path, stop_requested=lambda: True)
     steps = iter(range(100))
     proposed = implicit.ImplicitStepper.proposed
 
