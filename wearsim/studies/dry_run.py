@@ -179,21 +179,16 @@ def _log(scenario: Scenario, load: Load) -> Data | None:
 def _creepage(scenario: Scenario, random: set[str]) -> Data:
     """Return the creepages that are not random."""
     creepage = scenario.creepage
-    driven = "bearing_torque" if creepage.drive == "free" else "longitudinal"
-    values = {
-        "longitudinal": creepage.longitudinal,
-        "bearing_torque": creepage.bearing_torque or 0.0,
-        "yaw": scenario.per_roller(creepage.yaw),
-        "tilt": scenario.per_roller(creepage.tilt),
-    }
-    units = {"longitudinal": "", "bearing_torque": "_N_m", "yaw": "_rad", "tilt": "_rad"}
+    driven = ("longitudinal", "", creepage.longitudinal)
+    if creepage.drive == "free":
+        driven = ("bearing_torque", "_N_m", creepage.bearing_torque or 0.0)
+    both = ("yaw", creepage.yaw), ("tilt", creepage.tilt)
+    angles = [(name, "_rad", scenario.per_roller(angle)) for name, angle in both]
+    known = [item for item in (driven, *angles) if f"creepage.{item[0]}" not in random]
     return {
         "drive": creepage.drive,
-        **{
-            name + units[name]: values[name]
-            for name in (driven, "yaw", "tilt")
-            if f"creepage.{name}" not in random
-        },
+        **{name + unit: value for name, unit, value in known},
+        "bearing_friction": creepage.bearing_friction,
         "differential_slip": creepage.differential_slip,
     }
 
@@ -350,8 +345,11 @@ def _creepage_rows(creepage: Data) -> TableRows:
         words.append(f"longitudinal {creepage['longitudinal']:.4g}")
     if creepage["drive"] == "free":
         torque = creepage.get("bearing_torque_N_m")
-        text = "" if torque is None else f", bearing torque {torque * 1e3:.4g} N mm"
-        words.append(f"free{text}")
+        words, friction = ["free"], creepage["bearing_friction"]
+        if torque or (torque is not None and not friction):
+            words.append(f"bearing torque {torque * 1e3:.4g} N mm")
+        if friction:
+            words.append(f"bearing friction {friction:g}")
     for name in ("yaw", "tilt"):
         angles = creepage.get(f"{name}_rad", ())
         if any(angles):
@@ -391,9 +389,10 @@ def _test_rows(data: Data) -> TableRows:
         f" {_range(test['y_m'], 'mm', 1e-3)}"
     )
     rollers = f"{test['rollers']} ({test['rollers_solved']} solved{identical})"
+    duration = in_engineers_unit(test["duration_s"], "s")
     return [
         ("rollers", rollers if test["rollers"] > 1 else "1"),
-        ("duration", f"{test['duration_s'] / 60.0:.6g} min, {test['passes']:,} roller passes"),
+        ("duration", f"{duration}, {test['passes']:,} roller passes"),
         ("wear law", f"{test['wear_law']} ({test['wear_law_summary']})"),
         ("strips", strips),
         ("stepper", f"{test['stepper']}, tolerance {test['tolerance']:.1e}"),
