@@ -50,7 +50,7 @@ def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
 def rounded_lives(*lives: float) -> list[str]:
     """Return lives with the digits that the range between them supports: its first two.
 
-    Lives have five digits where they are equal or their range is unknown.
+    Lives have six digits at most.
     """
     known = [abs(life) for life in lives if math.isfinite(life)]
     least = max(known, default=0.0) * 1e-4

@@ -38,6 +38,7 @@ _INDICATING = ("slender", "hertz")  # models whose solution gives the indicators
 _LEAST_LOAD = 0.01  # of the greatest in a state: others are next to a pause
 _EARLY = 0.1  # of the passes, after which the second state is taken
 _TOLERANCE = 1e-2  # of that test
+_MOST_CONTACTS = 8  # of a test that may be solved by the exact theory
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,8 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     Raises
     ------
     CapabilityError
-        If no installed model suffices, or a friction field is given.
+        If no installed model suffices, or a friction field is given. The exact theory is not taken
+        for tests of more than eight contacts.
     """
     if scenario.contact.model != AUTO:
         return scenario
@@ -104,6 +106,8 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
         reason = f"the least estimated error is {100.0 * least:.2g} %, of '{best.label}'"
     finest = [item for item in able if item[1].model == REFERENCE][-1:]
     if not finest:
+        if test and (count := len(states[0].batch)) > _MOST_CONTACTS:
+            reason += f", and '{REFERENCE}' would take too long for {count} contacts in each step"
         missing = REFERENCE not in registry().names(ContactModelSpec)
         remedies = [f"install '{REFERENCE}' ({INSTALL[REFERENCE]})"] if missing else []
         raise _refusal(scenario, reason, *remedies, *(["raise the tolerance"] if every else []))
@@ -155,9 +159,12 @@ def _with(
 def _able(scenario: Scenario, choice: ContactChoice, states: list[_State], test: bool) -> bool:
     """Return whether a model is installed, supports a scenario and solves all its contacts.
 
-    Tests take models that step implicitly: others need several times as many solutions.
+    Tests take models that step implicitly: others need several times as many solutions. The exact
+    theory, whose steps take minutes with many contacts, is not taken for them.
     """
     if choice.model == AUTO or (test and not choice.spec.capabilities.wear_compliance):
+        return False
+    if test and choice.model == REFERENCE and len(states[0].batch) > _MOST_CONTACTS:
         return False
     changed = replace(scenario, contact=choice)
     try:

@@ -237,7 +237,11 @@ class LifeResult(LifeValues):
         wear.cylinder.k_over_h 1.68 0.59
         friction.coefficient 1.02 0.97
         """
-        from wearsim.uq.sensitivity.effects import effects, exact_effect  # noqa: PLC0415  (rarely needed)
+        from wearsim.uq.sensitivity.effects import (  # noqa: PLC0415  (rarely needed)
+            effects,
+            exact_effect,
+            normal_scores,
+        )
 
         drawn = self.drawn_numbers([item["name"] for item in self.raw.groups])
         factor, logs, found = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
@@ -247,7 +251,9 @@ class LifeResult(LifeValues):
             low, middle, high = np.log((self.law or self._drawn_law).quantile(_QUANTILES)).tolist()
             found[factor] = exact_effect(middle - low, middle - high)
             del drawn[factor]
-        found |= effects(logs, drawn)
+        laws = {one.name: one.scalar for one in self.scenario.random if one.role == "scalar"}
+        scores = {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
+        found |= effects(logs, scores)
         return dict(sorted(found.items(), key=lambda item: -item[1].size))
 
     def compare(self, other: LifeResult) -> LifeComparison:

@@ -9,10 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from wearsim.types import FloatArray
+from wearsim.uq.distributions.base import Distribution
 from wearsim.uq.estimation.intervals import Interval, t_interval
 
 #: Probability of the quantiles of an input at which its effect is stated, and its complement.
 TAIL = 0.1
+_SCORES = np.linspace(-5.0, 5.0, 2001)  # at which a quantile function is tabulated
 _PER_TERM = 2  # least number of realisations per term of a fit
 
 
@@ -51,7 +53,7 @@ class SignedEffect:
         return 0
 
 
-def effects(values: FloatArray, groups: Mapping[str, FloatArray]) -> dict[str, SignedEffect]:
+def effects(values: FloatArray, scores: Mapping[str, FloatArray]) -> dict[str, SignedEffect]:
     """Return the effects of inputs on a value, from a quadratic fit to their normal scores.
 
     All inputs are fitted together, so that the effects of the others do not add to the noise of
@@ -61,9 +63,9 @@ def effects(values: FloatArray, groups: Mapping[str, FloatArray]) -> dict[str, S
     ----------
     values : ndarray, shape (n,)
         Values of the realisations, finite.
-    groups : mapping of str to ndarray, shape (n, m)
-        Numbers drawn for each input, by its name. The effect of several numbers is that of all at
-        the same quantile.
+    scores : mapping of str to ndarray, shape (n, m)
+        Normal scores of the numbers drawn for each input, by its name; see `normal_scores`. The
+        effect of several numbers is that of all at the same quantile.
 
     Returns
     -------
@@ -72,7 +74,7 @@ def effects(values: FloatArray, groups: Mapping[str, FloatArray]) -> dict[str, S
         with standard errors that allow for unequal variances: HC3 of MacKinnon and White, J.
         Econometrics 29 (1985), DOI 10.1016/0304-4076(85)90158-7.
     """
-    designs = {name: _design(numbers) for name, numbers in groups.items()}
+    designs = {name: np.column_stack([one, one**2]) for name, one in scores.items()}
     columns = sum(design.shape[1] for design in designs.values())
     if len(values) >= _PER_TERM * (1 + columns):
         return _fitted(values, designs)
@@ -88,13 +90,24 @@ def exact_effect(low: float, high: float) -> SignedEffect:
     return SignedEffect(Interval(low, low, low), Interval(high, high, high))
 
 
-def _design(numbers: FloatArray) -> FloatArray:
-    """Return the normal scores of numbers and their squares, shape (n, 2 m)."""
-    from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
+def normal_scores(numbers: FloatArray, law: Distribution | None) -> FloatArray:
+    """Return the normal scores of drawn numbers, shape as `numbers`, (n, m).
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (n, m)
+    law : Distribution, optional
+        Their distribution. Without it, and where it has jumps, the scores are those of the ranks,
+        which know the quantiles of the input less well.
+    """
+    from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
     from scipy.stats import rankdata  # noqa: PLC0415  (slow to load)
 
-    scores = ndtri((rankdata(numbers, axis=0) - 0.5) / len(numbers))
-    return np.column_stack([scores, scores**2])
+    if law is not None:
+        values = np.asarray(law.quantile(ndtr(_SCORES)))
+        if (np.diff(values) > 0.0).all():
+            return np.asarray(np.interp(numbers, values, _SCORES))
+    return np.asarray(ndtri((rankdata(numbers, axis=0) - 0.5) / len(numbers)))
 
 
 def _fitted(values: FloatArray, designs: Mapping[str, FloatArray]) -> dict[str, SignedEffect]:
