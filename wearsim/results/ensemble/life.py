@@ -235,7 +235,7 @@ class LifeResult(LifeValues):
         ...     low, high = effect.factors
         ...     print(name, f"{low.value:.2f} {high.value:.2f}")
         wear.cylinder.k_over_h 1.68 0.59
-        friction.coefficient 1.02 0.97
+        friction.coefficient 1.17 0.87
         """
         from wearsim.uq.sensitivity.effects import (  # noqa: PLC0415  (rarely needed)
             effects,
