@@ -61,9 +61,9 @@ def test_json_has_the_life_of_a_design(command: Command, slim: Path) -> None:
         0,
     )
     assert found["b"].keys() == {"10", "50"}
-    for life in found["b"].values():
-        assert life["low"] < life["value"] < life["high"]
-        assert life["numerical_low"] < life["value"] < life["numerical_high"]
+    for one in found["b"].values():
+        assert one["low"] < one["value"] < one["high"]
+        assert one["numerical_low"] < one["value"] < one["numerical_high"]
     probability = found["probability_before_target"]
     assert 0.0 < probability["low"] < probability["value"] < probability["high"] < 1.0
     assert found["first_limits"] == {"depth": 1.0}
