@@ -279,6 +279,10 @@ def conversion(
     return size / measure(target)[0]
 
 
+#: Time from which texts state hours instead of minutes [s].
+LONG = 3.6e5
+
+
 def engineers_unit(unit: str) -> tuple[str, float]:
     """Return the engineering unit for the quantity of an SI unit, and its size in SI.
 
@@ -313,9 +317,14 @@ def in_engineers_unit(value: float, unit: str, digits: int = 6) -> str:
     Returns
     -------
     str
-        "12.5 mm" for 0.0125 and "m"; zero and infinity have no unit.
+        "12.5 mm" for 0.0125 and "m"; zero and infinity have no unit. Torques of 1 N m or
+        more are in N m, and times of 100 h or more in h.
     """
     if unit == "1" or value in {0.0, float("inf"), -float("inf")}:
         return f"{value:.{digits}g}"
     engineers, size = engineers_unit(unit)
+    if unit == "N m" and abs(value) >= 1.0:
+        engineers, size = unit, 1.0
+    if unit == "s" and abs(value) >= LONG:
+        engineers, size = "h", 3600.0
     return f"{value / size:.{digits}g} {engineers}"

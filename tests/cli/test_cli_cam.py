@@ -120,3 +120,16 @@ def test_check_gives_the_greatest_pressure_of_a_turn_at_its_own_load(command: Co
     assert patch["load_N"] == pytest.approx(stations["normal_force_N"][place])
     assert patch["load_N"] < max(stations["normal_force_N"])
     assert any(text.startswith("cam.material: the peak pressure") for text in found["warnings"])
+
+
+def test_check_states_the_friction_of_a_bearing(command: Command) -> None:
+    friction = ["--set", "creepage.bearing_friction=0.002"]
+    friction += [
+        "--set",
+        "creepage.bearing_diameter=12 mm",
+        "--set",
+        "creepage.bearing_torque=0 N mm",
+    ]
+    text = " ".join(command("check", CAM, *friction).stdout.split())
+    assert "creepage free, bearing friction 0.002, yaw 1 mrad" in text
+    assert "bearing torque" not in text

@@ -15,6 +15,7 @@ from cli_examples import Command
 from tests.studies.life.test_life import design
 from wearsim.results import open_results
 from wearsim.results.ensemble.life import LifeResult
+from wearsim.studies.life.api import life
 
 HERE = ("--scheduler", "serial", "-q")
 
@@ -35,6 +36,17 @@ def wide(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the lives of both designs."""
+    folder = tmp_path_factory.mktemp("pair")
+    for name, radius in (("wide", "600 mm"), ("slim", "500 mm")):
+        scenario = folder / f"{name}.toml"
+        scenario.write_text(design(roller__crown_radius=radius).text)
+        life(scenario, 8, folder / f"{name}-life.h5", scheduler="serial")
+    return folder
+
+
 def life_of(command: Command, *words: object) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(command("life", *words, "--json", *HERE).stdout)
     return found
@@ -49,9 +61,9 @@ def test_json_has_the_life_of_a_design(command: Command, slim: Path) -> None:
         0,
     )
     assert found["b"].keys() == {"10", "50"}
-    for life in found["b"].values():
-        assert life["low"] < life["value"] < life["high"]
-        assert life["numerical_low"] < life["value"] < life["numerical_high"]
+    for one in found["b"].values():
+        assert one["low"] < one["value"] < one["high"]
+        assert one["numerical_low"] < one["value"] < one["numerical_high"]
     probability = found["probability_before_target"]
     assert 0.0 < probability["low"] < probability["value"] < probability["high"] < 1.0
     assert found["first_limits"] == {"depth": 1.0}
@@ -75,11 +87,9 @@ def test_two_designs_are_compared(command: Command, slim: Path, wide: Path) -> N
 
 
 def test_stopped_comparison_states_how_to_go_on(
-    command: Command, slim: Path, wide: Path, monkeypatch: pytest.MonkeyPatch
+    command: Command, slim: Path, wide: Path, pair: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = life_of(command, wide, slim, "-n", 8)
-    for file in ("wide-life.h5", "slim-life.h5"):
-        Path(file).unlink()
+    whole = life_of(command, pair / "wide-life.h5", pair / "slim-life.h5")
     with monkeypatch.context() as patch:
         patch.setattr(Event, "is_set", lambda _: True)
         stopped = command("life", wide, slim, "-n", 8, *HERE)
@@ -175,11 +185,23 @@ def test_extended_study_is_resumed(command: Command, slim: Path) -> None:
     assert again.stderr.startswith("note: nothing to do: the study of lives is finished")
 
 
-def test_figure_is_written(command: Command, slim: Path, wide: Path) -> None:
-    command("life", wide, slim, "-n", 8, "--figure", "lives.png", *HERE)
+def test_figure_is_written(command: Command, pair: Path) -> None:
+    files = pair / "wide-life.h5", pair / "slim-life.h5"
+    command("life", *files, "--figure", "lives.png", *HERE)
     assert Path("lives.png").stat().st_size > 20_000
-    command("plot", "slim-life.h5", "-o", "one.svg")
+    command("plot", files[1], "-o", "one.svg")
     assert Path("one.svg").is_file()
+
+
+def test_effects_have_sign_and_interval(command: Command, pair: Path) -> None:
+    found = life_of(command, pair / "slim-life.h5")["effects_on_life"]
+    factor, *others = found
+    assert factor["input"] == "wear.cylinder.k_over_h"
+    assert factor["sign"] == -1
+    ends = factor["factor_at_90_percent"]
+    assert ends["low"] == ends["value"] == ends["high"] == pytest.approx(1.5**-1.2815516)
+    for other in others:
+        assert other["factor_at_90_percent"]["low"] < other["factor_at_90_percent"]["high"]
 
 
 @pytest.mark.parametrize(

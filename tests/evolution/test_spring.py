@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.evolution import built, cylinder_depth_of, stepped
-from wearsim.errors import CapabilityError
+from wearsim.errors import CapabilityError, ScenarioError
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.loads import descents
 from wearsim.evolution.steppers.single_step import carried_loads, recovery_at, solve_at_record
@@ -108,3 +108,10 @@ def test_model_without_an_approach_is_refused_with_a_remedy(monkeypatch):
     monkeypatch.setattr(problem.model, "solve", without_approach)
     with pytest.raises(CapabilityError, match=r"approach that is not finite.*contact\.model"):
         fresh_state(problem)
+
+
+def test_parabola_is_refused_with_a_spring_that_unloads_the_roller():
+    spring = {"load__kind": "spring", "load__stiffness": "200 kN/mm", "contact__model": "hertz"}
+    with pytest.raises(ScenarioError, match=r"200000 N/mm, expected contact.model = 'slender'"):
+        built(**spring)
+    assert built(**spring, operation__passes=2000)[2] == 2000.0

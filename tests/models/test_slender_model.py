@@ -275,3 +275,23 @@ def test_only_strip_theory_has_the_compiled_loop():
     assert Slender(StripTheory(), *arguments).capabilities.pass_loop
     marched = SPEC.factory(SlenderOptions(tangential="fastsim"), *arguments)
     assert not marched.capabilities.pass_loop
+
+
+def test_contacts_without_a_common_worn_body_are_solved_apart():
+    grid = Grid.spanning(-6e-3, 6e-3, 61)
+    model = SPEC.factory(SlenderOptions(), grid, MATERIALS)
+    offsets = [-1e-3, 0.5e-3, 2e-3]
+    gaps = np.array([scale * (grid.y - y) ** 2 for scale in (1.0, 1.3, 0.7) for y in offsets])
+    points = [OperatingPoint(200.0 + 20.0 * k, SPEED, Creepage(1e-3), 0.1) for k in range(9)]
+    batch = ContactBatch.of(gaps, RIG, points)
+    compliance = np.zeros((9, 2, 61))
+    compliance[:, 0] = 2e-11 * np.random.default_rng(1).random((9, 61))
+    rollers = np.tile(np.arange(3), 3)
+    bodies = np.stack([np.repeat(np.arange(3), 3), rollers], axis=1)
+    together = model.solve(batch, None, SharedWear(bodies, compliance))
+    for station in range(3):
+        own = np.arange(3 * station, 3 * station + 3)
+        alone = SharedWear(bodies[own], compliance[own])
+        found = model.solve(batch.at(own), None, alone)
+        for name in ("line_load", "half_length", "approach", "iterations", "power"):
+            assert (getattr(together.at(own), name) == getattr(found, name)).all()

@@ -179,7 +179,9 @@ def test_life_shows_its_quantiles_and_survival(life):
     page = unescape(page_of([life]))
     assert "How many passes does the design last, until the first of: depth 5.000 um?" in page
     found = life.b(10)
-    assert f"{found.value:,.0f} passes [{found.low:,.0f}..{found.high:,.0f}]" in page
+    low, value, high = (f"{round(life, -2):,.0f}" for life in (found.low, found.value, found.high))
+    assert f"{value} passes [{low}..{high}]" in page
+    assert "What moves the life, from the median of each input" in page
     assert "P(life < 20,000 passes)" in page
     plots = _part(life, []).plots
     (curve,) = data_of(titled(plots, "Survival").figure, "survival")

@@ -163,3 +163,12 @@ def test_concave_arc_tighter_than_the_roller_is_refused(tmp_path):
     (tmp_path / "points.csv").write_text(points("angle [deg], radius [mm]", rows))
     with pytest.raises(ScenarioError, match=r"a concave arc is tighter than the roller: .* at 17"):
         read(with_file("profile"), tmp_path)
+
+
+def test_mistake_of_a_cam_is_reported_alone():
+    bearing = 'bearing_friction = 0.002\nbearing_diameter = "12 mm"\nyaw'
+    text = changed(('base_radius = "25 mm"', 'base_radius = "-25 mm"'), ("yaw", bearing))
+    with pytest.raises(ScenarioError) as raised:
+        read(text)
+    assert len(raised.value.mistakes) == 1
+    assert "base_radius" in str(raised.value)

@@ -183,3 +183,13 @@ def test_stored_contacts_are_those_of_their_seed(number):
         solution = contact.solve("hertz", {})
     found = indicators_of(solution, contact.curvature, contact.point)
     np.testing.assert_allclose(found, data["indicators"][place], rtol=1e-6, atol=1e-9)
+
+
+def test_exact_theory_is_not_taken_for_many_contacts():
+    values = {
+        "contact": {"model": "auto", "tolerance": 1e-3},
+        "creepage": {"drive": "creepage", "longitudinal": 1e-3},
+        "operation.turns": 10,
+    }
+    with pytest.raises(CapabilityError, match=r"for \d+ contacts in each step; .*raise"):
+        with_chosen_model(shipped_scenario("cam-groove", values), test=True)

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
 from wearsim.cli.shared import console, note
-from wearsim.report.text import count, lapse, shown
+from wearsim.report.text import count, lapse, shown, simulated
 from wearsim.studies.kernels import compilation_counted
 from wearsim.studies.run.recorder import Event, Finished, Started, Stepped, Warned
 
@@ -180,7 +180,7 @@ class RunWatcher(Display):
         part = f" ({100.0 * step.passes / step.total_passes:.0f} %)"
         text = (
             f"pass {count(step.passes)}{part if self.live.disable else ''},"
-            f" {shown(step.time, 'min')}, depth {shown(step.depth, 'um')},"
+            f" {simulated(step.time)}, depth {shown(step.depth, 'um')},"
             f" step of {count(step.step_passes)} passes{left}"
         )
         is_last = step.passes >= step.total_passes
@@ -195,7 +195,7 @@ def _start(event: Started) -> str:
         passes = (
             f"continuing from pass {count(event.from_passes)} of {count(event.total_passes)} passes"
         )
-    return f"{passes}, {shown(event.total_time, 'min')}, with {event.model}, {event.stepper}"
+    return f"{passes}, {simulated(event.total_time)}, with {event.model}, {event.stepper}"
 
 
 class EnsembleWatcher(Display):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.evolution.problem import WearProblem
 from wearsim.types import FloatArray
 
+GRIP = 0.98  # greatest traction of a rolling roller, of friction: at the ends of a skid
 LEAST_LOAD = 1e-3  # next to a pause, of the greatest load
 
 
@@ -34,12 +37,29 @@ def contact_batch(
     return ContactBatch(
         gap=gap.reshape(-1, problem.grid.strips),
         normal_force=loads.ravel(),
-        **problem.input_columns,
+        **_input_columns(problem, loads, worn),
         variation=_creepage_variation(problem, cylinder_depth, worn),
         rolling_radius=_rolling_radius(problem, worn) if problem.free else None,
         shape=problem.shape,
         mean_radius=problem.free and problem.kinematics.cam is not None,
     )
+
+
+def _input_columns(
+    problem: WearProblem, loads: FloatArray, roller_depth: FloatArray
+) -> dict[str, Any]:
+    """Return the inputs of all contacts, shape (contacts,).
+
+    Next to the skids of a cam's roller, its torque is at most that which friction transmits under
+    the present load and at the present radius, until wear has moved the skids so far that they are
+    located again.
+    """
+    columns, cam = problem.input_columns, problem.kinematics.cam
+    if not problem.free or cam is None or not (cam.relocated or len(cam.skids)):
+        return columns
+    radius = problem.kinematics.roller_radius - roller_depth.max(axis=-1)
+    most = GRIP * columns["friction"] * np.abs(loads * radius).ravel()
+    return columns | {"bearing_torque": np.clip(columns["bearing_torque"], -most, most)}
 
 
 def at_least(problem: WearProblem, loads: FloatArray) -> FloatArray:

@@ -19,6 +19,7 @@ from wearsim.report.text import (
     in_unit,
     lapse,
     shown,
+    simulated,
     with_interval,
 )
 from wearsim.results import DissipationResult, EnsembleResult, Result
@@ -200,7 +201,7 @@ def effort(result: Result) -> Rows:
 def standing(result: Result) -> str:
     """Return the passes and the simulated time that a run has reached."""
     passes, total = float(result.passes[-1]), float(result.raw.total_passes)
-    time = shown(float(result.time[-1]), "min")
+    time = simulated(float(result.time[-1]))
     if result.until:
         return f"stopped at {result.until}: pass {count(passes)} of {count(total)}, {time}"
     if result.finished:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from wearsim.results.ensemble.schema import ALL_OBSERVABLES as STORED
+from wearsim.units import LONG
 
 if TYPE_CHECKING:
     from wearsim.results import EnsembleResult
     from wearsim.studies.ensemble.compare import Compared, Comparison
-    from wearsim.uq.distributions.base import MaxentDistribution
     from wearsim.uq.estimation.estimates import Target
     from wearsim.uq.estimation.intervals import Interval
     from wearsim.uq.estimation.mann_whitney import Paired
@@ -26,6 +26,7 @@ PER_SI = {
     "mm": 1e3,
     "mm^3": 1e9,
     "min": 1.0 / 60.0,
+    "h": 1.0 / 3600.0,
     "N mm": 1e3,
     "N/mm": 1e-3,
     "MPa": 1e-6,
@@ -107,6 +108,11 @@ def lapse(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+def simulated(seconds: float) -> str:
+    """Return a time of the test as text: "450.0 min", "740.7 h"."""
+    return shown(seconds, "min" if seconds < LONG else "h")
 
 
 def brief(seconds: float) -> str:
@@ -306,7 +312,7 @@ def kind(row: Compared) -> str:
 
 def length(row: Compared) -> str:
     """Return the length of the tests, "3,000 passes, 1.000 min"."""
-    return f"{count(row.passes)} passes, {shown(row.time, 'min')}"
+    return f"{count(row.passes)} passes, {simulated(row.time)}"
 
 
 def against(found: Comparison, row: Compared) -> list[tuple[str, str]]:
@@ -370,31 +376,3 @@ def _of_pairs(found: Paired, unit: str, more: str, less: str) -> str:
     if by.low == by.value == by.high == 0.0:
         return EQUAL
     return f"in {part_with_interval(found.share)}, by {with_interval(by, unit)} on average"
-
-
-_ROUNDING = 1e-12  # in standard deviations
-
-
-def without_rounding(distribution: MaxentDistribution, number: float) -> float:
-    """Return a value, or 0 if it is a rounding error near 0 inside the support."""
-    low, high = distribution.support
-    return 0.0 if low < 0.0 < high and abs(number) < _ROUNDING * distribution.std else number
-
-
-def multipliers(distribution: MaxentDistribution) -> tuple[float, float, float]:
-    """Return the multipliers l0, l1 and l2, with 0 for rounding errors of l1 and l2."""
-    l0, l1, l2 = distribution.multipliers
-    scale = distribution.std**2 if distribution.third == "x^2" else 1.0
-    return (
-        l0,
-        0.0 if abs(l1) * distribution.std < _ROUNDING else l1,
-        0.0 if abs(l2) * scale < _ROUNDING else l2,
-    )
-
-
-def parent(distribution: MaxentDistribution) -> tuple[float, float] | None:
-    """Return mean and standard deviation of the parent normal distribution, if there is one."""
-    return distribution.parent and (
-        without_rounding(distribution, distribution.parent[0]),
-        distribution.parent[1],
-    )

@@ -185,21 +185,16 @@ def _log(scenario: Scenario, load: Load) -> Data | None:
 def _creepage(scenario: Scenario, random: set[str]) -> Data:
     """Return the creepages that are not random."""
     creepage = scenario.creepage
-    driven = "bearing_torque" if creepage.drive == "free" else "longitudinal"
-    values = {
-        "longitudinal": creepage.longitudinal,
-        "bearing_torque": creepage.bearing_torque or 0.0,
-        "yaw": scenario.per_roller(creepage.yaw),
-        "tilt": scenario.per_roller(creepage.tilt),
-    }
-    units = {"longitudinal": "", "bearing_torque": "_N_m", "yaw": "_rad", "tilt": "_rad"}
+    driven = ("longitudinal", "", creepage.longitudinal)
+    if creepage.drive == "free":
+        driven = ("bearing_torque", "_N_m", creepage.bearing_torque or 0.0)
+    both = ("yaw", creepage.yaw), ("tilt", creepage.tilt)
+    angles = [(name, "_rad", scenario.per_roller(angle)) for name, angle in both]
+    known = [item for item in (driven, *angles) if f"creepage.{item[0]}" not in random]
     return {
         "drive": creepage.drive,
-        **{
-            name + units[name]: values[name]
-            for name in (driven, "yaw", "tilt")
-            if f"creepage.{name}" not in random
-        },
+        **{name + unit: value for name, unit, value in known},
+        "bearing_friction": creepage.bearing_friction,
         "differential_slip": creepage.differential_slip,
     }
 

@@ -132,8 +132,11 @@ def _creepage_rows(creepage: Data) -> TableRows:
         words.append(f"longitudinal {creepage['longitudinal']:.4g}")
     if creepage["drive"] == "free":
         torque = creepage.get("bearing_torque_N_m")
-        text = "" if torque is None else f", bearing torque {torque * 1e3:.4g} N mm"
-        words.append(f"free{text}")
+        words, friction = ["free"], creepage["bearing_friction"]
+        if torque or (torque is not None and not friction):
+            words.append(f"bearing torque {torque * 1e3:.4g} N mm")
+        if friction:
+            words.append(f"bearing friction {friction:g}")
     for name in ("yaw", "tilt"):
         angles = creepage.get(f"{name}_rad", ())
         if any(angles):
@@ -173,9 +176,10 @@ def _test_rows(data: Data) -> TableRows:
         f" {_range(test['y_m'], 'mm', 1e-3)}"
     )
     rollers = f"{test['rollers']} ({test['rollers_solved']} solved{identical})"
+    duration = in_engineers_unit(test["duration_s"], "s")
     return [
         ("rollers", rollers if test["rollers"] > 1 else "1"),
-        ("duration", f"{test['duration_s'] / 60.0:.6g} min, {test['passes']:,} roller passes"),
+        ("duration", f"{duration}, {test['passes']:,} roller passes"),
         ("wear law", f"{test['wear_law']} ({test['wear_law_summary']})"),
         ("strips", strips),
         ("stepper", f"{test['stepper']}, tolerance {test['tolerance']:.1e}"),

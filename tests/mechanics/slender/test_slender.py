@@ -217,6 +217,21 @@ def test_coupled_contacts_satisfy_the_equations(bodies):
     assert_solved(grid, gaps, [300.0, 250.0, 400.0], wear, q, approach)
 
 
+@pytest.mark.parametrize(("stations", "rollers"), [(4, 2), (2, 4)])
+def test_stations_and_rollers_that_all_wear_satisfy_the_equations(stations, rollers):
+    grid = Grid.spanning(-5e-3, 5e-3, 61)
+    random = np.random.default_rng(5)
+    count = stations * rollers
+    gaps = (grid.y - random.uniform(-1e-3, 1e-3, (count, 1))) ** 2
+    bodies = np.stack(np.divmod(np.arange(count), rollers), axis=1)
+    wear = SharedWear(bodies, 2e-11 * random.random((count, 2, 61)))
+    loads = random.uniform(200.0, 400.0, count)
+    status, q, approach, iterations = solve(grid, gaps, loads, wear)
+    assert status == CONVERGED
+    assert iterations < 20
+    assert_solved(grid, gaps, loads, wear, q, approach)
+
+
 def test_fifty_contacts_on_one_body_satisfy_the_equations():
     grid = Grid.spanning(-4e-3, 4e-3, 81)
     random = np.random.default_rng(4)

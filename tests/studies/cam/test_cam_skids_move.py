@@ -9,6 +9,8 @@ from cam_text import SCENARIOS
 import wearsim
 from wearsim.errors import Interrupted
 from wearsim.evolution import relocation
+from wearsim.evolution.contacts import contact_batch
+from wearsim.evolution.state import fresh_state
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
@@ -131,3 +133,22 @@ def test_depth_at_moved_stations_is_that_of_the_worn_cam():
     np.testing.assert_allclose(moved, expected, rtol=2e-3)
     same = relocation.moved_depth(smooth[:, None], cam, cam)[:, 0]
     assert (same == smooth).all()
+
+
+def test_roller_with_less_lever_rolls_on_next_to_its_skids():
+    values = {"load.feedback": "static", "contact.strips": 31, "cam.stations": 7}
+    groove = wearsim.load_scenario(SCENARIOS / "cam-groove.toml", values)
+    problem, _, _ = assemble_problem(draw(groove))
+    state = fresh_state(problem)
+    loads = np.broadcast_to(problem.force(np.zeros(1)), problem.shape)
+    worn = np.full_like(state.roller_depth, 0.05 * groove.roller.radius)
+    gap = problem.gap(state.cylinder_depth, worn)
+    batch = contact_batch(problem, gap, loads, state.cylinder_depth, worn)
+    solved = problem.model.solve(batch)
+    rolls = np.isfinite(batch.bearing_torque)
+    assert 0 < rolls.sum() < len(rolls)
+    radius = 0.95 * groove.roller.radius
+    most = groove.friction.coefficient * batch.normal_force * radius
+    assert (np.abs(batch.bearing_torque[rolls]) <= most[rolls]).all()
+    balanced = np.abs(solved.force_x[rolls]) * radius
+    assert balanced == pytest.approx(np.abs(batch.bearing_torque[rolls]), rel=0.02, abs=1e-6)

@@ -261,15 +261,6 @@ def test_study_of_lives_is_opened_as_such(exact: LifeResult) -> None:
         resume_ensemble(exact.path)
 
 
-def test_wear_factor_moves_the_life_most(tmp_path: Path) -> None:
-    result = lives(tmp_path / "many.h5", count=60)
-    assert result.sensitivity("life")[0].name == "wear.cylinder.k_over_h"
-    assert next(iter(result.tornado())) == "wear.cylinder.k_over_h"
-    low, high = result.tornado()["wear.cylinder.k_over_h"]
-    # 10 to 90 % of a lognormal factor of 1.5
-    assert math.log(high / low) == pytest.approx(2.0 * 1.2816 * math.log(1.5), rel=0.25)
-
-
 def test_designs_are_compared_with_common_draws(exact: LifeResult, tmp_path: Path) -> None:
     wider = lives(tmp_path / "wider.h5", design(roller__crown_radius="600 mm"))
     found = wider.compare(exact)

@@ -166,7 +166,8 @@ def _summary(study: CamStudy) -> list[tuple[str, str]]:
         ("winding number", f"{study.winding_number:.6g}, nearest ratio {p}/{q}{sweeps}"),
     ]
     if turn.free:
-        text = f"{len(study.skids)} arcs, {shown(skids, 'J', 3)} per turn" if skids else NOTHING
+        arcs = f"{len(study.skids)} arc{'s' * (len(study.skids) > 1)}"
+        text = f"{arcs}, {shown(skids, 'J', 3)} per turn" if skids else NOTHING
         rows.append(("skids of the roller", text))
     if study.weight is not None:
         rows.append(("stations", f"{len(study.weight)} of a run"))

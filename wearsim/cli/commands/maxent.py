@@ -93,7 +93,7 @@ def _limit(text: str) -> float:
 
 
 def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
-    from wearsim.report.text import multipliers, parent, without_rounding
+    from wearsim.report.maxent import multipliers, parent, without_rounding
 
     found = parent(distribution)
     return [
@@ -117,7 +117,7 @@ def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
 def _quantiles(distribution: MaxentDistribution) -> dict[float, float]:
     import numpy as np
 
-    from wearsim.report.text import without_rounding
+    from wearsim.report.maxent import without_rounding
 
     values = distribution.quantile(np.array(PROBABILITIES)).tolist()
     return {
@@ -144,7 +144,7 @@ def _plot(distribution: MaxentDistribution) -> list[str]:
 
 def _data(distribution: MaxentDistribution, figure: Path | None) -> dict[str, Any]:
     """Return the distribution in the units of the given moments."""
-    from wearsim.report.text import multipliers, parent, without_rounding
+    from wearsim.report.maxent import multipliers, parent, without_rounding
 
     found = parent(distribution)
     return {

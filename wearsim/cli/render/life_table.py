@@ -15,7 +15,7 @@ import typer
 
 from wearsim.cli.shared import write_list, write_table
 from wearsim.errors import Interrupted, ResultsFileError
-from wearsim.report.lives import life_cells, rare_text
+from wearsim.report.lives import effect_cells, life_cells, rare_text, rounded_lives
 from wearsim.report.summary import Rows, input_rows, limits_of
 from wearsim.report.text import NOTHING, count, lapse, part_with_interval, shown, too_few
 from wearsim.results.ensemble.life import LifeResult
@@ -113,16 +113,13 @@ def _ends(result: LifeResult) -> str:
     return text
 
 
-def _life(value: float) -> str:
-    return count(value) if math.isfinite(value) else NOTHING
-
-
 def _write_lives(result: LifeResult) -> None:
     heads = [f"life [{result.unit}]", "estimate", "95 % interval", "numerical error"]
     lines = []
     for share in result.settings.shares:
-        low, high = result.b_error(share)
-        error = f"{_life(low)}..{_life(high)}" if math.isfinite(low + high) else NOTHING
+        ends = result.b_error(share)
+        low, high = rounded_lives(*ends)
+        error = f"{low}..{high}" if all(map(math.isfinite, ends)) else NOTHING
         lines.append([f"B{share:g}", *life_cells(result, share), error])
     write_list(heads, lines)
     if not result.observed.any() and not result.is_exact and result.count:
@@ -171,7 +168,7 @@ def _write_fits(result: LifeResult) -> None:
 
 
 def _fitted(found: Interval) -> str:
-    return f"{_life(found.value)} ({_life(found.low)}..{_life(found.high)})"
+    return "{1} ({0}..{2})".format(*rounded_lives(found.low, found.value, found.high))
 
 
 def _write_limits(result: LifeResult) -> None:
@@ -201,16 +198,18 @@ def _write_effects(result: LifeResult) -> None:
     if not any(math.isfinite(item.first.value) for item in effects):
         write_list([f"{head}: {too_few(result)}"], [])
         return
+    changes = result.tornado()
     lines = [
         [
             item.name,
             f"not significant, at most {shown(item.first.high, '%', 2)}"
             if item.without_effect
             else part_with_interval(item.first),
+            *(effect_cells(changes[item.name]) if item.name in changes else (NOTHING, NOTHING)),
         ]
         for item in effects
     ]
-    write_list([head, "first order"], lines)
+    write_list([head, "first order", "life, input at 10 %", "input at 90 %"], lines)
 
 
 def write_lives_of(labels: Sequence[str], results: Sequence[LifeResult]) -> None:
@@ -319,6 +318,15 @@ def life_json(result: LifeResult) -> dict[str, Any]:
             {"input": item.name, "first_order": asdict(item.first)}
             for item in (result.sensitivity("life") if result.count > 1 else [])
         ],
+        "effects_on_life": [
+            {
+                "input": name,
+                "sign": effect.sign,
+                "factor_at_10_percent": asdict(effect.factors[0]),
+                "factor_at_90_percent": asdict(effect.factors[1]),
+            }
+            for name, effect in ({} if result.are_equal else result.tornado()).items()
+        ],
         "exact_wear_factor": settings.factor or None,
         "counted_because": settings.reason or None,
         "interval_method": result.method,
@@ -373,8 +381,13 @@ def remarks(result: LifeResult) -> list[str]:
     elif result.at_once:
         remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
     if result.count and not result.observed.any():
-        greatest = []
-        for name, limit in result.scenario.limit.given.items():
+        greatest, known = [], result.known_lives[np.isfinite(result.known_lives)]
+        # tests with an exact wear factor are run up to its greatest value, and further than `most`
+        if result.is_exact and len(known):
+            greatest.append(f"the shortest drawn life is {rounded_lives(known.min())[0]}")
+        elif result.is_exact:
+            greatest.append("with the greatest wear factor")
+        for name, limit in () if len(known) else result.scenario.limit.given.items():
             stored = {"volume": "worn_volume"}.get(name, name)
             if stored in result.observables:
                 part = float(result.at_end(stored).max()) / limit

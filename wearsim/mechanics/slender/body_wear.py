@@ -3,6 +3,10 @@
 The unknown worn depths of the shared bodies form one system of equations. With the responses of the
 separate contacts to their gaps it turns their separate steps into the coupled step. A strip of a
 body that only one contact touches is no unknown: its wear is a compliance of that contact.
+
+As a contact touches one body of each kind, bodies of one kind, such as the stations of a cam, are
+coupled only through those of the other, its rollers. The depths of the more numerous kind are
+eliminated body by body; those of the other kind remain, the outer bodies.
 """
 
 from __future__ import annotations
@@ -22,31 +26,68 @@ SIDES = 2  # a contact touches a cylinder and a roller
 class DepthSystem(NamedTuple):
     """Factored linear system of the bodies' worn depths.
 
-    `number` is the unknown of each body's strip, -1 for none, (bodies, strips). `matrix` is stored
-    by columns, and `depth` is its solution [m]. `response` is S of each contact by columns:
-    decrease of the line load, by row, per increase of the gap, by row, at constant load (contacts,
-    strips, strips) [N/m^2], and `approach_slope` the increase of the approach per increase of the
-    gap (contacts, strips).
+    Its unknowns are stored by body where they are eliminated, and together for the outer bodies.
+    Matrices are stored by columns.
+
+    `number` is the unknown of each body's strip, counted within an eliminated body and over all
+    outer bodies, -1 for none, (bodies, strips). `size` is the number of unknowns of each body, 0 of
+    an outer one, and `total` that of all outer bodies, (1,). `touched` are the eliminated and the
+    outer body of each contact, -1 for none, (contacts, 2), and `side` their columns in `bodies`.
+
+    `block` holds the coefficients of the depths of an eliminated body in its own equations,
+    (bodies, strips, strips), `across` its depths per depth of the outer bodies, negative, (bodies,
+    unknowns, strips), and `outer` the system of the outer bodies after elimination. `depth`
+    and `outer_depth` are the solution [m], and `sums` is work space.
+
+    `response` is S of each contact by columns: decrease of the line load, by row, per increase of
+    the gap, by row, at constant load (contacts, strips, strips) [N/m^2], and `approach_slope` the
+    increase of the approach per increase of the gap (contacts, strips).
     """
 
     number: IntArray
-    matrix: FloatArray
+    size: IntArray
+    touched: IntArray
+    side: IntArray
+    block: FloatArray
+    across: FloatArray
+    outer: FloatArray
     depth: FloatArray
+    outer_depth: FloatArray
+    sums: FloatArray
+    total: IntArray
     response: FloatArray
     approach_slope: FloatArray
 
 
 @subroutine
 def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
-    """Return an empty `DepthSystem` for the shared `bodies`, (contacts, 2), with `n` strips."""
-    count = bodies.max() + 1
-    size = count * n
+    """Return an empty `DepthSystem` for the shared `bodies`, (contacts, 2), with `n` strips.
+
+    The bodies of the first column have the lower numbers.
+    """
+    contacts, count = bodies.shape[0], bodies.max() + 1
+    first = bodies[:, 0].max() + 1  # number of bodies in the first column
+    inner = 0 if 2 * first >= count else 1
+    size = min(first, count - first) * n
+    touched, side = np.empty((contacts, SIDES), np.int64), np.empty(SIDES, np.int64)
+    side[0], side[1] = inner, 1 - inner
+    for k in range(contacts):
+        for kind in range(SIDES):
+            touched[k, kind] = bodies[k, side[kind]]
     return DepthSystem(
         np.empty((count, n), np.int64),
+        np.empty(count, np.int64),
+        touched,
+        side,
+        np.empty((count, n, n)),
+        np.empty((count, size, n)),
         np.empty((size, size)),
+        np.empty((count, n)),
         np.empty(size),
-        np.empty((len(bodies), n, n)),
-        np.empty((len(bodies), n)),
+        np.empty(n),
+        np.zeros(1, np.int64),
+        np.empty((contacts, n, n)),
+        np.empty((contacts, n)),
     )
 
 
@@ -128,12 +169,19 @@ def number_depths(
             b = bodies[k, side]
             for row in range(state.size[k] if b >= 0 else 0):
                 number[b, place[k, row]] += 1
-    count = 0
+    outer = 0
     for b in range(number.shape[0]):
+        eliminated = False
+        for k in range(contacts):
+            eliminated = eliminated or system.touched[k, 0] == b
+        count = 0 if eliminated else outer
         for i in range(n):
             several = number[b, i] > 1
             number[b, i] = count if several else -1
             count += int(several)
+        system.size[b] = count if eliminated else 0
+        outer = outer if eliminated else count
+    system.total[0] = outer
     for k in range(contacts):
         for row in range(state.size[k]):
             i = place[k, row]
@@ -148,14 +196,12 @@ def number_depths(
 
 
 @subroutine
-def factor_depths(
-    bodies: IntArray, shared: FloatArray, state: NewtonState, system: DepthSystem
-) -> bool:
+def factor_depths(shared: FloatArray, state: NewtonState, system: DepthSystem) -> bool:
     """Assemble and factor the system of the bodies' depths.
 
     Parameters
     ----------
-    bodies, shared
+    shared
         As in `add_depths`.
     state : NewtonState
         With the rows of the contacts.
@@ -167,30 +213,91 @@ def factor_depths(
     bool
         False if the system is singular.
     """
-    matrix, number, response, place = system.matrix, system.number, system.response, state.place
-    count = number.max() + 1
-    for i in range(count):
-        for j in range(count):
-            matrix[i, j] = 0.0
-        matrix[i, i] = 1.0
-    for k in range(bodies.shape[0]):
-        size = state.size[k]
-        for side in range(SIDES):
-            for other in range(SIDES):
-                worn, opened = bodies[k, side], bodies[k, other]
-                for column in range(size if worn >= 0 and opened >= 0 else 0):
-                    unknown = number[opened, place[k, column]]
-                    for row in range(size if unknown >= 0 else 0):
-                        i = place[k, row]
-                        if number[worn, i] >= 0:
-                            wear = shared[k, side, i] * response[k, column, row]
-                            matrix[unknown, number[worn, i]] += wear
-    return factor_in_place(matrix, count)
+    number, size, across, outer = system.number, system.size, system.across, system.outer
+    inner_side, outer_side = system.side[0], system.side[1]
+    response, place, block = system.response, state.place, system.block
+    count = system.total[0]
+    for u in range(count):
+        for v in range(count):
+            outer[u, v] = 0.0
+        outer[u, u] = 1.0
+    for b in range(len(size)):
+        for u in range(size[b]):
+            for v in range(size[b]):
+                block[b, u, v] = 0.0
+            block[b, u, u] = 1.0
+        for u in range(count if size[b] > 0 else 0):
+            for v in range(size[b]):
+                across[b, u, v] = 0.0
+    for k in range(len(response)):
+        b, c = system.touched[k, 0], system.touched[k, 1]
+        for column in range(state.size[k]):
+            j = place[k, column]
+            opened = number[b, j] if b >= 0 else -1
+            opened_outer = number[c, j] if c >= 0 else -1
+            for row in range(state.size[k]):
+                i = place[k, row]
+                if b >= 0 and number[b, i] >= 0:
+                    wear = shared[k, inner_side, i] * response[k, column, row]
+                    if opened >= 0:
+                        block[b, opened, number[b, i]] += wear
+                    if opened_outer >= 0:
+                        across[b, opened_outer, number[b, i]] += wear
+                if opened_outer >= 0 and number[c, i] >= 0:
+                    wear = shared[k, outer_side, i] * response[k, column, row]
+                    outer[opened_outer, number[c, i]] += wear
+    for b in range(len(size)):
+        if size[b] > 0 and not factor_in_place(block[b], size[b]):
+            return False
+        for u in range(count if size[b] > 0 else 0):
+            solve_factored(block[b], size[b], across[b, u])
+    for k in range(len(response)):
+        b = system.touched[k, 0]
+        for u in range(count if b >= 0 else 0):
+            subtract_outer_wear(k, shared, state, system, across[b, u], outer[u])
+    return factor_in_place(outer, count)
+
+
+@subroutine
+def subtract_outer_wear(
+    k: int,
+    shared: FloatArray,
+    state: NewtonState,
+    system: DepthSystem,
+    depth: FloatArray,
+    result: FloatArray,
+) -> None:
+    """Subtract the wear of the outer body of contact `k` due to depths of its eliminated body.
+
+    Parameters
+    ----------
+    shared, state, system
+        As in `factor_depths`.
+    depth : ndarray
+        Depths of the eliminated body, by unknown.
+    result : ndarray
+        Wear of the outer bodies, by unknown; changed.
+    """
+    b, c, size, sums = system.touched[k, 0], system.touched[k, 1], state.size[k], system.sums
+    number, response, place = system.number, system.response, state.place
+    outer_side = system.side[1]
+    if c < 0:
+        return
+    for row in range(size):
+        sums[row] = 0.0
+    for column in range(size):
+        unknown = number[b, place[k, column]]
+        opening = depth[unknown] if unknown >= 0 else 0.0
+        for row in range(np.uint64(size if opening != 0.0 else 0)):
+            sums[row] += response[k, column, row] * opening
+    for row in range(size):
+        i = place[k, row]
+        if number[c, i] >= 0:
+            result[number[c, i]] -= shared[k, outer_side, i] * sums[row]
 
 
 @subroutine
 def solve_depths(
-    bodies: IntArray,
     shared: FloatArray,
     state: NewtonState,
     system: DepthSystem,
@@ -200,7 +307,7 @@ def solve_depths(
 
     Parameters
     ----------
-    bodies, shared
+    shared
         As in `add_depths`.
     state : NewtonState
         With the steps of the separate contacts, replaced by the coupled ones.
@@ -209,26 +316,47 @@ def solve_depths(
     approach : ndarray, shape (contacts,)
         Approach without the bodies' wear, replaced by the one with it [m].
     """
-    depth, number, response = system.depth, system.number, system.response
-    place, step, count = state.place, state.step, number.max() + 1
+    depth, outer_depth, number, response = (
+        system.depth,
+        system.outer_depth,
+        system.number,
+        system.response,
+    )
+    place, step, size, count = state.place, state.step, system.size, system.total[0]
+    for b in range(len(size)):
+        for unknown in range(size[b]):
+            depth[b, unknown] = 0.0
     for unknown in range(count):
-        depth[unknown] = 0.0
-    for k in range(bodies.shape[0]):
-        for side in range(SIDES):
-            b = bodies[k, side]
-            for row in range(state.size[k] if b >= 0 else 0):
-                i = place[k, row]
-                if number[b, i] >= 0:
-                    depth[number[b, i]] += shared[k, side, i] * step[k, row]
-    solve_factored(system.matrix, count, depth)
-    for k in range(bodies.shape[0]):
-        size = state.size[k]
-        for column in range(size):
-            opening = 0.0
-            for side in range(SIDES):
-                b = bodies[k, side]
-                if b >= 0 and number[b, place[k, column]] >= 0:
-                    opening += depth[number[b, place[k, column]]]
+        outer_depth[unknown] = 0.0
+    for k in range(len(response)):
+        b, c = system.touched[k, 0], system.touched[k, 1]
+        for row in range(state.size[k]):
+            i = place[k, row]
+            if b >= 0 and number[b, i] >= 0:
+                depth[b, number[b, i]] += shared[k, system.side[0], i] * step[k, row]
+            if c >= 0 and number[c, i] >= 0:
+                outer_depth[number[c, i]] += shared[k, system.side[1], i] * step[k, row]
+    for b in range(len(size)):
+        if size[b] > 0:
+            solve_factored(system.block[b], size[b], depth[b])
+    if count > 0:
+        for k in range(len(response)):
+            b = system.touched[k, 0]
+            if b >= 0:
+                subtract_outer_wear(k, shared, state, system, depth[b], outer_depth)
+        solve_factored(system.outer, count, outer_depth)
+        for b in range(len(size)):
+            for u in range(count if size[b] > 0 else 0):
+                for unknown in range(size[b]):
+                    depth[b, unknown] -= system.across[b, u, unknown] * outer_depth[u]
+    for k in range(len(response)):
+        b, c = system.touched[k, 0], system.touched[k, 1]
+        for column in range(state.size[k]):
+            i, opening = place[k, column], 0.0
+            if b >= 0 and number[b, i] >= 0:
+                opening += depth[b, number[b, i]]
+            if c >= 0 and number[c, i] >= 0:
+                opening += outer_depth[number[c, i]]
             approach[k] += system.approach_slope[k, column] * opening
-            for row in range(size if opening != 0.0 else 0):
+            for row in range(state.size[k] if opening != 0.0 else 0):
                 step[k, row] -= response[k, column, row] * opening

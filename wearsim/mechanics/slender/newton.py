@@ -216,7 +216,8 @@ def solve_slender(
     compliance : ndarray, shape (sets, contacts, strips)
         Wear compliance of the separate contacts: increase of gap per line load [m/(N/m)].
     bodies : ndarray of int, shape (contacts, 2), or None
-        Bodies that each contact of a set shares with others, numbered from 0; -1 for none.
+        Bodies that each contact of a set shares with others, numbered from 0; -1 for none. Those of
+        the first column have the lower numbers.
     shared : ndarray, shape (sets, contacts, 2, strips), or None
         Depth that a contact wears off those bodies per unit of line load [m/(N/m)].
     loads, longitudinal_curvature : ndarray, shape (sets, contacts)
@@ -334,7 +335,7 @@ def solve_slender(
                 if (
                     bodies is not None
                     and renewed
-                    and not factor_depths(members, worn[number], state, system)
+                    and not factor_depths(worn[number], state, system)
                 ):
                     outcome = SINGULAR
                     break
@@ -348,7 +349,7 @@ def solve_slender(
                         solve_factored(state.matrix[k], state.size[k], state.step[k])
                         add_approach(k, load[k] / spacing, total, state, delta)
                     if bodies is not None:
-                        solve_depths(members, worn[number], state, system, delta)
+                        solve_depths(worn[number], state, system, delta)
                 change, left = update_loads(total, state, iteration > CAUTIOUS)
                 stale = change if renewed else stale + change
                 for k in range(contacts):

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
-from wearsim.contact_batch import NO_BODY, ContactBatch, ContactBatchSolution
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
-from wearsim.mechanics.numerics.jit import kernel_input, own_array
 from wearsim.mechanics.slender import newton as kernels
 from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, no_table
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS
+from wearsim.models.contact.normal_contacts import NormalContacts
 from wearsim.models.contact.strip_model import (
     StripModel,
     check_edges,
@@ -35,122 +35,7 @@ from wearsim.plugins import (
     refuse_unclaimed,
 )
 from wearsim.plugins.contact_model import naming_contact, solved_one_by_one
-from wearsim.types import FloatArray, Grid, IntArray, Material
-
-_NONE = np.zeros(0, dtype=np.int64)
-
-#: Strip width [m], E* [Pa] and the two tables of `mechanics.slender.newton.solve_slender`.
-Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray]
-
-
-class NormalContacts(NamedTuple):
-    """Normal problems of sets of contacts; the contacts of a set may wear common bodies.
-
-    Parameters
-    ----------
-    gap : ndarray, shape (sets, contacts, strips)
-        Gap [m].
-    longitudinal_curvature, loads : ndarray, shape (sets, contacts)
-        Relative curvature along rolling [1/m] and loads [N].
-    line_load, half_length : ndarray, shape (sets, contacts, strips)
-        Output: q [N/m], whose values on entry are the initial guess, and a [m].
-    approach : ndarray, shape (sets, contacts)
-        Output: approach [m], whose values on entry are the initial guess.
-    status, iterations : ndarray of int, shape (sets,)
-        Output: status and number of iterations of Newton's method.
-    """
-
-    gap: FloatArray
-    longitudinal_curvature: FloatArray
-    loads: FloatArray
-    line_load: FloatArray
-    approach: FloatArray
-    half_length: FloatArray
-    status: IntArray
-    iterations: IntArray
-
-    @classmethod
-    def starting(
-        cls, batch: ContactBatch, size: int, start: ContactBatchSolution | None
-    ) -> NormalContacts:
-        """Return the normal problems of sets of `size` contacts, with an initial guess if any."""
-        shape = len(batch) // size, size
-        wide = *shape, batch.gap.shape[1]
-        if start is None:
-            line_load, approach = np.zeros(wide), np.zeros(shape)
-        else:
-            line_load = own_array(start.line_load).reshape(wide)
-            approach = own_array(start.approach).reshape(shape)
-        status, iterations = np.zeros((2, shape[0]), np.int64)
-        return cls(
-            kernel_input(batch.gap).reshape(wide),
-            kernel_input(batch.longitudinal_curvature).reshape(shape),
-            kernel_input(batch.normal_force).reshape(shape),
-            line_load,
-            approach,
-            np.zeros(wide),
-            status,
-            iterations,
-        )
-
-    @property
-    def failed(self) -> IntArray:
-        """Sets without a solution, or with a contact that reaches its first or last strip."""
-        # counted, since any() takes three times as long on short arrays
-        first, last = self.line_load[..., 0], self.line_load[..., -1]
-        if not sum(map(np.count_nonzero, (self.status, first, last))):
-            return _NONE
-        ends = (first != 0.0) | (last != 0.0)
-        return np.flatnonzero((self.status != kernels.CONVERGED) | ends.any(axis=1))
-
-    def solve(self, wear: SharedWear | FloatArray | None, constants: Constants) -> None:
-        """Solve all sets in place.
-
-        Parameters
-        ----------
-        wear : SharedWear or ndarray, shape (sets, strips), optional
-            Wear compliance, with the sets as leading axis; an array where each set is one contact.
-        constants : Constants
-        """
-        if not isinstance(wear, SharedWear):
-            own = np.zeros(self.gap.shape) if wear is None else kernel_input(wear)
-            self._solve(own.reshape(self.gap.shape), None, None, constants)
-            return
-        for numbers, own, members, shared in wear.groups:
-            part = self
-            if len(numbers) < len(self.gap):
-                part = NormalContacts._make(array[numbers] for array in self)
-            if (members == NO_BODY).all():
-                part._solve(own, None, None, constants)
-            else:
-                part._solve(own, members, shared, constants)
-            if part is not self:
-                for array, solved in zip(self, part, strict=True):
-                    array[numbers] = solved
-
-    def _solve(
-        self,
-        own: FloatArray,
-        members: IntArray | None,
-        shared: FloatArray | None,
-        constants: Constants,
-    ) -> None:
-        """Solve sets in place; `members` and `shared` are those of `SharedWear.groups`."""
-        kernels.solve_slender(
-            self.gap,
-            own,
-            members,
-            shared,
-            self.loads,
-            self.longitudinal_curvature,
-            *constants,
-            self.line_load,
-            self.approach,
-            self.half_length,
-            self.status,
-            self.iterations,
-        )
-
+from wearsim.types import FloatArray, Grid, Material
 
 _FAILURE = {
     kernels.SINGULAR: "its equations are singular: check the gap, the load and the materials",
@@ -221,7 +106,7 @@ class Slender(StripModel):
         line_load = normal.line_load.reshape(batch.gap.shape)
         half_length = normal.half_length.reshape(batch.gap.shape)
         approach = normal.approach.reshape(len(batch))
-        iterations = normal.iterations.repeat(normal.gap.shape[1])
+        iterations = normal.iterations.ravel()
         free = batch.bearing_torque is not None
         if not isinstance(self.theory, StripTheory) or (free and not batch.mean_radius):
             return solved_one_by_one(
@@ -271,7 +156,7 @@ class Slender(StripModel):
         for number in normal.failed.tolist():
             try:
                 self._check(
-                    int(normal.status[number]),
+                    int(normal.status[number].max()),
                     normal.gap[number],
                     normal.loads[number],
                     normal.line_load[number],

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from wearsim.report.maxent import multipliers, parent, without_rounding
 from wearsim.report.parts import (
     BLUE,
     GREEN,
@@ -23,15 +24,7 @@ from wearsim.report.parts import (
     titled_figure,
     write_message,
 )
-from wearsim.report.text import (
-    PER_SI,
-    in_unit,
-    multipliers,
-    number_of_realisations,
-    parent,
-    shown,
-    without_rounding,
-)
+from wearsim.report.text import PER_SI, in_unit, number_of_realisations, shown
 from wearsim.results import DissipationResult
 from wearsim.studies.contact.comparison import ContactErrors, ContactReference
 from wearsim.studies.contact.single import ContactStudy

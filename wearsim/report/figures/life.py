@@ -234,7 +234,7 @@ def _draw_probabilities(
 def _draw_tornado(
     axes: Axes, results: Sequence[LifeResult], labels: Sequence[str], colours: Sequence[str]
 ) -> None:
-    """Draw how far each input moves the life."""
+    """Draw how far each input moves the life from its median, and the 95 % intervals."""
     title = "What moves the life"
     bars = [{} if result.are_equal else result.tornado() for result in results]
     names = list(dict.fromkeys(name for found in bars for name in found))
@@ -248,15 +248,27 @@ def _draw_tornado(
         places = [
             names.index(name) + (number - 0.5 * (len(results) - 1)) * height for name in found
         ]
-        low = np.array([ends[0] for ends in found.values()])
-        high = np.array([ends[1] for ends in found.values()])
-        axes.barh(places, high - low, height, left=low, color=colour, alpha=0.8, label=label)
+        for end, alpha in enumerate((0.35, 0.8)):
+            ends = [effect.factors[end] for effect in found.values()]
+            value = np.array([one.value for one in ends])
+            reach = np.array([[one.value - one.low, one.high - one.value] for one in ends]).T
+            axes.barh(
+                places,
+                value - 1.0,
+                height,
+                left=1.0,
+                color=colour,
+                alpha=alpha,
+                label=label if end else "",
+                xerr=reach,
+                error_kw={"lw": 1.0, "capsize": 2.0, "ecolor": "0.2"},
+            )
     axes.axvline(1.0, color="0.3", lw=0.8)
     axes.use_sticky_edges = False
     axes.margins(x=0.08)
     axes.set_yticks(range(len(names)), names)
     axes.invert_yaxis()
-    name_axes(axes, title, "factor of the life, 10 % to 90 % of each effect", "")
+    name_axes(axes, title, "factor of the life, input at its 10 % (pale) and 90 % quantile", "")
     _legend(axes, labels)
 
 

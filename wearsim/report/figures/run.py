@@ -27,7 +27,7 @@ from wearsim.report.parts import (
     titled_figure,
 )
 from wearsim.report.summary import width_of
-from wearsim.report.text import PER_SI, count, pass_unit, shown
+from wearsim.report.text import PER_SI, count, pass_unit, shown, simulated
 from wearsim.results import Result
 from wearsim.types import FloatArray
 
@@ -79,7 +79,7 @@ def caption(result: Result) -> str:
         unfinished = f", stopped at {result.until}"
     return (
         f"{count(float(result.passes[-1]))} roller passes in"
-        f" {shown(float(result.time[-1]), 'min')}"
+        f" {simulated(float(result.time[-1]))}"
         f" ({result.described_model}, {result.stepper}{unfinished})\n"
         f"{depth}, width {width_of(result, np.max(result.width[-1]))}"
     )

@@ -10,7 +10,7 @@ import numpy as np
 
 from wearsim.report import summary
 from wearsim.report.figures.life import survival_of
-from wearsim.report.lives import against, life_cells, rare_text
+from wearsim.report.lives import against, effect_cells, life_cells, rare_text, rounded_lives
 from wearsim.report.page.part import SAMPLING, Part, command_of, files_of, tables_of
 from wearsim.report.page.plots import COLOURS, Plot, axes, columns, hover, legend
 from wearsim.report.page.study_plots import effect_plots
@@ -56,11 +56,24 @@ def of_life(result: LifeResult) -> Part:
         answer=_estimates(result),
         error=_ERROR,
         plots=_plots(result),
-        tables=tables_of(result, ("Study", study), summary.input_rows(result)),
+        tables=[
+            *_changes(result),
+            *tables_of(result, ("Study", study), summary.input_rows(result)),
+        ],
         warnings=[*result.warnings, *result.notes],
         files=files_of(result),
         command=command_of(result, "life", *options),
     )
+
+
+def _changes(result: LifeResult) -> list[tuple[str, summary.Rows]]:
+    """Return the table of what moves the life, if two lives differ."""
+    found = {} if result.are_equal else result.tornado()
+    rows = []
+    for name, effect in found.items():
+        low, high = effect_cells(effect)
+        rows.append((name, f"{low} at its 10 % quantile, {high} at its 90 % quantile"))
+    return [("What moves the life, from the median of each input", rows)] if rows else []
 
 
 def _estimates(result: LifeResult) -> summary.Rows:
@@ -72,7 +85,8 @@ def _estimates(result: LifeResult) -> summary.Rows:
     for share in shares:
         low, high = result.b_error(share)
         if math.isfinite(low + high):
-            rows.append((f"B{share:g}, numerical error", f"{count(low)} to {count(high)}"))
+            text = " to ".join(rounded_lives(low, high))
+            rows.append((f"B{share:g}, numerical error", text))
     if result.target is not None:
         found = part_with_interval(result.probability_before(result.target))
         rows.append((f"P(life < {count(result.target)} {result.unit})", found))

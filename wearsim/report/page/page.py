@@ -28,6 +28,7 @@ from wearsim.report.text import (
     kind,
     number_of_realisations,
     shown,
+    simulated,
     with_interval,
 )
 from wearsim.results import DissipationResult, EnsembleResult, Result
@@ -118,7 +119,7 @@ def _of_run(result: Result, measured: Sequence[Measured]) -> Part:
     if "station_angle" in raw.static:
         turns = raw.total_passes / raw.kinematics["physical_rollers"]
         body, length = "cam", f"{count(turns)} turns"
-    time = shown(raw.total_passes / raw.kinematics["pass_rate"], "min")
+    time = simulated(raw.total_passes / raw.kinematics["pass_rate"])
     test = [
         ("reached", summary.standing(result)),
         ("contact model", result.described_model),
@@ -142,13 +143,13 @@ def _of_run(result: Result, measured: Sequence[Measured]) -> Part:
 
 def _position(result: Result, record: int) -> str:
     passes, time = float(result.record_passes[record]), float(result.record_time[record])
-    return f"pass {count(passes)}, {shown(time, 'min')}"
+    return f"pass {count(passes)}, {simulated(time)}"
 
 
 def _of_ensemble(result: EnsembleResult, measured: Sequence[Measured]) -> Part:
     from wearsim.report.page.study_plots import ensemble_plots  # noqa: PLC0415  (bokeh)
 
-    raw, time = result.raw, shown(result.raw.total_time, "min")
+    raw, time = result.raw, simulated(result.raw.total_time)
     done = f"{count(result.count)} of {count(result.requested)}, {count(result.failed)} failed"
     tests = [
         ("done", done),

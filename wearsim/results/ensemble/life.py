@@ -19,6 +19,7 @@ from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.types import IntArray
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+from wearsim.uq.sensitivity.effects import TAIL, SignedEffect
 from wearsim.uq.survival.distributions import (
     CountedLives,
     FactorMixture,
@@ -28,6 +29,7 @@ from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
 from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
 from wearsim.uq.survival.rare_events import RareProbability
 
+_QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
 _FEWEST = 32  # realisations below which a target is not reached
 
 
@@ -216,34 +218,43 @@ class LifeResult(LifeValues):
         found = first_order(self.log_lives, self.drawn_numbers(groups))
         return {group: (index, None) for group, index in found.items()}
 
-    def tornado(self) -> dict[str, tuple[float, float]]:
-        """Return the change of life by each input, by its name, the greatest first.
+    def tornado(self) -> dict[str, SignedEffect]:
+        """Return the effect of each input on the logarithm of life, by its name, greatest first.
 
         Returns
         -------
-        dict of str to (float, float)
-            Factors of the life that the input's effect exceeds with 90 % and with 10 %
-            probability, from a quadratic fit of ln life to the normal scores of its numbers.
+        dict of str to SignedEffect
+            At the 10 % and the 90 % quantile of the input, relative to its median, the others
+            unchanged. That of a wear factor which is integrated exactly has no sampling error, and
+            adds none to the others.
 
         Examples
         --------
-        >>> list(wearsim.open_results("rig-life.h5").tornado())
-        ['wear.cylinder.k_over_h', 'friction.coefficient']
+        >>> found = wearsim.open_results("rig-life.h5").tornado()
+        >>> for name, effect in found.items():
+        ...     low, high = effect.factors
+        ...     print(name, f"{low.value:.2f} {high.value:.2f}")
+        wear.cylinder.k_over_h 1.68 0.59
+        friction.coefficient 1.17 0.87
         """
-        from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
+        from wearsim.uq.sensitivity.effects import (  # noqa: PLC0415  (rarely needed)
+            effects,
+            exact_effect,
+            normal_scores,
+        )
 
-        logs, found = self.log_lives - self.log_lives.mean(), {}
-        groups = [item["name"] for item in self.raw.groups]
-        for name, numbers in self.drawn_numbers(groups).items():
-            ranks = numbers.argsort(axis=0).argsort(axis=0)
-            scores = ndtri((ranks + 0.5) / len(numbers))
-            terms = np.column_stack([np.ones(len(scores)), scores, scores**2])
-            if len(terms) < 2 * terms.shape[1]:
-                continue
-            effect = terms @ np.linalg.lstsq(terms, logs, rcond=None)[0]
-            low, high = np.exp(np.quantile(effect, (0.1, 0.9))).tolist()
-            found[name] = (low, high)
-        return dict(sorted(found.items(), key=lambda item: math.log(item[1][0] / item[1][1])))
+        drawn = self.drawn_numbers([item["name"] for item in self.raw.groups])
+        factor, logs, found = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
+        if factor in drawn and self.is_known_throughout and not self.at_once:
+            # life is kappa/K: kappa holds all that the other inputs change
+            logs = np.log(self.values("life") * self.values(factor))
+            low, middle, high = np.log((self.law or self._drawn_law).quantile(_QUANTILES)).tolist()
+            found[factor] = exact_effect(middle - low, middle - high)
+            del drawn[factor]
+        laws = {one.name: one.scalar for one in self.scenario.random if one.role == "scalar"}
+        scores = {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
+        found |= effects(logs, scores)
+        return dict(sorted(found.items(), key=lambda item: -item[1].size))
 
     def compare(self, other: LifeResult) -> LifeComparison:
         """Compare the lives with those of another design.

@@ -280,7 +280,7 @@ def parse_fields(
     refuse_cylinder(mistakes, data)
     tables = of_follower(data)
     sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
-    assemble_cam(mistakes, sections)
+    assemble_cam(mistakes, sections, "cam" in tables)
     check_lists(mistakes, data, sections["limit"])
     check_correlation(mistakes, sections["sampling"])
     mistakes.raise_any()

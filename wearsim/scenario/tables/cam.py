@@ -261,11 +261,20 @@ def of_follower(data: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-def assemble_cam(mistakes: Mistakes, sections: dict[str, Any]) -> None:
-    """Replace the tables [cam] and [follower] by the cam and its base circle."""
+def assemble_cam(mistakes: Mistakes, sections: dict[str, Any], has_cam: bool) -> None:
+    """Replace the tables [cam] and [follower] by the cam and its base circle.
+
+    Parameters
+    ----------
+    mistakes : Mistakes
+    sections : dict
+        The tables that have been read; None after mistakes in them.
+    has_cam : bool
+        Whether the scenario has a table [cam], also one with mistakes.
+    """
     table, follower = sections["cam"], sections.pop("follower")
     creepage = sections["creepage"]
-    if table is None and creepage is not None and creepage.bearing_friction > 0.0:
+    if not has_cam and creepage is not None and creepage.bearing_friction > 0.0:
         what = "is only for [cam], whose load differs along the angle"
         mistakes.add("creepage", "bearing_friction", what, None, "bearing_torque")
     if table is not None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.evolution.contacts import GRIP
 from wearsim.evolution.quantities import CamStations
 from wearsim.mechanics.cam import moved_stations
 from wearsim.studies.cam.checks import harmonic_depth, harmonic_limit
@@ -19,7 +20,6 @@ from wearsim.types import FloatArray
 
 FEWEST_HARMONICS = 3
 FOLLOWED = 0.8  # demand of friction on the unworn cam from which skids are followed through a run
-GRIP = 0.98  # greatest traction of a rolling roller, of friction: at the ends of a skid
 _BETWEEN = 49  # points of a panel between its stations, for the lift error
 
 

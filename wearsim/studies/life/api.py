@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import cast
 
 import numpy as np
 
-from wearsim.errors import ResultsFileError
+from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.results import (
     DISK,
     EnsembleData,
@@ -32,7 +34,6 @@ from wearsim.studies.life.realisation import LifeRunner, first_length, with_leng
 from wearsim.studies.life.settings import (
     SHARES,
     design_variable,
-    results_file,
     settings_of,
     with_limits,
     with_rare_events,
@@ -73,7 +74,7 @@ def life(
     realisations : int
         Maximum number of realisations; one is sufficient where the wear factor alone is random.
     output : path, optional
-        Results file; by default the name of the scenario, which ends in ``-life.h5``.
+        Results file; without it the result is kept in memory only.
     limits : sequence of str
         Limits in addition to those of the scenario, or instead of equal ones: "depth 50 um",
         "lift_error=30um".
@@ -126,24 +127,47 @@ def life(
     settings = with_rare_events(scenario, settings, rare, precision, rare_method)
     if variable and (found := design_variable(scenario, variable)):
         settings = replace(settings, variable=asdict(found))
-    path = results_file(scenario) if output is None else Path(output)
-    check_output(path, force, scenario.paths)
+    if output is not None:
+        check_output(output, force, scenario.paths)
     runner, content = _prepared(scenario, settings, aim)
-    with (
-        shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
-        executor(
-            scheduler,
-            workers,
-            on_notice=on_notice or getattr(watch, "notice", None),
-            stop_requested=stop_requested,
-            preload=PRELOAD,
-            realisations=settings.plain,
-        ) as pool,
-        EnsembleFile.create(path, *content, storage) as file,
-    ):
-        runner.compile_kernels()
-        _finish_stages(EnsembleWork(file, runner, aim, pool, watch, stop_requested), runner)
-    return cast("LifeResult", open_ensemble(path))
+    with _results_path(output) as path:
+        with (
+            shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
+            executor(
+                scheduler,
+                workers,
+                on_notice=on_notice or getattr(watch, "notice", None),
+                stop_requested=stop_requested,
+                preload=PRELOAD,
+                realisations=settings.plain,
+            ) as pool,
+            EnsembleFile.create(path, *content, storage) as file,
+        ):
+            runner.compile_kernels()
+            _finish_stages(EnsembleWork(file, runner, aim, pool, watch, stop_requested), runner)
+        return _opened(path, in_memory=output is None)
+
+
+@contextmanager
+def _results_path(output: str | Path | None) -> Iterator[Path]:
+    """Give the results file of a study, one in a temporary folder without `output`."""
+    if output is not None:
+        yield Path(output)
+        return
+    with TemporaryDirectory(prefix="wearsim-") as folder:
+        try:
+            yield Path(folder) / "life.h5"
+        except Interrupted as error:
+            raise Interrupted("stopped; nothing was written, since no output is given") from error
+
+
+def _opened(path: Path, in_memory: bool) -> LifeResult:
+    """Open the result of a study; read all of it if it is to be kept in memory only."""
+    found = cast("LifeResult", open_ensemble(path))
+    if not in_memory:
+        return found
+    variables = {name: found.raw.variables[name] for name in found.raw.schema.variables}
+    return replace(found, raw=replace(found.raw, variables=variables), path=None)
 
 
 def resume_life(

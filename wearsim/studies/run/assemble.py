@@ -28,6 +28,7 @@ from wearsim.studies.cam.stations import cam_stations
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import growth_of, strips_of_run
+from wearsim.studies.run.groove import predicted_half_width
 from wearsim.studies.run.inputs import (
     MAX_NODES,
     contact_inputs,
@@ -36,6 +37,7 @@ from wearsim.studies.run.inputs import (
     with_nodes,
 )
 from wearsim.types import FloatArray, Grid
+from wearsim.units import in_engineers_unit
 
 ITERATION_FRACTION = 1e-3  # convergence criterion of a step's iterations, over the tolerance
 ITERATION_RANGE = 1e-8, 1e-5
@@ -43,6 +45,8 @@ ITERATION_RANGE = 1e-8, 1e-5
 #: Returns the contact model of a scenario for strips.
 ModelBuilder: TypeAlias = Callable[[Scenario, Grid], ContactModel]
 
+UNLOADED = 6.0  # depth at a constant load over N/k, with 5e-5 of the load left
+ONE_PARABOLA = {"hertz", "hertz-fastsim"}  # models that fit a single one to the gap
 PARABOLA = {"hertz", "hertz-fastsim", "semi-hertzian"}  # models that fit one to the gap
 
 
@@ -67,6 +71,32 @@ def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> st
             " contact.model"
         )
     return name
+
+
+def _check_spring(draws: Draws) -> None:
+    """Refuse a spring that unloads the roller with a model that fits one parabola to the gap.
+
+    The fit jumps where a strip leaves the patch. A stiff spring turns that into a jump of the load,
+    which steps of tens of passes resolve.
+
+    Raises
+    ------
+    ScenarioError
+        If the groove at a constant load would be many times as deep as the spring's travel N/k,
+        after which the load has vanished: by then the load falls as exp(-(2/3) (d k/N)^(3/2)).
+    """
+    scenario = draws.scenario
+    model, stiffness = scenario.contact.model, getattr(scenario.load.options, "stiffness", 0.0)
+    load = getattr(scenario.load.options, "normal_force", 0.0)
+    if model not in ONE_PARABOLA or not stiffness * load or scenario.creepage.drive == "free":
+        return
+    half = predicted_half_width(draws, load, full_slip=False)
+    ratio = half**2 / (2.0 * scenario.roller.crown_radius) * stiffness / load
+    if ratio > UNLOADED:
+        what = f"unloads the roller, whose load cannot be followed by contact.model = '{model}'"
+        got = in_engineers_unit(stiffness, "N/m")
+        remedy = "contact.model = 'slender', a softer spring or a shorter test"
+        raise ScenarioError(scenario.file, [Mistake("load", "stiffness", what, got, remedy)])
 
 
 def build_stepper(scenario: Scenario, name: str) -> Stepper:
@@ -157,6 +187,7 @@ def assemble_problem(
     first, multiplicity = merged_rollers(draws)
     several = len(first) > 1 or draws.passes or scenario.cam
     name = chosen_stepper(scenario, chosen, 2 if several else 1)
+    _check_spring(draws)
     if name == "per-pass" and getattr(scenario.load.options, "feedback", "") == "inertia":
         what = 'follows single turns, without feedback = "inertia"'
         remedy = 'feedback = "static", or another stepper'

@@ -186,7 +186,7 @@ class RunInProgress:
         last, most = passes[-1:], self.scenario.evolution.max_steps
         (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most)
         if coarse is None:
-            self._warn(
+            self.warn(
                 "error by strips: not estimated, as the test fails on strips of twice the width"
             )
         records = self.recorder.records

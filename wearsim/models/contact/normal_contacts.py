@@ -1,0 +1,172 @@
+"""Normal problems of slender contacts, those that wear no common body apart."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from wearsim.contact_batch import NO_BODY, ContactBatch, ContactBatchSolution
+from wearsim.mechanics.numerics.jit import kernel_input, own_array
+from wearsim.mechanics.slender import newton as kernels
+from wearsim.plugins import SharedWear
+from wearsim.types import FloatArray, IntArray
+
+_NONE = np.zeros(0, dtype=np.int64)
+
+#: Strip width [m], E* [Pa] and the two tables of `mechanics.slender.newton.solve_slender`.
+Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray]
+
+
+@lru_cache(maxsize=64)
+def _coupled_contacts(members: bytes, contacts: int) -> list[tuple[IntArray, IntArray | None]]:
+    """Return the contacts that shared bodies couple, those with equal bodies in one array.
+
+    Parameters
+    ----------
+    members : bytes
+        The shared bodies of each contact, as in `SharedWear.groups`.
+    contacts : int
+        Number of contacts.
+
+    Returns
+    -------
+    list of (numbers, bodies)
+        Numbers of the contacts, shape (systems, contacts of each), and the shared bodies of those
+        of one system, counted from 0; None for a contact that shares none.
+    """
+    bodies, label = np.frombuffer(members, np.int64).reshape(contacts, 2), np.arange(contacts)
+    touching = [(bodies == body).any(axis=1) for body in range(bodies.max() + 1)]
+    for _ in touching:  # a chain of bodies is joined after as many rounds as it has bodies
+        before = label.copy()
+        for contact in touching:
+            label[contact] = label[contact].min()
+        if np.array_equal(before, label):
+            break
+    systems: dict[tuple[int, bytes], tuple[list[IntArray], IntArray | None]] = {}
+    for number in np.unique(label):
+        own = np.flatnonzero(label == number)
+        part = bodies[own]
+        shared = part != NO_BODY
+        part[shared] = np.unique(part[shared], return_inverse=True)[1]
+        some = part if shared.any() else None
+        systems.setdefault((len(own), part.tobytes()), ([], some))[0].append(own)
+    return [(np.stack(numbers), some) for numbers, some in systems.values()]
+
+
+class NormalContacts(NamedTuple):
+    """Normal problems of sets of contacts; the contacts of a set may wear common bodies.
+
+    Parameters
+    ----------
+    gap : ndarray, shape (sets, contacts, strips)
+        Gap [m].
+    longitudinal_curvature, loads : ndarray, shape (sets, contacts)
+        Relative curvature along rolling [1/m] and loads [N].
+    line_load, half_length : ndarray, shape (sets, contacts, strips)
+        Output: q [N/m], whose values on entry are the initial guess, and a [m].
+    approach : ndarray, shape (sets, contacts)
+        Output: approach [m], whose values on entry are the initial guess.
+    status, iterations : ndarray of int, shape (sets, contacts)
+        Output: status and number of iterations of Newton's method.
+    """
+
+    gap: FloatArray
+    longitudinal_curvature: FloatArray
+    loads: FloatArray
+    line_load: FloatArray
+    approach: FloatArray
+    half_length: FloatArray
+    status: IntArray
+    iterations: IntArray
+
+    @classmethod
+    def starting(
+        cls, batch: ContactBatch, size: int, start: ContactBatchSolution | None
+    ) -> NormalContacts:
+        """Return the normal problems of sets of `size` contacts, with an initial guess if any."""
+        shape = len(batch) // size, size
+        wide = *shape, batch.gap.shape[1]
+        if start is None:
+            line_load, approach = np.zeros(wide), np.zeros(shape)
+        else:
+            line_load = own_array(start.line_load).reshape(wide)
+            approach = own_array(start.approach).reshape(shape)
+        status, iterations = np.zeros((2, *shape), np.int64)
+        return cls(
+            kernel_input(batch.gap).reshape(wide),
+            kernel_input(batch.longitudinal_curvature).reshape(shape),
+            kernel_input(batch.normal_force).reshape(shape),
+            line_load,
+            approach,
+            np.zeros(wide),
+            status,
+            iterations,
+        )
+
+    @property
+    def failed(self) -> IntArray:
+        """Sets without a solution, or with a contact that reaches its first or last strip."""
+        # counted, since any() takes three times as long on short arrays
+        first, last = self.line_load[..., 0], self.line_load[..., -1]
+        if not sum(map(np.count_nonzero, (self.status, first, last))):
+            return _NONE
+        ends = (first != 0.0) | (last != 0.0)
+        return np.flatnonzero(((self.status != kernels.CONVERGED) | ends).any(axis=1))
+
+    def solve(self, wear: SharedWear | FloatArray | None, constants: Constants) -> None:
+        """Solve all sets in place; contacts that wear no common body are solved apart.
+
+        Parameters
+        ----------
+        wear : SharedWear or ndarray, shape (sets, strips), optional
+            Wear compliance, with the sets as leading axis; an array where each set is one contact.
+        constants : Constants
+        """
+        if not isinstance(wear, SharedWear):
+            own = np.zeros(self.gap.shape) if wear is None else kernel_input(wear)
+            self._solve(own.reshape(self.gap.shape), None, None, constants)
+            return
+        sets, contacts = self.gap.shape[:2]
+        for numbers, own, members, shared in wear.groups:
+            for coupled, bodies in _coupled_contacts(members.tobytes(), contacts):
+                chosen, size = coupled.ravel(), coupled.shape[1]
+                whole = len(numbers) == sets and np.array_equal(chosen, np.arange(contacts))
+                places = numbers[:, None], chosen
+                taken = self if whole else NormalContacts._make(array[places] for array in self)
+                apart = NormalContacts._make(a.reshape(-1, size, *a.shape[2:]) for a in taken)
+                softness = own if whole else own[:, chosen]
+                worn = None
+                if bodies is not None:
+                    worn = (shared if whole else shared[:, chosen]).reshape(
+                        -1, size, *shared.shape[2:]
+                    )
+                apart._solve(softness.reshape(apart.gap.shape), bodies, worn, constants)
+                for array, solved in () if whole else zip(self, taken, strict=True):
+                    array[places] = solved
+
+    def _solve(
+        self,
+        own: FloatArray,
+        members: IntArray | None,
+        shared: FloatArray | None,
+        constants: Constants,
+    ) -> None:
+        """Solve sets in place; `members` and `shared` are those of `SharedWear.groups`."""
+        status, iterations = np.zeros((2, len(self.gap)), np.int64)
+        kernels.solve_slender(
+            self.gap,
+            own,
+            members,
+            shared,
+            self.loads,
+            self.longitudinal_curvature,
+            *constants,
+            self.line_load,
+            self.approach,
+            self.half_length,
+            status,
+            iterations,
+        )
+        self.status[:], self.iterations[:] = status[:, None], iterations[:, None]
