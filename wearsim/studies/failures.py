@@ -88,6 +88,8 @@ def _edge(error: SolverError, scenario: Scenario) -> tuple[str, str]:
             ),
             f"check the wear factors and {length_key(scenario)}",
         )
+    if choice.strips is not None:
+        return error.message, f"raise contact.strips = {choice.strips} or leave it out"
     return (
         f"{error.message}, chosen automatically",
         "set contact.width to a greater value",

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.evolution.strips import JOINED, Growth, Surfaces, same_strips
+from wearsim.evolution.strips import JOINED, LEAST_LOADED, Growth, Surfaces, same_strips
 from wearsim.mechanics.hertz.ellipse import HertzContact
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
@@ -356,7 +356,8 @@ def growth_of(
         margin += scenario.roller.crown_radius * max(map(abs, draws.range_of("tilt")))
     if scenario.roller.width is not None:
         last = roller_grid(scenario, strips_of_roller(scenario, STRIPS_AT_START, greatest))
-    return (Growth(model, surfaces, coarse, most, margin, last),)
+    least = LEAST_LOADED if choice.strips is None else FEWEST_PER_HALF_WIDTH
+    return (Growth(model, surfaces, coarse, most, margin, last, least),)
 
 
 def coarse_grid(scenario: Scenario, grid: Grid) -> Grid:

@@ -224,7 +224,7 @@ class RunInProgress:
                     part = scatter / relative
                     remedy = f"{part:.0%} of it is sampling scatter of the small number of passes"
             elif strips > 0.5 * relative:
-                strips_here = self._present.grid.strips
+                strips_here = self.scenario.contact.strips or self._present.grid.strips
                 remedy = f"more contact.strips than {strips_here} decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
         for remedy, found in beyond.items():
