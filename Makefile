@@ -56,6 +56,7 @@ bench-ensembles: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.persistence -o $(MEASURED)/persistence.json
 	$(BIN)/python -m tests.benchmarks.ensembles -o $(MEASURED)/ensembles.json
 	$(BIN)/python -m tests.uq.survival.coverage_study $(MEASURED)/life-coverage.json
+	$(BIN)/python -m tests.uq.survival.small_probabilities $(MEASURED)/life-small.json
 
 docs: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html

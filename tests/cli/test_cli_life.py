@@ -53,7 +53,7 @@ def life_of(command: Command, *words: object) -> dict[str, Any]:
 
 
 def test_json_has_the_life_of_a_design(command: Command, slim: Path) -> None:
-    found = life_of(command, slim, "-n", 10, "--target", 1000, "--b", "10,50")
+    found = life_of(command, slim, "-n", 10, "--target", 2000, "--b", "10,50")
     assert (found["unit"], found["realisations"], found["censored"], found["failed"]) == (
         "passes",
         10,
@@ -166,10 +166,10 @@ def test_sweep_of_words_has_no_lives_against_the_design(command: Command, slim: 
 
 
 def test_file_answers_another_target(command: Command, slim: Path) -> None:
-    command("life", slim, "-n", 6, "-o", "one.h5", *HERE)
+    command("life", slim, "-n", 12, "-o", "one.h5", *HERE)
     one, other = (
         life_of(command, "one.h5", "--target", target)["probability_before_target"]["value"]
-        for target in ("1000", "40 s")
+        for target in ("1800", "40 s")
     )
     assert 0.0 < one < other
 

@@ -24,7 +24,7 @@ from wearsim.report.text import (
 )
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.types import FloatArray
-from wearsim.units import engineers_unit, in_engineers_unit
+from wearsim.units import engineers_unit, in_engineers_unit, kind_of
 from wearsim.uq.estimation.moments import is_constant
 
 if TYPE_CHECKING:
@@ -223,6 +223,12 @@ def limits_of(limits: Mapping[str, float]) -> list[str]:
     """Return limits of a life by name in SI units as texts, "depth 50.00 um"."""
     each = ((name, _LIMIT_UNITS.get(name, "um"), value) for name, value in limits.items())
     return [f"{name.replace('_', ' ')} {shown(value, unit)}" for name, unit, value in each]
+
+
+def limits_in_si(limits: Mapping[str, float]) -> list[str]:
+    """Return limits of a life as arguments of --limit, "depth=5e-05 m"."""
+    units = ((name, kind_of(_LIMIT_UNITS.get(name, "um")).unit) for name in limits)
+    return [f"{name}={limits[name]:.12g} {unit}" for name, unit in units]
 
 
 def with_range(value: float, low: float, high: float, scale: float) -> str:

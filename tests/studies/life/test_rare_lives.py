@@ -20,7 +20,6 @@ from wearsim.results.ensemble.rare import IMPORTANCE, SUBSET
 from wearsim.results.ensemble.schema import OBSERVABLES
 from wearsim.scenario import Scenario
 from wearsim.studies.life.api import life, resume_life
-from wearsim.studies.life.rare import log_weight
 from wearsim.studies.life.realisation import LifeRunner
 from wearsim.studies.run.draws import Drawer
 from wearsim.uq.survival.rare_events import RareProbability, subset_stages
@@ -49,10 +48,12 @@ def closed_form(
         logs = [np.mean(np.log(drawn[key] / MEDIANS[key])) for key in MEDIANS if key in drawn]
         value = MEDIAN * math.exp(-sum(logs))
         scalars = dict.fromkeys(("life", "life_low", "life_high"), value)
-        weight = log_weight(runner.drawer, runner.shift, number) if runner.shift else 0.0
         scalars |= {"first_limit": 0.0, "limit_angle": math.nan, "score_mean": 0.0}
         scalars |= dict.fromkeys(("steps", "solves", "depth_error", "volume_error"), 1.0)
-        scalars |= {"log_weight": weight, "depth_profile": np.zeros(len(self.grid.y))}
+        scalars |= {
+            "log_weight": runner.log_weight(number),
+            "depth_profile": np.zeros(len(self.grid.y)),
+        }
         courses = {name: np.ones(2) for name in OBSERVABLES}
         outcomes[number] = Outcome(number=number, values={**drawn, **courses, **scalars})
     return []

@@ -9,9 +9,12 @@ from scipy.stats import binom
 from wearsim.uq.survival.fits import fit_lives
 from wearsim.uq.survival.lives import (
     cumulative_incidence,
+    fewest_lives,
     least_survival,
     life_quantile,
     lower_bound,
+    median_positions,
+    median_rank,
     probability_before,
     proportion,
     survival_curve,
@@ -97,6 +100,29 @@ def test_b10_is_bounded_by_exact_ranks(count, ranks):
     assert (found.low, found.high) == ranks
     held = binom.cdf(ranks[1] - 1, count, 0.1) - binom.cdf(ranks[0] - 1, count, 0.1)
     assert held >= 0.95
+
+
+@pytest.mark.parametrize(("count", "share"), [(36, 0.1), (100, 0.01), (20, 0.5)])
+def test_counted_quantiles_are_above_the_truth_in_half_of_the_samples(count, share):
+    lives = np.random.default_rng(5).random((4000, count))
+    found = [life_quantile(one, one > 0.0, share).value for one in lives]
+    # the deviation of a share of one half of 4000 samples is 0.8 %
+    assert np.mean(np.array(found) > share) == pytest.approx(0.5, abs=0.03)
+
+
+def test_positions_are_medians_of_the_ordered_lives():
+    lives = np.sort(np.random.default_rng(6).random((20_000, 8)), axis=1)
+    below = (lives < median_positions(8)).mean(axis=0)
+    assert below == pytest.approx(np.full(8, 0.5), abs=0.015)
+
+
+def test_b1_takes_69_lives_and_b10_takes_7():
+    assert [fewest_lives(share) for share in (0.01, 0.1, 0.5, 0.9)] == [69, 7, 1, 7]
+    for count, share in ((69, 0.01), (7, 0.1)):
+        lives = np.arange(1.0, count + 1.0)
+        assert life_quantile(lives, lives > 0.0, share).value == pytest.approx(1.0, abs=0.1)
+        assert math.isnan(life_quantile(lives[1:], lives[1:] > 0.0, share).value)
+        assert math.isnan(median_rank(count - 1, share))
 
 
 def test_b10_has_one_bound_only_in_small_samples():

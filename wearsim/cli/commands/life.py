@@ -346,7 +346,7 @@ def report(
     from wearsim.cli.render import life_table
     from wearsim.cli.render.ensemble_table import warn_of_failures
     from wearsim.errors import ResultsFileError, SolverError
-    from wearsim.report.lives import against
+    from wearsim.report.lives import against, remarks
 
     for result in results:
         warn_of_failures(result)
@@ -379,7 +379,7 @@ def report(
     for result in results:
         more = [("results file", str(result.path))]
         life_table.write_life(result, more)
-        write_notes(result.notes, [*result.warnings, *life_table.remarks(result)])
+        write_notes(result.notes, [*result.warnings, *remarks(result)])
     if others:
         life_table.write_lives_of(labels, results)
     if len(others) == 1:

@@ -15,7 +15,14 @@ import typer
 
 from wearsim.cli.shared import write_list, write_table
 from wearsim.errors import Interrupted, ResultsFileError
-from wearsim.report.lives import effect_cells, life_cells, rare_text, rounded_lives
+from wearsim.report.lives import (
+    effect_cells,
+    life_cells,
+    rare_command,
+    rare_text,
+    rounded_lives,
+    target_text,
+)
 from wearsim.report.summary import Rows, input_rows, limits_of
 from wearsim.report.text import NOTHING, count, lapse, part_with_interval, shown, too_few
 from wearsim.results.ensemble.life import LifeResult
@@ -130,22 +137,15 @@ def _write_lives(result: LifeResult) -> None:
         )
     target = result.target
     if target is not None:
-        text = part_with_interval(result.probability_before(target))
-        typer.echo(f"P(life < {count(target)} {result.unit}) = {_small(result, text)}")
+        obstacle = result.probability_obstacle(target)
+        equals = "is" if obstacle else "="
+        typer.echo(f"P(life < {count(target)} {result.unit}) {equals} {target_text(result)}")
+        if obstacle and result.rare is None and not result.settings.alone:
+            typer.echo(f"further tests that sample the other inputs: `{rare_command(result)}`")
     for method, estimate in result.rare_estimates.items():
         typer.echo(f"by {method}: {rare_text(estimate)}")
     if result.rare is not None and not result.rare.is_reliable:
         typer.echo("no probability is stated; give a greater --rare")
-
-
-def _small(result: LifeResult, text: str) -> str:
-    """Return a probability with more digits if it is small."""
-    assert result.target is not None
-    found = result.probability_before(result.target)
-    if not 0.0 < found.value < 0.01:
-        return text
-    interval = f" [{found.low:.2g}, {found.high:.2g}]" if found.low < found.high else ""
-    return f"{found.value:.3g}{interval}"
 
 
 def _write_fits(result: LifeResult) -> None:
@@ -193,6 +193,10 @@ def _write_effects(result: LifeResult) -> None:
         return
     if result.are_equal:
         write_list([f"{head}: nothing, no two lives differ"], [])
+        return
+    if result.effects_obstacle:
+        write_list([f"{head}: not stated"], [])
+        typer.echo(result.effects_obstacle)
         return
     effects = result.sensitivity("life")
     if not any(math.isfinite(item.first.value) for item in effects):
@@ -277,7 +281,13 @@ def life_json(result: LifeResult) -> dict[str, Any]:
     settings, target = result.settings, result.target
     probability = None
     if target is not None:
-        probability = {"target": target, **asdict(result.probability_before(target))}
+        obstacle = result.probability_obstacle(target)
+        probability = {
+            "target": target,
+            **asdict(result.probability_before(target)),
+            "not_stated_because": obstacle or None,
+            "command": rare_command(result) if obstacle and not settings.rare else None,
+        }
     lives = {}
     for share in settings.shares:
         low, high = result.b_error(share)
@@ -318,6 +328,7 @@ def life_json(result: LifeResult) -> dict[str, Any]:
             {"input": item.name, "first_order": asdict(item.first)}
             for item in (result.sensitivity("life") if result.count > 1 else [])
         ],
+        "sensitivity_not_stated_because": result.effects_obstacle or None,
         "effects_on_life": [
             {
                 "input": name,
@@ -371,30 +382,3 @@ def against_json(variable: DesignVariable, results: Sequence[LifeResult]) -> dic
             for share in results[0].settings.shares
         },
     }
-
-
-def remarks(result: LifeResult) -> list[str]:
-    """Return what a user should know of the lives."""
-    remarks = []
-    if result.count and result.at_once == result.count:
-        remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
-    elif result.at_once:
-        remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
-    if result.count and not result.observed.any():
-        greatest, known = [], result.known_lives[np.isfinite(result.known_lives)]
-        # tests with an exact wear factor are run up to its greatest value, and further than `most`
-        if result.is_exact and len(known):
-            greatest.append(f"the shortest drawn life is {rounded_lives(known.min())[0]}")
-        elif result.is_exact:
-            greatest.append("with the greatest wear factor")
-        for name, limit in () if len(known) else result.scenario.limit.given.items():
-            stored = {"volume": "worn_volume"}.get(name, name)
-            if stored in result.observables:
-                part = float(result.at_end(stored).max()) / limit
-                greatest.append(f"{name.replace('_', ' ')} up to {100.0 * part:.3g} % of its limit")
-        reached = f" ({', '.join(greatest)})" if greatest else ""
-        remarks.append(
-            f"no realisation reaches a limit within {result.most:,.0f} {result.unit}{reached};"
-            " give a greater --max or other limits"
-        )
-    return remarks

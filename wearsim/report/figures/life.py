@@ -32,7 +32,7 @@ from wearsim.results.ensemble.life_settings import DesignVariable
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.survival.fits import FAMILIES, Family
-from wearsim.uq.survival.lives import cumulative_incidence, survival_curve
+from wearsim.uq.survival.lives import cumulative_incidence, median_positions, survival_curve
 
 _POINTS = 200  # of a curve
 _MOST_MARKS = 500
@@ -157,11 +157,13 @@ def survival_of(result: LifeResult) -> tuple[FloatArray, FloatArray, FloatArray,
     end_of_life: float = min(distribution.quantile_of_mean(0.999), result.most)
     life = np.linspace(0.0, end_of_life, _POINTS)[1:]
     found = [distribution.probability_before(float(n)) for n in life]
-    columns = [
+    survival, low, high = (
         np.array([1.0, *(1.0 - getattr(item, name) for item in found)])
         for name in ("value", "high", "low")
-    ]
-    return np.append(0.0, life), columns[0], columns[1], columns[2]
+    )
+    # the survival falls, so that a bound at one life is one for those before or after it
+    low, high = np.maximum.accumulate(low[::-1])[::-1], np.minimum.accumulate(high)
+    return np.append(0.0, life), survival, low, high
 
 
 def _scale(family: Family) -> Callable[[FloatArray], FloatArray]:
@@ -187,8 +189,7 @@ def _draw_probabilities(
         lives = np.sort(result.lives[chosen])
         if not len(lives):
             continue
-        zero = result.at_once
-        part = (np.arange(len(lives)) + zero + 0.5) / result.count
+        part = median_positions(result.count)[result.at_once :][: len(lives)]
         picks = evenly_spaced(len(lives), _MOST_MARKS)
         axes.plot(lives[picks], scale(part[picks]), ".", color=colour, ms=4.0, label=label)
         ends += [float(lives[0]), float(lives[-1])]
@@ -241,7 +242,10 @@ def _draw_tornado(
     if not names:
         alone = {result.settings.factor for result in results if result.settings.alone}
         text = f"only {', '.join(alone)}" if alone else "too few realisations, or equal lives"
-        write_message(axes, title, [text])
+        obstacles = [result.effects_obstacle for result in results if result.effects_obstacle]
+        write_message(
+            axes, title, [line for one in obstacles for line in one.split("; ")] or [text]
+        )
         return
     height = 0.7 / len(results)
     for number, (found, colour, label) in enumerate(zip(bars, colours, labels, strict=False)):

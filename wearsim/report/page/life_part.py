@@ -10,7 +10,16 @@ import numpy as np
 
 from wearsim.report import summary
 from wearsim.report.figures.life import survival_of
-from wearsim.report.lives import against, effect_cells, life_cells, rare_text, rounded_lives
+from wearsim.report.lives import (
+    against,
+    effect_cells,
+    life_cells,
+    rare_command,
+    rare_text,
+    rounded_lives,
+    study_options,
+    target_text,
+)
 from wearsim.report.page.part import SAMPLING, Part, command_of, files_of, tables_of
 from wearsim.report.page.plots import COLOURS, Plot, axes, columns, hover, legend
 from wearsim.report.page.study_plots import effect_plots
@@ -41,11 +50,7 @@ def of_life(result: LifeResult) -> Part:
         ("95 % intervals", result.method if result.count else "-"),
         ("contact model", result.described_model),
     ]
-    shares = ",".join(f"{share:g}" for share in settings.shares)
-    options = ["-n", str(settings.plain), "--seed", str(result.raw.seed), "--b", shares]
-    options += ["--max", f"{result.most:.17g}"]
-    if result.target is not None:
-        options += ["--target", f"{result.target:.17g}"]
+    options = study_options(result)
     if result.raw.until:
         options += ["--precision", result.raw.until]
     if settings.rare:
@@ -88,8 +93,10 @@ def _estimates(result: LifeResult) -> summary.Rows:
             text = " to ".join(rounded_lives(low, high))
             rows.append((f"B{share:g}, numerical error", text))
     if result.target is not None:
-        found = part_with_interval(result.probability_before(result.target))
+        found = target_text(result)
         rows.append((f"P(life < {count(result.target)} {result.unit})", found))
+        if result.probability_obstacle(result.target) and result.rare is None:
+            rows.append(("tests that sample the other inputs", rare_command(result)))
     for method, estimate in result.rare_estimates.items():
         rows.append((f"the same by {method}", rare_text(estimate)))
     for name, share in result.first_limits.items():

@@ -90,7 +90,8 @@ class LifeResult(LifeValues):
         Raises
         ------
         ValueError
-            If the wear factor is not integrated exactly, or correlated with other inputs.
+            If the wear factor is not integrated exactly, is correlated with other inputs, or takes
+            single values with a probability, which do not say at which quantile they are.
 
         Examples
         --------
@@ -103,6 +104,11 @@ class LifeResult(LifeValues):
         if not settings.factor or settings.spread < 1.0:
             reason = settings.reason or "it is correlated with other inputs"
             raise ValueError(f"the distribution of the wear factor cannot be replaced: {reason}")
+        if len(atoms := self._drawn_score.atoms):
+            raise ValueError(
+                f"the distribution of the wear factor cannot be replaced: {settings.factor} takes"
+                f" the value {atoms[0]:g} with a probability; run the study with the other one"
+            )
         changed = self.scenario.changed({settings.factor: table})
         inputs = {item.name: item for item in changed.random}
         return replace(self, law=inputs[settings.factor].scalar)
@@ -118,15 +124,16 @@ class LifeResult(LifeValues):
         Returns
         -------
         Interval
-            Sampling interval; the value is nan beyond the censoring, and -inf an end for which
-            which there are too few lives. See `b_error` for the numerical error.
+            Sampling interval; the value is nan beyond the censoring and with too few counted lives
+            (69 for B1, 7 for B10), and -inf an end for which there are too few. See `b_error` for
+            the numerical error.
 
         Examples
         --------
         >>> lives = wearsim.open_results("rig-life.h5")
         >>> found = lives.b(10)
         >>> print(f"{found.value:.3g}, 95 % interval {found.low:.3g} to {found.high:.3g}")
-        8.5e+05, 95 % interval 7.98e+05 to 9.03e+05
+        8.5e+05, 95 % interval 7.98e+05 to 9.08e+05
         """
         return self._b(percent, "life")
 
@@ -173,6 +180,8 @@ class LifeResult(LifeValues):
     def probability_before(self, life: float) -> Interval:
         """Return the probability of a life below `life`; unknown beyond the censoring.
 
+        It is also unknown if `probability_obstacle` has a reason.
+
         Examples
         --------
         >>> lives = wearsim.open_results("rig-life.h5")
@@ -182,7 +191,8 @@ class LifeResult(LifeValues):
         if not self.count or life > self.most:
             return UNKNOWN
         if self.is_exact:
-            return self.distribution.probability_before(life)
+            obstacle = self.probability_obstacle(life)
+            return UNKNOWN if obstacle else self.distribution.probability_before(life)
         return probability_before(np.minimum(self.lives, self.most), self.observed, life)
 
     def survival(self, life: float) -> Interval:
@@ -210,9 +220,11 @@ class LifeResult(LifeValues):
     def _indices(
         self, name: str, groups: list[str]
     ) -> Mapping[str, tuple[Interval, Interval | None]]:
-        """Return first-order indices; those of "life" are of its logarithm."""
+        """Return first-order indices; those of "life" are of its logarithm, or unknown."""
         if name != "life":
             return super()._indices(name, groups)
+        if self.effects_obstacle:
+            return dict.fromkeys(groups, (UNKNOWN, None))
         from wearsim.uq.sensitivity.sobol_indices import first_order  # noqa: PLC0415  (rarely needed)
 
         found = first_order(self.log_lives, self.drawn_numbers(groups))
@@ -226,7 +238,8 @@ class LifeResult(LifeValues):
         dict of str to SignedEffect
             At the 10 % and the 90 % quantile of the input, relative to its median, the others
             unchanged. That of a wear factor which is integrated exactly has no sampling error, and
-            adds none to the others.
+            adds none to the others. None where more than 2 % of the lives are censored or zero,
+            see `effects_obstacle`.
 
         Examples
         --------
@@ -243,6 +256,8 @@ class LifeResult(LifeValues):
             normal_scores,
         )
 
+        if self.effects_obstacle:
+            return {}
         drawn = self.drawn_numbers([item["name"] for item in self.raw.groups])
         factor, logs, found = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
         if factor in drawn and self.is_known_throughout and not self.at_once:

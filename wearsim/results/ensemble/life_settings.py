@@ -132,8 +132,9 @@ class LifeSettings:
         Method that they serve; "auto" is subset simulation where importance sampling fails.
     stages : tuple of dict
         Of these tests: number of the first, and their count. For importance sampling also the shift
-        of the normal scores of their draws by name of the input; for subset simulation the numbers
-        of the realisations from which they depart, and the scale of the change.
+        of the normal scores of their draws by name of the input, and for the estimate with an
+        integrated wear factor share and shift of each part of the draws; for subset simulation the
+        numbers of the realisations from which they depart, and the scale of the change.
     variable : dict
         Fields of the `DesignVariable` in a sweep; empty otherwise.
     """

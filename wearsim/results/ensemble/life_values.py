@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -16,8 +15,11 @@ from wearsim.uq.survival.distributions import (
     CountedLives,
     FactorMixture,
     LifeDistribution,
-    score_function,
 )
+from wearsim.uq.survival.effective import LEAST_NUMBER
+from wearsim.uq.survival.scores import ScoreFunction, score_function
+
+_MOST_UNKNOWN = 0.02  # share of lives at an end of the range up to which effects are stated
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +87,7 @@ class LifeValues(EnsembleResult):
             from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
             drawn = self.values(self.settings.factor)
-            chance = ndtr(score_function(self._drawn_law)(drawn))
+            chance = ndtr(self._drawn_score(drawn))
             found = found * drawn / self.law.quantile(chance)
         return found
 
@@ -120,24 +122,66 @@ class LifeValues(EnsembleResult):
         return self._distribution("life")
 
     def _distribution(self, name: str) -> LifeDistribution:
-        settings = self.settings
         if not self.is_exact:
             return CountedLives(self._lives(name))
-        kappa = self.values(name) / settings.per_unit * self.values(settings.factor)
-        return FactorMixture(
-            kappa, self._score, self.values("score_mean"), settings.spread, settings.alone
-        )
+        return self.mixture_of(self.numbers, name)
+
+    def mixture_of(self, numbers: IntArray, name: str = "life") -> FactorMixture:
+        """Return the lives of realisations by number, with the wear factor integrated exactly.
+
+        Parameters
+        ----------
+        numbers : ndarray of int, shape (n,)
+        name : str
+            "life", or one of its numerical bounds, "life_low" and "life_high".
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.mixture_of(lives.numbers[:4]).count
+        4
+        """
+        settings, keys = self.settings, (name, self.settings.factor, "score_mean")
+        life, factor, shift = (self.raw.rows(key, 0, None)[numbers] for key in keys)
+        kappa = life / settings.per_unit * factor
+        return FactorMixture(kappa, self._score, shift, settings.spread, settings.alone)
+
+    def probability_obstacle(self, life: float) -> str:
+        """Return why the probability of a life below `life` is not stated; empty if it is.
+
+        Where the wear factor is integrated exactly, a small probability is caused by realisations
+        that are rarely in a sample. It takes an effective number of 20 realisations, see
+        `FactorMixture.effective_number`.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.probability_obstacle(800_000), lives.probability_obstacle(400_000)
+        ('', 'its effective number of realisations is 6.7, below 20')
+        """
+        distribution = self.distribution
+        if not isinstance(distribution, FactorMixture):
+            return ""
+        number = distribution.effective_number(life)
+        if number >= LEAST_NUMBER:
+            return ""
+        return f"its effective number of realisations is {number:.2g}, below {LEAST_NUMBER:g}"
 
     @property
     def _drawn_law(self) -> Distribution:
         """Distribution of the wear factor in the scenario."""
-        return next(
-            item.scalar for item in self.scenario.random if item.name == self.settings.factor
-        )
+        inputs = {item.name: item for item in self.scenario.random}
+        return inputs[self.settings.factor].scalar
 
     @cached_property
-    def _score(self) -> Any:
-        return score_function(self.law or self._drawn_law)
+    def _drawn_score(self) -> ScoreFunction:
+        """Normal score of the wear factor of the scenario."""
+        return score_function(self._drawn_law)
+
+    @cached_property
+    def _score(self) -> ScoreFunction:
+        """Normal score of the wear factor."""
+        return score_function(self.law) if self.law else self._drawn_score
 
     @property
     def first_limits(self) -> dict[str, float]:
@@ -164,7 +208,27 @@ class LifeValues(EnsembleResult):
 
     @property
     def log_lives(self) -> FloatArray:
-        """Logarithms of the lives, those that are censored or zero at the ends of the range."""
-        positive = self.lives[self.lives > 0.0]
-        least = float(positive.min(initial=self.most))
-        return np.asarray(np.log(np.clip(self.lives, least, self.most)))
+        """Logarithms of the lives, those that are censored or zero at the ends of the range.
+
+        Where the wear factor is integrated exactly, lives beyond the maximum are known too.
+        """
+        found, has_log = self._lives_and_logs
+        ends = found[has_log].min(initial=self.most), found[has_log].max(initial=0.0)
+        return np.asarray(np.log(np.clip(found, ends[0], ends[1] or self.most)))
+
+    @property
+    def effects_obstacle(self) -> str:
+        """Why the effects of the inputs on the life are not stated; empty if they are."""
+        unknown = int((~self._lives_and_logs[1]).sum())
+        if self.count < 2 or unknown <= _MOST_UNKNOWN * self.count:
+            return ""
+        return (
+            f"{unknown} of {self.count} lives are censored or zero, more than"
+            f" {100.0 * _MOST_UNKNOWN:g} %; give a greater --max or other limits"
+        )
+
+    @cached_property
+    def _lives_and_logs(self) -> tuple[FloatArray, BoolArray]:
+        """Lives, as far as they are known, and whether each has a logarithm."""
+        found = self.known_lives if self.is_exact else self.lives
+        return found, np.isfinite(found) & (found > 0.0)

@@ -48,11 +48,18 @@ def by_importance(result: LifeValues) -> RareProbability | None:
     stages = [stage for stage in settings.stages if "parents" not in stage]
     if not stages or sum(stage["count"] for stage in stages) < settings.rare:
         return None
-    first, count = stages[-1]["first"], stages[-1]["count"]
+    last = [stage for stage in stages if "mixture" in stage] or stages[-1:]
+    first, end = last[0]["first"], last[-1]["first"] + last[-1]["count"]
     done = result.raw.done
-    chosen = done[(done >= first) & (done < first + count)]
-    lives, weights = (result.raw.rows(name, 0, None)[chosen] for name in ("life", "log_weight"))
-    return weighted_probability(lives < settings.target, weights, settings.rare)
+    chosen = done[(done >= first) & (done < end)]
+    weights = result.raw.rows("log_weight", 0, None)[chosen]
+    target = result.target
+    assert target is not None
+    if result.is_exact:
+        event = result.mixture_of(chosen).failed(np.array([target]))[:, 0]
+    else:
+        event = result.raw.rows("life", 0, None)[chosen] < settings.target
+    return weighted_probability(event, weights, settings.rare)
 
 
 def by_subset(result: LifeValues) -> RareProbability | dict[str, Any]:

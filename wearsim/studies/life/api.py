@@ -29,7 +29,7 @@ from wearsim.studies.ensemble.api import PRELOAD, Watcher, checked_request, ense
 from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.realisation import profile_axis
 from wearsim.studies.execution.factory import executor
-from wearsim.studies.life.rare import next_stage
+from wearsim.studies.life.rare import next_stages
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
 from wearsim.studies.life.settings import (
     SHARES,
@@ -89,8 +89,8 @@ def life(
         Target that ends the study early, such as "b10 3%": the relative half-width of the 95 %
         confidence interval.
     rare : int
-        Number of further tests, 200 or more, for a small probability of a life before the target;
-        where the wear factor is integrated exactly, none are needed.
+        Number of further tests, 200 or more, for a small probability of a life before the target.
+        Where the wear factor is integrated exactly, they sample the other inputs.
     rare_method : {"auto", "importance", "subset"}
         Importance sampling, subset simulation, or the second where the first fails, each with at
         most `rare` tests.
@@ -216,7 +216,7 @@ def resume_life(
     check_plugins(path, data)
     before = LifeResult(data, path)
     settings = before.settings
-    is_over = data.finished and next_stage(before) is None
+    is_over = data.finished and not next_stages(before)
     if is_over and realisations is None and not (failed and len(data.failed)):
         return before
     scenario = parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__)
@@ -264,8 +264,8 @@ def resume_life(
 def _finish_stages(work: EnsembleWork, runner: LifeRunner) -> None:
     """Run all tests, also those for rare events stage by stage; raises as `EnsembleWork`."""
     work.run()
-    while stage := next_stage(work.result()):
-        stages, total = (*runner.settings.stages, stage), stage["first"] + stage["count"]
+    while found := next_stages(work.result()):
+        stages, total = (*runner.settings.stages, *found), found[-1]["first"] + found[-1]["count"]
         settings = replace(runner.settings, stages=stages)
         runner = LifeRunner(runner.scenario, total, runner.grid, settings, runner.base)
         work.extend(runner, total, life={**asdict(settings), "base": runner.base})

@@ -15,6 +15,7 @@ from wearsim.types import FloatArray
 SHARED = "wear.factor"  # of cylinder and roller
 OF_BODIES = {f"wear.{body}.k_over_h": body for body in BODIES}
 RARE = 1e-6  # probability of a greater factor than that up to which tests are run
+NEGLIGIBLE = 1e-12  # the same for a life before the target
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,9 @@ class ExactFactor:
         """The median, with which tests are run."""
         return float(self.item.scalar.quantile(np.array([0.5]))[0])
 
-    @property
-    def greatest(self) -> float:
-        """The factor that is exceeded with the probability 1e-6."""
-        return float(self.item.scalar.quantile(np.array([1.0 - RARE]))[0])
+    def exceeded(self, probability: float) -> float:
+        """Return the factor that is exceeded with a probability."""
+        return float(self.item.scalar.quantile(np.array([1.0 - probability]))[0])
 
     def score_mean(self, drawer: Drawer, realisation: int) -> float:
         """Return the mean normal score of the factor given the other draws of a realisation."""
@@ -106,6 +106,8 @@ def _obstacle(scenario: Scenario) -> str:
         return f"the wear law {scenario.wear.law} is not linear in the dissipation"
     if len(names) > 1:
         return f"{' and '.join(names)} are drawn independently"
+    if factors[0].scalar.quantile(np.array([0.5 * RARE]))[0] <= 0.0:
+        return f"{names[0]} is 0 with a probability, and such a test has no limit"
     body = OF_BODIES.get(names[0])
     fixed = [other for other, rate in rates.items() if body and other != body and rate]
     if fixed:

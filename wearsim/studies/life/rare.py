@@ -1,59 +1,24 @@
-"""Further tests for rare, early ends of life: shifted draws, and changes of earlier draws."""
+"""Further tests for rare, early ends of life, stage by stage."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from wearsim.results.ensemble.life import LifeResult
 from wearsim.results.ensemble.rare import by_importance, by_subset, needs_subset, responses
-from wearsim.scenario import Scenario
+from wearsim.studies.life.draws import MOST_INPUTS, drawn_scores, shifted_inputs
+from wearsim.studies.life.integrated import integrated_stages
 from wearsim.studies.run.draws import Drawer
-from wearsim.types import FloatArray
 from wearsim.uq.survival.rare_events import log_weights, next_shift
 
-MOST_INPUTS = 4  # with a shift
 LEAST_TESTS = 200
 _ADAPTED = 2  # stages that choose the shift, each with a quarter of the tests
 
 
-def shifted_inputs(scenario: Scenario) -> list[str]:
-    """Return the inputs that may be shifted: one number per test, without rank correlation."""
-    correlated = {name for *names, _ in scenario.sampling.correlation for name in names}
-    return [
-        item.name
-        for item in scenario.random
-        if item.role == "scalar" and item.persistence == "per-test" and item.name not in correlated
-    ]
-
-
-def drawn_scores(drawer: Drawer, names: list[str], first: int, count: int) -> FloatArray:
-    """Return the normal scores of inputs in consecutive realisations, (count, inputs)."""
-    from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
-
-    uniforms = drawer.uniforms(first, count)
-    return np.column_stack([ndtri(uniforms[name][:, 0]) for name in names])
-
-
-def log_weight(drawer: Drawer, shift: dict[str, float], realisation: int) -> float:
-    """Return the logarithm of the weight of a realisation with shifted draws."""
-    scores = drawn_scores(drawer, list(shift), realisation, 1)
-    return float(log_weights(scores, np.array(list(shift.values())))[0])
-
-
-def changes_of(stages: Sequence[Mapping[str, Any]]) -> dict[int, tuple[int, float]]:
-    """Return from which realisation the draws of others depart, and the scale of the change."""
-    return {
-        stage["first"] + place: (parent, stage["scale"])
-        for stage in stages
-        for place, parent in enumerate(stage.get("parents", ()))
-    }
-
-
-def next_stage(result: LifeResult) -> dict[str, Any] | None:
-    """Return the first number, the count and the draws of the next tests; None if all are done.
+def next_stages(result: LifeResult) -> list[dict[str, Any]]:
+    """Return the first number, the count and the draws of the next tests; none if all are done.
 
     Parameters
     ----------
@@ -63,18 +28,20 @@ def next_stage(result: LifeResult) -> dict[str, Any] | None:
     Notes
     -----
     Two stages of a quarter of the tests choose the mean of the draws of the most influential
-    inputs; the next stage gives the estimate. If it is not reliable, those of subset simulation
-    follow.
+    inputs; the next stage gives the estimate. Where the wear factor is integrated exactly, see
+    `integrated_stages`. If the estimate is not reliable, the tests of subset simulation follow.
     """
     settings = result.settings
     if settings.target is None or not settings.rare:
-        return None
+        return []
     importance = by_importance(result)
     if needs_subset(settings.rare_method, importance):
         found = by_subset(result)
-        return found if isinstance(found, dict) else None
+        return [found] if isinstance(found, dict) else []
     if importance:
-        return None
+        return []
+    if settings.factor:
+        return integrated_stages(result)
     stages = list(settings.stages)
     done = sum(stage["count"] for stage in stages)
     first = settings.plain + done
@@ -93,8 +60,5 @@ def next_stage(result: LifeResult) -> dict[str, Any] | None:
         names, scores = [names[place] for place in chosen], scores[:, chosen]
     weights = log_weights(scores, np.array([last["shift"].get(name, 0.0) for name in names]))
     shift = next_shift(scores[good], response[good], weights[good])
-    return {
-        "first": first,
-        "count": count,
-        "shift": dict(zip(names, map(float, shift), strict=True)),
-    }
+    moved = dict(zip(names, map(float, shift), strict=True))
+    return [{"first": first, "count": count, "shift": moved}]

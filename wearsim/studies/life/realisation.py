@@ -18,8 +18,8 @@ from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
 from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths
 from wearsim.studies.life.batch import LifeRun, observe_lives
-from wearsim.studies.life.factor import ExactFactor, exact_factor
-from wearsim.studies.life.rare import changes_of, log_weight
+from wearsim.studies.life.draws import changes_of, log_weight
+from wearsim.studies.life.factor import NEGLIGIBLE, RARE, ExactFactor, exact_factor
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
 
@@ -74,9 +74,17 @@ class LevelRunner(RealisationRunner):
         fixed: Mapping[str, float],
         shift: Mapping[str, float],
         changes: Mapping[int, tuple[int, float]],
+        mixture: Sequence[tuple[float, Mapping[str, float]]] = (),
     ) -> None:
         super().__init__(scenario, "monte-carlo", total, grid)
         self.fixed, self.shift, self.changes = dict(fixed), dict(shift), dict(changes)
+        self.mixture = mixture
+
+    def log_weight(self, realisation: int) -> float:
+        """Return the logarithm of the weight of a realisation; 0 without a shift."""
+        if not self.shift:
+            return 0.0
+        return log_weight(self.drawer, self.shift, realisation, self.mixture)
 
     @cached_property
     def drawer(self) -> Drawer:
@@ -133,10 +141,14 @@ class LifeRunner(RealisationRunner):
 
     @property
     def longest(self) -> float:
-        """Passes up to which tests are run."""
-        if self.factor is None:
-            return self.settings.most
-        return math.ceil(self.settings.most * self.factor.greatest / self.settings.reference)
+        """Passes up to which tests are run; to the maximum and the target with great factors."""
+        settings, factor = self.settings, self.factor
+        if factor is None:
+            return settings.most
+        ends = settings.most * factor.exceeded(RARE)
+        if settings.target is not None:
+            ends = max(ends, settings.target * factor.exceeded(NEGLIGIBLE))
+        return math.ceil(ends / settings.reference)
 
     def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
         """Run realisations to their limits; the outcome of one that fails holds its error.
@@ -180,10 +192,16 @@ class LifeRunner(RealisationRunner):
         if (level, stage) not in self._levels:
             passes = min(self.base * EXTENSION**level, self.longest)
             scenario = with_length(self.scenario, passes)
-            shift = self.settings.stages[stage - 1]["shift"] if stage else {}
+            own = self.settings.stages[stage - 1] if stage else {"shift": {}}
             changes = changes_of(self.settings.stages[:stage])
             self._levels[level, stage] = LevelRunner(
-                scenario, self.total, self.grid, self.fixed, shift, changes
+                scenario,
+                self.total,
+                self.grid,
+                self.fixed,
+                own["shift"],
+                changes,
+                own.get("mixture", ()),
             )
         return self._levels[level, stage]
 
@@ -199,6 +217,5 @@ class LifeRunner(RealisationRunner):
             score_mean = self.factor.score_mean(runner.drawer, run.number)
         for name in ("life", "life_low", "life_high"):
             scalars[name] *= scale
-        weight = log_weight(runner.drawer, runner.shift, run.number) if runner.shift else 0.0
-        scalars |= {"score_mean": score_mean, "log_weight": weight}
+        scalars |= {"score_mean": score_mean, "log_weight": runner.log_weight(run.number)}
         return self.outcome(run, replace(found, scalars=scalars))

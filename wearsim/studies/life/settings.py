@@ -16,8 +16,9 @@ from wearsim.quantities import NUMBER, quantity
 from wearsim.results.ensemble.life_settings import DesignVariable, LifeSettings
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import checked_request
+from wearsim.studies.life.draws import shifted_inputs
 from wearsim.studies.life.factor import exact_factor
-from wearsim.studies.life.rare import LEAST_TESTS, shifted_inputs
+from wearsim.studies.life.rare import LEAST_TESTS
 from wearsim.studies.life.realisation import with_length
 from wearsim.units import QuantityError, kind_of
 
@@ -45,10 +46,10 @@ def with_rare_events(
         return settings
     if settings.target is None:
         raise ValueError("rare events need a target, the life of which the probability is small")
-    if settings.factor:
+    if settings.alone:
         raise ValueError(
-            f"{settings.factor} is integrated exactly, which gives small probabilities without"
-            " further tests"
+            f"{settings.factor} is integrated exactly, and nothing else is random: any probability"
+            " is known without further tests"
         )
     if precision is not None:
         raise ValueError("rare events go with a fixed number of realisations, not a precision")
@@ -59,7 +60,7 @@ def with_rare_events(
     drawn = [item for item in scenario.random if not item.is_redrawn and item.role != "process"]
     if not drawn:
         raise ValueError("rare events need an input that is drawn once per test or roller")
-    if not shifted_inputs(scenario):
+    if not shifted_inputs(scenario, settings.factor):
         if method == "importance":
             raise ValueError("no random input of one number per test can be shifted; use subset")
         method = "subset"

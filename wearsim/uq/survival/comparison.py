@@ -11,11 +11,13 @@ from wearsim.types import FloatArray
 from wearsim.uq.estimation.intervals import CONFIDENCE, UNKNOWN, Interval, t_quantile
 from wearsim.uq.estimation.mann_whitney import part_below
 from wearsim.uq.survival.distributions import CountedLives, LifeDistribution, logit_interval
-from wearsim.uq.survival.lives import proportion
+from wearsim.uq.survival.lives import median_rank, proportion
 
 SAMPLES = 2000  # bootstrap samples
 _GRID = 401  # lives at which mixtures are evaluated
+_ROUNDING = 1e-12  # relative distance of lives about a step
 _MOST = 4_000_000  # numbers of a block of samples
+_LARGEST = 40_000_000  # probabilities at all lives, beyond which steps are not resolved
 FEWEST = 5  # realisations for an interval
 
 
@@ -67,7 +69,8 @@ def two_specimens(
     -------
     Interval
         Student's t on the logit scale, with the error of DeLong, DeLong and Clarke-Pearson,
-        Biometrics 44 (1988), DOI 10.2307/2531595.
+        Biometrics 44 (1988), DOI 10.2307/2531595. Unknown for wear factors with so many single
+        values that the steps of the probabilities of all realisations are too many.
     """
     both_exact = first.exact and second.exact
     n, m = first.count, second.count
@@ -80,6 +83,8 @@ def two_specimens(
         own = (lives[0] > lives[1]) + 0.5 * (lives[0] == lives[1]) if paired else np.zeros(n)
     else:
         grid = _common_grid((first, second), most)
+        if len(grid) * max(n, m) > _LARGEST:
+            return UNKNOWN
         one, other = (_with_start(item.failed(grid)) for item in (first, second))
         alive, fails = 1.0 - 0.5 * (one[:, 1:] + one[:, :-1]), np.diff(other, axis=1)
         last = 1.0 - one[:, -1], 1.0 - other[:, -1]
@@ -132,7 +137,7 @@ def quantile_ratio(
     -------
     Interval
         Percentiles of the ratio, with the log scale stretched about the median by t over z and
-        sqrt(n/(n - 1)) for small samples.
+        sqrt(n/(n - 1)) for small samples. Unknown where `two_specimens` is for its steps.
 
     Notes
     -----
@@ -141,7 +146,10 @@ def quantile_ratio(
     """
     if min(first.count, second.count) < FEWEST and not (first.exact and second.exact):
         return UNKNOWN
-    grid = _common_grid((first, second), most)
+    counted = isinstance(first, CountedLives) and isinstance(second, CountedLives)
+    grid = np.zeros(0) if counted else _common_grid((first, second), most)
+    if len(grid) * max(first.count, second.count) > _LARGEST:
+        return UNKNOWN
     functions = [_weighted_quantile(item, grid, probability) for item in (first, second)]
     whole = [
         function(np.ones((1, item.count)))[0]
@@ -163,7 +171,7 @@ def quantile_ratio(
         with np.errstate(divide="ignore", invalid="ignore"):
             logs[start : start + size] = np.log(found[0]) - np.log(found[1])
     if not np.isfinite(logs).all():
-        return Interval(value, 0.0, math.inf)
+        return Interval(value, 0.0, math.inf) if math.isfinite(value) else UNKNOWN
     tail = 0.5 * (1.0 - CONFIDENCE)
     widening = t_quantile(n - 1) / t_quantile(math.inf) * math.sqrt(n / (n - 1))
     low, middle, high = np.quantile(logs, (tail, 0.5, 1.0 - tail))
@@ -175,12 +183,18 @@ def _ratio(one: float, other: float) -> float:
 
 
 def _common_grid(designs: tuple[LifeDistribution, ...], most: float) -> FloatArray:
-    """Return lives that span the distributions of all designs, up to the censoring."""
+    """Return lives that span the distributions of all designs, up to the censoring.
+
+    Each step of a probability is between two lives that are equal but for rounding.
+    """
     ends = [item.quantile_of_mean(p) for item in designs for p in (1e-7, 1.0 - 1e-7)]
     finite = [end for end in ends if 0.0 < end < math.inf] or [1.0]
     last = min(max(finite), most)
     grid = np.exp(np.linspace(math.log(min(*finite, 0.5 * last)), math.log(last), _GRID))
-    return np.append(grid[:-1], last)
+    steps = np.concatenate([item.steps for item in designs])
+    about = (steps[:, None] * (1.0 + _ROUNDING * np.array([-1.0, 1.0]))).ravel()
+    inner = np.concatenate([grid[:-1], about[(about > 0.0) & (about < last)]])
+    return np.append(np.unique(inner), last)
 
 
 def _with_start(failed: FloatArray) -> FloatArray:
@@ -194,17 +208,18 @@ def _weighted_quantile(
     """Return the function from weights, (samples, n), to the quantile of the weighted lives."""
     if isinstance(design, CountedLives):
         order = np.argsort(design.life)
-        lives = design.life[order]
+        lives, rank = design.life[order], median_rank(design.count, probability) - 1.0
 
         def counted(weights: FloatArray) -> FloatArray:
             # the mean of the two order statistics about the level, linear between their ranks
+            if math.isnan(rank):
+                return np.full(len(weights), math.nan)
             below = np.cumsum(weights[:, order], axis=1)
-            rank = probability * (below[:, -1:] - 1.0)
-            low = (below <= np.floor(rank)).sum(axis=1)
-            high = (below <= np.floor(rank) + 1.0).sum(axis=1)
-            part = (rank - np.floor(rank))[:, 0]
+            low = (below <= math.floor(rank)).sum(axis=1)
+            high = (below <= math.floor(rank) + 1.0).sum(axis=1)
+            part = rank - math.floor(rank)
             one, other = lives[low], lives[np.minimum(high, len(lives) - 1)]
-            return np.asarray(np.where(part > 0.0, one + part * (other - one), one))
+            return np.asarray(one + part * (other - one) if part > 0.0 else one)
 
         return counted
     failed, logs = design.failed(grid), np.log(grid)

@@ -15,42 +15,15 @@ from functools import cached_property
 
 import numpy as np
 
-from wearsim.types import FloatArray
-from wearsim.uq.distributions.base import Distribution
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval, bisect, t_quantile
+from wearsim.types import BoolArray, FloatArray
+from wearsim.uq.estimation.intervals import Interval, bisect, t_quantile
+from wearsim.uq.survival.effective import effective_number, fits_of, predicted_number
+from wearsim.uq.survival.scores import ScoreFunction
 
 _HALVINGS = 50
-_ROUNDING = 1e-12  # probability below which a mean over realisations is a matter of rounding
+_ROUNDING = 1e-12  # relative, of a mean of probabilities
+_ABOVE = 1e-12  # relative distance of a life from a step before it
 _WIDEST = 60.0  # range of ln life in which quantiles are sought, on both sides
-_SCORES = np.linspace(-8.2, 8.2, 16_401)  # normal scores at which a quantile function is tabulated
-
-
-def score_function(distribution: Distribution) -> Callable[[FloatArray], FloatArray]:
-    """Return the normal score of the distribution function, for any quantile function.
-
-    Parameters
-    ----------
-    distribution : Distribution
-        Of a positive number.
-
-    Returns
-    -------
-    callable
-        Function of values, infinite outside the support; interpolated in the logarithm of the
-        value, which is exact for a log-normal distribution.
-    """
-    from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
-
-    values = np.maximum(distribution.quantile(ndtr(_SCORES)), np.finfo(float).tiny)
-    logs, first = np.unique(np.log(values), return_index=True)
-    last = np.append(first[1:] - 1, len(_SCORES) - 1)  # a jump has the greater probability above
-
-    def score(value: FloatArray) -> FloatArray:
-        with np.errstate(divide="ignore"):
-            log = np.log(value)
-        return np.asarray(np.interp(log, logs, _SCORES[last], left=-math.inf, right=math.inf))
-
-    return score
 
 
 class LifeDistribution(ABC):
@@ -81,32 +54,61 @@ class LifeDistribution(ABC):
         """
         each = self.failed(np.array([life]))[:, 0]
         value = float(each.mean())
-        if self.exact or not _ROUNDING < value < 1.0 - _ROUNDING:
+        if self.exact:
             return Interval(value, value, value)
         if self.count < 2:
             return Interval(value, 0.0, 1.0)
-        error = float(each.std(ddof=1)) / math.sqrt(self.count)
-        return logit_interval(value, error, self.count - 1)
+        return logit_interval(value, *self.error(life, each))
+
+    def error(self, life: float, each: FloatArray) -> tuple[float, float]:
+        """Return the standard error of the mean probability, and its degrees of freedom.
+
+        Parameters
+        ----------
+        life : float
+        each : ndarray, shape (count,)
+            Probabilities of failure before it.
+        """
+        return float(each.std(ddof=1)) / math.sqrt(self.count), self.count - 1
 
     def quantile(self, probability: float) -> Interval:
-        """Return the life that a share does not reach; its ends invert `probability_before`."""
+        """Return the life that a share does not reach.
+
+        Notes
+        -----
+        The ends are the lives at which the mean probability has the ends of its interval at the
+        estimate (Woodruff, Journal of the American Statistical Association 47 (1952), DOI
+        10.1080/01621459.1952.10483443).
+        """
         value = self.quantile_of_mean(probability)
         if self.exact:
             return Interval(value, value, value)
         if self.count < 2:
             return Interval(value, 0.0, math.inf)
-        low = self._crossing(lambda n: self.probability_before(n).high, probability)
-        high = self._crossing(lambda n: self.probability_before(n).low, probability)
-        return Interval(value, low, high)
+        reach = math.exp(_WIDEST)
+        # just above, so that a step of the probability is included
+        life = min(max(value, self.middle / reach), self.middle * reach) * (1.0 + _ABOVE)
+        error, degrees = self.error(life, self.failed(np.array([life]))[:, 0])
+        ends = logit_interval(probability, error, degrees)
+        low = self.quantile_of_mean(ends.low)
+        high = self.quantile_of_mean(ends.high) if ends.high < 1.0 else math.inf
+        return Interval(value, min(low, value), max(high, value))
 
     def quantile_of_mean(self, probability: float) -> float:
         """Return a quantile without its interval."""
-        return self._crossing(lambda n: float(self.failed(np.array([n])).mean()), probability)
+        return self._crossing(
+            lambda n: float(self.failed(np.array([n])).mean()), probability * (1.0 - _ROUNDING)
+        )
 
     @cached_property
     @abstractmethod
     def middle(self) -> float:
         """A life within the distribution."""
+
+    @property
+    @abstractmethod
+    def steps(self) -> FloatArray:
+        """Lives at which the probability of a realisation has a step, in any order."""
 
     def _crossing(self, probability_at: Callable[[float], float], level: float) -> float:
         """Return the least life at which a rising probability reaches a level."""
@@ -124,8 +126,10 @@ class LifeDistribution(ABC):
 
 def logit_interval(value: float, error: float, degrees: float) -> Interval:
     """Return the interval of a probability by Student's t on the logit scale."""
-    if not 0.0 < value < 1.0:
-        return Interval(value, value, value) if error == 0.0 else UNKNOWN.within(0.0, 1.0)
+    if error == 0.0:
+        return Interval(value, value, value)
+    if not 0.0 < value < 1.0 or math.isinf(error):
+        return Interval(value, 0.0, 1.0)
     odds = value / (1.0 - value)
     reach = math.exp(min(t_quantile(degrees) * error / (value * (1.0 - value)), 700.0))
     return Interval(value, odds / (odds + reach), odds * reach / (1.0 + odds * reach))
@@ -139,8 +143,8 @@ class FactorMixture(LifeDistribution):
     ----------
     kappa : ndarray, shape (n,)
         Wear factor times passes at the limit; 0 where reached at once, infinite if never.
-    score : callable
-        Normal score of the distribution function of the wear factor, see `score_function`.
+    score : ScoreFunction
+        Normal score of the distribution function of the wear factor.
     shift : ndarray, shape (n,)
         Mean of that score given the other draws of a realisation; 0 without rank correlation.
     spread : float
@@ -151,6 +155,8 @@ class FactorMixture(LifeDistribution):
     Examples
     --------
     >>> from scipy.stats import lognorm
+    >>> from wearsim.uq.distributions.base import Distribution
+    >>> from wearsim.uq.survival.scores import score_function
     >>> class WearFactor(Distribution):
     ...     def quantile(self, probability):
     ...         return lognorm.ppf(probability, np.log(1.5), scale=1.1e-11)
@@ -160,7 +166,7 @@ class FactorMixture(LifeDistribution):
     """
 
     kappa: FloatArray
-    score: Callable[[FloatArray], FloatArray]
+    score: ScoreFunction
     shift: FloatArray | float = 0.0
     spread: float = 1.0
     exact: bool = False
@@ -173,13 +179,17 @@ class FactorMixture(LifeDistribution):
     @cached_property
     def middle(self) -> float:
         """A life within the distribution: that of the median wear factor."""
-        finite = self.kappa[np.isfinite(self.kappa) & (self.kappa > 0.0)]
-        if not len(finite):
-            return 1.0
-        from scipy.optimize import brentq  # noqa: PLC0415  (slow to load)
+        finite = self.kappa[self._is_finite]
+        return (
+            float(np.median(finite) / math.exp(self.score.log_quantile(0.0)))
+            if len(finite)
+            else 1.0
+        )
 
-        log = brentq(lambda x: min(max(float(self.score(np.exp(x))), -9.0), 9.0), -700.0, 700.0)
-        return float(np.median(finite) / math.exp(log))
+    @property
+    def steps(self) -> FloatArray:
+        """Lives of the finite realisations with each value of the factor that has a probability."""
+        return np.unique(self.kappa[self._is_finite][:, None] / self.score.atoms)
 
     def failed(self, life: FloatArray) -> FloatArray:
         """Return each realisation's probability of failure before `life`, (m,) to (count, m)."""
@@ -189,6 +199,67 @@ class FactorMixture(LifeDistribution):
             factor = self.kappa[:, None] / life
         shift = np.broadcast_to(np.asarray(self.shift), self.kappa.shape)[:, None]
         return np.asarray(ndtr((shift - self.score(factor)) / self.spread))
+
+    def error(self, life: float, each: FloatArray) -> tuple[float, float]:
+        """Return the standard error of the mean probability, and its degrees of freedom.
+
+        The error is at least the one predicted by fits of ln kappa, since a sample rarely contains
+        the realisations that cause most of the scatter of a small probability.
+        """
+        error, degrees = super().error(life, each)
+        mean, predicted = float(each.mean()), self._predicted(life, cautious=False)
+        if predicted == 0.0:  # a probability below the least number
+            return math.inf, 1.0
+        error = max(error, min(mean, 1.0 - mean) / math.sqrt(predicted))
+        return error, max(min(degrees, predicted - 1.0), 1.0)
+
+    def effective_number(self, life: float) -> float:
+        """Return the effective number of realisations of a probability of a life below `life`.
+
+        It is the number of counted failures that would have the variation of the estimate,
+        predicted with the upper limit of the spread of ln kappa; infinite if nothing is sampled.
+        """
+        if self.exact:
+            return math.inf
+        if self.count < 2:
+            return 0.0
+        each = self.failed(np.array([life]))[:, 0]
+        number = effective_number(self.count, float(each.mean()), float(each.var(ddof=1)))
+        return min(number, self._predicted(life, cautious=True))
+
+    def _predicted(self, life: float, cautious: bool) -> float:
+        """Return the effective number by the fits of ln kappa."""
+        from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
+
+        shares = float((self.kappa == 0.0).mean()), float(self._is_finite.mean())
+        return predicted_number(
+            self._fits[cautious],
+            lambda log: np.asarray(ndtr(-self.needed_score(log, life))),
+            shares,
+            self.count,
+        )
+
+    @cached_property
+    def _is_finite(self) -> BoolArray:
+        return np.isfinite(self.kappa) & (self.kappa > 0.0)
+
+    @cached_property
+    def log_kappa(self) -> tuple[FloatArray, BoolArray]:
+        """Finite ln kappa over the median factor given the other draws, and which are finite."""
+        chosen = self._is_finite
+        shift = np.broadcast_to(np.asarray(self.shift), self.kappa.shape)[chosen]
+        moved = self.score.log_quantile(shift) - self.score.log_quantile(0.0)
+        return np.log(self.kappa[chosen]) - moved, chosen
+
+    def needed_score(self, log_kappa: FloatArray, life: float) -> FloatArray:
+        """Return the score that the wear factor must exceed for a failure before `life`."""
+        return np.asarray(self.score(np.exp(log_kappa) / life) / self.spread)
+
+    @cached_property
+    def _fits(self) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Fits of ln kappa, and cautious ones."""
+        log, _ = self.log_kappa
+        return fits_of(log), fits_of(log, cautious=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +283,11 @@ class CountedLives(LifeDistribution):
         """The median of the finite lives."""
         finite = self.life[np.isfinite(self.life) & (self.life > 0.0)]
         return float(np.median(finite)) if len(finite) else 1.0
+
+    @property
+    def steps(self) -> FloatArray:
+        """The finite lives."""
+        return self.life[np.isfinite(self.life)]
 
     def failed(self, life: FloatArray) -> FloatArray:
         """Return whether each realisation has failed before `life`, (m,) to (count, m)."""

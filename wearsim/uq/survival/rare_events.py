@@ -87,13 +87,15 @@ def _result(
     return RareProbability(interval, tests, variation, size, obstacle)
 
 
-def weighted_probability(event: BoolArray, log_weight: FloatArray, tests: int) -> RareProbability:
+def weighted_probability(
+    event: BoolArray | FloatArray, log_weight: FloatArray, tests: int
+) -> RareProbability:
     """Return the probability of an event from draws of another density.
 
     Parameters
     ----------
-    event : ndarray of bool, shape (n,)
-        Whether each draw has the event.
+    event : ndarray of bool or float, shape (n,)
+        Whether each draw has the event, or its probability where one input is integrated.
     log_weight : ndarray, shape (n,)
         Logarithm of the ratio of the densities.
     tests : int
@@ -103,7 +105,7 @@ def weighted_probability(event: BoolArray, log_weight: FloatArray, tests: int) -
     -------
     RareProbability
     """
-    weight = np.where(event, np.exp(log_weight), 0.0)
+    weight = event * np.exp(log_weight)
     total, square, count = float(weight.sum()), float((weight**2).sum()), len(weight)
     if total == 0.0:
         return _result(0.0, math.inf, tests, 0.0, _few(0.0, tests))
