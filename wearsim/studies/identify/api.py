@@ -44,6 +44,7 @@ def identify(
     *,
     before: Sequence[str | Path] = (),
     shoulders: float | str | None = None,
+    curvature: bool = False,
     share: Sequence[str] = (),
     fix: Mapping[str, object] | None = None,
     choice: ProfileChoice | None = None,
@@ -73,6 +74,9 @@ def identify(
     shoulders : float or str, optional
         Distance from the middle of a groove beyond which the surface is unworn, "9 mm" or in
         metres; found by default.
+    curvature : bool
+        Whether the traces have an unknown curvature beside offset and inclination, as of a bow of
+        the instrument's guide; they need unworn shoulders then.
     share : sequence of str
         ("cylinder", "roller") if both bodies have one unknown factor of their K/H.
     fix : mapping of str to object, optional
@@ -121,7 +125,7 @@ def identify(
     scenario = with_chosen_model(scenario, test=True)
     shared = _checked_share(share)
     width = quantity(shoulders, "m") if isinstance(shoulders, str) else shoulders
-    items = _measurements(tests, before, choice, width)
+    items = _measurements(tests, before, choice, width, curvature)
     files = [path for item in items for path in (item.profile, item.before) if path is not None]
     if output is not None:
         check_output(Path(output), force, [*scenario.paths, *files])
@@ -142,11 +146,14 @@ def _measurements(
     before: Sequence[str | Path],
     choice: ProfileChoice | None,
     shoulders: float | None,
+    curvature: bool,
 ) -> list[Measurement]:
     """Return the measurements given by files, by a tests file, or as they are."""
     if isinstance(tests, str | Path):
         if Path(tests).suffix.lower() == ".toml":
-            return read_tests(tests)
+            return [
+                replace(item, curvature=item.curvature or curvature) for item in read_tests(tests)
+            ]
         tests = [tests]
     given = [item for item in tests if isinstance(item, Measurement)]
     if given and (before or len(given) < len(tests)):
@@ -154,9 +161,9 @@ def _measurements(
     if not tests:
         raise ValueError("no test is given; name its profile, or a tests file")
     if given:
-        return given
+        return [replace(item, curvature=item.curvature or curvature) for item in given]
     files = [item for item in tests if not isinstance(item, Measurement)]
-    return measurements_of(files, before, choice, shoulders)
+    return measurements_of(files, before, choice, shoulders, curvature)
 
 
 def _checked_share(share: Sequence[str]) -> bool:
