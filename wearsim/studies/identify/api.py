@@ -136,6 +136,7 @@ def identify(
     seconds = time.monotonic() - started
     given = {"measured": tables_of(items), "draws": draws, "shared": shared}
     data = content(study.scenario, specimens, negligible, study.notes, created, seconds, **given)
+    data.warnings.extend(study.left_out)
     if output is not None:
         write_results(Path(output), data)
     return IdentificationResult(data, Path(output) if output is not None else None)
@@ -194,14 +195,20 @@ class _Study:
     ) -> None:
         self.scenario, self.items, self.draws, self.shared = scenario, items, draws, shared
         self.notes: list[str] = list(scenario.notes)
+        self.left_out: list[str] = []
         self._by_inputs: dict[str, list[_Ready]] = {}
         for item in items:
             ready = self._ready(item)
+            if ready is None:
+                continue
             known = sorted(item.values.items()), sorted(item.errors.items())
             self._by_inputs.setdefault(repr(known), []).append(ready)
+        if not self._by_inputs:
+            what = f"no groove can be used: {'; '.join(self.left_out)}"
+            raise ScenarioError(items[0].file or items[0].name, [Mistake("", "", what)])
 
-    def _ready(self, item: Measurement) -> _Ready:
-        """Read a measurement."""
+    def _ready(self, item: Measurement) -> _Ready | None:
+        """Read a measurement; None if it is left out."""
         if item.body == "roller" and not self.shared:
             what = "wear of the roller is measured, and its K/H is that of the scenario"
             expected = "share = cylinder, roller (--share k=cylinder,roller)"
@@ -219,11 +226,12 @@ class _Study:
             greatest = 0.125 * (trace.y[-1] - trace.y[0]) ** 2 / crown
             return _Ready(item, scenario, trace, passes, (0.2 * greatest, 1.2 * greatest))
         if trace.depth < _LEAST_SIGNAL * trace.noise.std:
-            what = (
-                f"the groove is {1e6 * trace.depth:.3g} um deep, and the noise of the shoulders is"
-                f" {1e6 * trace.noise.std:.3g} um: no wear can be seen"
+            self.left_out.append(
+                f"{item.name} is left out: its groove is {1e6 * trace.depth:.3g} um deep, and the"
+                f" noise of the shoulders is {1e6 * trace.noise.std:.3g} um, so that no wear can be"
+                " seen; if it wore less than the others, K/H of the others is not that of all"
             )
-            raise ScenarioError(item.name, [Mistake("", "", what)])
+            return None
         return _Ready(item, scenario, trace, passes, (trace.depth, trace.depth))
 
     def rows(self, watch: Callable[[int, int], None] | None) -> list[Identified]:
@@ -250,7 +258,7 @@ class _Study:
             if trajectories.lost:
                 self.notes.append(f"{trajectories.lost} draws are left out, whose tests failed")
             found.update({id(row.item): row for row in some})
-        return [found[id(item)] for item in self.items]
+        return [found[id(item)] for item in self.items if id(item) in found]
 
     def _group(
         self, group: Sequence[_Ready], draws: int | None, report: Callable[[int, int], None]

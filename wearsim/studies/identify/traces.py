@@ -152,6 +152,8 @@ def _without_spikes(profile: Profile) -> BoolArray:
             good[part] = False
     for _ in range(2):
         kept = np.flatnonzero(good)
+        # at the ends the window is mirrored, where an inclination looks like a bend
+        height = profile.height - np.polyval(_line_of_ends(y[kept], profile.height[kept]), y)
         spacing = float(np.median(np.diff(y[kept])))
         half = int(np.clip(0.5 * _WINDOW / spacing, 3, len(kept) // 4))
         padded = np.pad(height[kept], half, mode="symmetric")
@@ -166,6 +168,15 @@ def _without_spikes(profile: Profile) -> BoolArray:
             break
         good[kept[far]] = False
     return good
+
+
+def _line_of_ends(y: FloatArray, height: FloatArray) -> tuple[float, float]:
+    """Return slope and offset of the line through the medians of both ends of a trace."""
+    ends = max(2, int(0.06 * len(y)))
+    first, last = float(np.median(height[:ends])), float(np.median(height[-ends:]))
+    start = float(y[:ends].mean())
+    slope = (last - first) / (float(y[-ends:].mean()) - start)
+    return slope, first - slope * start
 
 
 def _thinned(profile: Profile, item: Measurement, crown_radius: float, averaged: bool) -> Trace:
@@ -214,12 +225,7 @@ def level(
     """
     y, height = trace.y, trace.height
     item = Measurement(trace.name)
-    ends = np.maximum(2, int(0.06 * len(y)))
-    left, right = (slice(0, ends), slice(len(y) - ends, len(y)))
-    slope = (np.median(height[right]) - np.median(height[left])) / (
-        y[right].mean() - y[left].mean()
-    )
-    level_ = height - np.median(height[left]) - slope * (y - y[left].mean())
+    level_ = height - np.polyval(_line_of_ends(y, height), y)
     _check_sign(item, level_)
     unworn = np.zeros(len(y), dtype=np.bool_)
     middle = 0.5 * (y[0] + y[-1])
