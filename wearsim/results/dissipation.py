@@ -307,7 +307,7 @@ def _summary(
     return replace(
         found,
         mean=known.mean.value,
-        std=known.std.value,
+        std=known.std.value if math.isfinite(known.std.value) else found.std,
         mean_error=mean_error,
         std_error=std_error,
         quantiles=tuple(quantiles),
