@@ -207,7 +207,7 @@ def test_bow_of_a_trace_is_fitted_where_it_is_asked_for(tmp_path: Path):
 
 def test_curvature_without_shoulders_is_refused(tmp_path: Path):
     path = write(tmp_path / "t.csv", *groove(np.random.default_rng(1), half=7.2e-3))
-    with pytest.raises(ScenarioError, match="cannot be told from the groove"):
+    with pytest.raises(ScenarioError, match="cannot be distinguished from the groove"):
         wearsim.identify(rig(), [path], curvature=True)
 
 

@@ -34,7 +34,7 @@ _SUSPECT = 1.6
 _CONFOUNDED = Mistake(
     "",
     "curvature",
-    "cannot be told from the groove, since the trace has no unworn shoulders",
+    "cannot be distinguished from the groove, since the trace has no unworn shoulders",
     "true",
     "a trace with shoulders, or no curvature",
 )
