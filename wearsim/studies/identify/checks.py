@@ -16,8 +16,8 @@ _EDGE = 0.01  # of the depth, where a groove ends
 _WIDTH_WARNED, _WIDTH_REFUSED = 0.08, 0.25  # relative difference of measured and predicted width
 _FOREIGN = 100.0  # mean square of the residuals over that of the noise
 _LEAST_PART = 0.1  # of a variance, that a difference of two estimates has at least
-_OTHER_DEPTH = 2.58  # standard deviations: one sound groove of a hundred is warned of
-_OTHER_FORM = 1.645  # the same for one trace of ten, since a curvature is seen late
+_OTHER_DEPTH = 2.58  # standard deviations: 2 to 3 sound grooves of a hundred are warned of
+_OTHER_FORM = 1.645  # the same: 6 straight traces of a hundred, since a curvature is seen late
 
 
 def profiles_of_depth(grown: Grown, body: str, depth: float) -> FloatArray:
