@@ -184,7 +184,7 @@ def test_convergence_ends_at_the_summary():
     assert found.count[-1] == 500
     assert (np.diff(found.count) > 0).all()
     assert found.mean[-1] == pytest.approx(power.mean, rel=1e-13)
-    assert found.std_error[-1] == power.std_error
+    np.testing.assert_equal(found.std_error[-1], power.std_error)
 
 
 def test_repr_of_study():

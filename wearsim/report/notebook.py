@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.report.summary import NINETY_FIVE, Rows, end_state, estimates, standing
+from wearsim.report.summary import Rows, end_state, estimates, standing
 from wearsim.report.text import count, shown
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.results.ensemble.life import LifeResult
@@ -68,7 +68,7 @@ def _rows(result: Result | DissipationResult | EnsembleResult) -> Rows:
     done = [("realisations", f"{count(result.count)} of {count(result.raw.requested)}")]
     if isinstance(result, DissipationResult):
         power = result.summaries["power"]
-        error = shown(NINETY_FIVE * power.mean_error, "W", 2)
+        error = shown(power.mean_interval.half_width, "W", 2)
         return [*done, ("mean dissipated power", f"{shown(power.mean, 'W')} ± {error}")]
     if isinstance(result, LifeResult):
         return [

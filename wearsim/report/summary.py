@@ -279,9 +279,6 @@ def run_json(result: Result) -> dict[str, Any]:
     }
 
 
-NINETY_FIVE = 1.96  # standard errors of the half-width of a normal 95 % interval
-
-
 def run_line(result: Result) -> str:
     """Return the footer of a run, with the estimated errors of its stepping."""
     used = [result.described_model, f"{len(result.y)} strips", result.stepper]
@@ -326,7 +323,7 @@ def dissipation_line(result: DissipationResult) -> str:
     power = result.summaries["power"]
     used = [result.described_model, f"{len(result.y)} strips", result.raw.plan]
     used.append(f"{count(result.count)} realisations")
-    error = _within("mean dissipated power", NINETY_FIVE * power.mean_error, power.mean)
+    error = _within("mean dissipated power", power.mean_interval.half_width, power.mean)
     return _line(used, f"{error} (95 % interval)", lapse(result.raw.wall_seconds))
 
 

@@ -315,12 +315,15 @@ def _study_tables(raw: DissipationData) -> dict[str, Iterable[str]]:
 
 def _identification_tables(result: IdentificationResult) -> dict[str, Iterable[str]]:
     """Return the tables of an identification: tests, and all traces below each other."""
-    heads = ("file", "specimen", "passes", "depth [um]", "K/H [1/Pa]", "low [1/Pa]", "high [1/Pa]")
+    depths = ("depth [um]", "model_depth [um]")
+    heads = ("file", "specimen", "passes", *depths, "K/H [1/Pa]", "low [1/Pa]", "high [1/Pa]")
     rows = [
         [
             test["file"],
             test["specimen"],
-            *(f"{value:.12g}" for value in (test["passes"], 1e6 * test["depth_m"])),
+            f"{test['passes']:.12g}",
+            "" if test["depth_m"] is None else f"{1e6 * test['depth_m']:.12g}",
+            f"{1e6 * test['model_depth_m']:.12g}",
             *(f"{test['k_over_h_per_Pa'][name]:.12g}" for name in ("value", "low", "high")),
         ]
         for test in result.tests

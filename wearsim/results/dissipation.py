@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -24,7 +24,9 @@ from wearsim.results.content import (
 )
 from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray
-from wearsim.uq.estimation.moments import Convergence, Summary, converge, summarise
+from wearsim.uq.estimation.estimates import Design, estimate
+from wearsim.uq.estimation.moments import Convergence, Quantile, Summary, converge, summarise
+from wearsim.uq.estimation.standard_errors import Replicated
 
 if TYPE_CHECKING:
     import pandas
@@ -107,9 +109,13 @@ class DissipationData(StudyData):
         Estimates over the realisations, for other programs that read the file.
     solve_seconds : float
         Time spent on contact solves [s].
+    replicates : int
+        Number of independently scrambled Sobol sequences, to which the realisations belong in
+        turn; 1 for other designs.
     """
 
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored | {"variables"}
+    optional: ClassVar[frozenset[str]] = frozenset({"replicates"})
 
     plan: str
     inputs: list[dict[str, str]]
@@ -120,6 +126,7 @@ class DissipationData(StudyData):
     variables: Arrays
     solve_seconds: float
     statistics: dict[str, Any] = field(default_factory=dict)
+    replicates: int = 1
 
     @property
     def schema(self) -> Schema:
@@ -234,7 +241,7 @@ class DissipationResult(StudyResult[DissipationData]):
     @cached_property
     def summaries(self) -> dict[str, Summary]:
         """Estimates of power, forces, moment and pressure over the realisations, by variable."""
-        return summaries(self.raw.variables)
+        return summaries(self.raw.variables, self.raw.plan, self.raw.replicates)
 
     def convergence(self, points: int = 200) -> Convergence:
         """Return mean and standard deviation of the power against the number of realisations.
@@ -253,23 +260,68 @@ class DissipationResult(StudyResult[DissipationData]):
         (100, True)
         """
         counts = np.geomspace(1, self.count, min(points, self.count)).round()
-        return converge(self.power, np.unique(counts.astype(np.int64)))
+        found = converge(self.power, np.unique(counts.astype(np.int64)))
+        if self.raw.plan != "sobol":
+            return found
+        errors = [
+            _replicated_errors(self.power[:count], self.raw.replicates) for count in found.count
+        ]
+        mean_error, std_error = np.array(errors).T
+        return replace(found, mean_error=mean_error, std_error=std_error)
 
 
-def summaries(variables: Arrays) -> dict[str, Summary]:
+def summaries(
+    variables: Arrays, plan: str = "monte-carlo", replicates: int = 1
+) -> dict[str, Summary]:
     """Return estimates over the realisations, for each variable of `SUMMARISED`.
 
     Parameters
     ----------
     variables : dict of str to ndarray
         Variables of a dissipation study.
+    plan : str
+        Its sampling design.
+    replicates : int
+        Number of independent Sobol sequences, to which the realisations belong in turn.
 
     Returns
     -------
     dict of str to Summary
     """
     probabilities = tuple(sorted({*BAND, *PAPER_BAND, 0.5}))
-    return {name: summarise(variables[name], probabilities) for name in SUMMARISED}
+    return {name: _summary(variables[name], probabilities, plan, replicates) for name in SUMMARISED}
+
+
+def _summary(
+    values: FloatArray, probabilities: tuple[float, ...], plan: str, replicates: int
+) -> Summary:
+    """Return estimates with the errors and intervals of a sampling design."""
+    design: Design = "sobol" if plan == "sobol" else "monte-carlo"
+    found = summarise(values, probabilities)
+    known = estimate(values, probabilities, design, np.arange(len(values)) % replicates)
+    found = replace(found, mean_interval=known.mean, std_interval=known.std)
+    if design == "monte-carlo" or found.is_constant:
+        return found
+    mean_error, std_error = _replicated_errors(values, replicates)
+    quantiles = [Quantile(item.value, item.low, item.high, p) for p, item in known.quantiles]
+    return replace(
+        found,
+        mean=known.mean.value,
+        std=known.std.value if math.isfinite(known.std.value) else found.std,
+        mean_error=mean_error,
+        std_error=std_error,
+        quantiles=tuple(quantiles),
+    )
+
+
+def _replicated_errors(values: FloatArray, replicates: int) -> tuple[float, float]:
+    """Return the standard errors of mean and standard deviation by independent sequences."""
+    errors = Replicated(np.arange(len(values)) % replicates)
+    std = float(values.std())
+    if errors.degrees < 1 or std == 0.0:
+        return math.nan, math.nan
+    deviation = values - values.mean()
+    return errors.error(deviation), errors.error(deviation**2) / (2.0 * std)
 
 
 def as_numbers(found: dict[str, Summary]) -> dict[str, Any]:

@@ -50,7 +50,7 @@ VARIABLES: Mapping[str, Variable] = by_name(
 
 IDENTIFICATION = Schema(
     "wearsim-identification",
-    1,
+    2,
     "wear factors of measured grooves, from `wearsim identify`",
     by_name(
         (
@@ -169,6 +169,20 @@ class IdentificationResult(StudyResult[IdentificationData]):
         """Evidence of equal wear factors over that of scattered ones."""
         return float(self.raw.summary["bayes_factor"])
 
+    @property
+    def verdict_words(self) -> str:
+        """Verdict with its reason in words."""
+        t = self.scatter_of_k
+        size = f"a scatter of {t['value']:.2g} (95 %: {t['low']:.2g} to {t['high']:.2g})"
+        below = f"that of ln K/H is below the negligible {self.summary['negligible']:g}"
+        if self.verdict == "random":
+            return f"random, with {size}"
+        if self.verdict == "undecided":
+            return "undecided: these tests cannot show whether K/H scatters"
+        if self.summary["scatter_detected"]:
+            return f"explained: {below}, although {size} is detected"
+        return f"explained: the inputs explain the scatter; {below}"
+
     def samples(self, draws: int = 500, seed: int = 1) -> xarray.Dataset:
         """Return samples of mean, scatter and every ln K/H together, as arviz reads them.
 
@@ -213,12 +227,13 @@ class IdentificationResult(StudyResult[IdentificationData]):
         --------
         >>> from wearsim.studies.identify.measurements import Measurement
         >>> depths = [Measurement(f"test {d}", depth=d, depth_std=1e-6) for d in (45e-6, 48e-6)]
-        >>> print(wearsim.identify("rig.toml", depths).posterior_toml().splitlines()[2])
+        >>> print(wearsim.identify("rig.toml", depths).posterior_toml().splitlines()[3])
         [wear.cylinder.k_over_h]
         """
         found, scatter = self.raw.summary["next_specimen"], self.scatter_of_k
         return (
-            f"# K/H of the next specimen by {len(self.raw.specimens)} specimens: {self.verdict}\n"
+            f"# K/H of the next specimen by {len(self.raw.specimens)} specimens\n"
+            f"# {self.verdict_words}\n"
             f"# scatter of ln K/H {scatter['value']:.3g}"
             f" (95 %: {scatter['low']:.3g} to {scatter['high']:.3g})\n"
             "[wear.cylinder.k_over_h]\n"

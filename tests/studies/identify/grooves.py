@@ -58,13 +58,18 @@ def grown() -> Grown:
 
 
 def groove(
-    rng: np.random.Generator, k: float = K, shift: float = 0.2e-3, half: float = 11e-3
+    rng: np.random.Generator,
+    k: float = K,
+    shift: float = 0.2e-3,
+    half: float = 11e-3,
+    noise: Noise = NOISE,
+    inclination: float = 2e-4,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return positions and heights of a noisy groove with offset and inclination [m]."""
     y = np.arange(-half, half, 40e-6)
     clean = TraceLikelihood(y, np.zeros_like(y), NOISE, grown())
     worn = clean.worn(np.array([0]), np.array([np.log(k)]), np.array([shift]))[:, 0]
-    return y, 3e-6 + 2e-4 * y - worn + NOISE.sample(y, rng.standard_normal((2, len(y))))
+    return y, 3e-6 + inclination * y - worn + noise.sample(y, rng.standard_normal((2, len(y))))
 
 
 def write(path: Path, y: np.ndarray, height: np.ndarray, names: str = "y [mm],height [um]") -> Path:

@@ -10,9 +10,13 @@ import pytest
 import wearsim
 from tests.studies.identify.grooves import NOISE, PASSES, RANDOM, K, groove, grown, rig, write
 from wearsim.errors import CapabilityError, ScenarioError
+from wearsim.report.figures.identification import identification_figure
+from wearsim.report.page.identification_part import of_identification
+from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.identify import api, trajectories
 from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.measurements import Measurement
+from wearsim.studies.identify.planning import DEPTH_ERROR, plan_tests
 from wearsim.studies.identify.trajectories import Grower
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
@@ -31,7 +35,8 @@ def test_known_inputs_give_the_wear_factor_of_a_groove(tmp_path: Path):
     k = test["k_over_h_per_Pa"]
     assert k["low"] < K < k["high"]
     assert k["high"] / k["low"] < 1.08
-    assert test["depth_m"] == pytest.approx(48.1e-6, abs=0.8e-6)
+    assert test["model_depth_m"] == pytest.approx(48.1e-6, abs=0.8e-6)
+    assert test["depth_m"] == pytest.approx(48.1e-6, abs=1.5e-6)
     assert 0.8 < test["residual_ratio"] < 1.25
     assert abs(test["residual_autocorrelation"]) < 0.15
     assert found.summary["scatter_seen"] is None
@@ -141,6 +146,22 @@ def test_paper_depths_are_undecided_and_reproducible():
     assert alone == pytest.approx(np.hypot(np.log(1.2), np.log(1.3)), rel=0.1)
 
 
+def test_small_detected_scatter_is_explained_everywhere(tmp_path: Path):
+    values = 48.0 * (1.0 + 0.03 * np.linspace(-1.5, 1.5, 12))
+    tests = [Measurement(f"{d:.3f} um", depth=d * 1e-6, depth_std=0.1e-6) for d in values]
+    found = wearsim.identify(rig(), tests, tmp_path / "k.h5")
+    assert found.verdict == "explained"
+    assert found.summary["scatter_detected"]
+    assert found.scatter_of_k["low"] > 0.0
+    words = "is below the negligible 0.2, although a scatter of 0.04"
+    assert words in found.verdict_words
+    assert words in found.posterior_toml()
+    assert words in identification_figure(found).get_suptitle()
+    assert dict(of_identification(found).answer)["Is K/H random?"] == found.verdict_words
+    strict = wearsim.identify(rig(), tests, negligible=0.02)
+    assert strict.verdict == "random"
+
+
 def test_results_file_and_posterior_are_used_again(tmp_path: Path):
     tests = [depth(45.0), depth(48.0), depth(52.0)]
     path = tmp_path / "k.h5"
@@ -171,9 +192,69 @@ def test_groove_of_another_rig_is_refused(tmp_path: Path):
     assert any("another rig" in text for text in found.warnings)
 
 
+def test_bow_of_a_trace_is_fitted_where_it_is_asked_for(tmp_path: Path):
+    y, height = groove(np.random.default_rng(3), half=12e-3)
+    path = write(tmp_path / "t.csv", y, height + 6e-6 * (y / 12e-3) ** 2)
+    straight, curved = (wearsim.identify(rig(), [path], curvature=c) for c in (False, True))
+    (low, high) = (curved.tests[0]["k_over_h_per_Pa"][end] for end in ("low", "high"))
+    assert low < K < high
+    assert not low < straight.tests[0]["k_over_h_per_Pa"]["value"] < high
+    (text,) = straight.warnings
+    assert "may follow a curvature of the trace" in text
+    assert curved.warnings == ()
+    assert curved.raw.measured[0]["curvature"] is True
+
+
+def test_curvature_without_shoulders_is_refused(tmp_path: Path):
+    path = write(tmp_path / "t.csv", *groove(np.random.default_rng(1), half=7.2e-3))
+    with pytest.raises(ScenarioError, match="cannot be distinguished from the groove"):
+        wearsim.identify(rig(), [path], curvature=True)
+
+
+def test_measured_depth_differs_where_the_wear_of_the_roller_is_ignored(tmp_path: Path):
+    both = rig().changed({"wear.roller.k_over_h": "4e-12 1/Pa"})
+    run = wearsim.run(both)
+    y = np.arange(-12e-3, 12e-3, 40e-6)
+    worn = np.interp(y, run.y, run.profiles[-1])
+    noise = NOISE.sample(y, np.random.default_rng(1).standard_normal((2, len(y))))
+    path = write(tmp_path / "t.csv", y, noise - worn)
+    (test,) = (found := wearsim.identify(rig(), [path])).tests
+    low, high = test["depth_interval_m"]
+    assert low < run.depth[-1] < high
+    assert not test["model_depth_interval_m"][0] < run.depth[-1] < test["model_depth_interval_m"][1]
+    assert any("does the roller wear too" in text for text in found.warnings)
+    (shared,) = wearsim.identify(both, [path], share=("cylinder", "roller")).tests
+    low, high = shared["model_depth_interval_m"]
+    assert low < run.depth[-1] < high
+
+
+def test_shallow_groove_is_left_out_with_a_warning(tmp_path: Path):
+    rng = np.random.default_rng(1)
+    good = write(tmp_path / "t.csv", *groove(rng))
+    y = np.arange(-11e-3, 11e-3, 40e-6)
+    flat = 1e-6 * (np.abs(y) > 1e-3) + NOISE.sample(y, rng.standard_normal((2, len(y))))
+    shallow = write(tmp_path / "s.csv", y, flat)
+    found = wearsim.identify(rig(), [good, shallow])
+    assert [test["file"] for test in found.tests] == [str(good)]
+    assert any("s.csv is left out" in text for text in found.warnings)
+    with pytest.raises(ScenarioError, match="no groove can be used"):
+        wearsim.identify(rig(), [shallow])
+
+
+def test_power_is_that_of_a_plan_of_the_same_tests(monkeypatch: pytest.MonkeyPatch):
+    scenario = rig(random=True)
+    (plan,) = plan_tests(scenario, [3], draws=64)
+    reached = float(closed_form_depths(scenario, {}, 1)[0])
+    error = DEPTH_ERROR * reached
+    tests = [Measurement(f"test {n}", depth=reached, depth_std=error) for n in range(3)]
+    found = wearsim.identify(scenario, tests, draws=64).summary["to_decide"]
+    assert found["power"] == plan.random[0.4][0]
+    assert found["tests"] == plan.needed[0.4]
+
+
 def test_groove_wider_than_the_trace_is_refused(tmp_path: Path):
     path = write(tmp_path / "t.csv", *groove(np.random.default_rng(1), half=4e-3))
-    with pytest.raises(ScenarioError, match="wider than the trace"):
+    with pytest.raises(ScenarioError, match="may be wider than the trace"):
         wearsim.identify(rig(), [path])
 
 
@@ -183,6 +264,8 @@ def test_trace_without_shoulders_knows_less(tmp_path: Path):
     k = test["k_over_h_per_Pa"]
     assert k["low"] < K < k["high"]
     assert k["high"] / k["low"] > 1.15
+    assert test["depth_m"] is None
+    assert test["residual_ratio"] is None
 
 
 def test_scenarios_without_a_wear_factor_are_refused():

@@ -11,7 +11,13 @@ from tests.studies.identify.grooves import NOISE, groove, write
 from wearsim.errors import ScenarioError
 from wearsim.studies.identify import traces
 from wearsim.studies.identify.measurements import Measurement, measurements_of
-from wearsim.studies.identify.traces import Trace, half_depth_width, read_trace
+from wearsim.studies.identify.traces import (
+    Trace,
+    half_depth_width,
+    level,
+    measured_depth,
+    read_trace,
+)
 from wearsim.types import Profile
 
 CROWN = 0.5
@@ -55,6 +61,27 @@ def test_spikes_and_dropouts_are_left_out(tmp_path: Path):
     rough[::3] += 3e-4 * (1.0 + np.arange(len(rough[::3])) % 2)
     with pytest.raises(ScenarioError, match="are spikes or dropouts"):
         trace(write(tmp_path / "bad.csv", y, rough))
+
+
+def test_good_points_of_an_inclined_trace_are_kept(tmp_path: Path):
+    y, height = groove(np.random.default_rng(1), inclination=20e-3)
+    found = trace(write(tmp_path / "t.csv", y, height))
+    assert len(found.y) == len(y)
+    assert found.notes == ()
+    assert found.inclination == pytest.approx(20e-3, rel=5e-3)
+
+
+def test_measured_depth_is_not_biased_by_noise():
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(40):
+        y, height = groove(rng, half=12e-3)
+        unworn = np.zeros(len(y), dtype=bool)
+        one = level(Trace("t", y, height, unworn, "", None, None, None, 0.0), None, CROWN)
+        found.append(measured_depth(one, CROWN))
+    values, errors = np.array(found).T
+    assert values.mean() == pytest.approx(DEPTH, abs=0.2e-6)
+    assert 0.7 < errors.mean() / values.std() < 1.6
 
 
 def test_difference_of_traces_removes_the_form(tmp_path: Path):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import chdtrc, chdtri, ndtri
 
 from wearsim.uq.hierarchy.kernels import Kernel
 from wearsim.uq.hierarchy.pooled import Posterior
-from wearsim.uq.hierarchy.verdict import Design, needed_tests, normal_power, word
+from wearsim.uq.hierarchy.verdict import ALPHA, Design, Power, word
 
 #: ln of the energy of the paper's tests, which wore 28, 48 and 62 um: depth ~ energy^(2/3)
 PAPER = 1.5 * np.log([28.0, 48.0, 62.0])
@@ -16,6 +17,12 @@ PAPER = 1.5 * np.log([28.0, 48.0, 62.0])
 def normal(centre: float, std: float) -> Kernel:
     """Return the likelihood of a test whose apparent ln K is normal."""
     return Kernel(np.ones(1), np.array([centre]), np.array([std]))
+
+
+def normal_power(tests: int, variance: float, t: float) -> float:
+    """Return the power of the variance test for normal values of equal variance: closed form."""
+    limit = chdtri(tests - 1, ALPHA)
+    return float(chdtrc(tests - 1, limit * variance / (variance + t * t)))
 
 
 def paper() -> list[Kernel]:
@@ -50,8 +57,6 @@ def test_flat_prior_of_m_gives_the_closed_form():
 @pytest.mark.parametrize("tests", [3, 8, 20])
 def test_verdict_has_its_error_rate_and_the_ideal_power(tests: int):
     middles = (np.arange(256) + 0.5) / 256
-    from scipy.special import ndtri
-
     kernel = Kernel.of(np.zeros(256), 0.417 * ndtri(middles), np.full(256, 0.01))
     design = Design([kernel], tests, sets=4000)
     assert design.rates(0.0)[0] <= 0.07
@@ -69,8 +74,32 @@ def test_power_of_the_variance_test_as_published():
     powers = [normal_power(n, 0.417**2, 0.4) for n in (3, 10, 40)]
     assert powers == pytest.approx([0.21, 0.46, 0.90], abs=0.01)
     assert normal_power(3, 0.1**2, 0.4) == pytest.approx(0.84, abs=0.005)
-    assert needed_tests(0.417**2, 0.4) == 29
-    assert needed_tests(1.0, 1e-3) is None
+
+
+def test_needed_tests_are_those_of_the_closed_form_for_normal_values():
+    # the closed form has a power of 0.8 from 29 tests on
+    assert normal_power(28, 0.417**2, 0.4) < 0.8 < normal_power(29, 0.417**2, 0.4)
+    assert Power([normal(0.0, 0.417)]).needed(0.4) == pytest.approx(29, abs=3)
+    assert Power([normal(0.0, 1.0)], sets=200).needed(1e-3) is None
+
+
+def test_more_tests_repeat_the_given_ones():
+    given = [normal(0.0, 0.1), normal(0.0, 0.8)]
+    found = Design(given, 4, sets=500).simulated(0.0, "null").std(axis=0)
+    assert found == pytest.approx([0.1, 0.8, 0.1, 0.8], rel=0.15)
+
+
+def test_small_detected_scatter_is_negligible():
+    # forty tests with a scatter of 0.05 and precise inputs show it, and that it is negligible
+    centres = 0.05 * ndtri((np.arange(40) + 0.5) / 40)
+    kernels = [normal(centre, 0.005) for centre in centres]
+    design, posterior = Design(kernels, sets=500), Posterior.of(kernels)
+    upper = posterior.scatter([0.95])[0]
+    assert design.ratio(centres) > design.quantile
+    assert word(True, upper, 0.2) == "explained"
+    assert word(True, upper, 0.02) == "random"
+    decision = design.decide(centres[None])
+    assert (bool(decision.random[0]), bool(decision.explained[0])) == (False, True)
 
 
 def test_smoothing_keeps_mean_and_variance_of_the_draws():

@@ -46,7 +46,7 @@ Tests = Annotated[
         "--tests",
         metavar="TESTS.toml",
         help="Tests as [[test]] tables: profile or depth with depth_std; before, at, group, set,"
-        " std, body, shoulders, columns, units.",
+        " std, body, shoulders, curvature, columns, units.",
         show_default=False,
     ),
 ]
@@ -67,6 +67,14 @@ Shoulders = Annotated[
         help="Distance from the middle of the groove beyond which the surface is unworn: '9 mm';"
         " default: beyond the predicted groove.",
         show_default=False,
+    ),
+]
+Curvature = Annotated[
+    bool,
+    typer.Option(
+        "--curvature",
+        help="Fit a curvature of each trace, as of a bow of the instrument's guide, beside offset"
+        " and inclination; needs unworn shoulders.",
     ),
 ]
 Share = Annotated[
@@ -144,6 +152,7 @@ def identify(
     tests: Tests = None,
     before: Before = None,
     shoulders: Shoulders = None,
+    curvature: Curvature = False,
     share: Share = None,
     fix: Fix = None,
     columns: Columns = None,
@@ -221,6 +230,7 @@ def identify(
             output,
             before=[Path(name.strip()) for name in before.split(",")] if before else [],
             shoulders=distance,
+            curvature=curvature,
             share=bodies,
             choice=choice,
             draws=draws,

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from wearsim.cli.shared import write_list, write_table
 from wearsim.report.summary import CONSTANT, QUANTITIES, Rows, input_rows
 from wearsim.report.text import NOTHING, count, in_unit, lapse, shown
 from wearsim.results import DissipationResult
+from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import Summary, is_constant
 
 _ROUNDING = 1e-12  # rounding errors of forces, relative to the normal force
@@ -36,7 +39,7 @@ def write_spread(result: DissipationResult, more: Rows) -> None:
     rows += [("friction sampled on", raw.friction_grid)] if raw.friction_grid else []
     rows += [("inputs at their means", f"{shown(result.mean_problem_power, 'W')} dissipated")]
     write_table(result.title, [*rows, *_power_ranges(result.summaries["power"])])
-    heads = ("", "mean", "standard error", "std", "standard error", "skewness")
+    heads = ("", "mean", "95 % interval", "std", "95 % interval", "skewness")
     write_list(heads, [_cells(name, result) for name in QUANTITIES])
     effort = f"{lapse(raw.solve_seconds)} for the contacts, {lapse(raw.wall_seconds)} in total"
     write_table("", [*input_rows(result), ("wall time", effort), *more])
@@ -62,7 +65,7 @@ def _power_ranges(power: Summary) -> Rows:
 
 
 def _cells(name: str, result: DissipationResult) -> tuple[str, ...]:
-    """Return mean, standard deviation, their standard errors and skewness of a quantity."""
+    """Return mean, standard deviation, their intervals and skewness of a quantity."""
     (words, unit), summary = QUANTITIES[name], result.summaries[name]
     force = float(abs(result.values("normal_force")).max())
     length = result.raw.strip_width * len(result.y)
@@ -74,8 +77,15 @@ def _cells(name: str, result: DissipationResult) -> tuple[str, ...]:
     return (
         words,
         shown(mean, unit),
-        shown(summary.mean_error, unit, 2),
+        _ends(summary.mean_interval, unit),
         shown(summary.std, unit),
-        shown(summary.std_error, unit, 2),
+        _ends(summary.std_interval, unit),
         shown(summary.skewness, "1", 3),
     )
+
+
+def _ends(interval: Interval, unit: str) -> str:
+    """Return the ends of an interval, if the sample suffices for them."""
+    ends = [in_unit(end, unit) for end in (interval.low, interval.high)]
+    enough = math.isfinite(interval.half_width) and interval.low < interval.high
+    return " to ".join(ends) if enough else NOTHING

@@ -12,6 +12,7 @@ from wearsim.report.summary import with_range
 from wearsim.report.text import NOTHING, lapse, shown
 from wearsim.results import IdentificationResult
 from wearsim.studies.identify.planning import SCATTERS, PlannedDesign
+from wearsim.uq.hierarchy.verdict import MOST_TESTS
 
 _EXPECTED = 2.0 / 3.0
 
@@ -44,12 +45,20 @@ def write_identification(
         Last rows.
     """
     typer.echo(result.title)
-    heads = ("test", "levelled on", "depth [um]", "area [mm^2]", "K/H [1e-12 1/Pa]", "residuals")
+    heads = (
+        "test",
+        "levelled on",
+        "measured depth [um]",
+        "model's depth [um]",
+        "area [mm^2]",
+        "K/H [1e-12 1/Pa]",
+        "residuals",
+    )
     write_list(heads, [_line(test) for test in result.tests])
     rows = [
         *_energy(result),
         *_exponents(result),
-        *_scatter(result.summary, len(result.raw.specimens)),
+        *_scatter(result),
     ]
     write_table("", [*rows, *more, ("wall time", lapse(result.raw.wall_seconds))])
     write_notes(result.notes, result.warnings)
@@ -57,7 +66,8 @@ def write_identification(
 
 def _line(test: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the row of a measured groove."""
-    depth, area, k = test["depth_interval_m"], test["area_interval_m2"], test["k_over_h_per_Pa"]
+    measured, depth = test["depth_interval_m"], test["model_depth_interval_m"]
+    area, k = test["area_interval_m2"], test["k_over_h_per_Pa"]
     residuals = NOTHING
     if test["residual_ratio"] is not None:
         tilt = f"tilt {1e3 * test['inclination_rad']:.2g} mrad, "
@@ -66,7 +76,8 @@ def _line(test: Mapping[str, Any]) -> tuple[str, ...]:
     return (
         test["file"].rpartition("/")[2],
         test["levelled_on"],
-        with_range(test["depth_m"], depth[0], depth[1], 1e6),
+        NOTHING if measured is None else with_range(test["depth_m"], measured[0], measured[1], 1e6),
+        with_range(test["model_depth_m"], depth[0], depth[1], 1e6),
         with_range(test["area_m2"], area[0], area[1], 1e6),
         with_range(k["value"], k["low"], k["high"], 1e12),
         residuals,
@@ -100,22 +111,13 @@ def _exponents(result: IdentificationResult) -> Rows:
     ]
 
 
-def _scatter(summary: Mapping[str, Any], tests: int) -> Rows:
+def _scatter(result: IdentificationResult) -> Rows:
     """Return scatter, verdict, sensitivity to the prior and what would decide."""
+    summary, tests = result.summary, len(result.raw.specimens)
     t, seen = summary["scatter_of_k"], summary["scatter_seen"]
     factor, middle = summary["bayes_factor"], summary["k_over_h_median_per_Pa"]
     following = summary["next_specimen"]
     ratio = summary["likelihood_ratio"]
-    verdicts = {
-        "explained": f"explained: the inputs explain the scatter; that of ln K/H is below"
-        f" {summary['negligible']:g}",
-        "random": f"random, with a scatter of {t['value']:.2g}"
-        f" (95 %: {t['low']:.2g} to {t['high']:.2g})",
-        "undecided": "undecided: these tests cannot show whether K/H scatters",
-    }
-    verdict = verdicts[summary["verdict"]]
-    if summary["verdict"] == "random" and summary["scatter_upper_95"] < summary["negligible"]:
-        verdict += f", below the negligible {summary['negligible']:g}"
     sensitivity = "; ".join(
         f"{row['prior_scale']:g}: {row['bayes_factor']:.2f}, t {row['scatter_of_k']:.2f}"
         for row in summary["sensitivity"]
@@ -130,7 +132,7 @@ def _scatter(summary: Mapping[str, Any], tests: int) -> Rows:
                 f" 95 %: {t['low']:.2f} to {t['high']:.2f})"
             ),
         ),
-        ("verdict", verdict),
+        ("verdict", result.verdict_words),
         ("Bayes factor of t = 0", f"{factor:.2f} against t ~ half-normal(0.5)"),
         ("by the scale of the prior", sensitivity),
     ]
@@ -174,7 +176,7 @@ def deciding(found: Mapping[str, Any], tests: int) -> str:
     now = f"{found['power']:.2f} by these {tests} tests" if tests > 1 else "0 by one test"
     lines = [
         f"a scatter of {found['scatter']:g} is seen with probability {now}, and 0.8 by "
-        + (f"{many}" if many else "no number of")
+        + (f"{many}" if many else f"more than {found['most_tests']}")
         + " such tests"
     ]
     if found["tests_if_measured"] and found["power_if_measured"] > found["power"]:
@@ -196,7 +198,7 @@ def plan_json(designs: Sequence[PlannedDesign]) -> dict[str, Any]:
                 "false_random": design.random[0.0],
                 "explained": design.explained[0.0],
                 "power": {f"{t:g}": design.random[t] for t in SCATTERS},
-                "tests_for_power_0.8": {f"{t:g}": design.tests_for(0.8, t) for t in SCATTERS},
+                "tests_for_power_0.8": {f"{t:g}": design.needed[t] for t in SCATTERS},
             }
             for design in designs
         ]
@@ -220,6 +222,6 @@ def write_plan(title: str, designs: Sequence[PlannedDesign]) -> None:
         )
         write_list(heads, [(str(row[0]), *(f"{rate:.2f}" for rate in row[1:])) for row in rows])
         for t in SCATTERS:
-            tests = design.tests_for(0.8, t)
-            reached = f"{tests} tests" if tests else f"more than {design.tests[-1]} tests"
+            tests = design.needed[t]
+            reached = f"{tests} tests" if tests else f"more than {MOST_TESTS} tests"
             typer.echo(f"a scatter of {t:g} is found with power 0.8 by {reached}")

@@ -105,3 +105,55 @@ def filter_noise(noise: FloatArray, memory: float) -> FloatArray:
     for k in range(noise.shape[0]):
         path[k] = noise[k] if k == 0 else memory * path[k - 1] + fresh * noise[k]
     return path
+
+
+@kernel
+def squared_residuals(
+    columns: FloatArray,
+    decay: FloatArray,
+    gain: FloatArray,
+    scale: FloatArray,
+    lines: FloatArray,
+) -> FloatArray:
+    """Return sums of squared residuals of columns for several models of their noise.
+
+    Each column is whitened by the filter of each model, and the part along whitened lines is
+    removed.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (columns, points)
+        Heights [m].
+    decay, gain, scale : ndarray, shape (points, models)
+        Filters, see `wearsim.uq.hierarchy.noise.Noise.filter`.
+    lines : ndarray, shape (lines, points, models)
+        Orthonormal whitened lines of each model.
+
+    Returns
+    -------
+    ndarray, shape (models, columns)
+    """
+    count, points = columns.shape
+    models, forms = lines.shape[2], lines.shape[0]
+    found = np.empty((models, count))
+    mean, squares, residual = np.empty(models), np.empty(models), np.empty(models)
+    along = np.empty((forms, models))
+    for c in range(count):
+        mean[:] = 0.0
+        squares[:] = 0.0
+        along[:] = 0.0
+        for j in range(points):
+            for m in range(models):
+                error = columns[c, j] - mean[m]
+                white = scale[j, m] * error
+                mean[m] = decay[j, m] * (mean[m] + gain[j, m] * error)
+                squares[m] += white * white
+                residual[m] = white
+            for k in range(forms):
+                for m in range(models):
+                    along[k, m] += residual[m] * lines[k, j, m]
+        for m in range(models):
+            for k in range(forms):
+                squares[m] -= along[k, m] * along[k, m]
+            found[m, c] = squares[m]
+    return found

@@ -31,7 +31,7 @@ def identification_figure(result: IdentificationResult) -> Figure:
     shown = known[:_MOST_TRACES]
     columns = max(len(shown), 1)
     height = 8.6 if shown else 4.2
-    title = f"{result.title}: {result.verdict}"
+    title = f"{result.title}\n{result.verdict_words}"
     with titled_figure(max(4.2 * columns, 9.6), height, title) as figure:
         lower: Any = figure
         if shown:

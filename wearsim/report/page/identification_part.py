@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,6 @@ from wearsim.results.identification import IdentificationResult
 
 MOST_TRACES, MOST_POINTS = 12, 1200
 _SCALE = 1e12  # K/H is shown in 1e-12 1/Pa
-_VERDICTS = {
-    "explained": "explained: the inputs explain the scatter",
-    "random": "random: K/H itself scatters",
-    "undecided": "undecided: these tests cannot show it",
-}
 _ERROR = (
     "Intervals hold 95 %. In full slip a groove shows the product of K/H and dissipated energy: a"
     " K/H holds for the stated energy. The error of the contact model is not contained."
@@ -35,7 +31,7 @@ def of_identification(result: IdentificationResult) -> Part:
     middle, following = found["k_over_h_median_per_Pa"], found["next_specimen"]
     seen, ends = found["scatter_seen"], _ends(scatter["low"], scatter["high"])
     answer = [
-        ("Is K/H random?", _VERDICTS[result.verdict]),
+        ("Is K/H random?", result.verdict_words),
         (
             "scatter t of ln K/H",
             f"{scatter['value']:.2f} ({ends})",
@@ -48,10 +44,12 @@ def of_identification(result: IdentificationResult) -> Part:
     ]
     tests = []
     for test in result.tests:
-        k, depth = test["k_over_h_per_Pa"], test["depth_interval_m"]
-        depths = f"{in_unit(depth[0], 'um')} to {shown(depth[1], 'um')}"
+        k = test["k_over_h_per_Pa"]
+        depths = _depth("model's depth", test["model_depth_interval_m"])
+        if test["depth_interval_m"] is not None:
+            depths = f"{_depth('measured depth', test['depth_interval_m'])}; {depths}"
         energy = shown(test["energy_J"]["value"], "J", 3)
-        text = f"K/H {_factor(k['value'], k['low'], k['high'])}, for {energy}; depth {depths}"
+        text = f"K/H {_factor(k['value'], k['low'], k['high'])}, for {energy}; {depths}"
         tests.append((_name(test["file"]), text))
     return Part(
         title=result.title,
@@ -102,6 +100,11 @@ _NEXT = ("median_per_Pa", "low_per_Pa", "high_per_Pa")
 
 def _name(file: str) -> str:
     return file.rpartition("/")[2]
+
+
+def _depth(name: str, ends: Sequence[float]) -> str:
+    """Return the interval of a depth after its name."""
+    return f"{name} {in_unit(ends[0], 'um')} to {shown(ends[1], 'um')}"
 
 
 def _ends(low: float, high: float) -> str:
@@ -177,6 +180,8 @@ def _traces(result: IdentificationResult) -> list[Plot]:
         tips = ("measured", "@height{0.00} um"), ("model", "@fitted{0.00} um")
         hover(plot, [line], ("y", "@y{0.000} mm"), *tips)
         legend(plot)
-        text = f"Greatest depth {shown(test['depth_m'], 'um')}, after levelling."
-        plots.append(Plot(f"Groove {_name(test['file'])}", text, plot))
+        text = _depth("Model's depth", test["model_depth_interval_m"])
+        if test["depth_interval_m"] is not None:
+            text = f"{_depth('Measured depth', test['depth_interval_m'])}. {text}"
+        plots.append(Plot(f"Groove {_name(test['file'])}", f"{text}.", plot))
     return plots

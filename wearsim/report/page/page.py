@@ -179,7 +179,7 @@ def _of_dissipation(result: DissipationResult) -> Part:
     from wearsim.report.page.study_plots import dissipation_plots  # noqa: PLC0415  (bokeh)
 
     raw, power = result.raw, result.summaries["power"]
-    spread = shown(summary.NINETY_FIVE * power.mean_error, "W", 2)
+    spread = shown(power.mean_interval.half_width, "W", 2)
     answer = [("mean dissipated power", f"{shown(power.mean, 'W')} ± {spread}")]
     if power.count > 1 and not power.is_constant:
         ends = " to ".join(in_unit(power.quantile(p).value, "W") for p in (0.025, 0.975))

@@ -205,7 +205,7 @@ class Realisations:
             raise ScenarioError(scenario.file, [Mistake("cam", "", what, None, remedy)])
         mean_load = load_range(scenario, scenario.load.build(), 0.0)[0]
         self._once, field, self.notes = acting_inputs(scenario)
-        drawer = Drawer(self._once, scenario.sampling.plan, count, replicates=1)
+        drawer = Drawer(self._once, scenario.sampling.plan, count)
         self.values, self.units = drawer.columns(0, count), units_of(self._once)
         drawn = self._drawn(slice(None))
         self.loads = np.full(count, mean_load) + drawn.get("normal_force_offset", 0.0)

@@ -18,6 +18,7 @@ from wearsim.studies.contact.batch import Realisations
 from wearsim.studies.preparation import checked_count, nothing_random, origin_of
 from wearsim.studies.progress import shown_progress
 from wearsim.uq.estimation.moments import RowMoments
+from wearsim.uq.sampling.sampler import REPLICATES
 
 BATCH = 1024  # realisations of a batch
 MOST_POINTS = 4_000_000  # values of friction fields of a batch
@@ -172,6 +173,7 @@ class _Study:
             "mean_problem_dissipation": self._mean_problem.dissipation[0],
             **{key: values[:done] for key, values in contacts.values.items()},
         }
+        replicates = REPLICATES if scenario.sampling.plan == "sobol" else 1
         data = DissipationData(
             **origin_of(scenario),
             plan=scenario.sampling.plan,
@@ -187,7 +189,8 @@ class _Study:
             notes=[*scenario.notes, *contacts.notes],
             warnings=self._warnings(len(kept)),
             variables=variables,
-            statistics=as_numbers(summaries(variables)),
+            replicates=replicates,
+            statistics=as_numbers(summaries(variables, scenario.sampling.plan, replicates)),
             solve_seconds=self._solving,
             wall_seconds=time.monotonic() - self._started,
             created=self._created,
@@ -204,10 +207,10 @@ class _Study:
                 "only the contact of the first roller is considered",
             ),
             (
-                plan != "monte-carlo",
+                plan == "latin-hypercube",
                 (
-                    "standard errors and intervals are those of plain Monte Carlo, which are not"
-                    f" exact for {plan}"
+                    "standard errors and intervals are those of plain Monte Carlo, which are too"
+                    f" wide for {plan}"
                 ),
             ),
             (

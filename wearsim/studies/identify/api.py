@@ -44,6 +44,7 @@ def identify(
     *,
     before: Sequence[str | Path] = (),
     shoulders: float | str | None = None,
+    curvature: bool = False,
     share: Sequence[str] = (),
     fix: Mapping[str, object] | None = None,
     choice: ProfileChoice | None = None,
@@ -73,6 +74,9 @@ def identify(
     shoulders : float or str, optional
         Distance from the middle of a groove beyond which the surface is unworn, "9 mm" or in
         metres; found by default.
+    curvature : bool
+        Whether the traces have an unknown curvature beside offset and inclination, as of a bow of
+        the instrument's guide; they need unworn shoulders then.
     share : sequence of str
         ("cylinder", "roller") if both bodies have one unknown factor of their K/H.
     fix : mapping of str to object, optional
@@ -121,7 +125,7 @@ def identify(
     scenario = with_chosen_model(scenario, test=True)
     shared = _checked_share(share)
     width = quantity(shoulders, "m") if isinstance(shoulders, str) else shoulders
-    items = _measurements(tests, before, choice, width)
+    items = _measurements(tests, before, choice, width, curvature)
     files = [path for item in items for path in (item.profile, item.before) if path is not None]
     if output is not None:
         check_output(Path(output), force, [*scenario.paths, *files])
@@ -132,6 +136,7 @@ def identify(
     seconds = time.monotonic() - started
     given = {"measured": tables_of(items), "draws": draws, "shared": shared}
     data = content(study.scenario, specimens, negligible, study.notes, created, seconds, **given)
+    data.warnings.extend(study.left_out)
     if output is not None:
         write_results(Path(output), data)
     return IdentificationResult(data, Path(output) if output is not None else None)
@@ -142,11 +147,14 @@ def _measurements(
     before: Sequence[str | Path],
     choice: ProfileChoice | None,
     shoulders: float | None,
+    curvature: bool,
 ) -> list[Measurement]:
     """Return the measurements given by files, by a tests file, or as they are."""
     if isinstance(tests, str | Path):
         if Path(tests).suffix.lower() == ".toml":
-            return read_tests(tests)
+            return [
+                replace(item, curvature=item.curvature or curvature) for item in read_tests(tests)
+            ]
         tests = [tests]
     given = [item for item in tests if isinstance(item, Measurement)]
     if given and (before or len(given) < len(tests)):
@@ -154,9 +162,9 @@ def _measurements(
     if not tests:
         raise ValueError("no test is given; name its profile, or a tests file")
     if given:
-        return given
+        return [replace(item, curvature=item.curvature or curvature) for item in given]
     files = [item for item in tests if not isinstance(item, Measurement)]
-    return measurements_of(files, before, choice, shoulders)
+    return measurements_of(files, before, choice, shoulders, curvature)
 
 
 def _checked_share(share: Sequence[str]) -> bool:
@@ -187,14 +195,20 @@ class _Study:
     ) -> None:
         self.scenario, self.items, self.draws, self.shared = scenario, items, draws, shared
         self.notes: list[str] = list(scenario.notes)
+        self.left_out: list[str] = []
         self._by_inputs: dict[str, list[_Ready]] = {}
         for item in items:
             ready = self._ready(item)
+            if ready is None:
+                continue
             known = sorted(item.values.items()), sorted(item.errors.items())
             self._by_inputs.setdefault(repr(known), []).append(ready)
+        if not self._by_inputs:
+            what = f"no groove can be used: {'; '.join(self.left_out)}"
+            raise ScenarioError(items[0].file or items[0].name, [Mistake("", "", what)])
 
-    def _ready(self, item: Measurement) -> _Ready:
-        """Read a measurement."""
+    def _ready(self, item: Measurement) -> _Ready | None:
+        """Read a measurement; None if it is left out."""
         if item.body == "roller" and not self.shared:
             what = "wear of the roller is measured, and its K/H is that of the scenario"
             expected = "share = cylinder, roller (--share k=cylinder,roller)"
@@ -212,11 +226,12 @@ class _Study:
             greatest = 0.125 * (trace.y[-1] - trace.y[0]) ** 2 / crown
             return _Ready(item, scenario, trace, passes, (0.2 * greatest, 1.2 * greatest))
         if trace.depth < _LEAST_SIGNAL * trace.noise.std:
-            what = (
-                f"the groove is {1e6 * trace.depth:.3g} um deep, and the noise of the shoulders is"
-                f" {1e6 * trace.noise.std:.3g} um: no wear can be seen"
+            self.left_out.append(
+                f"{item.name} is left out: its groove is {1e6 * trace.depth:.3g} um deep, and the"
+                f" noise of the shoulders is {1e6 * trace.noise.std:.3g} um, so that no wear can be"
+                " seen; if it wore less than the others, K/H of the others is not that of all"
             )
-            raise ScenarioError(item.name, [Mistake("", "", what)])
+            return None
         return _Ready(item, scenario, trace, passes, (trace.depth, trace.depth))
 
     def rows(self, watch: Callable[[int, int], None] | None) -> list[Identified]:
@@ -243,7 +258,7 @@ class _Study:
             if trajectories.lost:
                 self.notes.append(f"{trajectories.lost} draws are left out, whose tests failed")
             found.update({id(row.item): row for row in some})
-        return [found[id(item)] for item in self.items]
+        return [found[id(item)] for item in self.items if id(item) in found]
 
     def _group(
         self, group: Sequence[_Ready], draws: int | None, report: Callable[[int, int], None]

@@ -1,9 +1,10 @@
 """Likelihood of the wear factor by one trace, for each draw of the other inputs.
 
-A trace is z(y) = c0 + c1 y + h(y - s) - u(y - s; ln K) + noise, where u is the worn depth and h the
-height before wear. Offset c0 and inclination c1 have flat priors and are integrated in closed form;
-ln K and the lateral shift s are integrated on a lattice, which is centred and scaled by the
-moments of the integrand itself.
+A trace is z(y) = c0 + c1 y + c2 y^2 + h(y - s) - u(y - s; ln K) + noise, where u is the worn depth
+and h the height before wear. Offset c0, inclination c1 and, if it is asked for, curvature c2 have
+flat priors and are integrated in closed form, as is the variance of the noise; its correlation
+length and white part are integrated on a grid. ln K and the lateral shift s are integrated on a
+lattice, which is centred and scaled by the moments of the integrand itself.
 """
 
 from __future__ import annotations
@@ -13,15 +14,19 @@ from functools import cached_property
 
 import numpy as np
 
+from wearsim.mechanics.numerics.gaussian_processes import squared_residuals
 from wearsim.studies.identify.trajectories import Grown
 from wearsim.types import FloatArray, IntArray
-from wearsim.uq.hierarchy.noise import Noise
+from wearsim.uq.hierarchy.noise import Noise, NoiseModels, noise_models
 
 _STARTS = 9  # values of ln K from which the maximum is sought
 _ITERATIONS = 8
 # in standard deviations; the trapezoidal rule on a normal density errs by less than 1e-3
 _LATTICE = np.array([[1.2 * a, 1.6 * b] for a in range(-3, 4) for b in range(-2, 3)])
-_ROUNDS = 3  # of centring the lattice
+_ROUNDS = 8  # of centring the lattice
+_FIRST = 4.0  # variance of the first lattice over that at the maximum, which has kinks beside it
+_COARSE = 0.05  # part of its variance by which a lattice is wider than the moments on it
+_UNFIT, _OFF = 0.35, 0.3  # of ln variance and of the mean, in standard deviations
 _VALUES = 3_000_000  # of an array
 _DROPPED = 80.0  # of chi2 above that of the best draw
 _LONGEST = np.array([0.4, 1e-3])  # greatest change of ln K and shift in one iteration
@@ -45,6 +50,10 @@ class TraceLikelihood:
     start : bool
         Whether the model includes the height of the cylinder before wear; false for a difference
         of traces.
+    curvature : bool
+        Whether a curvature of the trace is unknown, as offset and inclination are.
+    least : float
+        Least standard deviation of the noise, known from elsewhere [m].
     """
 
     y: FloatArray
@@ -54,6 +63,8 @@ class TraceLikelihood:
     body: str = "cylinder"
     lateral: bool = True
     start: bool = True
+    curvature: bool = False
+    least: float = 0.0
 
     @cached_property
     def _centroid(self) -> FloatArray:
@@ -63,11 +74,16 @@ class TraceLikelihood:
         return np.asarray((depth * self.grown.y).sum(axis=2) / total)
 
     @cached_property
+    def forms(self) -> FloatArray:
+        """Offset, inclination and perhaps curvature of the trace, shape (points, forms)."""
+        return np.vander(
+            2.0 * (self.y - self.y.mean()) / np.ptp(self.y), 3 if self.curvature else 2, True
+        )
+
+    @cached_property
     def _lines(self) -> FloatArray:
-        """Orthonormal whitened lines, shape (points, 2)."""
-        scaled = (self.y - self.y.mean()) / np.ptp(self.y)
-        lines = np.column_stack([np.ones_like(self.y), scaled])
-        return np.linalg.qr(self.noise.whitened(self.y, lines))[0]
+        """Orthonormal whitened forms, shape (points, forms)."""
+        return np.linalg.qr(self.noise.whitened(self.y, self.forms))[0]
 
     def worn(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:
         """Return worn depth less start height, shape (points, columns) [m].
@@ -115,6 +131,22 @@ class TraceLikelihood:
             found[some] = (self.residual(draw[some], ln_k[some], shift[some]) ** 2).sum(axis=0)
         return found
 
+    def deviance(
+        self, models: NoiseModels, draw: IntArray, ln_k: FloatArray, shift: FloatArray
+    ) -> FloatArray:
+        """Return -2 times the log likelihood, the noise integrated, shape (columns,)."""
+        found = np.empty(len(draw))
+        block = max(_VALUES // len(self.y), 1)
+        for start in range(0, len(draw), block):
+            some = slice(start, start + block)
+            sum_ = self.height[:, None] + self.worn(draw[some], ln_k[some], shift[some])
+            filters = models.decay, models.gain, models.scale, models.lines
+            squares = squared_residuals(np.ascontiguousarray(sum_.T), *filters)
+            score = models.log_weight[:, None] - models.exponent[:, None] * np.log(squares)
+            top = score.max(axis=0)
+            found[some] = -2.0 * (top + np.log(np.exp(score - top).sum(axis=0)))
+        return found
+
     def _start(self) -> tuple[FloatArray, FloatArray]:
         """Return ln K and shift from which the maximum is sought, for each draw."""
         draws = np.arange(len(self.grown.ln_k))
@@ -143,7 +175,7 @@ class TraceLikelihood:
         ln_k, shift = self._start()
         position = np.column_stack([ln_k, shift])
         draws, count = np.arange(len(ln_k)), len(self.y)
-        small = np.array([2e-3, 2e-6])
+        small = np.array([1e-2, 1e-5])
         damping = np.full(len(draws), 1e-3)
         chi2 = self.chi2(draws, *position.T)
         normal = np.zeros((len(draws), 2, 2))
@@ -181,10 +213,15 @@ class TraceLikelihood:
     def integrated(self) -> DrawLikelihood:
         """Return evidence, mean and standard deviation of ln K for each draw."""
         centre, covariance, chi2 = self.maximum()
-        best = float(chi2.min())
-        kept = np.flatnonzero(chi2 < best + _DROPPED)
+        kept = np.flatnonzero(chi2 < chi2.min() + _DROPPED)
+        first = np.array([int(chi2.argmin())])
+        residual = self.height + self.worn(first, *centre[first].T)[:, 0]
+        models = noise_models(self.y, residual, self.forms, self.least)
+        best = float(self.deviance(models, first, *centre[first].T)[0])
         lattice = _LATTICE if self.lateral else _LATTICE[np.abs(_LATTICE[:, 1]) < 0.1]
         log_evidence = np.full(len(centre), -np.inf)
+        found, spread = centre.copy(), np.sqrt(covariance[:, 0, 0])
+        covariance *= _FIRST
         pending = kept
         for _ in range(_ROUNDS):
             root = np.linalg.cholesky(covariance[pending])
@@ -192,9 +229,10 @@ class TraceLikelihood:
                 root[:, 1] = 0.0
             points = centre[pending][:, None] + lattice @ root.transpose(0, 2, 1)
             owner = np.repeat(pending, len(lattice))
-            values = self.chi2(owner, *points.reshape(-1, 2).T).reshape(len(pending), -1)
-            weight = np.exp(-0.5 * (values - best))
-            weight *= np.exp(0.5 * (values.min(axis=1) - best))[:, None]
+            values = self.deviance(models, owner, *points.reshape(-1, 2).T)
+            values = values.reshape(len(pending), -1)
+            least = values.min(axis=1)
+            weight = np.exp(-0.5 * (values - least[:, None]))
             total = weight.sum(axis=1)
             mean = np.einsum("cp,cpa->ca", weight, points) / total[:, None]
             away = points - mean[:, None]
@@ -202,17 +240,17 @@ class TraceLikelihood:
             if not self.lateral:
                 second[:, 1, 1] = 1.0
             area = root[:, 0, 0] * (root[:, 1, 1] if self.lateral else 1.0)
-            log_evidence[pending] = np.log(total * area) - 0.5 * (values.min(axis=1) - best)
-            unfit = np.sqrt(second[:, 0, 0] / covariance[pending, 0, 0])
-            unfit = np.maximum(unfit, 1.0 / unfit)
+            log_evidence[pending] = np.log(total * area) - 0.5 * (least - best)
+            found[pending], spread[pending] = mean, np.sqrt(second[:, 0, 0])
+            unfit = np.abs(np.log(second[:, 0, 0] / covariance[pending, 0, 0]))
             off = np.abs(mean[:, 0] - centre[pending, 0]) / np.sqrt(covariance[pending, 0, 0])
-            centre[pending], covariance[pending] = mean, second
-            pending = pending[(unfit > 1.25) | (off > 0.7)]
+            # few points of a lattice that is too coarse have weight
+            centre[pending] = mean
+            covariance[pending] = second + _COARSE * covariance[pending]
+            pending = pending[(unfit > _UNFIT) | (off > _OFF)]
             if not len(pending):
                 break
-        return DrawLikelihood(
-            log_evidence, centre[:, 0], np.sqrt(covariance[:, 0, 0]), centre[:, 1], chi2
-        )
+        return DrawLikelihood(log_evidence, found[:, 0], spread, found[:, 1], chi2)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ SHORT = {
 _ROWS = ("row", "mean_rows", "row_at")
 _KEYS = (
     *("profile", "depth", "depth_std", "before", "at", "group", "set", "std", "body", "shoulders"),
-    *("columns", "units", *_ROWS),
+    *("curvature", "columns", "units", *_ROWS),
 )
 _EXAMPLE = '[[test]] tables with profile = "t1.csv", or depth = "48 um" and depth_std = "1 um"'
 
@@ -58,6 +58,8 @@ class Measurement:
         Body of which the wear was measured.
     shoulders : float, optional
         Distance from the middle of the groove beyond which the surface is unworn [m].
+    curvature : bool
+        Whether the trace has an unknown curvature, as of a bow of the instrument's guide.
     file, place : str
         Tests file and "test 2", for messages; empty without such a file.
     """
@@ -74,6 +76,7 @@ class Measurement:
     errors: Mapping[str, object] = field(default_factory=dict)
     body: str = "cylinder"
     shoulders: float | None = None
+    curvature: bool = False
     file: str = ""
     place: str = ""
 
@@ -93,6 +96,7 @@ def measurements_of(
     before: Sequence[str | Path] = (),
     choice: ProfileChoice | None = None,
     shoulders: float | None = None,
+    curvature: bool = False,
 ) -> list[Measurement]:
     """Return the measurements in profile files, each of one test.
 
@@ -102,8 +106,8 @@ def measurements_of(
         Profiles after the tests, and before them if they were measured.
     choice : ProfileChoice, optional
         Columns, units and rows of all files.
-    shoulders : float, optional
-        As in `Measurement` [m].
+    shoulders, curvature
+        As in `Measurement`.
 
     Raises
     ------
@@ -124,6 +128,7 @@ def measurements_of(
             Path(first) if first is not None else None,
             choice or ProfileChoice(),
             shoulders=shoulders,
+            curvature=curvature,
         )
         for file, first in pairs
     ]
@@ -201,6 +206,7 @@ def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
             "std": dict(item.errors) or None,
             "body": item.body if item.body != "cylinder" else None,
             "shoulders": length(item.shoulders),
+            "curvature": item.curvature or None,
             "columns": choice.columns,
             "units": choice.units,
             "row": choice.row,
@@ -251,6 +257,8 @@ def _read_test(
         wrong("depth_std", "is needed with depth", None, "its standard deviation, such as '1 um'")
     if table.get("body", "cylinder") not in {"cylinder", "roller"}:
         wrong("body", "is unknown", table["body"], '"cylinder" or "roller"')
+    if not isinstance(table.get("curvature", False), bool):
+        wrong("curvature", "is not true or false", table["curvature"], "true or false")
     values, errors = _flat(table.get("set", {})), _flat(table.get("std", {}))
     for key, value in values.items():
         if "." not in key and key not in SHORT:
@@ -289,6 +297,7 @@ def _read_test(
         {key_of(key): value for key, value in errors.items()},
         str(table.get("body", "cylinder")),
         length("shoulders"),
+        table.get("curvature") is True,
         str(file),
         place,
     )

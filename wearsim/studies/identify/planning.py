@@ -17,10 +17,9 @@ from wearsim.studies.identify.likelihood import depth_likelihood
 from wearsim.studies.identify.measurements import key_of
 from wearsim.studies.identify.trajectories import CYLINDER, ROLLER, Grower, check_law, factors
 from wearsim.uq.hierarchy.kernels import Kernel
-from wearsim.uq.hierarchy.verdict import NEGLIGIBLE, Design
+from wearsim.uq.hierarchy.verdict import NEGLIGIBLE, POWER_SETS, Power
 
 SCATTERS = (0.2, 0.4, 0.8)
-SETS = 1000  # simulated sets of tests
 DEPTH_ERROR = 0.01  # relative error of a measured depth
 _MOST_SIZES = 9
 
@@ -41,6 +40,8 @@ class PlannedDesign:
         Rate of the verdict "random" for each number of tests, by the scatter of ln K/H.
     explained : dict of float to tuple of float
         Rate of the verdict "explained".
+    needed : dict of float to int or None
+        Least number of tests that finds a scatter with power 0.8, or None if it exceeds 128.
     """
 
     name: str
@@ -48,11 +49,7 @@ class PlannedDesign:
     tests: tuple[int, ...]
     random: Mapping[float, tuple[float, ...]]
     explained: Mapping[float, tuple[float, ...]]
-
-    def tests_for(self, power: float, scatter: float) -> int | None:
-        """Return the least of these numbers of tests with a power, or None."""
-        pairs = zip(self.tests, self.random[scatter], strict=True)
-        return next((tests for tests, rate in pairs if rate >= power), None)
+    needed: Mapping[float, int | None]
 
 
 def plan_tests(
@@ -62,7 +59,7 @@ def plan_tests(
     *,
     negligible: float = NEGLIGIBLE,
     draws: int | None = None,
-    sets: int = SETS,
+    sets: int = POWER_SETS,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> list[PlannedDesign]:
     """Return the power of tests of a scenario to show whether the wear factor scatters.
@@ -136,15 +133,13 @@ def _kernel(
 def _planned(
     name: str, kernel: Kernel, tests: Sequence[int], negligible: float, sets: int, seed: int
 ) -> PlannedDesign:
-    rates: dict[float, list[tuple[float, float]]] = {t: [] for t in (0.0, *SCATTERS)}
-    for count in tests:
-        design = Design([kernel], count, negligible=negligible, seed=seed, sets=sets)
-        for t, found in rates.items():
-            found.append(design.rates(t))
+    power = Power([kernel], negligible=negligible, seed=seed, sets=sets)
+    rates = {t: [power.rates(count, t) for count in tests] for t in (0.0, *SCATTERS)}
     return PlannedDesign(
         name,
         kernel.variance**0.5,
         tuple(tests),
         {t: tuple(random for random, _ in found) for t, found in rates.items()},
         {t: tuple(explained for _, explained in found) for t, found in rates.items()},
+        {t: power.needed(t) for t in SCATTERS},
     )

@@ -17,7 +17,7 @@ from wearsim.studies.preparation import origin_of
 from wearsim.types import FloatArray
 from wearsim.uq.hierarchy.kernels import Kernel
 from wearsim.uq.hierarchy.pooled import PRIOR_SCALE, Posterior
-from wearsim.uq.hierarchy.verdict import ALPHA, Design, needed_tests, normal_power, word
+from wearsim.uq.hierarchy.verdict import ALPHA, MOST_TESTS, Design, Power, word
 
 PRIORS = (0.25, 0.5, 1.0, 2.0)  # scales of the half-normal prior of t
 SHOWN = 0.4  # scatter of ln K/H for which the power is stated
@@ -192,8 +192,10 @@ def _test(row: Identified, specimen: Specimen) -> dict[str, Any]:
         "body": row.item.body,
         "levelled_on": "a measured depth" if fit is None else fit.trace.levelled,
         "passes": row.passes,
-        "depth_m": row.depth[0],
-        "depth_interval_m": list(row.depth[1:]),
+        "depth_m": None if row.depth is None else row.depth[0],
+        "depth_interval_m": None if row.depth is None else list(row.depth[1:]),
+        "model_depth_m": row.model_depth[0],
+        "model_depth_interval_m": list(row.model_depth[1:]),
         "area_m2": row.area[0],
         "area_interval_m2": list(row.area[1:]),
         "k_over_h_per_Pa": _three(alone),
@@ -253,6 +255,7 @@ def _summary(
         "likelihood_ratio": ratio,
         "likelihood_ratio_95": limit,
         "verdict": verdict,
+        "scatter_detected": random,
         "k_over_h_median_per_Pa": _three(np.exp(posterior.mean(_FIVE)).tolist()),
         "next_specimen": {
             "median_per_Pa": float(np.exp(middle)),
@@ -265,36 +268,39 @@ def _summary(
             for name, found in exponents.items()
             if found is not None
         },
-        "to_decide": _to_decide(specimens, variance, verdict),
+        "to_decide": _to_decide(specimens, negligible, scenario.seed, verdict),
     }
 
 
-def _to_decide(specimens: Sequence[Specimen], variance: float, verdict: str) -> dict[str, Any]:
-    """Return what would decide, by the power of the variance test of normal values."""
+def _to_decide(
+    specimens: Sequence[Specimen], negligible: float, seed: int, verdict: str
+) -> dict[str, Any]:
+    """Return what would decide, by simulated sets of such tests, as in `plan_tests`."""
     rows = [row for specimen in specimens for test in specimen.tests for row in test]
     shares: dict[str, float] = {}
     for row in rows:
         for key, part in row.shares.items():
             shares[key] = shares.get(key, 0.0) + part / len(rows)
     measure = [key for key, part in sorted(shares.items(), key=lambda item: -item[1]) if part > 0.1]
-    count = len(specimens)
-    known = float(np.mean([k.kernel.variance - k.kernel.variance_of_inputs for k in specimens]))
+    count, kernels = len(specimens), [specimen.kernel for specimen in specimens]
+    known = float(np.mean([k.variance - k.variance_of_inputs for k in kernels]))
+    measured = Kernel(np.ones(1), np.zeros(1), np.array([np.sqrt(MEASURED**2 + known)]))
+    now, then = (Power(k, negligible=negligible, seed=seed) for k in (kernels, [measured]))
     return {
         "scatter": SHOWN,
-        "power": normal_power(count, variance, SHOWN) if count > 1 else 0.0,
-        "tests": needed_tests(variance, SHOWN),
+        "power": now.rates(count, SHOWN)[0] if count > 1 else 0.0,
+        "tests": now.needed(SHOWN),
         "measure": measure[:3],
-        "tests_if_measured": needed_tests(MEASURED**2 + known, SHOWN),
-        "power_if_measured": (
-            normal_power(count, MEASURED**2 + known, SHOWN) if count > 1 else 0.0
-        ),
+        "tests_if_measured": then.needed(SHOWN),
+        "power_if_measured": then.rates(count, SHOWN)[0] if count > 1 else 0.0,
+        "most_tests": MOST_TESTS,
         "needed": verdict == "undecided",
     }
 
 
 def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list[str]:
     """Return remarks on fits, on the number of draws and on missing random inputs."""
-    found = [row.fit.warning for row in rows if row.fit is not None and row.fit.warning]
+    found = [text for row in rows if row.fit is not None for text in row.fit.warnings]
     few = [
         specimen.name
         for specimen in specimens

@@ -10,7 +10,7 @@ from wearsim.errors import Mistake, ScenarioError
 from wearsim.profiles import load_lines, load_profile
 from wearsim.studies.identify.measurements import Measurement
 from wearsim.types import BoolArray, FloatArray, Profile
-from wearsim.uq.hierarchy.noise import MOST_POINTS, Noise, fit_noise
+from wearsim.uq.hierarchy.noise import MOST_POINTS, Noise, fit_noise, noise_models
 
 _FEWEST = 40  # points
 _WINDOW = 1e-3  # m, of the running median that finds spikes
@@ -19,6 +19,7 @@ _MOST_SPIKES = 0.2  # fraction of the points
 _RUN = 10  # equal readings in a row that are a dropout
 _MARGIN = 0.4e-3  # m, between the predicted groove and its shoulders
 _LEAST_SHOULDER = 0.4e-3  # m, on each side
+_BOTTOM = 0.5  # part of the half-width of a groove in which its bottom is a parabola
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,8 @@ class Trace:
         Centroid of the groove [m].
     inclination : float
         Slope that levelling removed [rad].
+    spread : float
+        Standard error of the mean of several lines if it exceeds the noise of the shoulders [m].
     difference : bool
         Whether it is the difference of traces after and before the test.
     notes : tuple of str
@@ -57,6 +60,7 @@ class Trace:
     area: float | None
     middle: float
     inclination: float = 0.0
+    spread: float = 0.0
     difference: bool = False
     notes: tuple[str, ...] = ()
 
@@ -97,7 +101,7 @@ def read_trace(item: Measurement, crown_radius: float) -> Trace:
         ratio = spread / levelled.noise.std
         noise = levelled.noise
         noise = Noise(noise.sigma * ratio, noise.length, noise.white * ratio)
-        levelled = replace(levelled, noise=noise)
+        levelled = replace(levelled, noise=noise, spread=spread)
         notes.append(f"noise from the spread of the lines, {1e6 * spread:.2g} um")
     return replace(levelled, notes=(*notes, *levelled.notes))
 
@@ -148,6 +152,8 @@ def _without_spikes(profile: Profile) -> BoolArray:
             good[part] = False
     for _ in range(2):
         kept = np.flatnonzero(good)
+        # at the ends the window is mirrored, where an inclination looks like a bend
+        height = profile.height - np.polyval(_line_of_ends(y[kept], profile.height[kept]), y)
         spacing = float(np.median(np.diff(y[kept])))
         half = int(np.clip(0.5 * _WINDOW / spacing, 3, len(kept) // 4))
         padded = np.pad(height[kept], half, mode="symmetric")
@@ -162,6 +168,15 @@ def _without_spikes(profile: Profile) -> BoolArray:
             break
         good[kept[far]] = False
     return good
+
+
+def _line_of_ends(y: FloatArray, height: FloatArray) -> tuple[float, float]:
+    """Return slope and offset of the line through the medians of both ends of a trace."""
+    ends = max(2, int(0.06 * len(y)))
+    first, last = float(np.median(height[:ends])), float(np.median(height[-ends:]))
+    start = float(y[:ends].mean())
+    slope = (last - first) / (float(y[-ends:].mean()) - start)
+    return slope, first - slope * start
 
 
 def _thinned(profile: Profile, item: Measurement, crown_radius: float, averaged: bool) -> Trace:
@@ -210,12 +225,7 @@ def level(
     """
     y, height = trace.y, trace.height
     item = Measurement(trace.name)
-    ends = np.maximum(2, int(0.06 * len(y)))
-    left, right = (slice(0, ends), slice(len(y) - ends, len(y)))
-    slope = (np.median(height[right]) - np.median(height[left])) / (
-        y[right].mean() - y[left].mean()
-    )
-    level_ = height - np.median(height[left]) - slope * (y - y[left].mean())
+    level_ = height - np.polyval(_line_of_ends(y, height), y)
     _check_sign(item, level_)
     unworn = np.zeros(len(y), dtype=np.bool_)
     middle = 0.5 * (y[0] + y[-1])
@@ -289,6 +299,52 @@ def _check_sign(item: Measurement, level_: FloatArray) -> None:
             " below them; heights are positive up, and worn material is negative: if the column"
             " holds depths, choose it with --columns y,-NAME, or call it depth",
         )
+
+
+def measured_depth(
+    trace: Trace, crown_radius: float, curvature: bool = False
+) -> tuple[float, float]:
+    """Return the greatest depth of a groove below its shoulders, and its standard deviation [m].
+
+    It is that of a parabola through the bottom of the groove, fitted together with offset,
+    inclination and perhaps curvature of the shoulders under correlated noise; no wear model is
+    used. The deepest point, even of a smoothed trace, is too deep on average.
+
+    Parameters
+    ----------
+    trace : Trace
+        With shoulders.
+    crown_radius : float
+        Crown radius of the roller, which is nearly that of the bottom [m].
+    curvature : bool
+        Whether the trace has an unknown curvature.
+    """
+    assert trace.depth is not None
+    reach = _BOTTOM * np.sqrt(2.0 * crown_radius * trace.depth)
+    bottom = np.abs(trace.y - trace.middle) < reach
+    used = bottom | trace.unworn
+    y, height = trace.y[used], trace.height[used]
+    inside = bottom[used][:, None] * np.vander((y - trace.middle) / reach, 3, True)
+    line = np.vander((y - trace.middle) / np.ptp(y), 3 if curvature else 2, True)
+    forms = np.hstack([inside, line])
+    models = noise_models(y, height, forms, trace.spread)
+    depth, variance, score = np.empty((3, len(models.length)))
+    for place in range(len(depth)):
+        columns = np.column_stack([height, forms])
+        white = models.noise(place).whitened(y, columns)
+        inverse = np.linalg.inv(white[:, 1:].T @ white[:, 1:])
+        found = inverse @ white[:, 1:].T @ white[:, 0]
+        squares = float(((white[:, 0] - white[:, 1:] @ found) ** 2).sum())
+        score[place] = models.log_weight[place] - models.exponent[place] * np.log(squares)
+        vertex = float(np.clip(-0.5 * found[1] / found[2], -1.0, 1.0))
+        slope = np.zeros(len(found))
+        slope[:3] = 1.0, vertex, vertex**2
+        depth[place] = -slope @ found
+        variance[place] = slope @ inverse @ slope * squares / (2.0 * models.exponent[place])
+    weight = np.exp(score - score.max())
+    weight /= weight.sum()
+    mean = float(weight @ depth)
+    return mean, float(np.sqrt(weight @ (variance + (depth - mean) ** 2)))
 
 
 def half_depth_width(y: FloatArray, worn: FloatArray) -> float:

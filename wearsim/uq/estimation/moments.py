@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from wearsim.types import FloatArray, IntArray
-from wearsim.uq.estimation.intervals import CONFIDENCE, Interval, bisect
+from wearsim.uq.estimation.intervals import CONFIDENCE, UNKNOWN, Interval, bisect
 
 _SAME = 1e-9  # relative standard deviation below which values are constant
 _BLOCK = 256  # rows summed at once, independent of the batch size
@@ -47,6 +47,9 @@ class Summary:
         Extremes.
     quantiles : tuple of Quantile
         The requested quantiles.
+    mean_interval, std_interval : Interval
+        Mean and standard deviation with their 95 % intervals, where they have been computed; see
+        `wearsim.uq.estimation.estimates.estimate`.
     """
 
     count: int
@@ -58,6 +61,8 @@ class Summary:
     least: float
     greatest: float
     quantiles: tuple[Quantile, ...]
+    mean_interval: Interval = UNKNOWN
+    std_interval: Interval = UNKNOWN
 
     @property
     def is_constant(self) -> bool:

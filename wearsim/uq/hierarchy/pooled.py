@@ -41,11 +41,11 @@ class Hierarchy:
     Parameters
     ----------
     kernels : sequence of Kernel
-        Likelihood of each test, or one kernel for all of them.
+        Likelihood of each test; of more tests they are repeated in this order.
     t : ndarray, shape (t,)
         Grid of the scatter of ln K.
     tests : int, optional
-        Number of tests, where one kernel is given.
+        Number of tests, by default that of the kernels.
     """
 
     def __init__(self, kernels: Sequence[Kernel], t: FloatArray, tests: int | None = None) -> None:
@@ -53,7 +53,7 @@ class Hierarchy:
         found = [kernel.table(t) for kernel in self.kernels]
         self._scale = np.stack([scale for scale, _ in found])  # (kernels, t)
         self._table = np.stack([table for _, table in found])
-        self.owner = np.zeros(tests, dtype=np.int64) if tests else np.arange(len(self.kernels))
+        self.owner = np.arange(tests or len(self.kernels)) % len(self.kernels)
 
     def on_grid(self, centres: FloatArray, row: int, count: int) -> tuple[FloatArray, FloatArray]:
         """Return values of m and the log likelihood for one t.

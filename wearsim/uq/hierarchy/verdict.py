@@ -17,6 +17,8 @@ Word: TypeAlias = Literal["explained", "random", "undecided"]
 NEGLIGIBLE = 0.2  # scatter of ln K
 ALPHA = 0.05
 SETS = 4000  # simulated sets of tests for a quantile
+POWER_SETS = 1000  # simulated sets of tests for a power
+MOST_TESTS = 128  # for which a power is simulated
 _SCATTERS = 30  # values of t for simulated sets
 _GREATEST = 3.0
 
@@ -29,7 +31,7 @@ def simulated_centres(
     Parameters
     ----------
     kernels : sequence of Kernel
-        Likelihood of each test, or one for all of them.
+        Likelihood of each test; of more tests they are repeated in this order.
     tests, sets : int
         Number of tests of a set, and of sets.
     t : float
@@ -47,7 +49,7 @@ def simulated_centres(
     numbers = Stream(seed, name, "test").rows(0, sets, 3 * tests).reshape(sets, 3, tests)
     found = t * ndtri(numbers[:, 0])
     for test in range(tests):
-        kernel = kernels[test if len(kernels) > 1 else 0]
+        kernel = kernels[test % len(kernels)]
         found[:, test] += kernel.deviations(numbers[:, 1:, test].T)
     return np.asarray(found)
 
@@ -71,9 +73,9 @@ class Design:
     Parameters
     ----------
     kernels : sequence of Kernel
-        Likelihood of each test, or one for all of them.
+        Likelihood of each test; of more tests they are repeated in this order.
     tests : int, optional
-        Number of tests, where one kernel is given.
+        Number of tests, by default that of the kernels.
     negligible : float
         Scatter of ln K below which it is negligible.
     seed : int
@@ -109,10 +111,9 @@ class Design:
     def decide(self, centres: FloatArray) -> Decision:
         """Return the verdicts of sets of tests, shape (sets, tests)."""
         found = self.hierarchy.integrated(centres)
-        random = ratios(found) > self.quantile
         upper = upper_limits(found, self.hierarchy.t, 1.0 - ALPHA)
-        explained = ~random & (upper < self.negligible)
-        return Decision(random, explained)
+        explained = upper < self.negligible
+        return Decision((ratios(found) > self.quantile) & ~explained, explained)
 
     def rates(self, t: float) -> tuple[float, float]:
         """Return the rates of the verdicts "random" and "explained" where the scatter is t."""
@@ -121,7 +122,7 @@ class Design:
 
 
 def word(random: bool, upper: float, negligible: float) -> Word:
-    """Return the verdict of tests.
+    """Return the verdict of tests: first that of a test of equivalence, then that of t = 0.
 
     Parameters
     ----------
@@ -131,38 +132,58 @@ def word(random: bool, upper: float, negligible: float) -> Word:
         One-sided upper 95 % limit of t.
     negligible : float
     """
-    if random:
-        return "random"
-    return "explained" if upper < negligible else "undecided"
+    if upper < negligible:
+        return "explained"
+    return "random" if random else "undecided"
 
 
-def normal_power(tests: int, variance: float, t: float) -> float:
-    """Return the power of the variance test for normal apparent values of equal variance.
+class Power:
+    """Rates of the verdicts of tests like given ones, by simulated sets of tests.
 
     Parameters
     ----------
-    tests : int
-        Number of tests, 2 or more.
-    variance : float
-        Variance of the apparent ln K where t = 0.
-    t : float
-        Scatter of ln K.
+    kernels : sequence of Kernel
+        Likelihood of each test; of more tests they are repeated in this order.
+    negligible : float
+        Scatter of ln K below which it is negligible.
+    seed : int
+    sets : int
+        Number of simulated sets of tests.
     """
-    from scipy.special import chdtrc, chdtri  # noqa: PLC0415  (slow to import)
 
-    limit = chdtri(tests - 1, ALPHA)
-    return float(chdtrc(tests - 1, limit * variance / (variance + t * t)))
+    def __init__(
+        self,
+        kernels: Sequence[Kernel],
+        *,
+        negligible: float = NEGLIGIBLE,
+        seed: int = 0,
+        sets: int = POWER_SETS,
+    ) -> None:
+        self.kernels, self._options = list(kernels), (negligible, seed, sets)
+        self._designs: dict[int, Design] = {}
 
+    def rates(self, tests: int, t: float) -> tuple[float, float]:
+        """Return the rates of "random" and "explained" by a number of tests with the scatter t."""
+        if tests not in self._designs:
+            negligible, seed, sets = self._options
+            self._designs[tests] = Design(
+                self.kernels, tests, negligible=negligible, seed=seed, sets=sets
+            )
+        return self._designs[tests].rates(t)
 
-def needed_tests(variance: float, t: float, power: float = 0.8, most: int = 10_000) -> int | None:
-    """Return the number of tests with a power, or None if it exceeds `most`; see `normal_power`."""
-    low, high = 1, 2
-    while normal_power(high, variance, t) < power:
-        low, high = high, 2 * high
-        if low >= most:
-            return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        enough = normal_power(middle, variance, t) >= power
-        low, high = (low, middle) if enough else (middle, high)
-    return high if high <= most else None
+    def needed(self, t: float, power: float = 0.8, most: int = MOST_TESTS) -> int | None:
+        """Return the least number of tests with a power, or None if it exceeds `most`.
+
+        Between numbers in the ratio 2 the power is interpolated: its normal quantile against the
+        logarithm of the number.
+        """
+        from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
+
+        low, below, tests = 1, ALPHA, 2
+        while (found := self.rates(tests, t)[0]) < power:
+            if tests >= most:
+                return None
+            low, below, tests = tests, max(found, ALPHA), min(2 * tests, most)
+        ends = ndtri([below, power, min(found, 0.999)])
+        part = (ends[1] - ends[0]) / (ends[2] - ends[0])
+        return max(int(np.ceil(low * (tests / low) ** part)), 2)
