@@ -158,6 +158,8 @@ class Evolution:
         """Continue on wider strips with tests whose contacts are close to the outer strips."""
         grids = next_grids(self.problem, self.state)
         moving = [place for place, grid in enumerate(grids) if grid is not None]
+        if not moving:
+            return
         while moving:
             grid = grids[moving[0]]
             assert grid is not None
@@ -166,12 +168,11 @@ class Evolution:
             one = self.problem.at(places), self.state.at(places)
             self._waiting.append((self.numbers[places], *grown(*one, grid)))
         kept = np.array([k for k, grid in enumerate(grids) if grid is None], dtype=np.int64)
-        if len(kept) < len(grids):
-            self.numbers = self.numbers[kept]
-            if kept.size:
-                self.problem, self.state = self.problem.at(kept), self.state.at(kept)
-            else:
-                self._continue_waiting()
+        self.numbers = self.numbers[kept]
+        if kept.size:
+            self.problem, self.state = self.problem.at(kept), self.state.at(kept)
+        else:
+            self._continue_waiting()
 
     def fail(self, failures: dict[int, Exception]) -> None:
         """End tests, by number, with the errors given."""

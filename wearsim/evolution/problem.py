@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -26,6 +27,8 @@ from wearsim.types import FloatArray, Grid, IntArray
 
 if TYPE_CHECKING:
     from wearsim.evolution.strips import Growth
+
+FREE = 0.075  # part of all strips that is without load on each side, at least
 
 
 @dataclass(frozen=True)
@@ -173,6 +176,15 @@ class WearProblem:
     def body_rows(self) -> IntArray:
         """`bodies` counted together, the stations of the cylinder first, as in `stacked`."""
         return np.asarray(self.bodies + np.array([0, self.shape[0]]))
+
+    @cached_property
+    def free_strips(self) -> list[int]:
+        """Strips without load on each side below which strips grow; 0 where they do not."""
+        strips = self.grid.strips
+        least = max(3, math.ceil(FREE * strips))
+        margins = (math.ceil(one.margin / self.grid.spacing) for one in self.growth)
+        free = (min(max(least, margin), strips) for margin in margins)
+        return [count if one.most else 0 for count, one in zip(free, self.growth, strict=True)]
 
     @cached_property
     def volume_weights(self) -> FloatArray:

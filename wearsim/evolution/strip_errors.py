@@ -25,7 +25,7 @@ from wearsim.evolution.steppers.loads import elastic_approaches
 from wearsim.evolution.strips import averaged, coarse_problem
 from wearsim.types import FloatArray, Grid
 
-LOOSER = 5.0  # tolerance of the coarse test over that of the test
+LOOSER = 10.0  # tolerance of the coarse test over that of the test
 LOOSEST = 0.1  # greatest tolerance of a coarse test
 COVER = 0.5  # safety factor on the difference
 FRESH_COVER = 2.0  # the same before wear: later, wear reduces errors of the shape of a groove
@@ -83,10 +83,8 @@ def add_step(courses: Sequence[Course], advance: Advance) -> None:
     problem, end = advance.problem, advance.end
     sizes, profiles = sizes_of(problem, end), profiles_of(problem, end)
     errors = np.array([end.depth_error, end.volume_error, end.profile_error])
-    approaches = elastic_approaches(problem, end).max(axis=(0, 1))
     for place, number in enumerate(advance.numbers.tolist()):
         course = courses[number]
-        course.approach = float(approaches[place])
         course.passes.append(float(end.passes[place]))
         course.sizes.append(sizes[:, place])
         course.by_steps.append(errors[:, place])
@@ -122,6 +120,9 @@ def coarse_courses(
             add_step(courses, advance)
             done = advance.end.passes >= needed[advance.numbers]
             if done.any():
+                approaches = elastic_approaches(advance.problem, advance.end).max(axis=(0, 1))
+                for place in np.flatnonzero(done).tolist():
+                    courses[advance.numbers[place]].approach = float(approaches[place])
                 tests.end(advance.numbers[done].tolist())
     except Exception:  # a test fails for its own reasons, and the others are repeated without it
         if len(needed) == 1:

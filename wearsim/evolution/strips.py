@@ -22,7 +22,6 @@ from wearsim.evolution.steppers.single_step import carried_loads, solve_present
 from wearsim.plugins import ContactModel
 from wearsim.types import FloatArray, Grid
 
-FREE = 0.075  # part of all strips that is without load on each side, at least
 WIDER = 1.5  # width after growing over that before
 JOINED = 3  # strips joined to one; an odd number keeps symmetric strips symmetric
 LEAST_LOADED = 24  # strips of each contact after joining, as of a fresh contact
@@ -84,21 +83,19 @@ def next_grids(problem: WearProblem, state: WearState) -> list[Grid | None]:
     Strips grow if a contact is loaded close to the outer ones.
     """
     realisations, strips = len(state.passes), problem.grid.strips
-    unchanged: list[Grid | None] = [None] * realisations
-    if not any(one.most for one in problem.growth):
-        return unchanged
-    load, least = state.contacts.line_load, max(3, math.ceil(FREE * strips))
-    free = [max(least, math.ceil(one.margin / problem.grid.spacing)) for one in problem.growth]
-    widest = min(max(free), strips)
+    free, load = problem.free_strips, state.contacts.line_load
+    widest = max(free, default=0)
     # counted, since any() takes three times as long on short arrays
-    if not np.count_nonzero(load[:, :widest]) and not np.count_nonzero(load[:, -widest:]):
-        return unchanged
+    if not widest or not (
+        np.count_nonzero(load[:, :widest]) or np.count_nonzero(load[:, -widest:])
+    ):
+        return [None] * realisations
     loaded = (load > 0.0).reshape(-1, realisations, strips)
     counts = loaded.sum(axis=2).min(axis=0).tolist()
     found = []
     for v, (growth, width, count) in enumerate(zip(problem.growth, free, counts, strict=True)):
-        outer = loaded[:, v, :width].any() or loaded[:, v, -width:].any()
-        found.append(_next(problem.grid, growth, count) if outer and growth.most else None)
+        outer = width and (loaded[:, v, :width].any() or loaded[:, v, -width:].any())
+        found.append(_next(problem.grid, growth, count) if outer else None)
     return found
 
 

@@ -73,7 +73,7 @@ class RunInProgress:
         limit: Limit | None = None,
     ) -> None:
         self.limit, self.reached = limit, False
-        grid = start_of_run(scenario, draws)
+        self.start = grid = start_of_run(scenario, draws)
         if data is not None:
             grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
         self.scenario, self.draws, self.path, self.storage = scenario, draws, path, storage
@@ -171,17 +171,15 @@ class RunInProgress:
         stepper = coarse_stepper(self.draws, problem)
         if stepper is None or self._passes == 0.0:
             return
-        start = start_of_run(self.scenario, self.draws)
         first = self.problem
-        if not same_strips(first.grid, start):
-            first = assemble_problem(self.draws, start)[0]
-        history = self.recorder.history
-        passes, count = history["passes"], problem.kinematics.multiplicity
-        rollers = history["roller_worn_volume"][..., 0] @ count
+        if not same_strips(first.grid, self.start):
+            first = assemble_problem(self.draws, self.start)[0]
+        column, count = self.recorder.column, problem.kinematics.multiplicity
+        passes, rollers = column("passes"), column("roller_worn_volume")[..., 0] @ count
         sizes = [
-            history["depth"][:, 0],
-            history["roller_depth"][..., 0].max(axis=1),
-            history["worn_volume"][:, 0] + rollers,
+            column("depth")[:, 0],
+            column("roller_depth")[..., 0].max(axis=1),
+            column("worn_volume")[:, 0] + rollers,
         ]
         last, most = passes[-1:], self.scenario.evolution.max_steps
         (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most)
@@ -189,8 +187,8 @@ class RunInProgress:
             self.warn(
                 "error by strips: not estimated, as the test fails on strips of twice the width"
             )
-        records = self.recorder.records
-        profiles = [records[f"{body}_depth_profile"][-1][:, 0] for body in ("cylinder", "roller")]
+        record = self.recorder.last_record
+        profiles = [record[f"{body}_depth_profile"][:, 0] for body in ("cylinder", "roller")]
         end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
         self.recorder.strip_errors = strip_errors(coarse, passes, np.array(sizes), end)
 

@@ -308,6 +308,16 @@ class Recorder:
             columns[name] = by_steps + np.nan_to_num(part)[:, None]
         return columns
 
+    def column(self, name: str) -> FloatArray:
+        """Return a variable of the history except errors, first axis step."""
+        return np.array([row[name] for row in self._history])
+
+    @property
+    def last_record(self) -> Variables:
+        """The last record, on the present strips."""
+        grid, row = self._records[-1]
+        return _on_grid(row, grid, self.grid)
+
     def _strip_errors(self) -> FloatArray:
         """Return the errors due to the strips, shape (3, steps); nan where they are not known."""
         unknown = np.full((len(ERRORS), len(self._history)), np.nan)
