@@ -10,6 +10,8 @@ import wearsim
 TIME = r"[\d.]+ (us|ms|s)"
 RANDOM = "friction.coefficient={distribution = 'uniform', low = 0.09, high = 0.11}"
 
+WITHOUT_STRIPS = ("--set", "evolution.strip_error=false")
+
 
 def last_line(result):
     assert result.exit_code == 0, result.output
@@ -21,9 +23,11 @@ def test_footer_of_a_run_has_its_stepping_error(command, scenario):
     result = wearsim.open_results("short.h5")
     used = f"slender, {len(result.y)} strips, implicit, tolerance 0.001"
     assert line.startswith(f"{used}; depth within ")
-    numerical = r"\(estimated numerical error of the steps, not of model or inputs\)"
+    numerical = r"\(estimated numerical error of the steps and strips, not of model or inputs\)"
     assert re.search(rf"worn volume within [\d.]+ % {numerical}; {TIME}$", line)
-    part = float(re.search(r"depth within ([\d.]+) %", line)[1])
+    pattern = r"depth within ([\d.]+) % \(steps ([\d.e-]+) %, strips ([\d.]+) %\)"
+    part, steps, strips = map(float, re.search(pattern, line).groups())
+    assert steps + strips == pytest.approx(part, rel=0.05)
     stated = float(result.depth_error[-1] / result.depth[-1])
     assert part == pytest.approx(100.0 * stated, rel=0.05)
 
@@ -31,6 +35,8 @@ def test_footer_of_a_run_has_its_stepping_error(command, scenario):
 def test_per_pass_run_has_no_stepping_error(command, scenario):
     changes = ("--set", "evolution.stepper=per-pass", "--set", "operation.passes=30")
     line = last_line(command("run", scenario, "-o", "short.h5", "-q", *changes))
+    assert "(steps rounding, strips " in line
+    line = last_line(command("run", scenario, "-o", "b.h5", "-q", *changes, *WITHOUT_STRIPS))
     assert "per-pass; no stepping error; " in line
 
 

@@ -177,12 +177,12 @@ def test_hdf5_of_another_program_is_refused(tmp_path: Path) -> None:
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 7
+    file.attrs["format_version"] = 8
     del file["depth"]
 
 
 def _older(file: h5py.File) -> None:
-    file.attrs["format_version"] = 5
+    file.attrs["format_version"] = 6
 
 
 def _incomplete(file: h5py.File) -> None:

@@ -14,10 +14,12 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located, relocated
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
-from wearsim.evolution.strips import grown, next_grids, on_grid, same_strips
+from wearsim.evolution.strips import grown, identical_strips, next_grids, on_grid
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 T = TypeVar("T")
+
+MOST_WIDENED = 12  # times that strips grow for one step
 
 
 def bisect_failures(
@@ -129,6 +131,8 @@ class Evolution:
         self._scheme: Step
         self._first = problem
         self._waiting: list[tuple[IntArray, WearProblem, WearState]] = []
+        self._outgrown: IntArray = np.zeros(0, dtype=np.int64)
+        self._widened: dict[int, tuple[float, int]] = {}
         self._end_finished()
 
     def __iter__(self) -> Iterator[Advance]:
@@ -142,7 +146,7 @@ class Evolution:
     def _continue_waiting(self) -> None:
         """Continue the tests that wait on the same strips as the first of them."""
         grid = self._waiting[0][1].grid
-        chosen = [same_strips(problem.grid, grid) for _, problem, _ in self._waiting]
+        chosen = [identical_strips(problem.grid, grid) for _, problem, _ in self._waiting]
         parts = [part for part, use in zip(self._waiting, chosen, strict=True) if use]
         self._waiting = [part for part, use in zip(self._waiting, chosen, strict=True) if not use]
         (self.numbers, self.problem, self.state), *others = parts
@@ -156,14 +160,15 @@ class Evolution:
 
     def _grow(self) -> None:
         """Continue on wider strips with tests whose contacts are close to the outer strips."""
-        grids = next_grids(self.problem, self.state)
+        grids = next_grids(self.problem, self.state, np.isin(self.numbers, self._outgrown))
+        self._outgrown = np.zeros(0, dtype=np.int64)
         moving = [place for place, grid in enumerate(grids) if grid is not None]
         if not moving:
             return
         while moving:
             grid = grids[moving[0]]
             assert grid is not None
-            places = np.array([k for k in moving if same_strips(grids[k] or grid, grid)])
+            places = np.array([k for k in moving if identical_strips(grids[k] or grid, grid)])
             moving = [place for place in moving if place not in places]
             one = self.problem.at(places), self.state.at(places)
             self._waiting.append((self.numbers[places], *grown(*one, grid)))
@@ -287,12 +292,21 @@ class Evolution:
     def _rejected(self, failed: dict[int, Exception], lengths: FloatArray) -> dict[int, Exception]:
         """Shorten the steps that failed, by place; return errors of tests that cannot continue."""
         failures: dict[int, Exception] = {}
+        outgrown: list[int] = []
         for place, error in failed.items():
             number = int(self.numbers[place])
-            if isinstance(error, (StepError, ContactError)) and self.stepper.forced_step is None:
+            passes = float(self.state.passes[place])
+            edge = getattr(error, "cause", "") == "edge" and self.problem.free_strips[place]
+            before, times = self._widened.get(number, (passes, 0))
+            times = times if before == passes else 0
+            if edge and times < MOST_WIDENED:  # the step is tried again on wider strips
+                self._widened[number] = passes, times + 1
+                outgrown.append(number)
+            elif isinstance(error, (StepError, ContactError)) and self.stepper.forced_step is None:
                 self._trials[number].reject(error, float(lengths[place]))
             else:
                 failures[number] = error
+        self._outgrown = np.array(outgrown, dtype=np.int64)
         return failures
 
     def _continued(

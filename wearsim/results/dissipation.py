@@ -24,12 +24,12 @@ from wearsim.results.content import (
 )
 from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray
-from wearsim.uq.estimation.estimates import Design, estimate
 from wearsim.uq.estimation.moments import Convergence, Quantile, Summary, converge, summarise
-from wearsim.uq.estimation.standard_errors import Replicated
 
 if TYPE_CHECKING:
     import pandas
+
+    from wearsim.uq.estimation.estimates import Design
 
 _DRAW = ("realisation",)
 _STRIPS = ("y",)
@@ -296,6 +296,8 @@ def _summary(
     values: FloatArray, probabilities: tuple[float, ...], plan: str, replicates: int
 ) -> Summary:
     """Return estimates with the errors and intervals of a sampling design."""
+    from wearsim.uq.estimation.estimates import estimate  # noqa: PLC0415  (not of a run)
+
     design: Design = "sobol" if plan == "sobol" else "monte-carlo"
     found = summarise(values, probabilities)
     known = estimate(values, probabilities, design, np.arange(len(values)) % replicates)
@@ -316,6 +318,8 @@ def _summary(
 
 def _replicated_errors(values: FloatArray, replicates: int) -> tuple[float, float]:
     """Return the standard errors of mean and standard deviation by independent sequences."""
+    from wearsim.uq.estimation.standard_errors import Replicated  # noqa: PLC0415
+
     errors = Replicated(np.arange(len(values)) % replicates)
     std = float(values.std())
     if errors.degrees < 1 or std == 0.0:

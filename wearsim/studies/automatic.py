@@ -10,6 +10,7 @@ from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, SolverError, WearsimError
 from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.observables import present_batch
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import ContactModelSpec, registry
@@ -215,12 +216,13 @@ def _looked_at(scenario: Scenario, test: bool) -> tuple[list[_State], str]:
     evolution = scout.evolution.model_copy(
         update={"stepper": "auto", "step": None, "nodes": None, "tolerance": _TOLERANCE}
     )
-    seen: list[WearState] = []
+    evolution = evolution.model_copy(update={"strip_error": False})
+    seen: list[tuple[WearProblem, WearState]] = []
     run: RunInProgress | None = None
 
     def watch(event: Event) -> None:
         if isinstance(event, Stepped) and run is not None:
-            seen.append(run.recorder.state)
+            seen.append((run.present, run.recorder.state))
 
     mean = replace(scout, evolution=evolution)
     try:
@@ -230,10 +232,8 @@ def _looked_at(scenario: Scenario, test: bool) -> tuple[list[_State], str]:
         run.finish()
     except SolverError:
         return [_single(scout)], "at the start of the test, which 'slender' does not step"
-    early = min(seen, key=lambda state: abs(float(state.passes[0]) - _EARLY * run.stop))
-    states += [
-        _state(scout, problem.grid, present_batch(problem, state)) for state in (early, seen[-1])
-    ]
+    early = min(seen, key=lambda pair: abs(float(pair[1].passes[0]) - _EARLY * run.stop))
+    states += [_state(scout, pair[0].grid, present_batch(*pair)) for pair in (early, seen[-1])]
     return states, "at the start, after a tenth and at the end of the test with mean inputs"
 
 

@@ -127,7 +127,7 @@ def test_contact_of_one_element():
 def test_contact_at_the_edge_of_the_strips_is_an_error(width):
     grid = Grid.spanning(-0.5 * width, 0.5 * width, 41)
     model = Halfspace(HalfspaceOptions(mx=24), grid, (STEEL, STEEL))
-    with pytest.raises(ContactError, match=r"edge of its strips; raise contact\.width"):
+    with pytest.raises(ContactError, match=r"edge of its strips"):
         model.solve_one(crown(grid.y), CURVATURE, OperatingPoint(300.0, 1.0, LARGE, 0.1))
 
 

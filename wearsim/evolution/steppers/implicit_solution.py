@@ -158,7 +158,7 @@ class EndOfStep:
             shared = SharedWear(problem.bodies, compliance)
             solved = solve_compliant(problem, batch, shared, contacts, active)
             iterations += active
-            new, exponents = self._parts(solved), exponents.copy()
+            new, known, exponents = self._parts(solved), exponents, exponents.copy()
             rest, opening, depth = wear_of_bodies(
                 solved.line_load,
                 line_load,
@@ -172,6 +172,9 @@ class EndOfStep:
                 exponents,
                 worn,
             )
+            if np.count_nonzero(active) < len(active):  # of realisations that have converged
+                each = exponents.reshape(-1, len(active), shape[1])
+                each[:, ~active] = known.reshape(each.shape)[:, ~active]
             used, depths, change = depths, self.base + worn, rest
             # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
             relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)

@@ -269,7 +269,7 @@ class SemiHertzian(StripModel, SingleContactModel):
         line_load, half_length = np.zeros(len(gap)), np.zeros(len(gap))
         compliance = np.zeros(len(gap)) if wear_compliance is None else own_array(wear_compliance)
         # the depths under a vanishing load would be lost in the rounding of a deep groove
-        lowest = float(gap.min())
+        lowest = float(gap.min()) if np.isfinite(gap).all() else 0.0
         status, iterations, approach = kernels.solve_semi_hertzian(
             self._variant,
             own_array(gap - lowest),

@@ -239,7 +239,7 @@ class EnsembleValues(StudyResult[EnsembleData]):
         Examples
         --------
         >>> wearsim.open_ensemble("rig-ensemble.h5").kept_values("depth_profile").shape
-        (16, 169)
+        (16, 189)
         """
         if name not in self.raw.schema.variables or name not in KEPT:
             raise unknown_name(name, "a curve", KEPT[: 1 + self.raw.cam])

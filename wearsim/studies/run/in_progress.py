@@ -167,7 +167,7 @@ class RunInProgress:
 
     def _estimate_strip_errors(self) -> None:
         """Estimate the errors due to the strips by the same test on coarse ones."""
-        problem = self._present
+        problem = self.present
         stepper = coarse_stepper(self.draws, problem)
         if stepper is None or self._passes == 0.0:
             return
@@ -195,7 +195,7 @@ class RunInProgress:
     def _check_errors(self) -> None:
         """Warn if estimated errors exceed the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        problem = located(self._present, state)
+        problem = located(self.present, state)
         sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
         errors = state.depth_error, state.volume_error
         by_strips = (
@@ -222,7 +222,7 @@ class RunInProgress:
                     part = scatter / relative
                     remedy = f"{part:.0%} of it is sampling scatter of the small number of passes"
             elif strips > 0.5 * relative:
-                strips_here = self.scenario.contact.strips or self._present.grid.strips
+                strips_here = self.scenario.contact.strips or self.present.grid.strips
                 remedy = f"more contact.strips than {strips_here} decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
         for remedy, found in beyond.items():
@@ -294,7 +294,7 @@ class RunInProgress:
         if choice.auto is None or choice.model == REFERENCE or not (due and known):
             return
         materials = self.scenario.cylinder.material, self.scenario.roller.material
-        problem = self._present
+        problem = self.present
         batch = present_batch(problem, state)
         tolerance, grid = choice.auto.tolerance, problem.grid
         if text := excess(REFERENCE, choice, grid, materials, batch, tolerance):
@@ -321,7 +321,7 @@ class RunInProgress:
         ) from None
 
     @property
-    def _present(self) -> WearProblem:
+    def present(self) -> WearProblem:
         """The problem on the present strips."""
         grid = self.recorder.grid
         return self.problem if grid is self.problem.grid else on_grid(self.problem, grid)
@@ -344,7 +344,7 @@ class RunInProgress:
 
     def data(self, finished: bool) -> RunData:
         """Return the content of the results file."""
-        scenario, problem = self.scenario, self._present
+        scenario, problem = self.scenario, self.present
         kinematics = problem.kinematics
         checkpoint = self.recorder.state.to_arrays()
         checkpoint["record_base"] = np.asarray(self.record_base)

@@ -8,11 +8,12 @@ from itertools import groupby, pairwise
 import numpy as np
 
 from wearsim.evolution.quantities import centroid, oscillation
+from wearsim.evolution.strips import averaged
 from wearsim.results import Result
 from wearsim.scenario import Scenario
 from wearsim.studies.run.assemble import merged_rollers
 from wearsim.studies.run.draws import draw
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, Grid
 
 PROFILES = ("cylinder_depth_profile", "roller_depth_profile")
 _MIN_STRIPS = 20  # strips in contact, for which a parabola has second differences of 2 %
@@ -147,12 +148,15 @@ def asymmetry(result: Result, mirrored: Result) -> float:
 def change(coarse: Result, fine: Result) -> float:
     """Return the relative L1 difference of the final profile from that of a finer run.
 
-    If the finer run has a multiple of the strips, means over the wider strips are compared. The
-    body with more wear is used.
+    Means over the strips of the coarse run are compared. The body with more wear is used.
     """
     name = max(PROFILES, key=lambda name: float(fine.raw.records[name][-1].max()))
     one, other = (item.raw.records[name][-1] for item in (coarse, fine))
-    return _relative_difference(one, other.reshape(*one.shape, -1).mean(axis=-1))
+    return _relative_difference(one, averaged(other, *map(_grid, (fine, coarse))))
+
+
+def _grid(result: Result) -> Grid:
+    return Grid(result.y, float(result.raw.checkpoint["spacing"]))
 
 
 def changes(runs: Sequence[Result]) -> list[float]:
