@@ -180,6 +180,8 @@ class WearProblem:
     @cached_property
     def free_strips(self) -> list[int]:
         """Strips without load on each side below which strips grow; 0 where they do not."""
+        if not self.growth:
+            return [0] * self.shape[2]
         strips = self.grid.strips
         least = max(3, math.ceil(FREE * strips))
         margins = (math.ceil(one.margin / self.grid.spacing) for one in self.growth)
