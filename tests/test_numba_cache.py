@@ -44,12 +44,14 @@ print(json.dumps({"hits": sum(stats.cache_hits.values()), "path": stats.cache_pa
 
 EVERYTHING = f"""
 import json
+import numpy as np
 import wearsim
 from pathlib import Path
 from numba.core import event
 from wearsim.contact_batch import ContactBatch
 from wearsim.mechanics.numerics import jit
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
+from wearsim.mechanics.numerics.gaussian_processes import squared_residuals
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
 jit._call_elsewhere = lambda function: None  # compile all of them in this process
@@ -91,6 +93,8 @@ steel, grid = Material(200e9, 0.3), Grid.spanning(-3e-3, 3e-3, 61)
 model = HertzFastsim(HertzFastsimOptions(), grid, (steel, steel))
 point = OperatingPoint(300.0, 2.6, Creepage(1e-3), 0.1)
 model.friction_points(ContactBatch.of(grid.y[None] ** 2, 90.0, [point]))
+one = np.ones((3, 2))
+squared_residuals(np.ones((4, 3)), one, one, one, np.ones((1, 3, 2)))
 counts = {{}}
 for _, begun in compiled.buffer:
     function = begun.data["dispatcher"].py_func

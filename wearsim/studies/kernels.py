@@ -64,12 +64,17 @@ def kernels_of(
     if steps and model == "slender" and theory == "strip" and name == "per-pass":
         found |= {"run_passes"}
     roles = {item.role for item in scenario.random}
-    doubled = "process" in roles or not scenario.load.build().constant or evolution.step is not None
-    if steps and model in {"slender", "semi-hertzian"} and name in {"auto", "implicit"}:
+    varies = "process" in roles or not scenario.load.build().constant
+    redrawn = any(item.is_redrawn for item in scenario.random)
+    # the test on coarse strips
+    coarse = evolution.strip_error and not (name == "per-pass" and redrawn)
+    compliant, own = model in {"slender", "semi-hertzian"}, name in {"auto", "implicit"}
+    if steps and compliant and (own or coarse):
         found |= {"formulas", "extrapolated", "new_differences", "next_steps"}
         found |= {"linearised_wear", "wear_of_bodies"}
-        found |= {"difference_sizes" if doubled else "carried_errors"}
-    elif steps and name != "per-pass":
+        found |= {"difference_sizes" if varies else "carried_errors"}
+    doubled = name != "per-pass" if not (compliant and own) else evolution.step is not None
+    if steps and (doubled or (coarse and not compliant)):
         found |= {"difference_sizes"}
     found |= {"filter_noise"} if "process" in roles else set()
     return found | ({"smooth", "half_lengths"} if "field" in roles else set())

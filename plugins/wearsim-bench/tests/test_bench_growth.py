@@ -143,7 +143,7 @@ def test_all_sizes_are_measured():
         assert row.failed == ""
         assert row.seconds > 0.0
         assert row.counts["file_bytes"] > 0.0
-        assert 0.0 < row.errors["stated"] < 0.01
+        assert 0.0 < row.errors["stated"] < 0.05  # with few strips
     # single tests have a reference with individually solved passes
     for group in topic.groups[:3]:
         assert all(0.0 <= row.errors["depth"] < 2e-3 for row in topic.of(group))
