@@ -143,4 +143,5 @@ def test_records_of_a_prolonged_test_are_bounded(
     due = schedule.due_after(0.0, pass_by_pass)
     multiple = math.ceil(schedule.interval_at(end)) if pass_by_pass else schedule.interval_at(end)
     assert schedule.is_kept(multiple, end)
-    assert schedule.is_kept(due, end) == (due == multiple)
+    # a record may miss an interval by round-off
+    assert schedule.is_kept(due, end) == (abs(due - multiple) <= 1e-9 * multiple)
