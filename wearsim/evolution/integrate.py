@@ -131,7 +131,7 @@ class Evolution:
         self._scheme: Step
         self._first = problem
         self._waiting: list[tuple[IntArray, WearProblem, WearState]] = []
-        self._outgrown: IntArray = np.zeros(0, dtype=np.int64)
+        self._outgrown: set[int] = set()
         self._widened: dict[int, tuple[float, int]] = {}
         self._end_finished()
 
@@ -160,8 +160,12 @@ class Evolution:
 
     def _grow(self) -> None:
         """Continue on wider strips with tests whose contacts are close to the outer strips."""
-        grids = next_grids(self.problem, self.state, np.isin(self.numbers, self._outgrown))
-        self._outgrown = np.zeros(0, dtype=np.int64)
+        outgrown: set[int] = set()
+        if self._outgrown:
+            each = enumerate(self.numbers.tolist())
+            outgrown = {place for place, number in each if number in self._outgrown}
+            self._outgrown = set()
+        grids = next_grids(self.problem, self.state, outgrown)
         moving = [place for place, grid in enumerate(grids) if grid is not None]
         if not moving:
             return
@@ -292,7 +296,6 @@ class Evolution:
     def _rejected(self, failed: dict[int, Exception], lengths: FloatArray) -> dict[int, Exception]:
         """Shorten the steps that failed, by place; return errors of tests that cannot continue."""
         failures: dict[int, Exception] = {}
-        outgrown: list[int] = []
         for place, error in failed.items():
             number = int(self.numbers[place])
             passes = float(self.state.passes[place])
@@ -301,12 +304,11 @@ class Evolution:
             times = times if before == passes else 0
             if edge and times < MOST_WIDENED:  # the step is tried again on wider strips
                 self._widened[number] = passes, times + 1
-                outgrown.append(number)
+                self._outgrown.add(number)
             elif isinstance(error, (StepError, ContactError)) and self.stepper.forced_step is None:
                 self._trials[number].reject(error, float(lengths[place]))
             else:
                 failures[number] = error
-        self._outgrown = np.array(outgrown, dtype=np.int64)
         return failures
 
     def _continued(

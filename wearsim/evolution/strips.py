@@ -9,7 +9,7 @@ that the worn volume is kept, and the groove is then resolved as well as the fre
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.single_step import carried_loads, solve_present
 from wearsim.plugins import ContactModel
-from wearsim.types import BoolArray, FloatArray, Grid
+from wearsim.types import FloatArray, Grid
 
 WIDER = 1.5  # width after growing over that before
 JOINED = 3  # strips joined to one; an odd number keeps symmetric strips symmetric
@@ -77,27 +77,27 @@ class Growth:
     least_loaded: int = LEAST_LOADED
 
 
-def next_grids(problem: WearProblem, state: WearState, outgrown: BoolArray) -> list[Grid | None]:
+def next_grids(
+    problem: WearProblem, state: WearState, outgrown: Collection[int]
+) -> list[Grid | None]:
     """Return the wider strips of each realisation that needs them, else None.
 
     Strips grow if a contact is loaded close to the outer ones, or has reached them in a step from
-    the state: `outgrown`, shape (realisations,).
+    the state: `outgrown`, places of the realisations.
     """
     realisations, strips = len(state.passes), problem.grid.strips
     free, load = problem.free_strips, state.contacts.line_load
     widest = max(free, default=0)
     # counted, since any() takes three times as long on short arrays
     if not widest or not (
-        np.count_nonzero(load[:, :widest])
-        or np.count_nonzero(load[:, -widest:])
-        or np.count_nonzero(outgrown)
+        outgrown or np.count_nonzero(load[:, :widest]) or np.count_nonzero(load[:, -widest:])
     ):
         return [None] * realisations
     loaded = (load > 0.0).reshape(-1, realisations, strips)
     counts = loaded.sum(axis=2).min(axis=0).tolist()
     found = []
     for v, (growth, width, count) in enumerate(zip(problem.growth, free, counts, strict=True)):
-        near = outgrown[v] or loaded[:, v, :width].any() or loaded[:, v, -width:].any()
+        near = v in outgrown or loaded[:, v, :width].any() or loaded[:, v, -width:].any()
         outer = width and near
         found.append(_next(problem.grid, growth, count) if outer else None)
     return found

@@ -198,11 +198,7 @@ class RunInProgress:
         problem = located(self.present, state)
         sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
         errors = state.depth_error, state.volume_error
-        by_strips = (
-            np.nan_to_num(self.recorder.strip_errors)[:, -1:]
-            if (self.recorder.strip_errors is not None)
-            else np.zeros((3, 1))
-        )
+        by_strips = np.nan_to_num(self.recorder.errors_by_strips[:, -1:])
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [

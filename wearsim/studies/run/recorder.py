@@ -302,7 +302,7 @@ class Recorder:
         Errors are sums of those due to steps and, where they are known, due to strips.
         """
         columns = _columns(self._history)
-        for name, part in zip(ERRORS, self._strip_errors(), strict=True):
+        for name, part in zip(ERRORS, self.errors_by_strips, strict=True):
             by_steps = columns[f"{name}_by_steps"]
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
             columns[name] = by_steps + np.nan_to_num(part)[:, None]
@@ -318,8 +318,9 @@ class Recorder:
         grid, row = self._records[-1]
         return _on_grid(row, grid, self.grid)
 
-    def _strip_errors(self) -> FloatArray:
-        """Return the errors due to the strips, shape (3, steps); nan where they are not known."""
+    @property
+    def errors_by_strips(self) -> FloatArray:
+        """Errors due to the strips, shape (3, steps); nan where they are not known."""
         unknown = np.full((len(ERRORS), len(self._history)), np.nan)
         return unknown if self.strip_errors is None else self.strip_errors
 
