@@ -66,7 +66,7 @@ _UNINTERESTING = {"load.file", "sampling.realisation", "outputs.records", "evolu
 
 
 def digest(scenario: Scenario) -> str:
-    """Return a hash of what the exact solution of a scenario depends on."""
+    """Return a hash of the settings on which the exact solution of a scenario depends."""
     changes = {"evolution.tolerance": TRUE_TOLERANCE, "evolution.stepper": "auto"}
     return scenario.changed(changes).sha256[:12]
 
