@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -15,8 +16,8 @@ KINDS = {
 }
 #: what shows results: the verbs, the renderers, and the views of every kind
 PRESENTATION = re.compile(
-    r"wearsim/(cli/(commands|render)|report|views)/|wearsim/cli/render\.py"
-    r"|wearsim/results/(csv_export|tables)\.py|wearsim/studies/.*(view|panels|lives|measured)\w*\.py"
+    r"wearsim/(cli/(commands|render)/|report/|cli/(render|solver_state)\.py|scenario/display\.py"
+    r"|results/(csv_export|tables|study_view|viewed)\.py|studies/(.*/)?(\w*view|panels|rows)\.py)"
 )
 
 
@@ -58,4 +59,4 @@ def counts(root: Path = ROOT) -> dict[str, int]:
 
 if __name__ == "__main__":
     for name, number in counts().items():
-        print(f"{number:8,d}  {name}")
+        sys.stdout.write(f"{number:8,d}  {name}\n")

@@ -8,7 +8,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import IO, Any
 
-from wearsim.results import Storage
+from wearsim.atomic_write import Storage
 
 STAGES = ("open", "write", "fsync", "close", "rename", "fsync folder")
 """File operations of writing a file; "remove" deletes one."""

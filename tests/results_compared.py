@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from wearsim.results import RunData
+from wearsim.studies.run.result import RunData
 
 ARRAYS = ("static", "history", "records", "checkpoint")
 

@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from wearsim.cli.app import app
-from wearsim.results import open_results
-from wearsim.results.dissipation import DISSIPATION
-from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.run_schema import RUN
+from wearsim.studies.dissipation.result import DISSIPATION
+from wearsim.studies.ensemble.file.schema import ENSEMBLE
+from wearsim.studies.opening import open_results
+from wearsim.studies.run.schema import RUN
 
 ROOT = Path(__file__).parents[1]
 GENERATED = {"_build", "generated"}

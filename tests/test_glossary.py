@@ -11,10 +11,10 @@ import pytest
 from wearsim import load_scenario, run
 from wearsim.report.text import OBSERVABLES as LABELS
 from wearsim.report.text import si_key
-from wearsim.results.dissipation import VARIABLES as DISSIPATION
-from wearsim.results.ensemble.schema import ANGLE, CAM_OBSERVABLES, ENSEMBLE, LIFE, STATISTICS
-from wearsim.results.run_schema import ALL_VARIABLES as RUN
 from wearsim.scenario.examples import scenario_schema
+from wearsim.studies.dissipation.result import VARIABLES as DISSIPATION
+from wearsim.studies.ensemble.file.schema import ANGLE, CAM_OBSERVABLES, ENSEMBLE, LIFE, STATISTICS
+from wearsim.studies.run.schema import ALL_VARIABLES as RUN
 
 ROOT = Path(__file__).parents[1]
 HEAD = ["quantity", "symbol", "scenario key", "name in code", "file variable", "label"]

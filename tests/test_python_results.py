@@ -16,7 +16,7 @@ from rig_text import short_rig
 
 import wearsim
 from wearsim import Profile, Scenario, UnknownNameError
-from wearsim.studies.ensemble.compare import compare
+from wearsim.studies.comparison.compare import compare
 
 FRICTION = {"distribution": "uniform", "low": 0.08, "high": 0.12}
 LOAD = {

@@ -115,25 +115,21 @@ if TYPE_CHECKING:
     from wearsim.errors import (
         WorkerError as WorkerError,
     )
-    from wearsim.results import (
-        DissipationResult,
-        EnsembleResult,
-        IdentificationResult,
-        Result,
-        open_dissipation,
-        open_ensemble,
-        open_results,
-    )
-    from wearsim.results.ensemble.life import LifeResult
     from wearsim.scenario import Scenario, load_scenario
     from wearsim.studies.cam.study import CamStudy, study_cam
-    from wearsim.studies.contact.monte_carlo import dissipation
+    from wearsim.studies.comparison.compare import compare
     from wearsim.studies.contact.single import ContactStudy, solve_contact, study_contact
+    from wearsim.studies.dissipation.monte_carlo import dissipation
+    from wearsim.studies.dissipation.result import DissipationResult
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
-    from wearsim.studies.ensemble.compare import compare
+    from wearsim.studies.ensemble.result import EnsembleResult
     from wearsim.studies.ensemble.sweep import sweep
     from wearsim.studies.identify.api import identify
-    from wearsim.studies.life.api import life, resume_life
+    from wearsim.studies.identify.result import IdentificationResult
+    from wearsim.studies.life.api import life, resume_life, sweep_life
+    from wearsim.studies.life.result import LifeResult
+    from wearsim.studies.opening import open_dissipation, open_ensemble, open_results
+    from wearsim.studies.run.result import Result
     from wearsim.studies.run.run import resume, run
     from wearsim.types import ContactSolution, Profile
 
@@ -152,26 +148,21 @@ _NAMES = {
         "WearsimError",
         "WorkerError",
     ],
-    "wearsim.results": [
-        "DissipationResult",
-        "EnsembleResult",
-        "IdentificationResult",
-        "Result",
-        "open_dissipation",
-        "open_ensemble",
-        "open_results",
-    ],
-    "wearsim.results.ensemble.life": ["LifeResult"],
+    "wearsim.studies.dissipation.result": ["DissipationResult"],
+    "wearsim.studies.ensemble.result": ["EnsembleResult"],
+    "wearsim.studies.identify.result": ["IdentificationResult"],
+    "wearsim.studies.life.result": ["LifeResult"],
+    "wearsim.studies.run.result": ["Result"],
+    "wearsim.studies.opening": ["open_dissipation", "open_ensemble", "open_results"],
     "wearsim.scenario": ["Scenario", "load_scenario"],
     "wearsim.studies.cam.study": ["CamStudy", "study_cam"],
-    "wearsim.studies.contact.monte_carlo": ["dissipation"],
+    "wearsim.studies.dissipation.monte_carlo": ["dissipation"],
     "wearsim.studies.contact.single": ["ContactStudy", "solve_contact", "study_contact"],
     "wearsim.studies.ensemble.api": ["ensemble", "resume_ensemble"],
-    "wearsim.studies.ensemble.compare": ["compare"],
+    "wearsim.studies.comparison.compare": ["compare"],
     "wearsim.studies.ensemble.sweep": ["sweep"],
     "wearsim.studies.identify.api": ["identify"],
-    "wearsim.studies.life.api": ["life", "resume_life"],
-    "wearsim.studies.life.sweep": ["sweep_life"],
+    "wearsim.studies.life.api": ["life", "resume_life", "sweep_life"],
     "wearsim.studies.run.run": ["resume", "run"],
     "wearsim.types": ["ContactSolution", "Profile"],
 }

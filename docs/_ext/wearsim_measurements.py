@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import jinja2
 
-from wearsim.report.parts import save_figure
+from wearsim.report.figures import save_figure
 from wearsim.report.text import brief
 from wearsim_bench import figures
 from wearsim_bench.figures.hard_cases import hard_markdown

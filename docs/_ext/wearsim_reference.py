@@ -17,10 +17,10 @@ from typer.testing import CliRunner
 
 from wearsim.cli.app import FIRST_PARTY, app
 from wearsim.results.content import Schema, Variable
-from wearsim.results.dissipation import DISSIPATION
-from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.run_schema import CAM_VARIABLES, RUN
 from wearsim.scenario.examples import scenario_schema
+from wearsim.studies.dissipation.result import DISSIPATION
+from wearsim.studies.ensemble.file.schema import ENSEMBLE
+from wearsim.studies.run.schema import CAM_VARIABLES, RUN
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx

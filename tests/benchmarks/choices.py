@@ -6,7 +6,7 @@ import wearsim
 from tests.benchmarks.studies import PAPER
 from tests.benchmarks.table import Effort, Row, part
 from tests.benchmarks.wear_tests import SCENARIOS
-from wearsim.results import Result
+from wearsim.studies.run.result import Result
 from wearsim_bench.measure.timing import best, timed
 
 RUNS: dict[str, dict[str, object]] = {

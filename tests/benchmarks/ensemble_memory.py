@@ -17,9 +17,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from tests.benchmarks.ensemble_cases import Size, drawn
-from wearsim.results import Outcome
-from wearsim.results.ensemble.schema import OBSERVABLES
 from wearsim.studies.ensemble import api as study
+from wearsim.studies.ensemble.file.data import Outcome
+from wearsim.studies.ensemble.file.schema import OBSERVABLES
 from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths
 
 

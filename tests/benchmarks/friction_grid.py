@@ -42,7 +42,8 @@ def mean_power(field: str, points: int, realisations: int) -> tuple[float, float
 
 def draw(path: Path, realisations: int) -> None:
     """Plot the mean power of every field against the number of points along a strip."""
-    from wearsim.report.parts import BLUE, GREEN, ORANGE, figure_style, name_axes, save_figure
+    from wearsim.report.figures import figure_style, name_axes, save_figure
+    from wearsim.report.panels import BLUE, GREEN, ORANGE
 
     uniform = wearsim.solve_contact(wearsim.load_scenario(MEAN_CONTACT)).power
     with figure_style():

@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.benchmarks.table import Effort, Row, part
 from wearsim.scenario import Scenario, load_scenario
-from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.dissipation.monte_carlo import dissipation
 from wearsim.uq.distributions.maxent import maximum_entropy
 from wearsim.uq.sampling.sobol import Stream
 from wearsim_bench.measure.timing import best

@@ -22,7 +22,7 @@ from tests.benchmarks import (
     wear_tests,
 )
 from tests.benchmarks.report import QUICK, TABLES
-from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.dissipation.monte_carlo import dissipation
 
 
 def test_speed_of_hertz(benchmark):

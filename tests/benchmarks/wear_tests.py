@@ -7,8 +7,10 @@ from tempfile import TemporaryDirectory
 
 import wearsim
 from tests.benchmarks.table import Effort, Row, part
-from wearsim.results import Result, open_results, write_results
+from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario
+from wearsim.studies.opening import open_results
+from wearsim.studies.run.result import Result
 from wearsim_bench.measure.timing import best, timed
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

@@ -11,11 +11,11 @@ from cli_examples import SCENARIOS, Command
 
 from tests.studies.ensemble_cases import partly_failing, small
 from wearsim.errors import Interrupted
-from wearsim.results import open_ensemble, open_results
 from wearsim.scenario import load_scenario
-from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.comparison.compare import compare
+from wearsim.studies.dissipation.monte_carlo import dissipation
 from wearsim.studies.ensemble.api import ensemble
-from wearsim.studies.ensemble.compare import compare
+from wearsim.studies.opening import open_ensemble, open_results
 from wearsim.studies.run.run import run
 
 

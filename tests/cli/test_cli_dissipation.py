@@ -14,7 +14,7 @@ from cli_examples import SCENARIOS, Command
 
 from tests.interruptible import interruptible
 from wearsim.cli.progress import Counter
-from wearsim.results import open_dissipation
+from wearsim.studies.opening import open_dissipation
 from wearsim.studies.preparation import MOST_BYTES
 
 PAPER = SCENARIOS / "paper-monte-carlo.toml"
@@ -24,7 +24,7 @@ SMALL = ("--set", "contact.mx=8", "--set", "contact.my=12", "-n", 50)
 @pytest.fixture(scope="session")
 def studied_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from wearsim.scenario import load_scenario
-    from wearsim.studies.contact.monte_carlo import dissipation
+    from wearsim.studies.dissipation.monte_carlo import dissipation
 
     path = tmp_path_factory.mktemp("studied") / "a.h5"
     dissipation(load_scenario(PAPER, {"contact.mx": 8, "contact.my": 12}), 50, path)
@@ -138,8 +138,8 @@ def test_resume_refuses_a_study(command: Command, studied: Path) -> None:
     result = command("resume", studied)
     assert result.exit_code == 2
     assert result.stderr == (
-        f"error: {studied}: holds realisations of one contact, from `wearsim dissipation`; what is"
-        " needed is a wear test, from `wearsim run`. In Python, wearsim.open_results opens it\n"
+        f"error: {studied}: holds realisations of one contact, from `wearsim dissipation`, which"
+        " cannot be continued\n"
     )
 
 

@@ -14,8 +14,8 @@ from cli_examples import SCENARIOS, Command
 
 from tests.interruptible import interruptible
 from tests.studies.ensemble_cases import partly_failing, small
-from wearsim.results import open_ensemble
 from wearsim.studies.ensemble.designs import interim_sizes
+from wearsim.studies.opening import open_ensemble
 from wearsim.uq.estimation.estimates import Target
 
 HERE = ("--scheduler", "serial", "-q")

@@ -13,8 +13,8 @@ from cli_examples import Command
 import wearsim
 from tests.studies.ensemble_cases import differences, small
 from wearsim.errors import Interrupted, ResultsFileError
-from wearsim.results import open_ensemble
 from wearsim.studies.ensemble.api import ensemble
+from wearsim.studies.opening import open_ensemble
 
 
 @pytest.fixture(scope="session")

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from tests.report.made_up_ensembles import made_up
-from wearsim.cli.render.ensemble_table import write_ensemble
-from wearsim.results import EnsembleResult
+from wearsim.cli.render import show_view
+from wearsim.studies.ensemble.result import EnsembleResult
 
 
 def test_insignificant_effect_is_listed_with_its_bound(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = made_up(400, seed=2)
-    write_ensemble(found, [])
+    show_view(found.view, json=False)
     (none,) = [item for item in found.sensitivity() if item.without_effect]
     rows = " ".join(capsys.readouterr().out.split())
     assert f"{none.name} not significant, at most {100.0 * none.first.high:.2g} %" in rows
@@ -25,11 +25,11 @@ def test_insignificant_effect_is_listed_with_its_bound(
 def test_one_realisation_and_constant_ones_have_no_spread(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    write_ensemble(made_up(1), [])
+    show_view(made_up(1).view, json=False, stored=True)
     one = capsys.readouterr().out
     assert "95 % interval" not in one
     assert "Sobol indices of the depth: too few realisations," in one
-    write_ensemble(made_up(20, spread=0.0), [])
+    show_view(made_up(20, spread=0.0).view, json=False)
     same = capsys.readouterr().out
     assert ["depth", "[um]", "20.00", "constant", "-", "-", "-"] in [
         line.split() for line in same.splitlines()
@@ -39,7 +39,7 @@ def test_one_realisation_and_constant_ones_have_no_spread(
 
 def test_saltelli_has_total_indices(capsys: pytest.CaptureFixture[str]) -> None:
     found = made_up(5 * 60, "saltelli")
-    write_ensemble(found, [])
+    show_view(found.view, json=False)
     assert " total" in capsys.readouterr().out
 
 
@@ -64,16 +64,16 @@ def test_saltelli_has_total_indices(capsys: pytest.CaptureFixture[str]) -> None:
 def test_target_is_described_by_its_half_width(
     capsys: pytest.CaptureFixture[str], found: EnsembleResult, message: str
 ) -> None:
-    write_ensemble(found, [])
+    show_view(found.view, json=False)
     output = " ".join(capsys.readouterr().out.split())
-    assert f"{message} drawn" in output
+    assert f"{message} wall" in output
     assert "within -" not in output
 
 
 def test_too_few_realisations_name_the_needed_number(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    write_ensemble(made_up(10), [])
+    show_view(made_up(10).view, json=False)
     output = capsys.readouterr().out
     number = re.search(r"too few realisations, (\d+) are sufficient", output)
     assert number is not None
@@ -81,7 +81,7 @@ def test_too_few_realisations_name_the_needed_number(
     assert all(np.isfinite(item.first.value) for item in made_up(needed).sensitivity())
     fewer = made_up(needed - 1)
     (unknown,) = [item for item in fewer.sensitivity() if not np.isfinite(item.first.value)]
-    write_ensemble(fewer, [])
+    show_view(fewer.view, json=False)
     output = " ".join(capsys.readouterr().out.split())
     assert f"{unknown.name} too few realisations, {needed} are sufficient" in output
 
@@ -89,7 +89,7 @@ def test_too_few_realisations_name_the_needed_number(
 def test_needed_number_of_saltelli_counts_whole_rows(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    write_ensemble(made_up(5 * 3, "saltelli"), [])
+    show_view(made_up(5 * 3, "saltelli").view, json=False)
     output = capsys.readouterr().out
     number = re.search(r"too few realisations, (\d+) are sufficient", output)
     assert number is not None

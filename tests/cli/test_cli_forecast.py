@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from cli_examples import SCENARIOS, Command
 
-from wearsim.results import open_results
+from wearsim.studies.opening import open_results
 
 FREE = """\
 drive = "free"

@@ -5,9 +5,9 @@ from rich.console import Console
 
 from wearsim.cli import progress
 from wearsim.cli.progress import RunWatcher
-from wearsim.cli.shared import plain
 from wearsim.mechanics.numerics import jit
 from wearsim.mechanics.numerics.jit import kernel
+from wearsim.report.text import plain
 from wearsim.studies.run.recorder import Event, Finished, Started, Stepped, Warned
 
 STARTED = Started(1000.0, 60.0, 0.0, "implicit", "slender")

@@ -10,7 +10,7 @@ from cli_examples import SCENARIOS, Command
 import wearsim
 from wearsim.csv_tables import read_columns
 from wearsim.errors import Interrupted
-from wearsim.results import open_results
+from wearsim.studies.opening import open_results
 
 
 def test_show_prints_the_content_of_a_file(command: Command, finished: Path) -> None:

@@ -10,7 +10,7 @@ from cli_examples import SCENARIOS, Command
 
 from tests.interruptible import interruptible
 from wearsim.errors import Interrupted
-from wearsim.results import open_results
+from wearsim.studies.opening import open_results
 from wearsim.studies.run import run as study
 
 

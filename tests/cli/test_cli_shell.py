@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BaseModel
 
 import wearsim.cli.commands.scenarios
 from wearsim.cli.app import BUILT_IN
-from wearsim.cli.render.failure import solver_state
+from wearsim.cli.solver_state import solver_state
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
 VERBS = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 import tomllib
@@ -15,13 +16,14 @@ from typer.testing import CliRunner
 
 import wearsim
 from wearsim.cli.app import app as cli_app
-from wearsim.errors import CapabilityError
+from wearsim.errors import CapabilityError, PluginError
 from wearsim.plugins import (
     Capabilities,
     ContactModelSpec,
     LoadSpec,
     MotionLawSpec,
     RandomInputSpec,
+    StudyKind,
     WearLawSpec,
     registry,
 )
@@ -32,6 +34,7 @@ from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
 from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
+from wearsim.testing.study_kinds import STUDY_KIND, StudyKindFixture
 from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 from wearsim.units import ANGLE, FORCE
 
@@ -59,7 +62,7 @@ def documented(install, monkeypatch):
 
     def documented(hook: str) -> dict[str, str]:
         text = section(f"`{hook}`")
-        (code,), (toml,) = blocks(text, "python"), blocks(text, "toml")
+        code, toml = "\n".join(blocks(text, "python")), "".join(blocks(text, "toml"))
         made = ModuleType(f"documented_{hook}")
         monkeypatch.setitem(sys.modules, made.__name__, made)
         exec(compile(code, "docs/plugins.md", "exec", dont_inherit=True), vars(made))
@@ -214,3 +217,37 @@ def test_documented_message_is_that_of_the_check():
     check = CONTACT_MODEL["strips-carry-the-load"]
     flat = " ".join(message.split())
     assert flat.endswith(f"Violated requirement: {check.requirement} ({check.specified_in})")
+
+
+def test_documented_study_passes_the_checks_in_every_display(documented, tmp_path):
+    documented("wearsim_study_kinds")
+    module, path = sys.modules["documented_wearsim_study_kinds"], tmp_path / "survey.h5"
+    kind = registry().get(StudyKind, "survey")
+
+    def opened():
+        module.survey(rig(), [45e-6, 48e-6, 52e-6], path)
+        return wearsim.open_results(path)
+
+    run_checks(STUDY_KIND, StudyKindFixture(kind, opened()))
+
+
+def test_verbs_work_on_the_file_of_a_documented_study(documented, tmp_path, monkeypatch):
+    documented("wearsim_study_kinds")
+    monkeypatch.chdir(tmp_path)
+    sys.modules["documented_wearsim_study_kinds"].survey(rig(), [45e-6, 48e-6], "a.h5")
+    for verb in (["show"], ["plot"], ["export"], ["report"]):
+        done = CliRunner().invoke(cli_app, [*verb, "a.h5"])
+        assert done.exit_code == 0, done.output
+    assert json.loads(CliRunner().invoke(cli_app, ["show", "a.h5", "--json"]).stdout)["depth_m"]
+    assert Path("a", "grooves.csv").read_text().startswith("depth [um]")
+    refused = CliRunner().invoke(cli_app, ["resume", "a.h5"])
+    assert "holds depths of grooves, which cannot be continued" in refused.stderr
+
+
+def test_study_without_its_plugin_names_the_plugin(documented, install, tmp_path):
+    documented("wearsim_study_kinds")
+    path = tmp_path / "a.h5"
+    sys.modules["documented_wearsim_study_kinds"].survey(rig(), [45e-6, 48e-6], path)
+    install()
+    with pytest.raises(PluginError, match="pip install my-package"):
+        wearsim.open_results(path)

@@ -15,8 +15,16 @@ from plugin_examples import HOOKS, Point, rig
 
 import wearsim
 from wearsim.errors import ScenarioError
-from wearsim.plugins import LoadSpec, MotionLawSpec, RandomInputSpec, WearLawSpec, registry
+from wearsim.plugins import (
+    LoadSpec,
+    MotionLawSpec,
+    RandomInputSpec,
+    StudyKind,
+    WearLawSpec,
+    registry,
+)
 from wearsim.plugins.manager import HookSpecs
+from wearsim.results.viewed import study_kinds
 from wearsim.testing import random_inputs
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
@@ -147,3 +155,9 @@ def test_example_of_a_motion_law_runs(example):
     fixture = MotionLawFixture(ConfiguredSpec(registry().get(MotionLawSpec, "cosine")))
     for check in MOTION_LAW.values():
         check(fixture)
+
+
+def test_example_of_a_study_kind_is_found_by_its_format(example):
+    example("wearsim_study_kinds")
+    (kind,) = [kind for kind in study_kinds() if kind.format == "my-package-survey"]
+    assert registry().registered(StudyKind, kind.name).distribution == "my-package"

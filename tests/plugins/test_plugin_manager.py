@@ -17,6 +17,7 @@ from wearsim.plugins import (
     MotionLawSpec,
     Options,
     RandomInputSpec,
+    StudyKind,
     WearLawSpec,
     registry,
 )
@@ -41,12 +42,12 @@ def test_built_in_plugins_use_the_same_hooks(install):
 
 
 def test_every_kind_of_spec_is_registered():
-    def of(kind, **more):
-        return lambda: [
-            kind("new", Options, "new", factory=lambda options: None, protocol=2, **more)
-        ]
+    def of(kind):
+        if kind is StudyKind:
+            return lambda: [kind("new", summary="new", result="a:B", view="a:C", protocol=2)]
+        return lambda: [kind("new", Options, "new", factory=lambda options: None, protocol=2)]
 
-    specs = ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec
+    specs = ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec, StudyKind
     kinds = dict(zip(HOOKS, specs, strict=True))
     plugins = Registry([Point(module(**{hook: of(kind) for hook, kind in kinds.items()}))])
     for kind in kinds.values():

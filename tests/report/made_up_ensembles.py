@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tests.rig_text import BODIES
-from wearsim.results import EnsembleData, EnsembleResult
-from wearsim.results.ensemble.schema import DONE, FAILED, OBSERVABLES, PENDING
+from wearsim.studies.ensemble.file.data import EnsembleData
+from wearsim.studies.ensemble.file.schema import DONE, FAILED, OBSERVABLES, PENDING
+from wearsim.studies.ensemble.result import EnsembleResult
 
 TITLE = "made up"
 DEPTH = 20e-6  # of the mean inputs [m]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from wearsim.report.figures.cam import cam_figure
+from tests.report.drawn import cam_figure
 from wearsim.scenario import load_scenario
 from wearsim.studies.cam.study import study_cam
 

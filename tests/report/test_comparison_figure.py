@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from tests.report.drawn import comparison_figure
 from tests.report.made_up_ensembles import made_up
 from tests.studies.study_examples import short
-from wearsim.report.figures.comparison import MOST_POINTS, comparison_figure
-from wearsim.report.parts import save_figure
+from wearsim.report.figures import save_figure
 from wearsim.report.text import cells, part_with_interval, with_interval
-from wearsim.studies.ensemble.compare import compare
+from wearsim.studies.comparison.compare import compare
+from wearsim.studies.comparison.panels import MOST_POINTS
 from wearsim.studies.run import run as study
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from wearsim.report.figures.contact import CLASSES, MOST_LINES, dissipation_figure
-from wearsim.report.parts import save_figure
-from wearsim.results import DissipationResult
+from tests.report.drawn import dissipation_figure
+from wearsim.report.figures import save_figure
 from wearsim.scenario import load_scenario
-from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.dissipation.monte_carlo import dissipation
+from wearsim.studies.dissipation.panels import CLASSES, MOST_LINES
+from wearsim.studies.dissipation.result import DissipationResult
 
 PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"
 

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
+from tests.report.drawn import ensemble_figure
 from tests.report.made_up_ensembles import INPUTS, made_up
-from wearsim.report.figures.ensemble import LINES, convergence_of, ensemble_figure
-from wearsim.report.parts import GREY, save_figure
-from wearsim.results import EnsembleResult
+from wearsim.report.figures import save_figure
+from wearsim.report.panels import GREY
+from wearsim.studies.ensemble.panels import LINES, convergence_of
+from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.uq.estimation.estimates import Target
 
 

@@ -6,8 +6,8 @@ import shutil
 import pytest
 
 import wearsim
-from wearsim.report.page.page import save_report
 from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.opening import save_report
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = [
@@ -78,7 +78,7 @@ def test_page_is_accessible(browser, pages, name, scheme):
 
 
 SHOWN = """() => {
-  const named = Bokeh.documents[0].get_model_by_name("record profile");
+  const named = Bokeh.documents[0].get_model_by_name("record height above nominal");
   return Array.from(named.data.shown);
 }"""
 

@@ -7,18 +7,16 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from tests.report.drawn import contact_figure, identification_figure, run_figure
 from wearsim.errors import PluginError, ResultsFileError
-from wearsim.report.figures.contact import contact_figure
-from wearsim.report.figures.identification import identification_figure
-from wearsim.report.figures.run import run_figure
+from wearsim.report.figures import save_figure
 from wearsim.report.measured import Measured
-from wearsim.report.parts import save_figure
-from wearsim.results import Result
 from wearsim.scenario import load_scenario
 from wearsim.studies.contact.single import ContactStudy, study_contact
 from wearsim.studies.identify.api import identify
 from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.run import run as study_run
+from wearsim.studies.run.result import Result
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SHORT = {"operation.duration": "3 min", "outputs.records": 4}

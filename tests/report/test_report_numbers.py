@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from wearsim.report.parts import patch_edges
 from wearsim.report.text import brief, count, lapse, shown
+from wearsim.studies.contact.outline import patch_edges
 
 
 @pytest.mark.parametrize(

@@ -5,33 +5,10 @@ import pytest
 
 import wearsim
 from tests.evolution import SCENARIOS
-from wearsim.report.figures.ensemble import ensemble_figure
-from wearsim.report.figures.run import _draw_profiles, run_figure
+from tests.report.drawn import ensemble_figure, run_figure
 from wearsim.report.measured import Measured
 from wearsim.report.text import shown
 from wearsim.scenario import parse_scenario
-
-
-class Lines:
-    """Replacement of axes that stores the plotted heights."""
-
-    def __init__(self):
-        self.heights = []
-
-    def plot(self, y, height, **style):
-        self.heights.append(np.asarray(height))
-
-    def __getattr__(self, name):
-        return lambda *values, **named: ([], [])
-
-
-class Colours:
-    """Replacement of the colours of two records."""
-
-    records = (0, -1)
-
-    def of(self, record):
-        return "black"
 
 
 @pytest.fixture(scope="module")
@@ -46,11 +23,11 @@ def result(tmp_path_factory):
 
 
 def test_profiles_are_drawn_from_the_start_profile_on(result):
-    axes = Lines()
-    _draw_profiles(axes, result, Colours(), ())
+    (axes, *_) = run_figure(result).axes
+    heights = [line.get_ydata() for line in axes.get_lines()]
     expected = np.interp(result.y, [-3e-3, 0.0, 3e-3], [0.0, -9.0, 0.0])
-    np.testing.assert_allclose(axes.heights[0], expected, atol=1e-9)
-    np.testing.assert_allclose(axes.heights[1], expected - result.profiles[-1] * 1e6, atol=1e-9)
+    np.testing.assert_allclose(heights[0], expected, atol=1e-9)
+    np.testing.assert_allclose(heights[-1], expected - result.profiles[-1] * 1e6, atol=1e-9)
     assert result.start_height.min() < -8e-6
 
 

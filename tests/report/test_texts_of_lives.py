@@ -2,8 +2,8 @@
 
 import pytest
 
-from wearsim.report.lives import rounded_lives
 from wearsim.report.text import simulated
+from wearsim.studies.life.view import rounded_lives
 from wearsim.units import in_engineers_unit
 
 

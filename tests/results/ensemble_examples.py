@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 from run_examples import LOG, SCENARIO
 
-from wearsim.results import EnsembleData, EnsembleFile, Outcome, read_ensemble
 from wearsim.results.content import Arrays
-from wearsim.results.ensemble.schema import OBSERVABLES, STATISTICS
+from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.ensemble.file.schema import OBSERVABLES, STATISTICS
+from wearsim.studies.ensemble.file.writer import EnsembleFile
 
 RECORDS, ROLLERS, STRIPS = 4, 3, 9
 SCALARS = ("steps", "solves", "depth_error", "volume_error")

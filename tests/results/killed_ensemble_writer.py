@@ -12,9 +12,11 @@ from pathlib import Path
 from ensemble_examples import finish, some_header, some_outcome, some_static
 
 from tests.faulty_storage import WatchedStorage, some_of_each
-from wearsim.results import DISK, EnsembleFile, Outcome, Storage
-from wearsim.results.ensemble import writer
-from wearsim.results.ensemble.schema import DONE
+from wearsim.atomic_write import DISK, Storage
+from wearsim.studies.ensemble.file import writer
+from wearsim.studies.ensemble.file.data import Outcome
+from wearsim.studies.ensemble.file.schema import DONE
+from wearsim.studies.ensemble.file.writer import EnsembleFile
 
 COUNT, STRIPS = 5, 60
 BATCHES = ([3, 0, 1], [4, 2])

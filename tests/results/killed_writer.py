@@ -10,7 +10,7 @@ from pathlib import Path
 from run_examples import some_run
 
 from tests.faulty_storage import WatchedStorage, some_of_each
-from wearsim.results import write_results
+from wearsim.results.io.files import write_results
 
 
 def stages_of_a_write(path: Path) -> list[str]:

@@ -11,10 +11,12 @@ from ensemble_examples import finish, some_header, some_outcome, some_static
 from run_examples import some_run
 from test_dissipation_files import some_study
 
-from wearsim.results import DissipationData, EnsembleFile, RunData, write_results
-from wearsim.results.dissipation import DISSIPATION
-from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.run_schema import RUN
+from wearsim.results.io.files import write_results
+from wearsim.studies.dissipation.result import DISSIPATION, DissipationData
+from wearsim.studies.ensemble.file.schema import ENSEMBLE
+from wearsim.studies.ensemble.file.writer import EnsembleFile
+from wearsim.studies.run.result import RunData
+from wearsim.studies.run.schema import RUN
 
 FOLDER = Path(__file__).parent / "data"
 LAYOUTS = {

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.results import RunData
 from wearsim.results.content import Arrays
-from wearsim.results.run_schema import AXES, VARIABLES
+from wearsim.studies.run.result import RunData
+from wearsim.studies.run.schema import AXES, VARIABLES
 
 SCENARIO = 'title = "a rig"\n# µ = 0.1\n[load]\nfile = "load.csv"\n'
 LOG = "time [s],load [N]\n0,300\n60,310\n"

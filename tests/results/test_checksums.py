@@ -12,7 +12,9 @@ import xarray
 from layout_files import LAYOUTS, write_all
 
 from wearsim.errors import ResultsFileError
-from wearsim.results import read_dissipation, read_ensemble, read_results
+from wearsim.studies.dissipation.result import read_dissipation
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.run.result import read_results
 
 Content = Callable[[Path, str], object]
 

@@ -14,17 +14,19 @@ import xarray
 from run_examples import some_run
 
 from wearsim.errors import ResultsFileError
-from wearsim.results import (
+from wearsim.results.content import with_random_inputs
+from wearsim.results.io.files import write_results
+from wearsim.studies.dissipation.result import (
+    DISSIPATION,
+    VARIABLES,
     DissipationData,
     DissipationResult,
-    kind_of,
-    open_dissipation,
+    as_numbers,
     read_dissipation,
-    read_results,
-    write_results,
+    summaries,
 )
-from wearsim.results.content import with_random_inputs
-from wearsim.results.dissipation import DISSIPATION, VARIABLES, as_numbers, summaries
+from wearsim.studies.opening import kind_of, open_dissipation
+from wearsim.studies.run.result import read_results
 
 INPUTS = [{"key": "load.normal_force", "unit": "N"}, {"key": "friction.coefficient", "unit": "1"}]
 

@@ -9,7 +9,8 @@ import pytest
 
 from tests.report.made_up_ensembles import made_up
 from wearsim.errors import ResultsFileError
-from wearsim.results import csv_export, export_csv
+from wearsim.report import csv_files as csv_export
+from wearsim.studies.opening import export_csv
 
 
 def read(path):

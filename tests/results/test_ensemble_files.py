@@ -24,16 +24,14 @@ from run_examples import some_run
 from test_dissipation_files import some_study
 
 from wearsim.errors import ResultsFileError
-from wearsim.results import (
-    EnsembleData,
-    EnsembleFile,
-    kind_of,
-    read_dissipation,
-    read_ensemble,
-    read_results,
-    write_results,
-)
-from wearsim.results.ensemble.schema import DONE, FAILED, OBSERVABLES, PENDING, QUANTILES
+from wearsim.results.io.files import write_results
+from wearsim.studies.dissipation.result import read_dissipation
+from wearsim.studies.ensemble.file.data import EnsembleData
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.ensemble.file.schema import DONE, FAILED, OBSERVABLES, PENDING, QUANTILES
+from wearsim.studies.ensemble.file.writer import EnsembleFile
+from wearsim.studies.opening import kind_of
+from wearsim.studies.run.result import read_results
 
 ERROR = "lost contact at 1.2e6 passes: µ = 0.3"
 

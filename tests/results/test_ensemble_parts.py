@@ -11,9 +11,10 @@ import pytest
 from ensemble_examples import differences, finish, some_header, some_outcome, some_static
 
 from wearsim.errors import ResultsFileError
-from wearsim.results import EnsembleFile, read_ensemble
-from wearsim.results.ensemble import writer
-from wearsim.results.ensemble.schema import DONE, PENDING
+from wearsim.studies.ensemble.file import writer
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.ensemble.file.schema import DONE, PENDING
+from wearsim.studies.ensemble.file.writer import EnsembleFile
 
 COUNT = 12
 
@@ -135,8 +136,8 @@ def test_tests_of_removed_parts_are_repeated(in_parts, tmp_path, damaged):
 
 def test_part_with_unknown_realisations_is_an_error(in_parts, tmp_path):
     data = read_ensemble(in_parts)
-    from wearsim.results import DISK
-    from wearsim.results.ensemble.parts import blank_rows, part_path, write_part
+    from wearsim.atomic_write import DISK
+    from wearsim.studies.ensemble.file.parts import blank_rows, part_path, write_part
 
     rows = blank_rows([COUNT], data)
     write_part(part_path(in_parts, 4), data.run_id, rows, {}, DISK)

@@ -27,10 +27,14 @@ from ensemble_examples import (
 from run_examples import some_run
 
 from tests.faulty_storage import full_disk
+from wearsim.atomic_write import DISK
 from wearsim.errors import ResultsFileError
-from wearsim.results import DISK, EnsembleFile, check_output, read_ensemble, write_results
-from wearsim.results.ensemble import writer
-from wearsim.results.ensemble.schema import DONE, OBSERVABLES, PENDING
+from wearsim.results.io.files import write_results
+from wearsim.results.io.outputs import check_output
+from wearsim.studies.ensemble.file import writer
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.ensemble.file.schema import DONE, OBSERVABLES, PENDING
+from wearsim.studies.ensemble.file.writer import EnsembleFile
 
 HERE = Path(__file__).parent
 COUNT = 12
@@ -268,7 +272,7 @@ def test_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
     def refuse(self, *args, **kwargs):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("wearsim.results.ensemble.writer.Path.mkdir", refuse)
+    monkeypatch.setattr("wearsim.studies.ensemble.file.writer.Path.mkdir", refuse)
     with pytest.raises(ResultsFileError, match=r"a\.h5: cannot be written \(Permission denied\)"):
         EnsembleFile.open(path)
 
@@ -318,7 +322,7 @@ def test_realisation_is_written_only_once(tmp_path):
 
 
 def test_profiles_beyond_the_kept_ones_are_not_stored(tmp_path, monkeypatch):
-    monkeypatch.setattr("wearsim.results.ensemble.schema.MOST_KEPT", 27)
+    monkeypatch.setattr("wearsim.studies.ensemble.file.schema.MOST_KEPT", 27)
     path = tmp_path / "a.h5"
     bare, first = some_outcome(5), some_outcome(0)
     for outcome in (bare, first):

@@ -10,7 +10,8 @@ from run_examples import LOG, SCENARIO, some_run
 
 from wearsim.csv_tables import read_columns
 from wearsim.errors import ResultsFileError
-from wearsim.results import Result, export_csv
+from wearsim.studies.opening import export_csv
+from wearsim.studies.run.result import Result
 
 
 def _header(path: Path) -> list[str]:

@@ -12,7 +12,10 @@ from layout_files import FOLDER, LAYOUTS, run_of_file, study_of_file
 
 from tests.results_compared import differences
 from wearsim.errors import ResultsFileError
-from wearsim.results import kind_of, read_dissipation, read_ensemble, read_results
+from wearsim.studies.dissipation.result import read_dissipation
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.opening import kind_of
+from wearsim.studies.run.result import read_results
 
 READERS = {
     "run": read_results,

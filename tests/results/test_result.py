@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from run_examples import some_run
 
-from wearsim.results import Result, open_results, write_results
-from wearsim.results.run_schema import VARIABLES
+from wearsim.results.io.files import write_results
 from wearsim.scenario import load_scenario
+from wearsim.studies.opening import open_results
+from wearsim.studies.run.result import Result
+from wearsim.studies.run.schema import VARIABLES
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 

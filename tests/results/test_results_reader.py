@@ -18,8 +18,9 @@ from run_examples import some_run
 
 from tests.results_compared import differences
 from wearsim.errors import ResultsFileError
-from wearsim.results import read_results, write_results
-from wearsim.results.run_schema import AXES, VARIABLES
+from wearsim.results.io.files import write_results
+from wearsim.studies.run.result import read_results
+from wearsim.studies.run.schema import AXES, VARIABLES
 
 TEXT = st.text(max_size=40)
 PATH = st.text(st.characters(exclude_characters="\0"), min_size=1, max_size=10)

@@ -15,7 +15,9 @@ from run_examples import some_run
 from tests.faulty_storage import STAGES, WatchedStorage, full_disk, some_of_each
 from tests.results_compared import differences
 from wearsim.errors import ResultsFileError
-from wearsim.results import check_output, read_results, write_results
+from wearsim.results.io.files import write_results
+from wearsim.results.io.outputs import check_output
+from wearsim.studies.run.result import read_results
 
 HERE = Path(__file__).parent
 OLD, NEW = some_run(seed=1), some_run(seed=2, strips=400, records=20)

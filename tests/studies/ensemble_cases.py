@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from tests.studies.random_examples import CREEPAGE, LOAD, SLACK, scenario_of
-from wearsim.results import EnsembleResult, read_ensemble
 from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.ensemble.result import EnsembleResult
 
 LOGNORMAL = {"distribution": "lognormal", "median": "2e-9 1/Pa", "factor": 1.5}
 

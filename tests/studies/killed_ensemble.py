@@ -22,11 +22,12 @@ from killed_run import (
 )
 
 from tests.studies.ensemble_cases import differences, small
-from wearsim.results import DISK, Storage, open_ensemble
+from wearsim.atomic_write import DISK, Storage
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble import realisation
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
 from wearsim.studies.ensemble.driver import EnsembleWork
+from wearsim.studies.opening import open_ensemble
 
 
 def go(scenario: Scenario, count: int, path: Path, storage: Storage = DISK) -> int:

@@ -16,10 +16,12 @@ from pathlib import Path
 from study_examples import LOADS, ROLLERS, run_differences, short
 
 from tests.faulty_storage import WatchedStorage
-from wearsim.results import DISK, Result, Storage, open_results
+from wearsim.atomic_write import DISK, Storage
 from wearsim.scenario import Scenario
+from wearsim.studies.opening import open_results
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.recorder import Event, Started
+from wearsim.studies.run.result import Result
 
 OFTEN = {"outputs.checkpoint_every": "1e-9 s"}
 

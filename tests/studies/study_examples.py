@@ -8,9 +8,9 @@ from pathlib import Path
 from tests.results_compared import differences
 from tests.rig_text import BODIES, RUBBING
 from wearsim.errors import Interrupted
-from wearsim.results import Result, RunData
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run import run as studies
+from wearsim.studies.run.result import Result, RunData
 
 RIG = (
     'title = "a rig"\n\n'

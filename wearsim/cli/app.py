@@ -235,7 +235,7 @@ class Shell(TyperGroup):
 
 def _message(error: BaseException) -> str:
     if isinstance(error, SolverError) and error.state:
-        from wearsim.cli.render.failure import solver_state
+        from wearsim.cli.solver_state import solver_state
 
         state = solver_state(error.state)
         lines = [f"error: {error.at_shell}", *([f"state at the failure: {state}"] if state else [])]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,22 +58,9 @@ def write_list(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 def write_json(data: Mapping[str, Any]) -> None:
     """Write one JSON object to stdout; numbers that are not finite become null."""
+    from wearsim.report.text import plain
+
     typer.echo(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def plain(value: Any) -> Any:
-    """Convert a value to JSON types: arrays to lists, paths to text, NaN to null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):  # arrays and scalars of numpy
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def note(text: str) -> None:
@@ -342,7 +328,7 @@ def refuse_same_file(figure: Path | None, output: Path, inputs: Iterable[Path]) 
     """
     if figure is None:
         return
-    from wearsim.results import refuse_inputs, same_file
+    from wearsim.atomic_write import refuse_inputs, same_file
 
     refuse_inputs(figure, inputs, option="--figure")
     if same_file(figure, output):

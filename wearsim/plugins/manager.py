@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, distribution, entry_points
 from typing import TypeVar
 
 import pluggy
@@ -19,6 +19,7 @@ from wearsim.plugins.specs import (
     MotionLawSpec,
     RandomInputSpec,
     Spec,
+    StudyKind,
     WearLawSpec,
 )
 
@@ -239,6 +240,38 @@ class HookSpecs:
                 )
         """
 
+    @hookspec
+    def wearsim_study_kinds(self) -> Iterable[StudyKind]:  # type: ignore[empty-body]
+        """Yield kinds of studies, whose files all verbs for results open.
+
+        The requirements are documented in `StudyKind`, `StudyResult` and `View` and tested by
+        `wearsim.testing.study_kind_tests`.
+
+        Returns
+        -------
+        iterable of StudyKind
+
+        Examples
+        --------
+        .. code-block:: python
+
+            from wearsim.plugins import StudyKind, hookimpl
+
+
+            @hookimpl
+            def wearsim_study_kinds():
+                yield StudyKind(
+                    name="survey",
+                    summary="depths of several grooves",
+                    result="my_package.survey:SurveyResult",
+                    view="my_package.survey:SurveyView",
+                    data="my_package.survey:SurveyData",
+                    format="my-package-survey",
+                    holds="depths of several grooves, from `wearsim survey`",
+                    protocol=2,
+                )
+        """
+
 
 S = TypeVar("S", bound=Spec)
 
@@ -250,7 +283,10 @@ _HOOKS: dict[type[Spec], str] = {
     LoadSpec: "wearsim_loads",
     RandomInputSpec: "wearsim_random_inputs",
     MotionLawSpec: "wearsim_motion_laws",
+    StudyKind: "wearsim_study_kinds",
 }
+#: modules of wearsim that implement hooks; they need no entry point
+_BUILT_IN = {"builtin": "wearsim.models", "studies": "wearsim.studies.kinds"}
 
 
 @dataclass(frozen=True)
@@ -307,7 +343,7 @@ class Registry:
             self._load(point)
 
     def _load(self, point: EntryPoint) -> None:
-        dist = point.dist
+        dist = point.dist or (distribution(PROJECT) if point.value in _BUILT_IN.values() else None)
         name, version = (dist.name, dist.version) if dist else ("unknown distribution", "?")
         manager = pluggy.PluginManager(PROJECT)
         manager.add_hookspecs(HookSpecs)
@@ -388,4 +424,6 @@ class Registry:
 @cache
 def registry() -> Registry:
     """Return the registry of the installed plugins, built once per process."""
-    return Registry(entry_points(group=PROJECT))
+    built_in = [EntryPoint(name, value, PROJECT) for name, value in _BUILT_IN.items()]
+    installed = entry_points(group=PROJECT)
+    return Registry([*built_in, *(p for p in installed if p.value not in _BUILT_IN.values())])

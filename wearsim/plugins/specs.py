@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -367,3 +368,53 @@ class RandomInputSpec(Spec):
         kw_only=True
     )
     role: Literal["scalar", "joint", "field", "process"] = "scalar"
+
+
+@dataclass(frozen=True)
+class StudyKind(Spec):
+    """Spec of a kind of study: its results, their file, and how they are shown and continued.
+
+    References have the form "package.module:name" and are imported when they are needed.
+
+    Parameters
+    ----------
+    result : str
+        Reference of the class of its results, derived from `wearsim.results.content.StudyResult` if
+        it has a file.
+    view : str
+        Reference of a class derived from `wearsim.report.view.View`, called with a result.
+    data : str
+        Reference of the class of the content of its files, derived from
+        `wearsim.results.content.StudyData`, which has their schema.
+    format : str
+        Name of the format of its files, "wearsim-run"; empty if it has none.
+    read : str
+        Reference of a function that reads the content of a file, if it takes more than its schema.
+    marked_by : str
+        Field of the file that is not empty, for a kind that shares the format of another one.
+    holds : str
+        Content of a file and the command that writes it, for messages.
+    resume : str
+        Reference of a function that continues a study from its file; empty if there is none.
+    compare : str
+        Reference of a function that returns the view of several results; kinds with the same one
+        can be compared with each other.
+    """
+
+    kind: ClassVar[str] = "study kind"
+
+    options: type[Options] = field(kw_only=True, default=Options)
+    result: str = field(kw_only=True)
+    view: str = field(kw_only=True)
+    data: str = field(kw_only=True, default="")
+    format: str = field(kw_only=True, default="")
+    read: str = field(kw_only=True, default="")
+    marked_by: str = field(kw_only=True, default="")
+    holds: str = field(kw_only=True, default="")
+    resume: str = field(kw_only=True, default="")
+    compare: str = field(kw_only=True, default="")
+
+    def load(self, name: str) -> Any:
+        """Return what the reference in a field names, such as "result"."""
+        module, _, item = getattr(self, name).partition(":")
+        return getattr(import_module(module), item)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError, WearsimError
-from wearsim.report.text import count, shown, sufficient_for
-from wearsim.results import EnsembleResult, Result
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.report.panels import MARKS, RED, Line
+from wearsim.report.text import count, shown
 from wearsim.types import FloatArray
 
 
@@ -58,36 +59,6 @@ class ComputedProfile(NamedTuple):
     start: FloatArray
     label: str = ""
     kept: int = 1
-
-
-_BAND = 0.025  # probability below the band of an ensemble
-
-
-def computed_profile(result: Result | EnsembleResult) -> ComputedProfile:
-    """Return the profile at the end of a run or an ensemble."""
-    if isinstance(result, Result):
-        start = result.start_height
-        height = start - np.asarray(result.profiles[-1])
-        return ComputedProfile(result.y, height, height, height, start)
-    band, start = result.band(), _start_height(result)
-    low, high, label = band.low, band.high, ""
-    if band.kept > 1:
-        label = "2.5 % to 97.5 %"
-        if not sufficient_for(band.kept, _BAND):
-            kept = result.profiles
-            low, high, label = kept.min(axis=0), kept.max(axis=0), "least to greatest"
-    height = start - band.mean
-    return ComputedProfile(band.y, height, start - high, start - low, start, label, band.kept)
-
-
-def _start_height(result: EnsembleResult) -> FloatArray:
-    """Return the height at the start of the tests, which the scenario gives [m]."""
-    y = result.raw.variables["y"]
-    try:
-        profile = result.scenario.cylinder.profile
-    except WearsimError:  # a plugin of the scenario is not installed
-        profile = None
-    return np.zeros_like(y) if profile is None else np.interp(y, profile.y, profile.height)
 
 
 def _residual(
@@ -173,3 +144,20 @@ def _middle(y: FloatArray, depth: FloatArray) -> float:
     """Return the centroid of the deep part of a groove [m]."""
     deep = np.maximum(depth - _DEEP * depth.max(), 0.0)
     return float((deep * y).sum() / deep.sum())
+
+
+def measured_marks(measured: Sequence[Measured]) -> list[Line]:
+    """Return measured profiles as points of a panel."""
+    return [
+        Line(
+            profile.y,
+            profile.height,
+            dash="",
+            marker=MARKS[number % len(MARKS)],
+            size=3.2,
+            open=True,
+            colour=RED,
+            label=f"measured: {profile.label}",
+        )
+        for number, profile in enumerate(measured)
+    ]

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from wearsim.results.ensemble.schema import ALL_OBSERVABLES as STORED
 from wearsim.units import LONG
 
 if TYPE_CHECKING:
-    from wearsim.results import EnsembleResult
-    from wearsim.studies.ensemble.compare import Compared, Comparison
     from wearsim.uq.estimation.estimates import Target
     from wearsim.uq.estimation.intervals import Interval
-    from wearsim.uq.estimation.mann_whitney import Paired
 
 # One SI unit in each engineering unit.
 PER_SI = {
@@ -169,9 +164,18 @@ OBSERVABLES: Mapping[str, Named] = {
 }
 
 
+#: SI units in names of JSON by the unit shown
+_SI = {"um": "m", "mm": "m", "mm^3": "m3", "MPa": "Pa", "deg": "rad", "J": "J", "W": "W", "N": "N"}
+
+
+def si_unit(name: str) -> str:
+    """Return the SI unit of an observable, "m3" for a volume."""
+    return _SI[OBSERVABLES[name].unit]
+
+
 def si_key(name: str) -> str:
     """Return the name of an observable with its SI unit, for JSON: "worn_volume_m3"."""
-    return f"{name}_{STORED[name].unit.replace('^', '')}"
+    return f"{name}_{si_unit(name)}"
 
 
 def statistic_in_words(target: Target) -> str:
@@ -261,118 +265,43 @@ def sufficient_for(realisations: int, probability: float) -> bool:
     return realisations * min(probability, 1.0 - probability) >= _ONE
 
 
-def too_few(result: EnsembleResult, names: list[str] | None = None) -> str:
-    """Return a message with the sample size that Sobol indices require.
-
-    Parameters
-    ----------
-    result : EnsembleResult
-    names : list of str, optional
-        Random inputs; all by default.
-    """
-    from wearsim.uq.sensitivity import sobol_indices  # noqa: PLC0415
-
-    groups = [item["name"] for item in result.raw.groups]
-    if result.plan == "saltelli":
-        needed = sobol_indices.FEWEST_BASES * (len(groups) + 2)
-    else:
-        names = groups if names is None else names
-        needed = max(sobol_indices.fewest_realisations(_different(result, n)) for n in names)
-    return f"{TOO_FEW_REALISATIONS}, {count(needed)} are sufficient"
+def with_range(value: float, ends: Sequence[float], scale: float) -> str:
+    """Return a value with its 95 % interval, with the digits that the interval leaves."""
+    low, high = ends
+    digits = 3 if (high - low) > 0.02 * value else 4
+    texts = (in_unit(scale * one, "1", digits) for one in (value, low, high))
+    return "{} ({} to {})".format(*texts)
 
 
-def _different(result: EnsembleResult, name: str) -> int:
-    """Return the number of columns of an input; equal ones carry the same information."""
-    keys = [item["key"] for item in result.raw.inputs if item["input"] == name]
-    columns = np.column_stack([result.inputs[key].reshape(result.count, -1) for key in keys])
-    return int(np.unique(columns, axis=1).shape[1])
+def within(name: str, error: float, value: float) -> str:
+    """Return the relative error of a value as text."""
+    if value == error == 0.0:
+        return f"{name} is 0"
+    if value == 0.0 or not math.isfinite(error):
+        return f"{name} of unknown error"
+    return f"{name} within {percent(abs(error / value))}"
 
 
-EQUAL = "equal in all tests"
+def percent(part: float) -> str:
+    """Return a relative error in per cent, or a word where it is below all digits."""
+    return shown(float(part), "%", 2) if part else "rounding"
 
 
-def realisations(row: Compared) -> str:
-    """Return the number of realisations of an ensemble: "7 of 10, 3 failed"."""
-    text = count(row.done)
-    if row.done < row.requested:
-        text += f" of {count(row.requested)}"
-        # an ensemble that reached its target, without failures
-        text += " at most" if row.finished and row.done + row.failed < row.requested else ""
-    text += f", {count(row.failed)} failed" if row.failed else ""
-    text += f", {count(row.count)} of them independent" if row.count < row.done else ""
-    return text if row.finished else f"{text}, unfinished"
+def footer(used: list[str], error: str, time: str) -> str:
+    """Return method, error and time of a computation on one line."""
+    return "; ".join([", ".join(used), *([error] if error else []), time])
 
 
-def kind(row: Compared) -> str:
-    """Return the kind of a result, "ensemble of 40" or "run"."""
-    if row.kind == "run":
-        return "run" if row.finished else "run, unfinished"
-    return f"ensemble of {realisations(row)}"
-
-
-def length(row: Compared) -> str:
-    """Return the length of the tests, "3,000 passes, 1.000 min"."""
-    return f"{count(row.passes)} passes, {simulated(row.time)}"
-
-
-def against(found: Comparison, row: Compared) -> list[tuple[str, str]]:
-    """Return the comparison of a result with the first one, as table rows.
-
-    Parameters
-    ----------
-    found : Comparison
-    row : Compared
-        One of its rows except the first.
-    """
-    first = found.rows[0]
-    unit = OBSERVABLES[found.observable].unit
-    more, less = ("deeper", "shallower") if found.observable == "depth" else ("more", "less")
-    if row.difference is not None:
-        errors = (first.value.half_width, row.value.half_width)
-        text = _of_runs(row.difference, errors, unit, more, less)
-        return [(f"{row.label} against {first.label}", text)]
-    rows = []
-    if row.deeper is not None:
-        rows.append((f"{row.label} {more} than {first.label}", _of_tests(first, row, row.deeper)))
-    if row.paired is not None:
-        rows.append(("  with the same draws", _of_pairs(row.paired, unit, more, less)))
-    return rows
-
-
-def _of_runs(
-    difference: Interval, errors: tuple[float, float], unit: str, more: str, less: str
-) -> str:
-    """Return the difference of two runs, with their estimated errors."""
-    texts = " and ".join(shown(error, unit, 2) for error in errors)
-    stated = f"estimated errors {texts}" if any(errors) else "no error estimate"
-    by = difference.value
-    if by == 0.0:
-        return f"equal ({stated})"
-    if difference.low <= 0.0 <= difference.high:
-        return f"not significant: difference {shown(abs(by), unit, 3)}, within the {stated}"
-    return f"{more if by > 0.0 else less} by {shown(abs(by), unit)} ({stated})"
-
-
-def _of_tests(first: Compared, row: Compared, deeper: Interval) -> str:
-    """Return the probability that a test of one ensemble exceeds a test of the other."""
-    low = min(first.values[0], row.values[0])
-    high = max(first.values[-1], row.values[-1])
-    if low == high and row.count + first.count > 2:
-        return EQUAL
-    if not math.isfinite(deeper.value):
-        from wearsim.uq.estimation.mann_whitney import FEWEST  # noqa: PLC0415
-
-        return f"too few realisations, {FEWEST} of each are sufficient"
-    pairs = "pairs of tests" if row.kind == first.kind else "the tests of the ensemble"
-    return f"in {part_with_interval(deeper)} of {pairs}"
-
-
-def _of_pairs(found: Paired, unit: str, more: str, less: str) -> str:
-    """Return the difference between tests with the same draws."""
-    by = found.difference
-    if found.count == 1:
-        amount = f"{more if by.value > 0.0 else less} by {shown(abs(by.value), unit)}"
-        return f"{amount if by.value else 'equal'} in the only pair of tests"
-    if by.low == by.value == by.high == 0.0:
-        return EQUAL
-    return f"in {part_with_interval(found.share)}, by {with_interval(by, unit)} on average"
+def plain(value: Any) -> Any:
+    """Convert a value to JSON types: arrays to lists, paths to text, NaN to null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):  # arrays and scalars of numpy
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeAlias, TypeVar
 
@@ -13,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.errors import unknown_name
-from wearsim.results.tables import as_dataset
+from wearsim.report.frames import as_dataset
+from wearsim.results.viewed import Viewed
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.axes import Axes
 
     from wearsim.scenario import Scenario
 
@@ -199,7 +198,7 @@ class StudyData:
         Start of the study, ISO 8601.
     """
 
-    separately_stored: ClassVar[frozenset[str]] = frozenset({"scenario_text", "files"})
+    separately_stored: ClassVar[frozenset[str]] = frozenset({"scenario_text", "files", "variables"})
     #: fields that files of earlier versions lack
     optional: ClassVar[frozenset[str]] = frozenset()
 
@@ -223,10 +222,25 @@ class StudyData:
         """Return the names of all fields except those stored separately (long texts, arrays)."""
         return tuple(item.name for item in fields(cls) if item.name not in cls.separately_stored)
 
+    #: schema of the file without variables that depend on the study
+    base_schema: ClassVar[Schema]
+
     @property
     def schema(self) -> Schema:
         """Schema of the results file."""
-        raise NotImplementedError
+        return self.base_schema
+
+    @classmethod
+    def schema_of(cls, attributes: Mapping[str, Any], names: Container[str]) -> Schema:
+        """Return the schema of a file by its attributes and the names of its variables."""
+        return cls.base_schema
+
+    @classmethod
+    def from_variables(
+        cls, attributes: Mapping[str, Any], variables: Arrays, checkpoint: Arrays
+    ) -> Any:
+        """Return the content of a file from its fields, variables and checkpoint."""
+        return cls(**attributes, variables=variables)  # type: ignore[call-arg]
 
     @property
     def labels(self) -> dict[str, Any]:
@@ -253,7 +267,7 @@ Data = TypeVar("Data", bound=StudyData)
 
 
 @dataclass(frozen=True, eq=False)
-class StudyResult(Generic[Data]):
+class StudyResult(Viewed, Generic[Data]):
     """Result of a study, finished or not.
 
     Parameters
@@ -298,34 +312,6 @@ class StudyResult(Generic[Data]):
         """
         raw: Any = self.raw
         return as_dataset(raw.schema, raw.variables, raw.labels)
-
-    def plot(self, ax: Axes | None = None) -> Any:
-        """Draw the result.
-
-        Parameters
-        ----------
-        ax : matplotlib Axes, optional
-            For one panel: the worn profiles of a run, the depth of an ensemble against the roller
-            passes, the density of the dissipated power. By default a figure with all panels.
-
-        Returns
-        -------
-        Axes or Figure
-            A notebook shows the figure; ``savefig("rig.png")`` writes it.
-
-        Examples
-        --------
-        >>> result = wearsim.run("rig.toml")
-        >>> result.plot().savefig("rig.png")
-        >>> from matplotlib.figure import Figure
-        >>> result.plot(ax=Figure().subplots()).get_xlabel()
-        'y [mm]'
-        """
-        # by name, since the figures belong to a layer above
-        return import_module("wearsim.report.figures.result").plot(self, ax)
-
-    def _repr_html_(self) -> str:
-        return str(import_module("wearsim.report.notebook").result_html(self))
 
     @cached_property
     def scenario(self) -> Scenario:

@@ -6,7 +6,6 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path, PurePath
 from typing import TypeAlias
 
@@ -105,8 +104,10 @@ class Scenario:
     random: tuple[RandomInput, ...] = ()
     drawn: Mapping[str, Drawn] = field(default_factory=dict)
 
-    def _repr_html_(self) -> str:  # by name, since figures belong to a layer above
-        return str(import_module("wearsim.report.notebook").scenario_html(self))
+    def _repr_html_(self) -> str:
+        from wearsim.scenario.display import scenario_html  # noqa: PLC0415  (of notebooks)
+
+        return scenario_html(self)
 
     @classmethod
     def from_toml(

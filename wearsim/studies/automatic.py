@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wearsim.atomic_write import DISK
 from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, SolverError, WearsimError
 from wearsim.evolution.contacts import unworn_contacts
@@ -14,7 +15,6 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import ContactModelSpec, registry
-from wearsim.results import DISK
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.toml import apply_overrides
 from wearsim.scenario.tables.bodies import DUNDURS_LIMIT

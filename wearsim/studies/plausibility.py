@@ -12,14 +12,14 @@ from wearsim.plugins import Load
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.cam.checks import cam_warnings, skids_of
 from wearsim.studies.cam.turn import turn_of
-from wearsim.studies.run.groove import hardest_patch, widest_patch
-from wearsim.studies.run.inputs import load_file
-from wearsim.studies.run.roller_ends import (
+from wearsim.studies.roller_ends import (
     LEAST_PER_EDGE,
     STRIPS_BEYOND,
     edge_in_contact,
     strips_of_roller,
 )
+from wearsim.studies.run.groove import hardest_patch, widest_patch
+from wearsim.studies.run.inputs import load_file
 from wearsim.types import FloatArray
 
 YIELD_FACTOR = 4.0  # peak pressure over yield stress, beyond which a surface never shakes down

@@ -12,6 +12,7 @@ from wearsim.testing.kit import (
     load_tests,
     motion_law_tests,
     random_input_tests,
+    study_kind_tests,
     wear_law_tests,
 )
 from wearsim.testing.wear_and_loads import sliding_contact
@@ -27,5 +28,6 @@ __all__ = [
     "motion_law_tests",
     "random_input_tests",
     "sliding_contact",
+    "study_kind_tests",
     "wear_law_tests",
 ]

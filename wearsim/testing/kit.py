@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from wearsim.plugins import ContactModelSpec, LoadSpec, MotionLawSpec, RandomInputSpec, WearLawSpec
+from wearsim.plugins import (
+    ContactModelSpec,
+    LoadSpec,
+    MotionLawSpec,
+    RandomInputSpec,
+    StudyKind,
+    WearLawSpec,
+)
 from wearsim.scenario.parse.fields import WITH_MARGINAL
 from wearsim.testing import random_inputs
 from wearsim.testing.checks import Check, Checks, ConfiguredSpec, resolve, spec_checks
@@ -15,6 +22,7 @@ from wearsim.testing.contact_capabilities import CAPABILITIES
 from wearsim.testing.contact_fixtures import ContactCase, ContactFixture
 from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
+from wearsim.testing.study_kinds import STUDY_KIND, StudyKindFixture
 from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 from wearsim.units import Kind
 
@@ -229,3 +237,25 @@ def motion_law_tests(
         lambda: MotionLawFixture(ConfiguredSpec(resolved, options, files=files), angle, rise),
         without,
     )
+
+
+def study_kind_tests(
+    spec: StudyKind, build: Callable[[], Any], without: Mapping[str, str] = NOTHING
+) -> Tests[StudyKindFixture]:
+    """Return tests of a kind of study, one item per requirement on its displays and its file.
+
+    Parameters
+    ----------
+    spec : StudyKind
+        The spec that the hook yields; it must be installed.
+    build : callable
+        Returns a small result, with its file if the kind has one.
+    without
+        See `contact_model_tests`.
+
+    Returns
+    -------
+    callable
+        See `contact_model_tests`.
+    """
+    return build_tests(STUDY_KIND, lambda: StudyKindFixture(spec, build()), without)

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from wearsim.report.parts import save_figure
+from wearsim.report.figures import save_figure
 from wearsim_bench.figures import table as bench_table
 from wearsim_bench.figures.lines import spread
 from wearsim_bench.figures.table import (

@@ -8,8 +8,8 @@ import pytest
 
 import wearsim_bench.hard_cases.topic as hard_module
 from wearsim.mechanics.hertz.ellipse import hertz
-from wearsim.results import Result
 from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.run.result import Result
 from wearsim.studies.run.run import run
 from wearsim_bench.figures.hard_cases import hard_markdown
 from wearsim_bench.hard_cases import measures

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from wearsim.results import DissipationResult
 from wearsim.scenario import examples as shipped
 from wearsim.scenario import load_scenario
+from wearsim.studies.dissipation.result import DissipationResult
 from wearsim_chevalier2005 import paper
 from wearsim_chevalier2005.comparison import compare
 from wearsim_chevalier2005.comparison_inputs import EXACT_POWER, maxent_of, printed_area

@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from scipy.integrate import trapezoid
 
-from wearsim.report.parts import RED
+from wearsim.report.panels import RED
 from wearsim_chevalier2005.figure_panels import normal, smoothed
 from wearsim_chevalier2005.figures import reproduction_figure
 from wearsim_chevalier2005.study import Reproduction, reproduce

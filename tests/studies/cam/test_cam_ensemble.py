@@ -8,10 +8,10 @@ from cam_text import SCENARIOS
 
 import wearsim
 from wearsim.evolution.observables import peak_to_peak
-from wearsim.results import export_csv
 from wearsim.studies.ensemble.api import parse_target
 from wearsim.studies.ensemble.batch import batch_groups, joined_problem
 from wearsim.studies.ensemble.realisation import RealisationRunner, profile_axis
+from wearsim.studies.opening import export_csv
 
 RANDOM = {
     "coefficient = 0.1": 'coefficient = {distribution = "uniform", low = 0.08, high = 0.12}',

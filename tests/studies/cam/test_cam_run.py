@@ -12,15 +12,15 @@ import pytest
 from cam_text import cam, prescribed
 
 import wearsim
+from tests.report.drawn import run_figure as cam_run_figure
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.mechanics.cam.stations import NUMBERS
-from wearsim.report.figures.cam_run import cam_run_figure
-from wearsim.results.csv_export import export_csv
-from wearsim.results.io.files import read_results
+from wearsim.report.csv_files import export_csv
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
+from wearsim.studies.run.result import read_results
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SHORT = {"operation__turns": 20_000, "contact": {"strips": 61}}

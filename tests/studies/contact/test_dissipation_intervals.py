@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from dissipation_examples import COARSE, contact, paper
 
-from wearsim.results import DissipationResult, open_dissipation
-from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.dissipation.monte_carlo import dissipation
+from wearsim.studies.dissipation.result import DissipationResult
+from wearsim.studies.opening import open_dissipation
 
 REPEATS = 200
 

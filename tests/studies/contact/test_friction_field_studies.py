@@ -9,10 +9,10 @@ import pytest
 from dissipation_examples import contact, field, positive
 
 from wearsim.errors import CapabilityError, ScenarioError
-from wearsim.results import open_dissipation
 from wearsim.studies.contact.batch import Realisations
-from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import solve_contact
+from wearsim.studies.dissipation.monte_carlo import dissipation
+from wearsim.studies.opening import open_dissipation
 
 
 @pytest.mark.parametrize("frame", ["contact", "cylinder"])

@@ -11,12 +11,13 @@ import pytest
 from dissipation_examples import COARSE, NO_ANGLES, contact, field, normal, paper, positive
 
 from wearsim.errors import ContactError, Interrupted, ScenarioError
-from wearsim.results import DissipationResult, open_dissipation
 from wearsim.scenario import realise
 from wearsim.studies.contact import monte_carlo as study
 from wearsim.studies.contact.batch import Realisations, acting_inputs
-from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import study_contact
+from wearsim.studies.dissipation.monte_carlo import dissipation
+from wearsim.studies.dissipation.result import DissipationResult
+from wearsim.studies.opening import open_dissipation
 from wearsim.studies.preparation import bytes_per_realisation
 from wearsim.studies.run.draws import Drawer
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wearsim.results.ensemble.schema import PENDING
 from wearsim.studies.ensemble import driver
+from wearsim.studies.ensemble.file.schema import PENDING
 
 START, EACH = 3.0, 0.05  # s: start of a worker, and a realisation
 

@@ -8,8 +8,8 @@ import pytest
 import wearsim
 from tests.studies.ensemble_cases import small
 from wearsim.errors import Interrupted
+from wearsim.studies.comparison.compare import compare, have_same_draws
 from wearsim.studies.ensemble.api import ensemble
-from wearsim.studies.ensemble.compare import compare, have_same_draws
 from wearsim.studies.ensemble.designs import interim_sizes, parse_plan, sources, whole_count
 from wearsim.studies.ensemble.sweep import path_of, run_sweep
 from wearsim.studies.run.draws import Drawer

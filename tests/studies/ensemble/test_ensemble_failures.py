@@ -7,9 +7,9 @@ import pytest
 
 import wearsim
 from tests.studies.ensemble_cases import differences, partly_failing, small
-from wearsim.results import open_ensemble
 from wearsim.studies.ensemble import driver as ensemble_work
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
+from wearsim.studies.opening import open_ensemble
 
 SERIAL = {"scheduler": "serial"}
 

@@ -11,9 +11,9 @@ import wearsim
 from tests.studies.ensemble_cases import LOGNORMAL, differences, small
 from tests.studies.random_examples import CREEPAGE, FRICTION, LOAD, SLACK, scenario_of
 from wearsim.errors import CapabilityError, Interrupted, ResultsFileError, ScenarioError
-from wearsim.results import open_ensemble
 from wearsim.studies.ensemble import driver as ensemble_work
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
+from wearsim.studies.opening import open_ensemble
 
 SERIAL = {"scheduler": "serial"}
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import wearsim
+from tests.report.drawn import identification_figure
 from tests.studies.identify.grooves import NOISE, PASSES, RANDOM, K, groove, grown, rig, write
 from wearsim.errors import CapabilityError, ScenarioError
-from wearsim.report.figures.identification import identification_figure
-from wearsim.report.page.identification_part import of_identification
 from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.identify import api, trajectories
 from wearsim.studies.identify.likelihood import TraceLikelihood
@@ -157,7 +156,7 @@ def test_small_detected_scatter_is_explained_everywhere(tmp_path: Path):
     assert words in found.verdict_words
     assert words in found.posterior_toml()
     assert words in identification_figure(found).get_suptitle()
-    assert dict(of_identification(found).answer)["Is K/H random?"] == found.verdict_words
+    assert found.view.rows()[0].text == found.verdict_words
     strict = wearsim.identify(rig(), tests, negligible=0.02)
     assert strict.verdict == "random"
 

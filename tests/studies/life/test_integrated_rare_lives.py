@@ -14,16 +14,15 @@ from tests.studies.ensemble_cases import LOGNORMAL, differences
 from tests.studies.life.test_life import FRICTION, LOAD, design, lives
 from tests.studies.life.test_life_kills import Killed, counted
 from tests.studies.life.test_rare_lives import MEDIAN, closed_form, target_of
-from wearsim.cli.render.life_table import life_json, write_life
-from wearsim.report.lives import life_cells
-from wearsim.report.page.life_part import of_life
-from wearsim.results import read_ensemble
-from wearsim.results.ensemble.life import LifeResult
-from wearsim.results.ensemble.rare import IMPORTANCE, SUBSET
+from wearsim.cli.render import show_view
 from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.life.api import life, resume_life
 from wearsim.studies.life.factor import exact_factor
+from wearsim.studies.life.rare_estimates import IMPORTANCE, SUBSET
 from wearsim.studies.life.realisation import LifeRunner
+from wearsim.studies.life.result import LifeResult
+from wearsim.studies.life.view import life_cells
 from wearsim.uq.survival.lives import median_positions
 
 SPREAD = math.sqrt(math.log(1.5) ** 2 + math.log(1.6) ** 2 + math.log(1.1) ** 2)
@@ -73,19 +72,19 @@ def test_small_probability_is_not_stated_but_the_command_is(
     assert target is not None
     assert not math.isfinite(result.probability_before(target).value)
     assert not math.isfinite(result.survival(target).value)
-    write_life(result, [])
+    show_view(result.view, json=False)
     text = capsys.readouterr().out
-    assert "passes) is not stated: its effective number of realisations is 0." in text
-    assert "further tests that sample the other inputs: `wearsim life" in text
+    assert "passes)          not stated: its effective number of realisations is 0." in text
+    assert "tests that sample the other inputs   `wearsim life" in text
     assert "--rare 200" in text
     assert "'depth=2e-05 m'" in text
-    found = life_json(result)["probability_before_target"]
+    found = result.view.data()["probability_before_target"]
     assert "below 20" in found["not_stated_because"]
     assert "--rare 200" in found["command"]
-    assert any("not stated" in text for _, text in of_life(result).answer)
+    assert any("not stated" in row.text for row in result.view.rows())
     stated = result.with_settings(target=MEDIAN)
     assert stated.probability_before(MEDIAN).value == pytest.approx(0.5, abs=0.2)
-    assert life_json(stated)["probability_before_target"]["not_stated_because"] is None
+    assert stated.view.data()["probability_before_target"]["not_stated_because"] is None
 
 
 def test_correlated_inputs_are_sampled_given_the_factor(tmp_path: Path) -> None:
@@ -166,11 +165,11 @@ def test_effects_are_not_stated_where_lives_are_censored(
     assert censored.effects_obstacle.startswith(f"{censored.censored} of 60 lives are censored")
     assert censored.tornado() == {}
     assert not any(math.isfinite(item.first.value) for item in censored.sensitivity("life"))
-    write_life(censored, [])
+    show_view(censored.view, json=False)
     text = capsys.readouterr().out
     assert "what moves the life: Sobol indices of its logarithm: not stated" in text
     assert "give a greater --max" in text
-    assert "censored" in life_json(censored)["sensitivity_not_stated_because"]
+    assert "censored" in censored.view.data()["sensitivity_not_stated_because"]
     full = lives(tmp_path / "full.h5", scenario, 60, most=1e8)
     assert full.effects_obstacle == ""
     low, high = (one.value for one in full.tornado()["friction.coefficient"].factors)

@@ -13,16 +13,16 @@ from scipy.special import ndtr
 from tests.studies.ensemble_cases import LOGNORMAL, differences, small
 from tests.studies.random_examples import WANDERING
 from wearsim.errors import Interrupted, ResultsFileError, ScenarioError
-from wearsim.report.lives import against
-from wearsim.results import open_results, read_ensemble
-from wearsim.results.ensemble.life import LifeResult
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import resume_ensemble
-from wearsim.studies.life.api import life, resume_life
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.life.api import life, resume_life, sweep_life
 from wearsim.studies.life.factor import exact_factor
+from wearsim.studies.life.panels import swept_variable as against
 from wearsim.studies.life.realisation import LifeRunner
+from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.settings import design_variable, parse_life
-from wearsim.studies.life.sweep import sweep_life
+from wearsim.studies.opening import open_results
 from wearsim.studies.run.run import run
 
 LOAD = {"distribution": "lognormal", "median": "300 N", "factor": 1.1}

@@ -9,8 +9,8 @@ import pytest
 from tests.faulty_storage import WatchedStorage
 from tests.studies.ensemble_cases import LOGNORMAL, differences
 from tests.studies.life.test_life import design
-from wearsim.results.ensemble.life import LifeResult
 from wearsim.studies.life.api import life, resume_life
+from wearsim.studies.life.result import LifeResult
 
 COUNT = 4
 

@@ -13,14 +13,15 @@ from scipy.special import ndtri
 from tests.studies.ensemble_cases import LOGNORMAL, differences
 from tests.studies.life.test_life import FRICTION, LOAD, design, lives
 from tests.studies.life.test_life_kills import Killed, counted
-from wearsim.cli.render.life_table import life_json, write_life
-from wearsim.results import Outcome, read_ensemble
-from wearsim.results.ensemble.life import LifeResult
-from wearsim.results.ensemble.rare import IMPORTANCE, SUBSET
-from wearsim.results.ensemble.schema import OBSERVABLES
+from wearsim.cli.render import show_view
 from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.file.data import Outcome
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.ensemble.file.schema import OBSERVABLES
 from wearsim.studies.life.api import life, resume_life
+from wearsim.studies.life.rare_estimates import IMPORTANCE, SUBSET
 from wearsim.studies.life.realisation import LifeRunner
+from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.draws import Drawer
 from wearsim.uq.survival.rare_events import RareProbability, subset_stages
 
@@ -172,11 +173,11 @@ def test_subset_simulation_follows_where_importance_sampling_fails(
     assert second.tests <= 400
     assert result.rare == second
     assert second.probability.low < 1e-2 < second.probability.high
-    found = life_json(result)["rare"]
+    found = result.view.data()["rare"]
     assert found["method"] == SUBSET
     assert found["probability"]["value"] == second.probability.value
     assert found["tried"][IMPORTANCE]["refused"]
-    write_life(result, [])
+    show_view(result.view, json=False)
     text = capsys.readouterr().out
     assert "by importance sampling: refused, effective sample size" in text
     assert f"by subset simulation: {second.probability.value:.3g} [" in text
@@ -198,9 +199,9 @@ def test_probability_is_refused_where_both_methods_fail(
     assert "such as a censored life" in obstacles[1]
     assert result.rare is not None
     assert not result.rare.is_reliable
-    assert life_json(result)["rare"]["probability"] is None
-    write_life(result, [])
-    assert "no probability is stated; give a greater --rare" in capsys.readouterr().out
+    assert result.view.data()["rare"]["probability"] is None
+    show_view(result.view, json=False)
+    assert "not stated; give a greater --rare" in capsys.readouterr().out
 
 
 def subset_study(path: Path, **options: Any) -> LifeResult:

@@ -9,8 +9,8 @@ import pytest
 from study_examples import run_differences, short
 
 from wearsim.errors import Interrupted, ScenarioError, StepError
-from wearsim.results import open_results
 from wearsim.scenario import Scenario
+from wearsim.studies.opening import open_results
 from wearsim.studies.run import run as studies
 from wearsim.studies.run import schedule
 

@@ -15,13 +15,14 @@ from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.state import WearState, fresh_state
-from wearsim.results import Result, open_results
 from wearsim.scenario import load_scenario
 from wearsim.studies.ensemble.batch import joined_problem
+from wearsim.studies.opening import open_results
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import strips_of_run
+from wearsim.studies.run.result import Result
 from wearsim.types import Grid
 
 

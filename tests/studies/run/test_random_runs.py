@@ -21,7 +21,7 @@ from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import stability_limit
-from wearsim.results import open_results
+from wearsim.studies.opening import open_results
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 

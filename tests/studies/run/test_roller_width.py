@@ -11,8 +11,8 @@ from tests.evolution import SCENARIOS
 from wearsim.errors import CapabilityError, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, load_scenario
-from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import study_contact
+from wearsim.studies.dissipation.monte_carlo import dissipation
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run import run as studies

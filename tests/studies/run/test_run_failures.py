@@ -21,11 +21,13 @@ from wearsim.errors import (
     StepError,
 )
 from wearsim.evolution.steppers import implicit
-from wearsim.results import Result, open_results, read_results, write_results
+from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario, parse_scenario
+from wearsim.studies.opening import open_results
 from wearsim.studies.run import recorder
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.recorder import Event, Warned
+from wearsim.studies.run.result import Result, read_results
 
 pytestmark = pytest.mark.usefixtures("small_chunks", "quick_disk")
 

@@ -15,8 +15,8 @@ from study_examples import RIG, run_differences
 import wearsim
 from tests.faulty_storage import STAGES
 from tests.interruptible import interruptible
-from wearsim.results import open_results
 from wearsim.scenario import Scenario
+from wearsim.studies.opening import open_results
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
 

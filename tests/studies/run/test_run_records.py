@@ -11,8 +11,8 @@ from study_examples import LOADS, ROLLERS, STEPPERS, run_differences, short
 from wearsim.errors import StepError
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
-from wearsim.results import Result
 from wearsim.studies.run import run as studies
+from wearsim.studies.run.result import Result
 
 pytestmark = pytest.mark.usefixtures("small_chunks")
 

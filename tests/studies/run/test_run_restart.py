@@ -9,7 +9,7 @@ import pytest
 from study_examples import LOADS, OTHERS, ROLLERS, STEPPERS, run_differences, run_in_parts, short
 
 from wearsim.errors import Interrupted
-from wearsim.results import open_results
+from wearsim.studies.opening import open_results
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.recorder import Checkpointed, Event
 

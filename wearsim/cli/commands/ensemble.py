@@ -26,12 +26,10 @@ from wearsim.cli.shared import (
     read_scenario,
     refuse_same_file,
     results_option,
-    write_json,
-    write_notes,
 )
 
 if TYPE_CHECKING:
-    from wearsim.results import EnsembleResult
+    from wearsim.studies.ensemble.result import EnsembleResult
 
 Output = Annotated[Path | None, results_option("-ensemble.h5")]
 Precision = Annotated[
@@ -143,21 +141,20 @@ def ensemble(
         else:
             results = [api.ensemble(scenarios[""], realisations, path, **options)]
     if not key:
-        if figure is not None:
-            from wearsim.cli.commands.results import draw
-
-            draw(results[0], figure)
         report(results[0], json, figure, watch.workers)
         return
-    from wearsim.cli.render.ensemble_table import report_comparison
-
     for result in results:
         _end(result)
-    report_comparison(results, list(files), "depth", key, figure, json)
+    from wearsim.cli.render import draw_figure, show_view
+    from wearsim.studies.comparison.view import comparison_view
+
+    view = comparison_view(results, list(files), "depth", key)
+    draw_figure(view.panels(), figure)
+    show_view(view, json=json, files={"figure": figure}, more={"figure": figure})
 
 
 def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str = "") -> None:
-    """Write the estimates of an ensemble to stdout and its failures to stderr.
+    """Write an ensemble or lives to stdout and failures to stderr, and draw the figure.
 
     Parameters
     ----------
@@ -165,7 +162,7 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
     json : bool
         Whether to write JSON instead of tables.
     figure : Path, optional
-        Figure that was written.
+        Name of the figure.
     workers : str
         Workers that were used, "2 processes".
 
@@ -174,30 +171,23 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
     SolverError
         If all realisations failed.
     """
-    from wearsim.cli.render.ensemble_table import ensemble_json, write_ensemble
-    from wearsim.report.summary import ensemble_line
+    from wearsim.cli.render import draw_figure, show_view
     from wearsim.studies.execution.processes import InProcess
 
     if workers == InProcess.describe:
         workers = "this process, one realisation at a time"
-    if json:
-        write_json({**ensemble_json(result), "workers": workers or None, "figure": figure})
-    else:
-        more = [("results file", str(result.path))]
-        more += [("figure", str(figure))] if figure else []
-        write_ensemble(result, more, workers)
-        typer.echo(ensemble_line(result))
-        write_notes(result.notes, result.warnings)
+    view = result.view
+    draw_figure(view.panels(), figure)
+    files = {"workers": workers, "results file": result.path, "figure": figure}
+    show_view(view, json=json, files=files, more={"workers": workers or None, "figure": figure})
     _end(result)
 
 
 def _end(result: EnsembleResult) -> None:
-    """Warn of failed realisations; raise if all failed."""
-    from wearsim.cli.render.ensemble_table import warn_of_failures
-    from wearsim.errors import SolverError
-
-    warn_of_failures(result)
+    """Raise an error if all realisations failed."""
     if result.failed and not result.count:
+        from wearsim.errors import SolverError
+
         raise SolverError(f"{result.path}: all realisations failed")
 
 

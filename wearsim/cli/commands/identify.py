@@ -26,6 +26,7 @@ from wearsim.cli.shared import (
     refuse_existing,
     refuse_same_file,
     write_json,
+    write_list,
 )
 
 if TYPE_CHECKING:
@@ -243,22 +244,15 @@ def identify(
 
 def _finish(result: Any, posterior: Path | None, figure: Path | None, json: bool) -> None:
     """Write posterior, figure, and the table or JSON."""
-    from wearsim.cli.render.identification import identification_json, write_identification
+    from wearsim.cli.render import draw_figure, show_view
+    from wearsim.report.page.page import save_text
 
     files = {"results file": result.path, "posterior": posterior, "figure": figure}
     if posterior is not None:
-        from wearsim.report.parts import save_text
-
         save_text(result.posterior_toml(), posterior)
-    if figure is not None:
-        from wearsim.report.figures.identification import identification_figure
-        from wearsim.report.parts import save_figure
-
-        save_figure(identification_figure(result), figure)
-    if json:
-        write_json({**identification_json(result), "posterior": posterior, "figure": figure})
-        return
-    write_identification(result, [(name, str(path)) for name, path in files.items() if path])
+    draw_figure(result.view.panels(), figure)
+    more = {"posterior": posterior, "figure": figure}
+    show_view(result.view, json=json, files=files, more=more)
 
 
 def _shared(text: str | None) -> tuple[str, ...]:
@@ -286,8 +280,9 @@ def _plan(
 ) -> None:
     """Write the power of planned tests."""
     from wearsim.cli.progress import Counter
-    from wearsim.cli.render.identification import plan_json, write_plan
-    from wearsim.studies.identify.planning import plan_tests, sizes
+    from wearsim.cli.render import draw_figure
+    from wearsim.studies.identify.panels import power_sheet
+    from wearsim.studies.identify.planning import plan_data, plan_tables, plan_tests, sizes
     from wearsim.studies.kernels import kernels_of
 
     if numbers is None:
@@ -325,14 +320,14 @@ def _plan(
             draws=draws,
             on_progress=counter,
         )
-    if figure is not None:
-        from wearsim.report.figures.identification import power_figure
-        from wearsim.report.parts import save_figure
-
-        save_figure(power_figure(designs, scenario.title), figure)
+    draw_figure(power_sheet(designs, scenario.title), figure)
     if json:
-        write_json({**plan_json(designs), "figure": figure})
+        write_json({**plan_data(designs), "figure": figure})
         return
-    write_plan(scenario.title, designs)
+    typer.echo(scenario.title)
+    for table, sentences in plan_tables(designs):
+        typer.echo(f"\n{table.title}")
+        write_list(table.heads, table.rows)
+        typer.echo("\n".join(sentences))
     if figure is not None:
         typer.echo(f"figure: {figure}")

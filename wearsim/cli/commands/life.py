@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,12 +28,12 @@ from wearsim.cli.shared import (
     read_scenario,
     refuse_same_file,
     results_option,
-    write_json,
-    write_notes,
 )
+from wearsim.errors import Interrupted, ResultsFileError
 
 if TYPE_CHECKING:
-    from wearsim.results.ensemble.life import LifeResult
+    from wearsim.scenario import Scenario
+    from wearsim.studies.life.result import LifeResult
 
 Designs = Annotated[
     list[Path],
@@ -163,17 +165,17 @@ def life(
         for option, value in given.items():
             if value is not None:
                 raise typer.BadParameter("has no meaning for results files", param_hint=option)
-        from wearsim.report.lives import against
+        from wearsim.studies.life.panels import swept_variable
 
         results = [_opened(path, target, shares) for path in designs]
         labels = _labels(designs)
-        if against(results):
+        if swept_variable(results):
             labels = [one.variable.text for one in results if one.variable]
         report(results, labels, json, figure)
         return
     with checking("--precision"):
         if precision is not None:
-            from wearsim.results.ensemble.life_settings import LifeTarget
+            from wearsim.studies.life.stored_settings import LifeTarget
 
             LifeTarget.parse(precision)
     texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
@@ -226,8 +228,7 @@ def _run(
 ) -> list[LifeResult]:
     """Run the studies of all designs, and return their results."""
     from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
-    from wearsim.cli.render import life_table
-    from wearsim.results import check_output
+    from wearsim.results.io.outputs import check_output
     from wearsim.studies.ensemble.sweep import path_of
     from wearsim.studies.kernels import kernels_of
     from wearsim.studies.life import api, settings
@@ -258,7 +259,7 @@ def _run(
             )
             rare = (options[name] for name in ("rare", "precision", "rare_method"))
             settings.with_rare_events(scenario, chosen, *rare)
-    going_on = partial(life_table.going_on, labels, checked, paths, options["variable"])
+    going_on = partial(_going_on, labels, checked, paths, options["variable"])
     for scenario, path in zip(checked, paths, strict=True):
         refuse_same_file(figure, path, scenario.paths)
         with going_on(path):
@@ -301,9 +302,9 @@ def _shares(text: str) -> tuple[float, ...]:
 def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeResult:
     """Return the result in a file, for another target and other percentages."""
     from wearsim.errors import ResultsFileError
-    from wearsim.results import open_results
-    from wearsim.results.ensemble.life import LifeResult
+    from wearsim.studies.life.result import LifeResult
     from wearsim.studies.life.settings import parse_life
+    from wearsim.studies.opening import open_results
 
     result = open_results(path)
     if not isinstance(result, LifeResult):
@@ -322,10 +323,7 @@ def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeRe
 
 
 def report(
-    results: Sequence[LifeResult],
-    labels: Sequence[str],
-    json: bool,
-    figure: Path | None,
+    results: Sequence[LifeResult], labels: Sequence[str], json: bool, figure: Path | None
 ) -> None:
     """Write the lives of designs to stdout, and compare each with the first.
 
@@ -343,49 +341,64 @@ def report(
     ResultsFileError, SolverError
         If the units of lives differ, or all realisations of a design failed.
     """
-    from wearsim.cli.render import life_table
-    from wearsim.cli.render.ensemble_table import warn_of_failures
-    from wearsim.errors import ResultsFileError, SolverError
-    from wearsim.report.lives import against, remarks
+    from wearsim.cli.render import draw_figure, show_view
+    from wearsim.errors import SolverError
+    from wearsim.studies.opening import comparison_of
 
+    views = [result.view for result in results]
     for result in results:
-        warn_of_failures(result)
         if result.failed and not result.count:
+            note(f"warning: {result.view.failures}")
             raise SolverError(f"{result.path}: all realisations failed")
-    first, *others = results
-    try:
-        compared = [other.compare(first) for other in others]
-    except ValueError as error:
-        raise ResultsFileError(str(error)) from error
-    if figure is not None:
-        from wearsim.report.figures.life import life_figure
-        from wearsim.report.parts import save_figure
-
-        save_figure(life_figure(results, labels), figure)
-    if json:
-        designs = [life_table.life_json(result) for result in results]
-        if not others:
-            write_json({**designs[0], "figure": figure})
-            return
-        data: dict[str, Any] = {"unit": first.unit, "designs": designs, "labels": list(labels)}
-        if len(others) == 1:
-            data |= life_table.comparison_json(first.compare(others[0]))
-        else:
-            data["compared_with_first"] = [life_table.comparison_json(item) for item in compared]
-        if variable := against(results):
-            data["against"] = life_table.against_json(variable, results)
-        write_json({**data, "figure": figure})
-        return
-    for result in results:
-        more = [("results file", str(result.path))]
-        life_table.write_life(result, more)
-        write_notes(result.notes, [*result.warnings, *remarks(result)])
-    if others:
-        life_table.write_lives_of(labels, results)
-    if len(others) == 1:
-        life_table.write_comparison(list(labels), first.compare(others[0]))
-    else:
-        for label, item in zip(labels[1:], compared, strict=True):
-            life_table.write_comparison([label, labels[0]], item)
-    if figure is not None:
+    compared = comparison_of(results, labels) if len(results) > 1 else views[0]
+    draw_figure(compared.panels(), figure)
+    if not json or compared is views[0]:
+        for result, view in zip(results, views, strict=True):
+            files = {"results file": result.path}
+            show_view(view, json=json, files=files, more={"figure": figure})
+    if compared is not views[0]:
+        show_view(compared, json=json, more={"figure": figure})
+    if figure is not None and not json:
         note(f"figure: {figure}")
+
+
+@contextmanager
+def _going_on(
+    labels: Sequence[str],
+    scenarios: Sequence[Scenario],
+    paths: Sequence[Path],
+    key: str,
+    path: Path,
+) -> Iterator[None]:
+    """Add the commands for the other designs to the error of a file that exists or was stopped.
+
+    Parameters
+    ----------
+    labels, scenarios, paths : sequence
+        Designs and their results files.
+    key : str
+        Key of a sweep, whose values are the labels; empty for scenarios.
+    path : Path
+        The file in question.
+
+    Raises
+    ------
+    ResultsFileError, Interrupted
+        Those within, with more text where several designs are compared.
+    """
+    try:
+        yield
+    except (ResultsFileError, Interrupted) as error:
+        if len(paths) == 1 or not path.exists():
+            raise
+        commands = []
+        for label, scenario, file in zip(labels, scenarios, paths, strict=True):
+            if file.exists():
+                continue
+            swept = ["--set", f"{key}={label}"] if key else []
+            options = [*swept, "--seed", str(scenario.seed), "-o", str(file)]
+            commands.append(shlex.join(["wearsim", "life", scenario.file, *options]))
+        steps = [f"`{command}` with the other options" for command in commands]
+        steps.append(f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`")
+        text = f"{error.at_shell}; the comparison is finished by {', then '.join(steps)}"
+        raise type(error)(text) from error

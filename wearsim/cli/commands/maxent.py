@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,18 +12,11 @@ from wearsim.cli.shared import (
     Force,
     Json,
     check_figure,
-    note,
-    write_json,
-    write_notes,
-    write_table,
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from wearsim.uq.distributions.base import MaxentDistribution
 
-PROBABILITIES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
 _COLUMNS, _ROWS = 60, 8
 _BLOCKS = " ▁▂▃▄▅▆▇█"
 
@@ -67,19 +60,14 @@ def maxent(
         )
     except Infeasible as error:
         raise Infeasible(re.sub(r"\bmean_log\b", "--mean-log", str(error))) from error
-    if figure is not None:
-        from wearsim.report.figures.contact import maxent_figure
-        from wearsim.report.parts import save_figure
+    from wearsim.cli.render import draw_figure, show_view
+    from wearsim.report.maxent import MaxentView
 
-        save_figure(maxent_figure(distribution), figure)
-    if json:
-        write_json(_data(distribution, figure))
-        return
-    write_table("maximum-entropy distribution", _rows(distribution))
-    typer.echo("\n".join(_plot(distribution)))
-    write_notes((), distribution.warnings)
-    if figure is not None:
-        note(f"figure: {figure}")
+    view = MaxentView(distribution)
+    draw_figure(view.panels(), figure)
+    show_view(view, json=json, files={"figure": figure}, more={"figure": figure})
+    if not json:
+        typer.echo("\n".join(_plot(distribution)))
 
 
 def _limit(text: str) -> float:
@@ -90,40 +78,6 @@ def _limit(text: str) -> float:
         raise typer.BadParameter(
             f"'{text}' is not a number, expected one such as 0, -2.5 or inf", param_hint="--support"
         ) from error
-
-
-def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
-    from wearsim.report.maxent import multipliers, parent, without_rounding
-
-    found = parent(distribution)
-    return [
-        ("family", distribution.family),
-        ("support", " to ".join(f"{end:g}" for end in distribution.support)),
-        ("density", f"exp(-l0 - l1 x - l2 {distribution.third})"),
-        *((f"l{number}", f"{item:.7g}") for number, item in enumerate(multipliers(distribution))),
-        (
-            "parent normal distribution",
-            f"mean {found[0]:.7g}, standard deviation {found[1]:.7g}" if found else "none",
-        ),
-        ("mean", f"{without_rounding(distribution, distribution.mean):.7g}"),
-        ("standard deviation", f"{distribution.std:.7g}"),
-        *(
-            (f"{100.0 * probability:g} % quantile", f"{item:.7g}")
-            for probability, item in _quantiles(distribution).items()
-        ),
-    ]
-
-
-def _quantiles(distribution: MaxentDistribution) -> dict[float, float]:
-    import numpy as np
-
-    from wearsim.report.maxent import without_rounding
-
-    values = distribution.quantile(np.array(PROBABILITIES)).tolist()
-    return {
-        p: without_rounding(distribution, item)
-        for p, item in zip(PROBABILITIES, values, strict=True)
-    }
 
 
 def _plot(distribution: MaxentDistribution) -> list[str]:
@@ -140,22 +94,3 @@ def _plot(distribution: MaxentDistribution) -> list[str]:
     ]
     left, right = f"{low:.4g}", f"{high:.4g}"
     return [*lines, f"  {'▔' * _COLUMNS}", f"  {left}{right:>{_COLUMNS - len(left)}}"]
-
-
-def _data(distribution: MaxentDistribution, figure: Path | None) -> dict[str, Any]:
-    """Return the distribution in the units of the given moments."""
-    from wearsim.report.maxent import multipliers, parent, without_rounding
-
-    found = parent(distribution)
-    return {
-        "family": distribution.family,
-        "support": distribution.support,
-        "multipliers": dict(zip(("l0", "l1", "l2"), multipliers(distribution), strict=True)),
-        "l2_multiplies": distribution.third,
-        "parent": found and {"mean": found[0], "std": found[1]},
-        "mean": without_rounding(distribution, distribution.mean),
-        "std": distribution.std,
-        "quantiles": _quantiles(distribution),
-        "warnings": list(distribution.warnings),
-        "figure": figure,
-    }

@@ -56,15 +56,14 @@ def report(
     path = output if output is not None else Path(f"{files[0].stem}.html")
     if path.suffix.lower() not in {".html", ".htm"}:
         raise typer.BadParameter(f"'{path}' does not end in .html", param_hint="-o")
-    from wearsim.report.page.page import save_report
-    from wearsim.results import refuse_inputs
-    from wearsim.results.opening import open_results
+    from wearsim.atomic_write import refuse_inputs
+    from wearsim.studies.opening import open_results, save_report
 
     refuse_inputs(path, files, "the page")
     refuse_inputs(path, measured or [], "a measured profile")
     results = [open_results(file) for file in files]
     check_new_file(path, force)
     choice = profile_choice(columns, units, row, mean_rows, at)
-    profiles = measured_profiles(measured or [], choice, results, level)
-    save_report(results, path, profiles)
+    views = [result.view for result in results]
+    save_report(results, path, measured_profiles(measured or [], choice, views, level))
     note(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -21,21 +21,13 @@ from wearsim.cli.shared import (
     check_figure,
     note,
     profile_choice,
-    write_json,
     write_notes,
-    write_table,
 )
 
 if TYPE_CHECKING:
     from wearsim.profiles import ProfileChoice
     from wearsim.report.measured import Measured
-    from wearsim.results import (
-        DissipationResult,
-        EnsembleResult,
-        IdentificationResult,
-        Result,
-    )
-    from wearsim.results.content import StudyData
+    from wearsim.report.view import View
 
 
 _MISALIGNED = 0.5  # ratio of residuals below which levelling is suggested
@@ -74,30 +66,27 @@ def plot(
 ) -> None:
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
-    from wearsim.results import (
-        DissipationResult,
-        IdentificationResult,
-        open_results,
-        refuse_inputs,
-    )
+    from wearsim.atomic_write import refuse_inputs
+    from wearsim.cli.render import draw_figure
+    from wearsim.studies.opening import open_results
 
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
-    result = open_results(file)
+    view = open_results(file).view
     check_figure(path, force)
-    if measured and isinstance(result, DissipationResult | IdentificationResult):
+    if measured and view.profile() is None:
         raise typer.BadParameter(
-            f"requires wear tests; {file} holds {result.raw.schema.holds}", param_hint="--measured"
+            f"requires wear tests; {file} holds none: {view.question}", param_hint="--measured"
         )
     choice = profile_choice(columns, units, row, mean_rows, at)
-    draw(result, path, measured_profiles(measured or [], choice, [result], level))
+    draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level)), path)
     note(f"figure: {path}")
 
 
 def measured_profiles(
-    files: Sequence[Path], choice: ProfileChoice, results: Sequence[object], level: bool
+    files: Sequence[Path], choice: ProfileChoice, views: Sequence[View], level: bool
 ) -> list[Measured]:
-    """Return the profiles of measured files, levelled against the first result if required.
+    """Return the profiles of measured files, levelled against the first profile if required.
 
     How signs were read and the residuals go to stderr.
     """
@@ -107,25 +96,16 @@ def measured_profiles(
         return []
     from wearsim.errors import ScenarioError
     from wearsim.profiles import load_profile, sign_note
-    from wearsim.report.measured import Measured, computed_profile, levelled, residual_text, rms
+    from wearsim.report.measured import Measured, levelled, residual_text, rms
     from wearsim.report.text import shown
-    from wearsim.results import EnsembleResult, Result
-    from wearsim.results.ensemble.life import LifeResult
 
-    read = [load_profile(file, choice) for file in files]
-    each = zip(files, read, strict=True)
-    write_notes(filter(None, [sign_note(one, choice, str(file)) for file, one in each]))
-    each = zip(files, read, strict=True)
-    profiles = [Measured(file.stem, one.y, one.height) for file, one in each]
-    tests = (
-        one
-        for one in results
-        if isinstance(one, Result | EnsembleResult) and not isinstance(one, LifeResult)
-    )
-    test = next(tests, None)
-    if test is None:
+    read = {file: load_profile(file, choice) for file in files}
+    signs = (sign_note(profile, choice, str(file)) for file, profile in read.items())
+    write_notes(filter(None, signs))
+    profiles = [Measured(file.stem, profile.y, profile.height) for file, profile in read.items()]
+    computed = next(filter(None, (view.profile() for view in views)), None)
+    if computed is None:
         return profiles
-    computed = computed_profile(test)
     for place, profile in enumerate(profiles):
         try:
             corrected = levelled(profile, computed)
@@ -142,109 +122,12 @@ def measured_profiles(
     return profiles
 
 
-def draw(
-    result: Result | DissipationResult | EnsembleResult | IdentificationResult,
-    path: Path,
-    measured: Sequence[Measured] = (),
-) -> None:
-    """Write the figure of a result.
-
-    Parameters
-    ----------
-    result : Result, DissipationResult, EnsembleResult or IdentificationResult
-    path : Path
-        Name of the figure.
-    measured : sequence of Measured
-        Profiles drawn over those of a run or an ensemble.
-    """
-    from wearsim.report.figures.result import figure_of
-    from wearsim.report.parts import save_figure
-
-    save_figure(figure_of(result, measured), path)
-
-
 def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
-    from wearsim.cli.render import ensemble_table, life_table
-    from wearsim.cli.render.dissipation_table import write_spread
-    from wearsim.cli.render.failure import failure_rows
-    from wearsim.report import summary
-    from wearsim.report.text import count
-    from wearsim.results import (
-        DissipationResult,
-        EnsembleResult,
-        IdentificationResult,
-        open_results,
-    )
-    from wearsim.results.ensemble.life import LifeResult
+    from wearsim.cli.render import show_view
+    from wearsim.studies.opening import open_results
 
-    result = open_results(file)
-    if isinstance(result, IdentificationResult):
-        from wearsim.cli.render.identification import identification_json, write_identification
-
-        if json:
-            write_json({**identification_json(result), **_origin(result.raw)})
-        else:
-            write_identification(result, summary.sources(result.raw))
-        return
-    if json:
-        data: dict[str, Any]
-        if isinstance(result, DissipationResult):
-            data = summary.dissipation_json(result)
-        elif isinstance(result, LifeResult):
-            data = life_table.life_json(result)
-        elif isinstance(result, EnsembleResult):
-            data = ensemble_table.ensemble_json(result)
-        else:
-            data = {
-                **summary.run_json(result),
-                "total_passes": result.raw.total_passes,
-                "tolerance": result.raw.tolerance,
-                "record_passes": result.record_passes,
-            }
-        write_json({**data, **_origin(result.raw)})
-        return
-    if isinstance(result, DissipationResult):
-        write_spread(result, summary.sources(result.raw))
-    elif isinstance(result, LifeResult):
-        life_table.write_life(result, summary.sources(result.raw))
-    elif isinstance(result, EnsembleResult):
-        groups = [(f"random {item['name']}", item["text"]) for item in result.raw.groups]
-        ensemble_table.write_ensemble(result, [*groups, *summary.sources(result.raw)])
-    else:
-        first, last = (count(float(result.record_passes[place])) for place in (0, -1))
-        rows = [
-            ("test", summary.standing(result)),
-            *failure_rows(result),
-            ("contact model", result.described_model),
-            ("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
-            ("seed", str(result.raw.seed)),
-            *summary.draws(result),
-            ("records", f"{len(result.record_passes)}, at passes {first} to {last}"),
-            ("strips", str(len(result.y))),
-            *summary.effort(result),
-        ]
-        write_table(result.title, [*rows, *summary.sources(result.raw)])
-        title = "end state" if result.finished else "current state"
-        title = "state before the failure" if result.failure else title
-        write_table(title, summary.end_state(result))
-    write_notes(result.notes, result.warnings)
-    if isinstance(result, EnsembleResult):
-        ensemble_table.warn_of_failures(result)
-
-
-def _origin(raw: StudyData) -> dict[str, Any]:
-    """Return scenario, input files, plugins and software of a study."""
-    return {
-        "scenario_file": raw.scenario_file,
-        "scenario_sha256": raw.sha256,
-        "scenario": raw.scenario_text,
-        "files": list(raw.files),
-        "plugins": raw.plugins,
-        "software": raw.software,
-        "seed": raw.seed,
-        "created": raw.created,
-    }
+    show_view(open_results(file).view, json=json, stored=True)
 
 
 Files = Annotated[
@@ -276,46 +159,17 @@ def compare(
         raise typer.BadParameter(
             f"there is one file, {files[0]}; give another one to compare", param_hint="FILE.h5"
         )
-    from wearsim.results import refuse_inputs
-    from wearsim.studies.ensemble.compare import observables_of
+    from wearsim.atomic_write import refuse_inputs
+    from wearsim.cli.render import draw_figure, show_view
+    from wearsim.studies.opening import comparison_of, open_results
 
     if figure is not None:
         refuse_inputs(figure, files, "the comparison")
-    results = [_open(file) for file in files]
+    results = [open_results(file) for file in files]
     check_figure(figure, force)
-    labels = _labels(files)
-    for label, result in zip(labels, results, strict=True):
-        known = observables_of(result)
-        if observable not in known:
-            raise typer.BadParameter(
-                f"{label} has no '{observable}', expected one of {', '.join(known)}",
-                param_hint="--observable",
-            )
-    from wearsim.cli.render.ensemble_table import report_comparison
-
-    report_comparison(results, labels, observable, "", figure, json)
-
-
-def _open(file: Path) -> Result | EnsembleResult:
-    from wearsim.errors import ResultsFileError
-    from wearsim.results import (
-        DissipationResult,
-        EnsembleResult,
-        IdentificationResult,
-        open_results,
-    )
-    from wearsim.results.ensemble.life import LifeResult
-
-    result = open_results(file)
-    if isinstance(result, DissipationResult | IdentificationResult):
-        raise ResultsFileError(
-            f"{file}: holds {result.raw.schema.holds}; only runs and ensembles can be compared"
-        )
-    if isinstance(result, LifeResult):
-        raise ResultsFileError(f"{file}: holds lives; `wearsim life A.h5 B.h5` compares them")
-    if isinstance(result, EnsembleResult) and result.count == 0:
-        raise ResultsFileError(f"{file}: has no completed realisation; nothing to compare")
-    return result
+    view = comparison_of(results, _labels(files), observable)
+    draw_figure(view.panels(), figure)
+    show_view(view, json=json, files={"figure": figure}, more={"figure": figure})
 
 
 def _labels(files: list[Path]) -> list[str]:
@@ -356,7 +210,7 @@ def export(
     """Write a results file as CSV, with units in the headers."""
     if decimal not in {".", ","}:
         raise typer.BadParameter(f"'{decimal}' is neither '.' nor ','", param_hint="--decimal")
-    from wearsim.results import export_csv, open_results
+    from wearsim.studies.opening import export_csv, open_results
 
     sign: Literal[".", ","] = "," if decimal == "," else "."
     folder = output if output is not None else Path(file.stem)

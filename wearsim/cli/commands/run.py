@@ -22,14 +22,13 @@ from wearsim.cli.shared import (
     note,
     read_scenario,
     results_option,
-    write_json,
     write_notes,
-    write_table,
 )
-from wearsim.errors import SolverError, WearsimError
+from wearsim.errors import ResultsFileError, SolverError, WearsimError
 
 if TYPE_CHECKING:
-    from wearsim.results import EnsembleResult, Result
+    from wearsim.studies.ensemble.result import EnsembleResult
+    from wearsim.studies.run.result import Result
 
 
 Output = Annotated[Path | None, results_option(".h5")]
@@ -72,27 +71,16 @@ def run(
                 loaded, path, until=until, force=force, on_event=watch, stop_requested=stop.is_set
             )
     except SolverError as error:
-        from wearsim.results import open_results
+        from wearsim.studies.opening import open_results
 
         with suppress(WearsimError):  # a file that was there before may be of any kind
             if getattr(open_results(path), "failure", ""):
                 error.add_note(f"the last accepted step is kept: wearsim show {path}")
         raise
-    report(result, json)
-    # the study has chosen the contact model
-    write_notes(note for note in result.notes if note not in loaded.notes)
+    from wearsim.cli.render import show_view
 
-
-def report(result: Result, json: bool) -> None:
-    """Write the summary of a run to stdout."""
-    from wearsim.report.summary import draws, effort, end_state, run_json, run_line, standing
-
-    if json:
-        write_json(run_json(result))
-        return
-    rows = [("test", standing(result)), *draws(result), *end_state(result), *effort(result)]
-    write_table(result.title, [*rows, ("results file", str(result.path))])
-    typer.echo(run_line(result))
+    files = {"results file": result.path}
+    show_view(result.view, json=json, files=files, known=loaded.notes)
 
 
 More = Annotated[
@@ -129,56 +117,54 @@ def resume(
     quiet: Quiet = False,
 ) -> None:
     """Continue a run or an ensemble from its results file."""
-    from wearsim.results import kind_of
+    from wearsim.cli.render import show_view
+    from wearsim.results.kinds import kind_of, open_study
 
-    if kind_of(file) == "ensemble":
-        if until is not None:
-            raise typer.BadParameter("only wear tests can be extended", param_hint="--until")
-        if allow_deep:
-            raise typer.BadParameter("is an option for wear tests only", param_hint="--allow-deep")
-        if failed and realisations is not None:
-            raise typer.BadParameter("extend the ensemble first", param_hint="--failed")
-        chosen = checked_scheduler(scheduler, workers)
-        from wearsim.cli.commands.ensemble import STOPPING, report
-        from wearsim.cli.commands.life import report as report_lives
-        from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
-        from wearsim.results import open_ensemble
-        from wearsim.results.ensemble.life import LifeResult
-        from wearsim.studies.ensemble.api import resume_ensemble
-        from wearsim.studies.kernels import kernels_of
-
-        before = open_ensemble(file)
-        nothing = _nothing_to_do(before, failed)
-        if nothing and realisations is None:
-            note(f"note: nothing to do: {nothing}")
-        watcher = EnsembleWatcher(quiet, kernels=lambda: kernels_of(before.scenario))
-        with stop_on_signals(STOPPING) as stop, watcher as watch:
-            if isinstance(before, LifeResult):
-                from wearsim.studies.life.api import resume_life as resume_ensemble
-            result = resume_ensemble(
-                file,
-                failed=failed,
-                realisations=realisations,
-                workers=workers,
-                scheduler=chosen,
-                on_progress=watch,
-                stop_requested=stop.is_set,
-                on_notice=watch.notice,
-            )
-        if isinstance(result, LifeResult):
-            report_lives([result], [file.stem], json, None)
-        else:
-            report(result, json, None, watch.workers)
+    kind = kind_of(file)
+    if not kind.resume:
+        raise ResultsFileError(f"{file}: holds {kind.holds}, which cannot be continued")
+    if kind.name == "run":
+        given = {
+            "--failed": failed,
+            "--realisations": realisations is not None,
+            "--workers": workers is not None,
+            "--scheduler": scheduler is not None,
+        }
+        for option, is_given in given.items():
+            if is_given:
+                raise typer.BadParameter("is an option for ensembles only", param_hint=option)
+        check_limit(until)
+        result = _resumed_run(file, until, allow_deep, quiet)
+        show_view(result.view, json=json, files={"results file": result.path})
         return
-    for option, is_given in (
-        ("--failed", failed),
-        ("--realisations", realisations is not None),
-        ("--workers", workers is not None),
-        ("--scheduler", scheduler is not None),
-    ):
-        if is_given:
-            raise typer.BadParameter("is an option for ensembles only", param_hint=option)
-    _resume_run(file, until, allow_deep, json, quiet)
+    if until is not None:
+        raise typer.BadParameter("only wear tests can be extended", param_hint="--until")
+    if allow_deep:
+        raise typer.BadParameter("is an option for wear tests only", param_hint="--allow-deep")
+    if failed and realisations is not None:
+        raise typer.BadParameter("extend the ensemble first", param_hint="--failed")
+    chosen = checked_scheduler(scheduler, workers)
+    from wearsim.cli.commands.ensemble import STOPPING, report
+    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
+    from wearsim.studies.kernels import kernels_of
+
+    before = open_study(file, kind)
+    nothing = _nothing_to_do(before, kind.name, failed)
+    if nothing and realisations is None:
+        note(f"note: nothing to do: {nothing}")
+    watcher = EnsembleWatcher(quiet, kernels=lambda: kernels_of(before.scenario))
+    with stop_on_signals(STOPPING) as stop, watcher as watch:
+        result = kind.load("resume")(
+            file,
+            failed=failed,
+            realisations=realisations,
+            workers=workers,
+            scheduler=chosen,
+            on_progress=watch,
+            stop_requested=stop.is_set,
+            on_notice=watch.notice,
+        )
+    report(result, json, None, watch.workers)
 
 
 def check_limit(until: str | None) -> None:
@@ -196,28 +182,23 @@ def check_limit(until: str | None) -> None:
             Limit.parse(until)
 
 
-def _resume_run(file: Path, until: str | None, allow_deep: bool, json: bool, quiet: bool) -> None:
-    check_limit(until)
-    from wearsim.cli.commands.run import report
+def _resumed_run(file: Path, until: str | None, allow_deep: bool, quiet: bool) -> Result:
     from wearsim.cli.progress import RunWatcher, stop_on_signals
-    from wearsim.results import open_results
     from wearsim.studies.kernels import kernels_of
+    from wearsim.studies.opening import open_results
     from wearsim.studies.run import run as study
 
     watcher = RunWatcher(quiet, kernels=lambda: kernels_of(open_results(file).scenario))
     with stop_on_signals() as stop, watcher as watch:
-        result = study.resume(
+        return study.resume(
             file, until, allow_deep=allow_deep, on_event=watch, stop_requested=stop.is_set
         )
-    report(result, json)
 
 
-def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
+def _nothing_to_do(before: EnsembleResult, kind: str, failed: bool) -> str:
     """Return why there is nothing to do, or an empty text."""
     if not failed:
-        from wearsim.results.ensemble.life import LifeResult
-
-        what = "study of lives" if isinstance(before, LifeResult) else "ensemble"
+        what = "study of lives" if kind == "life" else kind
         return f"the {what} is finished" if before.finished else ""
     if before.failed:
         return ""

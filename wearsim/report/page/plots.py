@@ -1,131 +1,389 @@
-"""Axes, sources and labels that the interactive figures share."""
+"""Panels drawn with Bokeh, with values under the pointer and a slider over the records."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
+from bokeh.models.annotations import BoxAnnotation, ColorBar, Label
+from bokeh.models.annotations import Span as Rule
+from bokeh.models.axes import LinearAxis
 from bokeh.models.formatters import BasicTickFormatter, NumeralTickFormatter
-from bokeh.models.glyphs import Line
-from bokeh.models.ranges import Range1d
+from bokeh.models.mappers import LinearColorMapper
+from bokeh.models.ranges import DataRange1d, Range1d
 from bokeh.models.sources import ColumnDataSource
-from bokeh.models.tickers import SingleIntervalTicker
+from bokeh.models.tickers import FixedTicker
 from bokeh.models.tools import HoverTool
+from bokeh.palettes import Magma256, Viridis256
 from bokeh.plotting import figure
 
-from wearsim.report.measured import Measured
-from wearsim.report.parts import BLUE, GREEN, ORANGE, RED, depth_scales, evenly_spaced
-from wearsim.report.text import PER_SI
-from wearsim.types import BoolArray, FloatArray
+from wearsim.report.panels import (
+    Arrows,
+    Axis,
+    Band,
+    Bars,
+    Contours,
+    Image,
+    Line,
+    Mark,
+    Panel,
+    Patch,
+    Records,
+    Sheet,
+    Span,
+    Text,
+    Whiskers,
+    evenly_spaced,
+)
 
-UM, MM, MIN, W_MM, DEG = (PER_SI[unit] for unit in ("um", "mm", "min", "W/mm", "deg"))
-COLOURS = (BLUE, ORANGE, GREEN, RED, "#7a4fa3", "#5a5a5a")
-MOST_POINTS = 2000
+MOST_RECORDS, MOST_CURVES, MOST_POINTS = 60, 20, 2000
+RECORD = "record"  # start of the names of the sources that the slider of the page changes
+_DASHES: dict[str, Any] = {"-": "solid", "--": "dashed", ":": "dotted", "-.": "dashdot"}
+_MARKERS: dict[str, Any] = {
+    "o": "circle", ".": "circle", "s": "square", "^": "triangle", "D": "diamond",
+    "v": "inverted_triangle", "+": "cross", "|": "dash",
+}  # fmt: skip
+_PALETTES = {"magma": Magma256, "magma_r": Magma256[::-1], "viridis": Viridis256}
+_CELLS = 301  # of an image along each axis, if its places are irregular
 
 
-@dataclass(frozen=True)
-class Plot:
-    """A figure with its title and description.
-
-    Parameters
-    ----------
-    title : str
-    alt : str
-        What the figure shows, for readers who do not see it.
-    figure : bokeh figure
-    """
-
-    title: str
-    alt: str
-    figure: Any
+def plots_of(sheet: Sheet) -> tuple[list[tuple[Panel, Any]], list[str]]:
+    """Return the panels of a page with their figures, and the texts of the slider."""
+    shown = [panel for panel in sheet.panels.values() if not panel.figure_only]
+    steps = list(sheet.steps)
+    if steps:
+        steps = [steps[number] for number in evenly_spaced(len(steps), MOST_RECORDS)]
+    return [(panel, draw(panel)) for panel in shown], steps
 
 
-def axes(x: str, y: str, **options: Any) -> Any:
-    """Return empty axes with labels."""
-    plot = figure(
+def draw(panel: Panel) -> Any:
+    """Return the figure of a panel."""
+    scales: dict[str, Any] = {
+        "x_axis_type": "log" if panel.x.log else "linear",
+        "y_axis_type": "log" if panel.y.log else "linear",
+        "match_aspect": panel.equal,
+    }
+    plot: Any = figure(
         height=340,
         sizing_mode="stretch_width",
         tools="pan,box_zoom,wheel_zoom,reset,save",
         active_scroll=None,
-        x_axis_label=x,
-        y_axis_label=y,
+        x_axis_label=_plain(panel.x.label),
+        y_axis_label=_plain(panel.y.label),
         toolbar_location="above",
         min_border_right=14,  # for half of the last tick label
-        **options,
+        **scales,
     )
     plot.toolbar.logo = None
+    _set_axis(plot, "x", panel.x)
+    _set_axis(plot, "y", panel.y)
+    if panel.right is not None:
+        low, high = _limits(panel.right)
+        # a plain range, since one that follows the data would follow those of both axes
+        values = [np.ravel(mark.y) for mark in panel.marks if isinstance(mark, Line) and mark.right]
+        data = np.concatenate(values) * panel.right.scale
+        margin = 0.05 * float(np.nanmax(data) - np.nanmin(data))
+        low = float(np.nanmin(data)) - margin if low is None else low
+        high = float(np.nanmax(data)) + margin if high is None else high
+        plot.extra_y_ranges = {"right": Range1d(start=low, end=high)}
+        label = _plain(panel.right.label)
+        plot.add_layout(LinearAxis(y_range_name="right", axis_label=label), "right")
     for axis in (*plot.xaxis, *plot.yaxis):
         axis.axis_label_text_font_style = "normal"
         axis.axis_label_text_font_size = "14px"
         axis.major_label_text_font_size = "13px"
         axis.axis_label_text_color = axis.major_label_text_color = "#222222"
-        if isinstance(axis.formatter, BasicTickFormatter):
-            axis.formatter = BasicTickFormatter(
-                power_limit_low=-4, power_limit_high=8, precision="auto"
-            )
     plot.grid.grid_line_color = "#e4e4e4"
+    for mark in panel.marks:
+        y = panel.right if mark.right and panel.right else panel.y
+        _draw(plot, mark, panel.x, y, {"y_range_name": "right"} if mark.right else {})
+    _set_legend(plot)
     return plot
 
 
-def in_degrees(plot: Any) -> None:
-    """Show a whole turn on the axis of angles, with a tick at every 45 degrees."""
-    plot.x_range = Range1d(start=0, end=360)
-    plot.xaxis.ticker = SingleIntervalTicker(interval=45, num_minor_ticks=3)
+def _plain(text: str) -> str:
+    """Return a label without the marks of matplotlib's mathematical text."""
+    return text.replace("$", "").replace("_l", "").replace("_d", "").replace("\n", " ")
 
 
-def columns(**arrays: Any) -> ColumnDataSource:
-    """Return columns in single precision."""
-    return ColumnDataSource({name: _single(column) for name, column in arrays.items()})
+def _limits(axis: Axis) -> tuple[float | None, float | None]:
+    low, high = (None if end is None else float(end * axis.scale) for end in axis.limits)
+    return low, high
 
 
-def _single(column: Any) -> Any:
-    array = np.asarray(column)
-    return array.astype(np.float32) if array.dtype.kind == "f" else column
+def _set_axis(plot: Any, along: str, axis: Axis) -> None:
+    low, high = _limits(axis)
+    if low is not None and high is not None:
+        plot.update(**{f"{along}_range": Range1d(start=low, end=high)})
+    else:
+        ends: dict[str, Any] = {} if low is None else {"start": low}
+        ends |= {} if high is None else {"end": high}
+        # ticks at the places of the data only, without the lines of annotations
+        plot.update(**{f"{along}_range": DataRange1d(only_visible=True, **ends)})
+    ticks = plot.xaxis if along == "x" else plot.yaxis
+    if axis.ticks is not None:
+        places = [float(tick * axis.scale) for tick in axis.ticks]
+        ticks.ticker = FixedTicker(ticks=places)
+        if axis.names is not None:
+            ticks.major_label_overrides = dict(zip(places, map(_plain, axis.names), strict=True))
+    elif axis.log:
+        ticks.formatter = NumeralTickFormatter(format="0,0.[00000]")
+    else:
+        ticks.formatter = BasicTickFormatter(
+            power_limit_low=-4, power_limit_high=8, precision="auto"
+        )
 
 
-def hover(plot: Any, renderers: Sequence[Any], *tooltips: tuple[str, str]) -> None:
+def _set_legend(plot: Any) -> None:
+    """Move the legend below the axes; a click on an entry hides its line."""
+    for legend in plot.legend:
+        plot.add_layout(legend, "below")
+        legend.update(ncols=2, orientation="horizontal", border_line_alpha=0.0)
+        legend.update(click_policy="hide", padding=4)
+        legend.update(label_text_font_size="13px", label_text_color="#222222")
+
+
+def _source(columns: Mapping[str, Any]) -> ColumnDataSource:
+    """Return columns, numbers in single precision."""
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    single = {
+        name: array.astype(np.float32) if array.dtype.kind == "f" else array
+        for name, array in arrays.items()
+    }
+    return ColumnDataSource(single)
+
+
+def _colour(colour: Any) -> Any:
+    """Return a colour of matplotlib as one of CSS; "0.3" is a grey."""
+    if isinstance(colour, str) and colour.replace(".", "").isdigit():
+        level = round(255 * float(colour))
+        return f"#{level:02x}{level:02x}{level:02x}"
+    return colour
+
+
+def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
+    """Draw a mark in the units of both axes."""
+    named = {"legend_label": _plain(mark.label)} if mark.label else {}
+    style = {"color": _colour(mark.colour), "alpha": mark.alpha, **on}
+    match mark:
+        case Line():
+            _draw_line(plot, mark, x, y, style, named)
+        case Records():
+            _draw_records(plot, mark, x, y, named)
+        case Band():
+            _draw_band(plot, mark, x, y, style, named)
+        case Bars():
+            _draw_bars(plot, mark, x, y, style, named)
+        case Whiskers():
+            place, size = (y, x) if mark.horizontal else (x, y)
+            at = np.asarray(mark.place, dtype=float) * place.scale
+            low, high = (np.asarray(end, dtype=float) * size.scale for end in (mark.low, mark.high))
+            data = _source({"at": at, "low": low, "high": high})
+            ends = ("low", "at", "high", "at") if mark.horizontal else ("at", "low", "at", "high")
+            plot.segment(*ends, source=data, line_width=max(mark.width, 1.5), **style)
+        case Span():
+            _draw_span(plot, mark, (x if mark.across == "x" else y).scale, named)
+        case Image():
+            _draw_image(plot, mark, x, y)
+        case Contours():
+            grid = np.asarray(mark.x) * x.scale, np.asarray(mark.y) * y.scale
+            plot.contour(*grid, mark.value, list(mark.levels), fill_color=list(mark.colours))
+        case Arrows():
+            longest = float(np.hypot(mark.along_x, mark.along_y).max(initial=0.0)) or 1.0
+            width = 0.04 * float(np.ptp(mark.x)) * x.scale / longest
+            height = 0.04 * float(np.ptp(mark.y)) * y.scale / longest
+            tail_x, tail_y = np.ravel(mark.x) * x.scale, np.ravel(mark.y) * y.scale
+            tips = tail_x + width * np.ravel(mark.along_x), tail_y + height * np.ravel(mark.along_y)
+            plot.segment(tail_x, tail_y, *tips, **style)
+        case Patch():
+            data = _source({"x": mark.x * x.scale, "y": mark.y * y.scale})
+            plot.patch("x", "y", source=data, line_alpha=0.0, **style, **named)
+        case Text() if not mark.figure_only:
+            _draw_text(plot, mark, x, y)
+
+
+def _hover(plot: Any, renderers: Sequence[Any], *tips: tuple[str, str], line: bool = False) -> None:
     """Show values of the drawn data under the pointer, of a line also above and below it."""
-    lines = all(isinstance(renderer.glyph, Line) for renderer in renderers)
-    mode: Literal["vline", "mouse"] = "vline" if lines else "mouse"
-    plot.add_tools(HoverTool(renderers=list(renderers), tooltips=list(tooltips), mode=mode))
+    mode: Literal["vline", "mouse"] = "vline" if line else "mouse"
+    columns = {text[: text.index("{")] for _, text in tips if "{" in text}
+    printed: Any = dict.fromkeys((name for name in columns if name[0] == "@"), "printf")
+    tool = HoverTool(renderers=list(renderers), tooltips=list(tips), mode=mode, formatters=printed)
+    plot.add_tools(tool)
 
 
-def legend(plot: Any) -> None:
-    """Move the legend of a figure below its axes; a click on an entry hides its line."""
-    for each in plot.legend:
-        plot.add_layout(each, "below")
-        each.update(ncols=2, orientation="horizontal", border_line_alpha=0.0, click_policy="hide")
-        each.update(label_text_font_size="13px", label_text_color="#222222", padding=4)
+def _tip(axis: Axis, column: str, name: str = "") -> tuple[str, str]:
+    """Return the name of an axis, and the text of a column in its unit."""
+    unit = "" if axis.unit == "1" else f" {_plain(axis.unit)}"
+    return _plain(name or axis.name or "value"), f"@{column}{{%.5g}}{unit}"
 
 
-def worn_range(y: FloatArray, worn: FloatArray) -> Range1d:
-    """Return the range of y [mm] of the strips that are worn, with a margin."""
-    inside = y[worn > 1e-3 * worn.max()] if worn.max() > 0.0 else y
-    low, high = float(inside[0]) * MM, float(inside[-1]) * MM
-    margin = 0.15 * (high - low)
-    return Range1d(start=low - margin, end=high + margin)
+def _draw_line(
+    plot: Any, mark: Line, x: Axis, y: Axis, style: dict[str, Any], named: dict[str, Any]
+) -> None:
+    values = np.asarray(mark.y, dtype=float) * y.scale
+    places = np.asarray(mark.x, dtype=float) * x.scale
+    if values.ndim > 1:
+        some = values[:MOST_CURVES].astype(np.float32)
+        across = [places.astype(np.float32)] * len(some)
+        plot.multi_line(across, list(some), line_width=1, **style, **named)
+        return
+    if not len(places):
+        return
+    every = np.arange(len(places))
+    if not mark.dash:
+        every = evenly_spaced(len(places), MOST_POINTS)
+    further = {
+        f"more{number}": np.asarray(column)[every] * Axis("", unit).scale
+        for number, (column, unit) in enumerate(mark.more.values())
+    }
+    source = _source({"x": places[every], "y": values[every], **further})
+    tips = [_tip(x, "x"), _tip(y, "y", mark.label.split("\n")[0])]
+    tips += [
+        _tip(Axis(name, unit), f"more{number}")
+        for number, (name, (_, unit)) in enumerate(mark.more.items())
+    ]
+    width = max(1.5 * mark.width, 1.0)
+    line = {"source": source, "line_width": width, "line_dash": _DASHES.get(mark.dash, "solid")}
+    if mark.dash and mark.steps:
+        plot.step("x", "y", mode="after", **line, **style, **named)
+        # values under the pointer are those of a line, which steps do not have
+        pointed = plot.line("x", "y", source=source, line_alpha=0.0)
+    elif mark.dash:
+        pointed = plot.line("x", "y", **line, **style, **named)
+    if mark.marker and not mark.at_end:
+        look = {"marker": _MARKERS[mark.marker], "size": max(mark.size, 2.0) * 1.3}
+        look |= {"fill_color": "white"} if mark.open else {}
+        if mark.marker == "|":
+            look |= {"angle": 0.5 * np.pi}
+        points = plot.scatter("x", "y", source=source, **look, **style, **named)
+        pointed = pointed if mark.dash else points
+    _hover(plot, [pointed], *tips, line=bool(mark.dash))
 
 
-def add_measured(plot: Any, measured: Sequence[Measured]) -> None:
-    """Draw measured profiles as points."""
-    for number, profile in enumerate(measured):
-        every = evenly_spaced(len(profile.y), MOST_POINTS)
-        points = columns(y=profile.y[every] * MM, height=profile.height[every] * UM)
-        drawn = plot.scatter(
-            "y", "height", source=points, size=5, fill_color="white",
-            line_color=COLOURS[(number + 3) % len(COLOURS)],
-            legend_label=f"measured: {profile.label}",
-        )  # fmt: skip
-        hover(plot, [drawn], ("y", "@y{0.000} mm"), ("measured", "@height{0.000} um"))
+def _draw_records(plot: Any, mark: Records, x: Axis, y: Axis, named: dict[str, Any]) -> None:
+    """Draw the record of the slider; the values of the others are kept beside it."""
+    chosen = evenly_spaced(len(mark.passes), MOST_RECORDS)
+    values = np.asarray(mark.y) * y.scale
+    kept = {str(place): values[record] for place, record in enumerate(chosen)}
+    source = _source({"x": np.asarray(mark.x) * x.scale, **kept, "shown": values[chosen[-1]]})
+    source.name = f"{RECORD} {mark.label or y.name}"
+    style = {"color": _colour(mark.colour), "line_dash": _DASHES[mark.dash], "line_width": 2}
+    line = plot.line("x", "shown", source=source, **style, **named)
+    _hover(plot, [line], _tip(x, "x"), _tip(y, "shown", mark.label), line=True)
 
 
-def pass_axes(passes: FloatArray, depth: FloatArray, y: str) -> tuple[Any, BoolArray, float]:
-    """Return axes for a depth against passes, the drawn points, and the unit of the passes."""
-    drawn, logarithmic, unit, name = depth_scales(passes, depth)
-    if not logarithmic:
-        return axes(name, y), drawn, unit
-    plot = axes(name, y, x_axis_type="log", y_axis_type="log")
-    plot.yaxis.formatter = NumeralTickFormatter(format="0.[00000]")
-    return plot, drawn, unit
+def _draw_band(
+    plot: Any, mark: Band, x: Axis, y: Axis, style: dict[str, Any], named: dict[str, Any]
+) -> None:
+    places = np.asarray(mark.x, dtype=float) * x.scale
+    low, high = (np.asarray(end, dtype=float) * y.scale for end in (mark.low, mark.high))
+    if mark.steps:
+        low, high = (np.repeat(end, 2)[:-1] for end in (low, high))
+        places = np.repeat(places, 2)[1:]
+    source = _source({"x": places, "low": low, "high": high})
+    plot.varea("x", "low", "high", source=source, **style, **named)
+    # values under the pointer are those of a line, which areas do not have
+    line = plot.line("x", "high", source=source, line_alpha=0.0)
+    unit = "" if y.unit == "1" else f" {_plain(y.unit)}"
+    ends = f"@low{{%.5g}} to @high{{%.5g}}{unit}"
+    _hover(plot, [line], (_plain(mark.label) or "interval", ends), line=True)
+
+
+def _draw_bars(
+    plot: Any, mark: Bars, x: Axis, y: Axis, style: dict[str, Any], named: dict[str, Any]
+) -> None:
+    place, size = (y, x) if mark.horizontal else (x, y)
+    columns: dict[str, Any] = {
+        "low": np.asarray(mark.low, dtype=float) * place.scale,
+        "high": np.asarray(mark.high, dtype=float) * place.scale,
+        "value": np.asarray(mark.value, dtype=float) * size.scale,
+    }
+    columns["start"] = np.full(len(columns["low"]), mark.start * size.scale)
+    columns |= {f"more{number}": values for number, (values, _) in enumerate(mark.more.values())}
+    if isinstance(mark.colour, list):
+        columns["colour"] = mark.colour
+        style = {**style, "color": "colour"}
+    ends = {"left": "low", "right": "high", "bottom": "start", "top": "value"}
+    tips = [_tip(size, "value")]
+    if mark.horizontal:
+        ends = {"bottom": "low", "top": "high", "left": "start", "right": "value"}
+        names = list(place.names or ())
+        middle = 0.5 * (np.asarray(mark.low) + np.asarray(mark.high))
+        columns["name"] = [names[round(at)] for at in middle] if names else [""] * len(middle)
+        tips.insert(0, ("", "@name"))
+    elif place.names is None:
+        tips.insert(0, (place.name, f"@low{{%.5g}} to @high{{%.5g}} {_plain(place.unit)}"))
+    tips += [
+        _tip(Axis(name, unit), f"more{number}")
+        for number, (name, (_, unit)) in enumerate(mark.more.items())
+    ]
+    bars = plot.quad(**ends, source=_source(columns), **style, **named)
+    _hover(plot, [bars], *tips)
+
+
+def _draw_span(plot: Any, mark: Span, scale: float, named: dict[str, Any]) -> None:
+    low, colour = float(mark.low * scale), _colour(mark.colour)
+    across = mark.across == "x"
+    if mark.high is not None:
+        high = float(mark.high * scale)
+        ends: dict[str, Any] = {"left": low, "right": high}
+        ends = ends if across else {"bottom": low, "top": high}
+        plot.add_layout(BoxAnnotation(fill_color=colour, fill_alpha=mark.alpha, **ends))
+        return
+    rule = Rule(
+        location=low, dimension="height" if across else "width", line_color=colour,
+        line_dash=_DASHES[mark.dash], line_width=max(1.5 * mark.width, 1.0),
+    )  # fmt: skip
+    plot.add_layout(rule)
+    if named:  # an annotation has no entry in the legend, a line without points has
+        plot.line([], [], color=colour, line_dash=_DASHES[mark.dash], line_width=2, **named)
+
+
+def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
+    """Draw values as colours, on a regular grid."""
+    across, up = _regular(mark.x), _regular(mark.y)
+    values = np.asarray(mark.value) * mark.axis.scale
+    if np.ndim(mark.x) > 1:  # the places along y depend on those along x
+        lines = zip(np.asarray(mark.y).T, values.T, strict=True)
+        columns = [np.interp(up, *line, left=np.nan, right=np.nan) for line in lines]
+        at = np.asarray(mark.x)[0]
+        values = np.array([np.interp(across, at, row) for row in np.transpose(columns)])
+    else:
+        values = np.array([np.interp(across, mark.x, row) for row in values])
+        values = np.array([np.interp(up, mark.y, column) for column in values.T]).T
+    greatest = float(np.nanmax(values)) or 1.0
+    mapper = LinearColorMapper(palette=_PALETTES[mark.colours], low=0.0, high=greatest)
+    mapper.nan_color = "rgba(0, 0, 0, 0)"
+    left, bottom = float(across[0] * x.scale), float(up[0] * y.scale)
+    width, height = float(np.ptp(across) * x.scale), float(np.ptp(up) * y.scale)
+    extent = {"x": left, "y": bottom, "dw": width, "dh": height}
+    picture = plot.image(image=[values.astype(np.float32)], color_mapper=mapper, **extent)
+    bar = ColorBar(color_mapper=mapper, width=12, title=_plain(mark.axis.label))
+    bar.title_text_font_style = "normal"
+    plot.add_layout(bar, "right")
+    tips = (
+        (_plain(x.name), f"$x{{0.00}} {x.unit}"),
+        (_plain(y.name), f"$y{{0.00}} {y.unit}"),
+        (mark.axis.name, f"@image{{%.5g}} {mark.axis.unit}"),
+    )
+    _hover(plot, [picture], *tips)
+
+
+def _regular(places: Any) -> Any:
+    """Return evenly spaced places over the range of given ones."""
+    ends = np.nanmin(places), np.nanmax(places)
+    return np.linspace(*ends, min(np.shape(places)[-1] * 4, _CELLS))
+
+
+def _draw_text(plot: Any, mark: Text, x: Axis, y: Axis) -> None:
+    places: dict[str, Any] = {"x": float(mark.x * x.scale), "y": float(mark.y * y.scale)}
+    if mark.parts:
+        places |= {mark.parts: 3, f"{mark.parts}_units": "screen"}
+    plot.add_layout(
+        Label(
+            text=_plain(mark.text), text_color=_colour(mark.colour), text_align=mark.anchor,
+            text_font_size=f"{round(1.45 * mark.size)}px", x_offset=mark.offset[0],
+            y_offset=mark.offset[1], text_font_style="bold" if mark.bold else "normal", **places,
+        )
+    )  # fmt: skip

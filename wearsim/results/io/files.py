@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Container, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import ResultsFileError
 from wearsim.results.content import (
     ABOUT,
@@ -21,17 +22,7 @@ from wearsim.results.content import (
     Schema,
     StudyData,
     axis_lengths,
-    with_random_inputs,
 )
-from wearsim.results.dissipation import (
-    DISSIPATION,
-    DissipationData,
-)
-from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.identification import IDENTIFICATION, IdentificationData
-from wearsim.results.io.atomic_write import DISK, Storage
-from wearsim.results.run import RunData
-from wearsim.results.run_schema import CAM_RUN, RUN
 
 if TYPE_CHECKING:
     import h5py
@@ -41,71 +32,51 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SMALLEST = 96  # bytes: no HDF5 file is shorter
 # exceptions of h5py, json and numpy on damaged content
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
-FileKind: TypeAlias = Literal["run", "dissipation", "ensemble", "identification"]
-# kind and schema by format
-_KINDS: dict[str, tuple[FileKind, Schema]] = {
-    RUN.format: ("run", RUN),
-    DISSIPATION.format: ("dissipation", DISSIPATION),
-    ENSEMBLE.format: ("ensemble", ENSEMBLE),
-    IDENTIFICATION.format: ("identification", IDENTIFICATION),
-}
-
 Stored = TypeVar("Stored")
 
 
-def read_results(path: str | Path) -> RunData:
-    """Read the results file of a run.
+def read_study(path: str | Path, data: type[StudyData]) -> Any:
+    """Read a results file.
 
     Parameters
     ----------
     path : str or Path
         The file.
+    data : type of StudyData
+        The class of its content.
 
     Returns
     -------
-    RunData
+    StudyData
 
     Raises
     ------
     ResultsFileError
-        If it is missing, foreign, truncated, damaged, or of another layout.
+        If it is missing, foreign, truncated, damaged, of another kind or of another layout.
     """
-    return read_file(path, lambda file: _run_data(path, file))
 
-
-def read_dissipation(path: str | Path) -> DissipationData:
-    """Read the file of a dissipation study; see `read_results`."""
-    return read_file(path, lambda file: _dissipation_data(path, file))
-
-
-def read_identification(path: str | Path) -> IdentificationData:
-    """Read the file of an identification; see `read_results`."""
-
-    def take(file: h5py.File) -> IdentificationData:
-        attributes = read_attributes(path, file, IDENTIFICATION, IdentificationData)
-        return IdentificationData(**attributes, variables=_variables(file, IDENTIFICATION))
+    def take(file: h5py.File) -> StudyData:
+        attributes = read_attributes(path, file, data.base_schema, data)
+        schema = data.schema_of(attributes, file)
+        check_complete(path, file, schema.variables)
+        variables = {name: np.asarray(file[name][()]) for name in schema.variables}
+        axis_lengths(variables, schema.variables)
+        checkpoint = {name: np.asarray(item[()]) for name, item in file[CHECKPOINT].items()}
+        content: StudyData = data.from_variables(attributes, variables, checkpoint)
+        return content
 
     return read_file(path, take)
 
 
-def kind_of(path: str | Path) -> FileKind:
-    """Return the kind of a results file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    {"run", "dissipation", "ensemble", "identification"}
+def format_in(path: str | Path) -> tuple[str, dict[str, Any]]:
+    """Return the name of the format of a file, and its short attributes.
 
     Raises
     ------
     ResultsFileError
-        As `read_results`.
+        As `read_study`; if it has no format of wearsim, the name is another text.
     """
-    return read_file(path, lambda file: _kind(path, file)[0])
+    return read_file(path, lambda file: (format_of(file), dict(file.attrs)))
 
 
 def as_path(path: str | Path) -> Path:
@@ -137,7 +108,7 @@ def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
     Raises
     ------
     ResultsFileError
-        As `read_results`.
+        As `read_study`.
     TypeError
         As `as_path`.
     """
@@ -188,48 +159,10 @@ def _truncated(path: str | Path) -> str:
     return f"{path}: is truncated: its end is missing, as after a copy that was cut short"
 
 
-def _kind(path: str | Path, file: h5py.File) -> tuple[FileKind, Schema]:
-    found = _KINDS.get(format_of(file))
-    if found is None:
-        raise ResultsFileError(f"{path}: is HDF5, but not a results file of wearsim")
-    return found
-
-
 def format_of(file: h5py.File) -> str:
     """Return the name of the format of a file, or another text if it has none."""
     name = file.attrs.get("format")
     return name.decode(errors="replace") if isinstance(name, bytes) else str(name)
-
-
-def _run_data(path: str | Path, file: h5py.File) -> RunData:
-    attributes = read_attributes(path, file, RUN, RunData)
-    schema = CAM_RUN if "station_angle" in file else RUN
-    check_complete(path, file, schema.variables)
-    variables = _variables(file, schema)
-
-    def of_kind(kind: str) -> Arrays:
-        return {n: variables[n] for n, item in schema.variables.items() if item.kind == kind}
-
-    return RunData(
-        **attributes,
-        static=of_kind("static"),
-        history=of_kind("history"),
-        records=of_kind("record"),
-        checkpoint={name: np.asarray(item[()]) for name, item in file[CHECKPOINT].items()},
-    )
-
-
-def _dissipation_data(path: str | Path, file: h5py.File) -> DissipationData:
-    attributes = read_attributes(path, file, DISSIPATION, DissipationData)
-    schema = with_random_inputs(DISSIPATION, attributes["inputs"])
-    check_complete(path, file, schema.variables)
-    return DissipationData(**attributes, variables=_variables(file, schema))
-
-
-def _variables(file: h5py.File, schema: Schema) -> Arrays:
-    variables = {name: np.asarray(file[name][()]) for name in schema.variables}
-    axis_lengths(variables, schema.variables)
-    return variables
 
 
 def read_attributes(
@@ -251,10 +184,15 @@ def read_attributes(
     ResultsFileError
         If the file is of another kind or layout, or incomplete.
     """
-    _, found = _kind(path, file)
-    if found is not schema:
+    name = format_of(file)
+    if not name.startswith("wearsim-") and name != schema.format:
+        raise ResultsFileError(f"{path}: is HDF5, but not a results file of wearsim")
+    if name != schema.format:
+        from wearsim.results.viewed import study_kinds  # noqa: PLC0415  (of an error only)
+
+        held = next((kind.holds for kind in study_kinds() if kind.format == name), "results")
         raise ResultsFileError(
-            f"{path}: holds {found.holds}; what is needed is {schema.holds}. In Python,"
+            f"{path}: holds {held}; what is needed is {schema.holds}. In Python,"
             " wearsim.open_results opens it"
         )
     check_layout(path, file, schema)
@@ -296,18 +234,14 @@ def check_complete(path: str | Path, present: Container[str], names: Iterable[st
         raise ResultsFileError(f"{path}: is damaged (lacks {', '.join(missing)})")
 
 
-def write_results(
-    path: str | Path,
-    data: RunData | DissipationData | IdentificationData,
-    storage: Storage = DISK,
-) -> None:
+def write_results(path: str | Path, data: StudyData, storage: Storage = DISK) -> None:
     """Write a results file, replacing an existing one.
 
     Parameters
     ----------
     path : str or Path
         The file.
-    data : RunData, DissipationData or IdentificationData
+    data : StudyData
         Content of the file.
     storage : Storage
         File operations.
@@ -321,7 +255,7 @@ def write_results(
     """
     from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
-    checkpoint = data.checkpoint if isinstance(data, RunData) else {}
+    variables: Arrays = data.variables  # type: ignore[attr-defined]
     with hdf5_write.new_file(path, storage) as (file, _):
-        hdf5_write.put_variables(file, data.schema, data.variables)
-        hdf5_write.put_texts(file, data.schema, data, checkpoint)
+        hdf5_write.put_variables(file, data.schema, variables)
+        hdf5_write.put_texts(file, data.schema, data, getattr(data, "checkpoint", {}))

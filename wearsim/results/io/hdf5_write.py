@@ -17,6 +17,7 @@ import h5py
 import numpy as np
 from h5py import h5d, h5f, h5fd, h5g, h5p, h5s, h5t
 
+from wearsim.atomic_write import DISK, Storage, replacement
 from wearsim.results.content import (
     ABOUT,
     CHECKPOINT,
@@ -31,7 +32,6 @@ from wearsim.results.content import (
     as_plain,
     axis_lengths,
 )
-from wearsim.results.io.atomic_write import DISK, Storage, replacement
 
 #: Most rows of a chunk; who writes as many rows at a time writes each chunk once.
 CHUNK_ROWS = 4096

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.mechanics.cam import Stations, surface_points
-from wearsim.results import Result
 from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray
 
 _POINTS = 61  # of a panel

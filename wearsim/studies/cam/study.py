@@ -16,6 +16,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.mechanics.cam import Panel, extreme
 from wearsim.mechanics.film import minimum_film
 from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.results.viewed import Viewed
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.checks import (
@@ -36,7 +37,7 @@ _MOST_TEETH = 12  # greatest denominator of a ratio at which the same points of 
 
 
 @dataclass(frozen=True, eq=False)
-class CamStudy:
+class CamStudy(Viewed):
     """Motion, loads and fresh contact of a cam.
 
     Parameters
@@ -105,6 +106,11 @@ class CamStudy:
     skids: tuple[Skid, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        stations = f"{len(self.point.angle)} {'angles' if self.weight is None else 'stations'}"
+        peak = float(self.peak_pressure.max()) / 1e6
+        return f"<CamStudy '{self.turn.scenario.title}': {stations}, up to {peak:.4g} MPa>"
 
 
 def study_cam(

@@ -12,6 +12,7 @@ from wearsim.errors import ContactError, WearsimError
 from wearsim.evolution.contacts import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.profiles import load_profile
+from wearsim.results.viewed import Viewed
 from wearsim.scenario import Scenario, as_scenario, described_model
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.turn import turn_of
@@ -37,12 +38,13 @@ from wearsim.types import (
 )
 
 GRID_DEPENDENT = 0.1  # relative change of the peak pressure with half as many strips
+
 _BEYOND = 0.15  # strips beyond either end of those of a model that ends them with its contact
 _FEWEST = 5  # minimum number of strips for an error estimate
 
 
 @dataclass(frozen=True, eq=False)
-class ContactStudy:
+class ContactStudy(Viewed):
     """A solved contact and its problem.
 
     Parameters
@@ -76,6 +78,8 @@ class ContactStudy:
         The same contact by a reference model, if one was named.
     errors : ContactErrors, optional
         Differences of the solution from the reference.
+    title : str
+        Title of the scenario.
 
     Examples
     --------
@@ -99,6 +103,7 @@ class ContactStudy:
     widened: bool = False
     reference: ContactReference | None = None
     errors: ContactErrors | None = None
+    title: str = ""
 
     def __repr__(self) -> str:
         return f"<ContactStudy '{self.described_model}': {self.solution!r}>"
@@ -205,6 +210,7 @@ def study_contact(
         any(note.startswith("the contact is wider") for note in notes),
         reference,
         None if reference is None else reference.errors_of(solution),
+        scenario.title,
     )
 
 

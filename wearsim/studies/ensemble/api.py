@@ -11,18 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import CapabilityError, ResultsFileError, ScenarioError
-from wearsim.results import (
-    DISK,
-    EnsembleData,
-    EnsembleFile,
-    EnsembleResult,
-    Storage,
-    check_output,
-    open_ensemble,
-    read_ensemble,
-)
-from wearsim.results.ensemble.schema import ALL_OBSERVABLES, OBSERVABLES
+from wearsim.results.io.outputs import check_output
 from wearsim.scenario import Scenario, as_scenario, parse_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.observables import CURVE_ANGLES
@@ -34,8 +25,14 @@ from wearsim.studies.ensemble.designs import (
     whole_count,
 )
 from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
+from wearsim.studies.ensemble.file.data import EnsembleData
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, OBSERVABLES
+from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import RealisationRunner, control_of, profile_axis
+from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.execution.factory import executor
+from wearsim.studies.opening import open_ensemble
 from wearsim.studies.preparation import (
     changed_origins,
     check_plugins,

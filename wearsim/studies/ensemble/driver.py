@@ -14,13 +14,15 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import Interrupted, WorkerError
-from wearsim.results import EnsembleData, EnsembleFile, EnsembleResult, Outcome
-from wearsim.results.ensemble.life import ensemble_result
-from wearsim.results.ensemble.life_settings import LifeTarget
-from wearsim.results.ensemble.schema import DONE, FAILED, PENDING
 from wearsim.studies.ensemble.designs import interim_sizes
+from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
+from wearsim.studies.ensemble.file.schema import DONE, FAILED, PENDING
+from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import RealisationRunner
+from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.execution.processes import Executor
+from wearsim.studies.life.result import ensemble_result
+from wearsim.studies.life.stored_settings import LifeTarget
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Target

@@ -16,16 +16,16 @@ from wearsim.evolution.state import fresh_state
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.mechanics.numerics.jit import not_cached
 from wearsim.plugins import ContactModel
-from wearsim.results import Outcome
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, sources
+from wearsim.studies.ensemble.file.data import Outcome
 from wearsim.studies.failures import explained
 from wearsim.studies.kernels import kernels_of
+from wearsim.studies.roller_ends import ends_roller
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import extent_of, lattice, shared_strips, start_of, strips_of_run
-from wearsim.studies.run.roller_ends import ends_roller
 from wearsim.types import FloatArray, Grid
 
 DRAWS = 1_000_000  # draws from which the mean of the control variate is computed

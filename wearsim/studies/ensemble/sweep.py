@@ -8,17 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from wearsim.errors import Interrupted, ResultsFileError
-from wearsim.results import (
-    EnsembleResult,
-    Result,
-    check_output,
-    kind_of,
-    read_ensemble,
-    read_results,
-)
+from wearsim.results.io.outputs import check_output
+from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.api import checked_request, ensemble, named_precision, resume_ensemble
+from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.studies.run.result import Result, read_results
 from wearsim.studies.run.run import resume, run
 
 
@@ -143,7 +140,7 @@ def run_sweep(
 def _requested(path: Path) -> tuple[object, ...] | None:
     """Return what identifies the run or ensemble in a file, None for anything else."""
     try:
-        if kind_of(path) == "run":
+        if kind_of(path).name == "run":
             return (read_results(path).sha256,)
         data = read_ensemble(path)
     except ResultsFileError:  # another kind of file, which is not overwritten

@@ -13,7 +13,8 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
-from wearsim.results import IdentificationResult, check_output, write_results
+from wearsim.results.io.files import write_results
+from wearsim.results.io.outputs import check_output
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.identify.analysis import Identified, identified
@@ -26,6 +27,7 @@ from wearsim.studies.identify.measurements import (
     tables_of,
 )
 from wearsim.studies.identify.pooling import FEW_DRAWS, content, specimens_of
+from wearsim.studies.identify.result import IdentificationResult
 from wearsim.studies.identify.traces import Trace, read_trace
 from wearsim.studies.identify.trajectories import Grower, Trajectories, check_law
 from wearsim.studies.progress import shown_progress

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from wearsim.report.view import Table
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.realisation import closed_form_depths
@@ -17,7 +19,7 @@ from wearsim.studies.identify.likelihood import depth_likelihood
 from wearsim.studies.identify.measurements import key_of
 from wearsim.studies.identify.trajectories import CYLINDER, ROLLER, Grower, check_law, factors
 from wearsim.uq.hierarchy.kernels import Kernel
-from wearsim.uq.hierarchy.verdict import NEGLIGIBLE, POWER_SETS, Power
+from wearsim.uq.hierarchy.verdict import MOST_TESTS, NEGLIGIBLE, POWER_SETS, Power
 
 SCATTERS = (0.2, 0.4, 0.8)
 DEPTH_ERROR = 0.01  # relative error of a measured depth
@@ -143,3 +145,37 @@ def _planned(
         {t: tuple(explained for _, explained in found) for t, found in rates.items()},
         {t: power.needed(t) for t in SCATTERS},
     )
+
+
+def plan_data(designs: Sequence[PlannedDesign]) -> dict[str, Any]:
+    """Return the power of planned tests for JSON."""
+    return {
+        "designs": [
+            {
+                "inputs": design.name,
+                "scatter_from_inputs": design.scatter_from_inputs,
+                "tests": design.tests,
+                "false_random": design.random[0.0],
+                "explained": design.explained[0.0],
+                "power": {f"{t:g}": design.random[t] for t in SCATTERS},
+                "tests_for_power_0.8": {f"{t:g}": design.needed[t] for t in SCATTERS},
+            }
+            for design in designs
+        ]
+    }
+
+
+def plan_tables(designs: Sequence[PlannedDesign]) -> Iterator[tuple[Table, list[str]]]:
+    """Yield the power of planned tests as a table for each design, with sentences below it."""
+    heads = ("tests", *(f"power, t = {t:g}" for t in SCATTERS))
+    for design in designs:
+        rates = (*(design.random[t] for t in (*SCATTERS, 0.0)), design.explained[0.0])
+        rows = zip(design.tests, *rates, strict=True)
+        cells = [(str(row[0]), *(f"{rate:.2f}" for rate in row[1:])) for row in rows]
+        scatter = f"they scatter ln K/H by {design.scatter_from_inputs:.3f}"
+        sentences = []
+        for t in SCATTERS:
+            reached = f"{design.needed[t] or f'more than {MOST_TESTS}'} tests"
+            sentences.append(f"a scatter of {t:g} is found with power 0.8 by {reached}")
+        named = (*heads, "false 'random'", "'explained' if t = 0")
+        yield Table(f"inputs {design.name}: {scatter}", cells, named), sentences

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.results import IdentificationData
 from wearsim.scenario import Scenario
 from wearsim.studies.identify.analysis import Identified, exponent, kernel_of
 from wearsim.studies.identify.likelihood import DrawLikelihood
+from wearsim.studies.identify.result import IdentificationData
 from wearsim.studies.preparation import origin_of
 from wearsim.types import FloatArray
 from wearsim.uq.hierarchy.kernels import Kernel

@@ -17,15 +17,15 @@ from wearsim.scenario import Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.cam.turn import turn_of
-from wearsim.studies.run.draws import Draws
-from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
-from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
-from wearsim.studies.run.roller_ends import (
+from wearsim.studies.roller_ends import (
     STRIPS_BEYOND,
     ends_roller,
     roller_grid,
     strips_of_roller,
 )
+from wearsim.studies.run.draws import Draws
+from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
+from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
 from wearsim.types import FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3

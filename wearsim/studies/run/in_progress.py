@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wearsim.atomic_write import Storage
 from wearsim.errors import Interrupted, ResultsFileError, SolverError, StepError, failure_text
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
@@ -20,12 +21,7 @@ from wearsim.evolution.state import SIGMAS, WearState, fresh_state
 from wearsim.evolution.strip_errors import Course, coarse_courses, strip_errors
 from wearsim.evolution.strips import on_grid, same_strips
 from wearsim.plugins import ContactModelSpec, registry
-from wearsim.results import (
-    Result,
-    RunData,
-    Storage,
-    write_results,
-)
+from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, station_columns
 from wearsim.studies.contact.comparison import REFERENCE, excess
@@ -45,6 +41,7 @@ from wearsim.studies.run.recorder import (
     Stepped,
     Warned,
 )
+from wearsim.studies.run.result import Result, RunData
 from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import Grid
 

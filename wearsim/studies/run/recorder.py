@@ -20,9 +20,9 @@ from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem
 from wearsim.evolution.strips import averaged, same_strips
-from wearsim.results.run_schema import ALL_VARIABLES
 from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
 from wearsim.studies.run.schedule import RecordSchedule
+from wearsim.studies.run.schema import ALL_VARIABLES
 from wearsim.types import FloatArray, Grid
 
 

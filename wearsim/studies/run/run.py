@@ -8,25 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
+from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.state import WearState
-from wearsim.results import (
-    DISK,
-    Result,
-    Storage,
-    check_output,
-    kind_of,
-    read_results,
-)
+from wearsim.results.io.outputs import check_output
+from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.scenario.parse.toml import apply_overrides
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.preparation import check_plugins
 from wearsim.studies.progress import shown_progress
 from wearsim.studies.run.continuation import (
+    EXTENSIONS,
     is_at_limit,
     last_value,
+    limit_warnings,
     stored_scenario,
     with_end,
     without_limit_rows,
@@ -34,7 +31,7 @@ from wearsim.studies.run.continuation import (
 )
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.in_progress import RunInProgress, Watcher
-from wearsim.studies.run.plausible_limits import EXTENSIONS, limit_warnings
+from wearsim.studies.run.result import Result, read_results
 
 
 def run(
@@ -156,7 +153,7 @@ def resume(
     500 min
     """
     kind, path = kind_of(file), Path(file)
-    if kind == "ensemble":
+    if kind.resume and kind.name != "run":
         raise ResultsFileError(
             f"{path}: holds an ensemble of wear tests, which resume_ensemble continues; expected"
             " a single wear test"

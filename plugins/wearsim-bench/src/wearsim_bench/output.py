@@ -8,7 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wearsim.cli.shared import console, note, plain, write_json
+from wearsim.cli.shared import console, note, write_json
+from wearsim.report.text import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -61,7 +62,7 @@ class Output:
 
     def topic(self, topic: Topic) -> None:
         """Write the measurements of a topic."""
-        from wearsim.report.parts import save_figure
+        from wearsim.report.figures import save_figure
         from wearsim_bench.figures.table import markdown
         from wearsim_bench.figures.topic import bench_figure
 
@@ -111,7 +112,7 @@ class Output:
         self._write_text(f"{name}.json", text + "\n")
 
     def _write_text(self, name: str, text: str) -> None:
-        from wearsim.report.parts import save_text
+        from wearsim.report.page.page import save_text
 
         path = self.folder / name
         save_text(text, path)

@@ -66,7 +66,7 @@ def reproduce(
 
 
 def _draw(results: Reproduction, path: Path) -> None:
-    from wearsim.report.parts import save_figure
+    from wearsim.report.figures import save_figure
     from wearsim_chevalier2005.figures import reproduction_figure
 
     save_figure(reproduction_figure(results), path)

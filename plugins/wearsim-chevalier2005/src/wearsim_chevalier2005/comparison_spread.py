@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from wearsim.results.dissipation import BAND, PAPER_BAND
+from wearsim.studies.dissipation.result import BAND, PAPER_BAND
 from wearsim.uq.estimation.moments import Quantile, Summary, converge, summarise
 from wearsim_chevalier2005 import paper
 from wearsim_chevalier2005.comparison_row import Row, percent, printed_row

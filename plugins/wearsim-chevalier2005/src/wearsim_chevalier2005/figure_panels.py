@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from matplotlib.axes import Axes
 
-from wearsim.report.parts import BLUE, GREEN, ORANGE, RED, name_axes
+from wearsim.report.figures import name_axes
+from wearsim.report.panels import BLUE, GREEN, ORANGE, RED
 from wearsim.report.text import PER_SI
 from wearsim.studies.run.inputs import LOAD, TILT, YAW
 from wearsim.types import FloatArray
@@ -16,7 +17,7 @@ from wearsim_chevalier2005 import paper
 from wearsim_chevalier2005.comparison_inputs import maxent_of
 
 if TYPE_CHECKING:
-    from wearsim.results import DissipationResult
+    from wearsim.studies.dissipation.result import DissipationResult
     from wearsim_chevalier2005.study import Reproduction
 
 MM, W_MM = PER_SI["mm"], PER_SI["W/mm"]

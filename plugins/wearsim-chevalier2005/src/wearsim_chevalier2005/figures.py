@@ -15,18 +15,10 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from wearsim.report.figures.contact import SLIDE, STICK
-from wearsim.report.parts import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PRESSURE,
-    RED,
-    figure_style,
-    name_axes,
-)
+from wearsim.report.figures import figure_style, name_axes
+from wearsim.report.panels import BLUE, GREEN, GREY, ORANGE, PRESSURE, RED
 from wearsim.report.text import PER_SI, count, shown
+from wearsim.studies.contact.panels import SLIDE, STICK
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import figure_panels as spread
 from wearsim_chevalier2005 import paper

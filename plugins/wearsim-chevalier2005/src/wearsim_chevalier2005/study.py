@@ -9,12 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch
-from wearsim.results import DissipationResult
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.contact.batch import LocalFriction
-from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import ContactStudy, study_contact
+from wearsim.studies.dissipation.monte_carlo import dissipation
+from wearsim.studies.dissipation.result import DissipationResult
 from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.inputs import FRICTION, LONGITUDINAL, TILT, YAW
 from wearsim.types import FloatArray

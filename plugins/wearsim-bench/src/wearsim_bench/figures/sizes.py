@@ -10,7 +10,8 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wearsim.report.parts import BLUE, GREEN, ORANGE, figure_style, name_axes
+from wearsim.report.figures import figure_style, name_axes
+from wearsim.report.panels import BLUE, GREEN, ORANGE
 from wearsim_bench.figures.lines import EndLabel, label_ends, set_log_axis
 from wearsim_bench.measure.measurement import Measurement, Topic
 

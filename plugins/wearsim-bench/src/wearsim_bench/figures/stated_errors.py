@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, figure_style, name_axes
+from wearsim.report.figures import figure_style, name_axes
+from wearsim.report.panels import BLUE, GREEN, GREY, ORANGE
 from wearsim_bench.figures.lines import set_log_axis
 from wearsim_bench.measure.measurement import Topic
 from wearsim_bench.stated_errors.study import QUANTITIES, SMALL, STATED, TESTS, coverage

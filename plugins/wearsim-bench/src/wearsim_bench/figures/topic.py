@@ -10,7 +10,8 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from wearsim.report.parts import GREY, figure_style, name_axes, write_message
+from wearsim.report.figures import figure_style, name_axes, write_message
+from wearsim.report.panels import GREY
 from wearsim.report.text import brief
 from wearsim_bench.figures.lines import EndLabel, label_ends, set_log_axis
 from wearsim_bench.figures.sizes import growth_figure, savings_figure

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from wearsim.errors import WearsimError
-from wearsim.results import Result
 from wearsim.scenario import Scenario
+from wearsim.studies.run.result import Result
 from wearsim_bench.hard_cases import measures
 from wearsim_bench.hard_cases.cases import RobustnessCase
 from wearsim_bench.hard_cases.runs import Plan, is_symmetric

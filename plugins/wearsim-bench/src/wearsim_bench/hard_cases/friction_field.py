@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.errors import WearsimError
-from wearsim.results import DissipationResult
 from wearsim.scenario.examples import shipped_scenario
-from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.dissipation.monte_carlo import dissipation
+from wearsim.studies.dissipation.result import DissipationResult
 from wearsim_bench.hard_cases.measures import changes_of, order
 from wearsim_bench.hard_cases.verdict import Criterion, Verdict
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from wearsim.evolution.quantities import centroid, oscillation
 from wearsim.evolution.strips import averaged
-from wearsim.results import Result
 from wearsim.scenario import Scenario
 from wearsim.studies.run.assemble import merged_rollers
 from wearsim.studies.run.draws import draw
+from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray, Grid
 
 PROFILES = ("cylinder_depth_profile", "roller_depth_profile")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.results import Result
 from wearsim.scenario import Drawn, Scenario, parse_scenario
+from wearsim.studies.run.result import Result
 from wearsim.studies.run.run import run
 from wearsim.types import Profile
 from wearsim_bench.hard_cases.cases import LONG, SHORT, RobustnessCase

@@ -12,6 +12,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from wearsim.atomic_write import os_errors_converted, replacement
 from wearsim.errors import ContactError, ResultsFileError, SolverError
 from wearsim.evolution.error_estimates import DEPTHS, greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
@@ -20,7 +21,6 @@ from wearsim.evolution.state import Depths, WearState, fresh_state
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import is_compiled
 from wearsim.evolution.strips import same_strips
-from wearsim.results.io.atomic_write import os_errors_converted, replacement
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import contact_centre, contact_positions
 from wearsim.studies.run.groove import widest_patch

@@ -11,9 +11,9 @@ import numpy as np
 
 from wearsim.errors import WearsimError
 from wearsim.evolution.strips import same_strips
-from wearsim.results import Result
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import start_of_run
+from wearsim.studies.run.result import Result
 from wearsim.studies.run.run import run
 from wearsim.types import FloatArray, Grid
 from wearsim_bench.contact.worn_profiles import failure_reason

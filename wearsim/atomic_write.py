@@ -1,0 +1,230 @@
+"""Atomic writing of files, the lock of their writer, and checks of an output path.
+
+After a kill either the old or the new content of a file is complete.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import struct
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+from wearsim.errors import ResultsFileError
+
+#: Added to the name of a file while its new content is written.
+TEMPORARY = ".tmp"
+
+_BUFFER = 1 << 18  # bytes
+
+
+class Storage:
+    """File operations of the writers of results.
+
+    A subclass may replace single operations, for example to let a test fail at one of them.
+    """
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}()"
+
+    def open(self, path: Path) -> IO[bytes]:
+        """Open a file for new content, which can be read back."""
+        return path.open("w+b", buffering=_BUFFER)
+
+    def synchronise(self, file: IO[bytes]) -> None:
+        """Wait until all that was written to a file is on the disk."""
+        file.flush()
+        os.fsync(file.fileno())
+
+    def replace(self, source: Path, target: Path) -> None:
+        """Rename a file, in place of any with that name."""
+        source.replace(target)
+
+    def synchronise_folder(self, folder: Path) -> None:
+        """Wait until the names in a folder are on the disk."""
+        if os.name == "nt":  # Windows cannot open folders
+            return
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+    def remove(self, path: Path) -> None:
+        """Delete a file, if it exists."""
+        path.unlink(missing_ok=True)
+
+
+#: The file operations of the operating system.
+DISK = Storage()
+
+
+@contextmanager
+def replacement(path: str | Path, storage: Storage = DISK) -> Iterator[IO[bytes]]:
+    """Return an empty file that replaces another at the end of the with statement.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to replace, which need not exist.
+    storage : Storage
+        File operations.
+
+    Raises
+    ------
+    ResultsFileError
+        If it cannot be written; an existing file is then unchanged, as after any other exception.
+    """
+    target = Path(path).resolve()  # follows links, which are kept
+    temporary = target.with_name(target.name + TEMPORARY)
+    with os_errors_converted(path):
+        try:
+            with storage.open(temporary) as file:
+                yield file
+                storage.synchronise(file)
+            storage.replace(temporary, target)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+        storage.synchronise_folder(target.parent)
+
+
+@contextmanager
+def os_errors_converted(path: str | Path) -> Iterator[None]:
+    """Convert an OSError into a ResultsFileError with a one-line message.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file that is written, as named by the user.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise ResultsFileError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
+    """Lock an open file until it is closed or the process ends.
+
+    Where available, the lock belongs to the open file description (OFD): HDF5 uses the other
+    kind, flock, when it opens a file for reading.
+
+    Parameters
+    ----------
+    file : binary file
+        The file, open for writing.
+    path : str or Path
+        The file that it protects, for messages.
+
+    Raises
+    ------
+    ResultsFileError
+        If another process holds the lock, or held it until now and deleted the file.
+    """
+    busy = ResultsFileError(f"{path}: is being written by another process")
+    try:
+        _lock(file.fileno())
+    except OSError as error:
+        if error.errno in {errno.EAGAIN, errno.EACCES}:
+            raise busy from error
+        reason = error.strerror or str(error)
+        raise ResultsFileError(f"{path}: cannot be locked for writing ({reason})") from error
+    if os.fstat(file.fileno()).st_nlink == 0:
+        raise busy
+
+
+def parts_folder(path: str | Path) -> Path:
+    """Return the folder of the part files of an ensemble, and of the lock of its writer."""
+    target = Path(path).resolve()  # follows links
+    return target.with_name(f"{target.name}.parts")
+
+
+def lock_path(path: str | Path) -> Path:
+    """Return the file that the writer of an ensemble locks."""
+    return parts_folder(path) / "lock"
+
+
+def refuse_if_locked(path: str | Path) -> None:
+    """Refuse an ensemble that another process is writing.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its file, which need not exist.
+
+    Raises
+    ------
+    ResultsFileError
+        If another process is writing it.
+    """
+    lock = lock_path(path)
+    if os.access(lock, os.R_OK | os.W_OK):
+        with lock.open("r+b", buffering=0) as file:
+            lock_or_refuse(file, path)
+
+
+def _lock(handle: int) -> None:
+    if os.name == "nt":  # a lock would block readers on Windows
+        return
+    import fcntl  # noqa: PLC0415  (not on every system)
+
+    if hasattr(fcntl, "F_OFD_SETLK"):
+        whole = struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
+        fcntl.fcntl(handle, fcntl.F_OFD_SETLK, whole)
+    else:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+# suffixes of figures, scenarios and tables, which are refused for results files
+
+
+def refuse_inputs(
+    path: str | Path, inputs: Iterable[Path], what: str = "the scenario", option: str = "-o"
+) -> None:
+    """Raise if an output would replace an input file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The output.
+    inputs : iterable of Path
+        The input files.
+    what : str
+        Description of the inputs.
+    option : str
+        The option that set the output.
+
+    Raises
+    ------
+    ResultsFileError
+        If the output is one of the inputs, also by another name.
+    """
+    for source in inputs:
+        if same_file(path, source):
+            raise ResultsFileError(
+                f"{path}: {what} is read from {source}, and no input is replaced",
+                python="choose another name",
+                shell=f"choose another name with {option}",
+            )
+
+
+def same_file(one: str | Path, other: str | Path) -> bool:
+    """Return whether two paths refer to the same file.
+
+    Parameters
+    ----------
+    one, other : str or Path
+        The paths; the files need not exist.
+
+    Returns
+    -------
+    bool
+    """
+    try:
+        return os.path.samefile(one, other)
+    except OSError:  # one of them does not exist
+        return Path(one).resolve() == Path(other).resolve()

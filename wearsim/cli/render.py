@@ -1,0 +1,77 @@
+"""Views as the terminal shows them: tables, notes and a footer, or JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from wearsim.cli.shared import note, write_json, write_list, write_notes, write_table
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
+    from wearsim.report.view import View
+
+
+def show_view(
+    view: View,
+    *,
+    json: bool,
+    files: Mapping[str, object] | None = None,
+    known: Collection[str] = (),
+    more: dict[str, Any] | None = None,
+    stored: bool = False,
+) -> None:
+    """Write a view to stdout, and its notes and warnings to stderr.
+
+    Parameters
+    ----------
+    view : View
+    json : bool
+        Whether to write JSON instead of tables.
+    files : mapping of str to object, optional
+        Files that were written, by what they are, and the workers.
+    known : collection of str
+        Notes that were shown before.
+    more : dict of str to object, optional
+        Further fields of the JSON.
+    stored : bool
+        Whether the result was read from a file, whose origin is then shown too.
+    """
+    if json:
+        write_json({**view.data(), **(view.origin() if stored else {}), **(more or {})})
+    else:
+        _write_tables(view, {name: path for name, path in (files or {}).items() if path}, stored)
+        if not stored and (line := view.line()):
+            typer.echo(line)
+        write_notes([text for text in view.notes if text not in known], view.warnings)
+    if view.failures:
+        note(f"warning: {view.failures}")
+
+
+def _write_tables(view: View, files: Mapping[str, object], stored: bool) -> None:
+    from wearsim.report.view import ORIGIN, STUDY, Row, Table
+
+    tables = [table for table in view.tables() if stored or table.title != ORIGIN]
+    written = [Row(name, str(item)) for name, item in files.items()]
+    results = Table(view.heading, [*view.rows(), *written])
+    first = [tables.pop(0)] if tables and tables[0].title == STUDY else []
+    title = view.title
+    for table in (*first, results, *tables):
+        if table.heads:
+            write_list(table.heads, table.rows)
+            typer.echo("")
+        else:
+            write_table(title or table.title, [(row.label, row.text) for row in table.rows])
+        title = ""
+
+
+def draw_figure(sheet: Sheet, path: Path | None) -> None:
+    """Write the figure of a view, if a name is given."""
+    if path is None:
+        return
+    from wearsim.report.figures import figure_of, save_figure
+
+    save_figure(figure_of(sheet), path)

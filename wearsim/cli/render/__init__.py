@@ -1,1 +1,0 @@
-"""Tables and text for the terminal, and the data of the JSON output."""

@@ -1,0 +1,369 @@
+"""Figures of panels drawn with matplotlib, and their style."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import accumulate, groupby
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
+
+from wearsim.atomic_write import replacement
+from wearsim.report.panels import (
+    BLACK,
+    RECORDS,
+    Arrows,
+    Axis,
+    Band,
+    Bars,
+    Contours,
+    Image,
+    Line,
+    Mark,
+    Panel,
+    Patch,
+    Records,
+    Sheet,
+    Span,
+    Text,
+    Whiskers,
+    evenly_spaced,
+)
+from wearsim.report.text import count, pass_unit
+from wearsim.types import FloatArray
+
+DPI = 150
+_SETTINGS: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.3,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "figure.titlesize": 11.0,
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """Apply the settings of wearsim to the figures drawn in the context."""
+    with mpl.rc_context(_SETTINGS):
+        yield
+
+
+class _Figure(Figure):
+    """Figure that notebooks show; those of pyplot are shown without this."""
+
+    def _repr_png_(self) -> bytes:
+        return png_of(self, DPI)
+
+
+def png_of(figure: Figure, dpi: int) -> bytes:
+    """Return a figure as the content of a PNG file."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=dpi)
+    return content.getvalue()
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure; the suffix gives the format.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : Path
+        Ends in .png, .pdf or .svg; an existing file is replaced.
+
+    Raises
+    ------
+    ResultsFileError
+        If it cannot be written; an existing file is then unchanged.
+    """
+    with replacement(path) as file:
+        figure.savefig(file, format=path.suffix[1:].lower(), dpi=DPI)
+
+
+def figure_of(sheet: Sheet) -> Figure:
+    """Return the figure of all panels of a view, in the arrangement of its sheet."""
+    with figure_style():
+        figure = _Figure(figsize=sheet.size, layout="constrained")
+        if sheet.title:
+            figure.suptitle(sheet.title, fontsize=10.5)
+        axes = dict(_arranged(figure, sheet))
+        for name, panel in axes.items():
+            draw(panel, sheet.panels[name])
+        if sheet.scale_beside:
+            _draw_scale(figure, sheet, [axes[name] for name in sheet.scale_beside])
+    return figure
+
+
+def _arranged(figure: Figure, sheet: Sheet) -> Iterator[tuple[str, Axes]]:
+    """Yield the names of panels with their axes; rows of different lengths are arranged apart."""
+    groups = [list(group) for _, group in groupby(sheet.rows, len)]
+    heights = sheet.heights or [1.0] * len(sheet.rows)
+    if len(groups) == 1:
+        mosaic: Any = [list(row) for row in sheet.rows]
+        ratios: Any = {"width_ratios": sheet.widths, "height_ratios": sheet.heights}
+        yield from figure.subplot_mosaic(mosaic, **ratios).items()
+        return
+    ends = list(accumulate(map(len, groups)))
+    parts = [heights[end - len(group) : end] for group, end in zip(groups, ends, strict=True)]
+    below: Any = figure.subfigures(len(groups), 1, height_ratios=[sum(part) for part in parts])
+    for subfigure, rows, ratios_of in zip(below, groups, parts, strict=True):
+        mosaic = [list(row) for row in rows]
+        yield from subfigure.subplot_mosaic(mosaic, height_ratios=ratios_of).items()
+
+
+def png_of_panel(panel: Panel, dpi: int = 100) -> bytes:
+    """Return one panel as the content of a small PNG file."""
+    with figure_style():
+        figure = _Figure(figsize=(5.2, 3.1), layout="constrained")  # as wide as the longest title
+        draw(figure.subplots(), panel)
+        return png_of(figure, dpi)
+
+
+def draw(axes: Axes, panel: Panel) -> None:
+    """Draw a panel on axes."""
+    axes.set_title(panel.title)
+    if panel.message:
+        write_message(axes, panel.title, [panel.message])
+        return
+    axes.set(xlabel=_label(panel.x), ylabel=_label(panel.y))
+    for along, axis in (("x", panel.x), ("y", panel.y)):
+        if axis.log:
+            axes.set(**{f"{along}scale": "log"})
+    second = None if panel.right is None else _second(axes, panel.right)
+    for mark in panel.marks:
+        y = panel.right if mark.right and panel.right else panel.y
+        _draw(second if mark.right and second else axes, mark, panel.x, y)
+    if panel.equal:
+        axes.set_aspect("equal")
+        axes.set_anchor("N")
+    _set_axis(axes, "x", panel.x)
+    _set_axis(axes, "y", panel.y)
+    if second is not None and panel.right is not None:
+        _set_axis(second, "y", panel.right)
+    if panel.legend and axes.get_legend_handles_labels()[0]:
+        below = panel.legend == "below"
+        place: dict[str, Any] = {"loc": panel.legend}
+        if below:
+            place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "columnspacing": 1.2}
+        axes.legend(**place, ncols=panel.columns)
+
+
+def _second(axes: Axes, axis: Axis) -> Axes:
+    """Return a second axis at the right."""
+    other = axes.twinx()
+    other.set_ylabel(_label(axis))
+    other.spines["right"].set_visible(True)
+    other.grid(visible=False)
+    return other
+
+
+def _set_axis(axes: Axes, along: str, axis: Axis) -> None:
+    """Set limits and ticks of an axis, after all marks are drawn."""
+    limits = [None if end is None else end * axis.scale for end in axis.limits]
+    get, set_limits = getattr(axes, f"get_{along}lim"), getattr(axes, f"set_{along}lim")
+    if any(axis.margin):
+        low, high = get()
+        limits[0] = low - axis.margin[0] * (high - low) if limits[0] is None else limits[0]
+        limits[1] = high + axis.margin[1] * (high - low) if limits[1] is None else limits[1]
+    set_limits(*limits)
+    ticks = axes.xaxis if along == "x" else axes.yaxis
+    if axis.ticks is not None:
+        names = None if axis.names is None else list(axis.names)
+        ticks.set_ticks([tick * axis.scale for tick in axis.ticks], labels=names, minor=False)
+        ticks.set_minor_locator(NullLocator())
+    elif axis.log:
+        low, high = sorted(get())
+        decades = float(np.log10(high / low))
+        # powers of ten, twice and five times them are too few in less than a decade
+        if decades < 1.0:
+            ticks.set_major_locator(MaxNLocator(7, steps=[1, 2, 5, 10]))
+        elif decades < 2.3:
+            ticks.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ticks.set_major_formatter(FuncFormatter(lambda value, _: _plain(value)))
+        ticks.set_minor_formatter(NullFormatter())
+        if decades < 2.3:
+            ticks.set_minor_locator(NullLocator())
+
+
+def _label(axis: Axis) -> str:
+    return axis.label.replace("^2", "$^2$")
+
+
+def _plain(value: float) -> str:
+    """Return the label of a tick without an exponent, as far as it is short."""
+    return count(value) if 1e3 <= value < 1e9 else f"{value:g}"
+
+
+def _draw(axes: Axes, mark: Mark, x: Axis, y: Axis) -> None:
+    """Draw a mark on axes, in the units of both."""
+    style: dict[str, Any] = {"color": mark.colour, "alpha": mark.alpha}
+    named = {**style, "label": mark.label or None}
+    match mark:
+        case Line():
+            _draw_line(axes, mark, x, y, style)
+        case Records():
+            places = mark.x * x.scale
+            chosen = evenly_spaced(len(mark.passes), 24)
+            colours = _Colours(mark.passes)
+            for record in chosen[evenly_spaced(len(chosen), mark.most)]:
+                axes.plot(
+                    places, mark.y[record] * y.scale, mark.dash, color=colours.of(record), lw=1.1
+                )
+            if mark.label:
+                axes.plot([], [], mark.dash, color=BLACK, label=mark.label)
+        case Band():
+            low, high = (end * y.scale for end in (mark.low, mark.high))
+            step: Any = "post" if mark.steps else None
+            axes.fill_between(mark.x * x.scale, low, high, lw=0, step=step, **named)
+        case Bars():
+            place, size = (x, y) if not mark.horizontal else (y, x)
+            low, start = np.asarray(mark.low) * place.scale, mark.start * size.scale
+            width, length = (
+                np.asarray(mark.high) * place.scale - low,
+                np.asarray(mark.value) * size.scale - start,
+            )
+            if mark.horizontal:
+                axes.barh(low, length, width, left=start, align="edge", **named)
+            else:
+                axes.bar(low, length, width, bottom=start, align="edge", **named)
+        case Whiskers():
+            _draw_whiskers(axes, mark, x, y, style)
+        case Span():
+            _draw_span(axes, mark, (x if mark.across == "x" else y).scale, named)
+        case Image():
+            _draw_image(axes, mark, x, y)
+        case Contours():
+            grid = mark.x * x.scale, mark.y * y.scale, mark.value
+            axes.contourf(*grid, levels=list(mark.levels), colors=list(mark.colours))
+            if mark.outlined:
+                axes.contour(*grid, list(mark.levels[:-1]), colors=mark.colour, linewidths=0.8)
+        case Arrows():
+            longest = float(np.hypot(mark.along_x, mark.along_y).max(initial=0.0))
+            if longest > 0.0:
+                axes.quiver(
+                    mark.x * x.scale, mark.y * y.scale, mark.along_x, mark.along_y,
+                    color=mark.colour, scale=17.0 * longest, width=0.004, pivot="middle",
+                )  # fmt: skip
+        case Patch():
+            axes.fill(mark.x * x.scale, mark.y * y.scale, lw=0, zorder=0, **named)
+        case Text():
+            parts = ["axes fraction" if mark.parts == along else "data" for along in ("x", "y")]
+            place_x = mark.x if mark.parts == "x" else mark.x * x.scale
+            place_y = mark.y if mark.parts == "y" else mark.y * y.scale
+            axes.annotate(
+                mark.text, (place_x, place_y), xycoords=(parts[0], parts[1]),
+                xytext=mark.offset, textcoords="offset points", ha=mark.anchor,
+                color=mark.colour, weight="bold" if mark.bold else "normal", fontsize=mark.size,
+            )  # fmt: skip
+
+
+def _draw_line(axes: Axes, mark: Line, x: Axis, y: Axis, style: dict[str, Any]) -> None:
+    values = np.asarray(mark.y)
+    style |= {"mfc": "white", "zorder": 5} if mark.open else {}
+    lines = axes.plot(
+        np.asarray(mark.x) * x.scale,
+        (values.T if values.ndim > 1 else values) * y.scale,
+        ls=mark.dash or "none",
+        marker=mark.marker,
+        lw=mark.width,
+        ms=mark.size,
+        mew=1.4 if mark.marker == "|" else 0.7,
+        drawstyle="steps-post" if mark.steps else "default",
+        markevery=[-1] if mark.at_end else None,
+        **style,
+    )
+    lines[0].set_label(mark.label or "_line")
+
+
+def _draw_whiskers(axes: Axes, mark: Whiskers, x: Axis, y: Axis, style: dict[str, Any]) -> None:
+    place, size = (y, x) if mark.horizontal else (x, y)
+    places = np.broadcast_to(np.asarray(mark.place, dtype=float) * place.scale, (2, len(mark.low)))
+    ends = np.array([mark.low, mark.high], dtype=float) * size.scale
+    both = (ends, places) if mark.horizontal else (places, ends)
+    axes.plot(*both, lw=mark.width, solid_capstyle="butt", **style)
+
+
+def _draw_span(axes: Axes, mark: Span, scale: float, style: dict[str, Any]) -> None:
+    along = "v" if mark.across == "x" else "h"
+    if mark.high is not None:
+        getattr(axes, f"ax{along}span")(mark.low * scale, mark.high * scale, lw=0, **style)
+        return
+    line = getattr(axes, f"ax{along}line")
+    line(mark.low * scale, 0.0, mark.reach, ls=mark.dash, lw=mark.width, **style)
+
+
+def _draw_image(axes: Axes, mark: Image, x: Axis, y: Axis) -> None:
+    flat = np.ndim(mark.x) == 1
+    shading: Any = "nearest" if flat else "gouraud"
+    mesh = axes.pcolormesh(
+        mark.x * x.scale, mark.y * y.scale, mark.value * mark.axis.scale,
+        shading=shading, cmap=mark.colours, vmin=0.0, rasterized=True,
+    )  # fmt: skip
+    axes.grid(visible=False)
+    figure: Any = axes.figure
+    figure.colorbar(mesh, ax=axes, label=_label(mark.axis), pad=0.02, aspect=24)
+
+
+class _Colours:
+    """Colours of records by roller passes; the start of the run is black."""
+
+    def __init__(self, passes: FloatArray) -> None:
+        worn = passes[passes > 0.0]
+        last = float(worn[-1]) if len(worn) else 1.0
+        crowded = len(worn) > 2 and float(np.median(worn)) < 0.15 * last
+        unit, self.name = (1.0, "roller passes") if crowded else pass_unit(last)
+        self._passes = passes / unit
+        self.norm = LogNorm(float(worn[0]), last) if crowded else Normalize(0.0, last / unit)
+        self.map = colormaps[RECORDS].reversed()
+
+    def of(self, record: int) -> Any:
+        """Return the colour of a record."""
+        passes = float(self._passes[record])
+        return self.map(self.norm(passes)) if passes > 0.0 else BLACK
+
+
+def _draw_scale(figure: Figure, sheet: Sheet, beside: list[Axes]) -> None:
+    """Draw the scale of the colours of the records beside panels."""
+    marks = sheet.panels[sheet.scale_beside[0]].marks
+    passes = next(mark.passes for mark in marks if isinstance(mark, Records))
+    colours = _Colours(passes)
+    mapped = ScalarMappable(colours.norm, colours.map)
+    figure.colorbar(mapped, ax=beside, label=colours.name, aspect=45, pad=0.02)
+
+
+def name_axes(axes: Axes, title: str, x: str, y: str) -> None:
+    """Set the title of a panel and the labels of its axes."""
+    axes.set(title=title, xlabel=x, ylabel=y)
+
+
+def write_message(axes: Axes, title: str, lines: Sequence[str]) -> None:
+    """Write lines of text into a panel that has nothing to draw."""
+    text = "\n".join(lines)
+    axes.text(0.5, 0.5, text, ha="center", va="center", transform=axes.transAxes)
+    axes.set_title(title)
+    axes.set_axis_off()

@@ -1,0 +1,180 @@
+"""Views: what a result shows as rows, JSON, one line, panels, tables and columns.
+
+A view is the only thing that displays know of a result. The terminal (`wearsim.cli.render`), pages
+(`page`), notebooks (`notebook`), CSV files (`csv_files`) and tables of pandas (`frames`) render
+views, and figures (`figures`) the panels of a view.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from wearsim.report.panels import Sheet
+from wearsim.report.text import shown, with_interval
+from wearsim.uq.estimation.intervals import Interval
+
+if TYPE_CHECKING:
+    from wearsim.report.measured import ComputedProfile, Measured
+
+
+class Row(NamedTuple):
+    """A quantity with its label.
+
+    Parameters
+    ----------
+    label : str
+    quantity : str, float, ndarray or Interval
+        In words, or in SI; an array has one value for each roller.
+    unit : str
+        Unit that is shown, a key of `PER_SI`.
+    error : float, optional
+        Half-width of the interval that holds the true value [SI].
+    """
+
+    label: str
+    quantity: Any
+    unit: str = "1"
+    error: float | None = None
+
+    @property
+    def text(self) -> str:
+        """The quantity with its unit and error."""
+        if isinstance(self.quantity, str):
+            return self.quantity
+        if isinstance(self.quantity, Interval):
+            return with_interval(self.quantity, self.unit)
+        values = [shown(float(value), self.unit) for value in np.ravel(self.quantity)]
+        if len(set(values)) > 1:
+            numbers = (value.removesuffix(f" {self.unit}") for value in values)
+            return " / ".join(numbers) + f" {self.unit}"
+        return values[0] + ("" if self.error is None else f" ± {shown(self.error, self.unit, 2)}")
+
+
+Rows: TypeAlias = list[Row]
+
+
+class Table(NamedTuple):
+    """A table with a title: rows of quantities, or cells under heads.
+
+    Parameters
+    ----------
+    title : str
+    rows : list of Row, or of sequences of str
+        Quantities, or the cells of each row if there are heads.
+    heads : sequence of str
+        Heads of the columns; empty for rows of quantities.
+    """
+
+    title: str
+    rows: Sequence[Any]
+    heads: Sequence[str] = ()
+
+
+STUDY = "Study"  # title of the table on the computation, which stands first
+ORIGIN = "Origin"  # title of the table on scenario, files and software
+
+
+class Column(NamedTuple):
+    """A column of a CSV file: name, values in SI or texts, unit, and its size in SI."""
+
+    name: str
+    values: Any
+    unit: str = "1"
+    size: float = 1.0
+
+
+Columns: TypeAlias = Iterable[Sequence[Column]]  # in blocks of rows
+
+
+class Frame(NamedTuple):
+    """Columns of a table of pandas: name, SI unit and values; name and numbers of its rows."""
+
+    columns: Sequence[tuple[str, str, Any]]
+    axis: str
+    numbers: Iterable[int]
+
+
+class Repetition(NamedTuple):
+    """How a study is repeated: command, files by name, and a remark."""
+
+    command: str = ""
+    files: Mapping[str, str] = {}
+    remark: str = ""
+
+
+class View(ABC):
+    """What one result, or several compared results, show.
+
+    Attributes
+    ----------
+    title : str
+    question : str
+        What was asked, in a sentence.
+    basis : str
+        What the stated errors contain.
+    heading : str
+        Title of the rows.
+    notes, warnings : sequence of str
+    """
+
+    title: str
+    question: str = ""
+    basis: str = ""
+    heading: str = "results"
+    notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+    failures: str = ""  # remark on realisations that failed
+
+    @abstractmethod
+    def rows(self) -> Rows:
+        """Return the answers with their errors, the most important first."""
+
+    @abstractmethod
+    def data(self) -> dict[str, Any]:
+        """Return all numbers for JSON, in SI units."""
+
+    @abstractmethod
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return the panels; measured profiles are drawn over computed ones."""
+
+    def line(self) -> str:
+        """Return method, numerical or sampling error and time on one line, or an empty text."""
+        return ""
+
+    def tables(self) -> list[Table]:
+        """Return further tables: the study, its details, random inputs and origin."""
+        return []
+
+    def columns(self) -> Mapping[str, Columns]:
+        """Return the tables of CSV files by name of the file."""
+        return {}
+
+    def frame(self) -> Frame:
+        """Return the columns of a table of pandas.
+
+        Raises
+        ------
+        TypeError
+            If the result has none.
+        """
+        raise TypeError(f"{self.title}: there is no table of this result")
+
+    def stored_files(self) -> list[tuple[str, str]]:
+        """Return names and texts of the scenario, which is the first, and of its input files."""
+        raise TypeError(f"{self.title}: it has no scenario that could be written")
+
+    def repetition(self) -> Repetition:
+        """Return command and files that repeat the study."""
+        return Repetition()
+
+    def origin(self) -> dict[str, Any]:
+        """Return scenario, files, plugins and software for JSON, if they are stored."""
+        return {}
+
+    def profile(self) -> ComputedProfile | None:
+        """Return the worn profile with which measured ones are compared, if there is one."""
+        return None

@@ -1,0 +1,81 @@
+"""Checks of the name of a results file before a study starts."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from wearsim.atomic_write import refuse_if_locked, refuse_inputs
+from wearsim.errors import ResultsFileError
+
+_OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
+
+
+def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> None:
+    """Check before a long computation that a results file may be written.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    force : bool
+        Whether an existing file may be replaced.
+    inputs : iterable of Path
+        Files of the scenario, which are never replaced.
+
+    Raises
+    ------
+    ResultsFileError
+        If the file exists and `force` is not set, is an input, has the suffix of a figure, a
+        scenario or a table, is being written by another process, or if its folder is missing or
+        not writable.
+    """
+    refuse_inputs(path, inputs)
+    target, suffix = Path(path).resolve(), Path(path).suffix
+    folder = target.parent
+    if suffix.lower() in _OTHER_KINDS:
+        name = Path(path).with_suffix(".h5").name
+        raise _refused(path, f"no results file ends in {suffix}", f"choose another, such as {name}")
+    if target.is_dir():
+        raise _refused(path, "is a folder", "name a file in it")
+    if not folder.is_dir():
+        raise _refused(path, f"there is no folder {folder}", "make it, or choose another")
+    if target.exists():
+        if not target.is_file():
+            raise _refused(path, "is not a regular file", "choose another")
+        if not force:
+            verb = _continuing(path)
+            known = "already exists and is unfinished" if verb else "already exists"
+            python = f'wearsim.{verb}("{path}") continues it, ' if verb else ""
+            shell = f"`wearsim resume {path}` continues it, " if verb else ""
+            raise ResultsFileError(
+                f"{path}: {known}",
+                python=f"{python}force=True replaces it, output=... chooses another",
+                shell=f"{shell}--force replaces it, -o chooses another",
+            )
+        refuse_if_locked(path)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise _refused(path, f"the folder {folder} is not writable", "choose another")
+
+
+def _continuing(path: str | Path) -> str:
+    """Return the function that continues an unfinished study; "" for any other file."""
+    import h5py  # noqa: PLC0415  (takes 0.2 s to import)
+
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            if file.attrs.get("finished", 1):
+                return ""
+            # by a variable that only files of this kind have
+            verbs = {"step": "resume", "life": "resume_life", "realisation": "resume_ensemble"}
+            return next((verb for name, verb in verbs.items() if name in file), "")
+    except (OSError, RuntimeError, KeyError, ValueError):  # not a results file, or damaged
+        return ""
+
+
+def _refused(path: str | Path, what: str, remedy: str) -> ResultsFileError:
+    """Return the error of an output, with the argument and the option that set its name."""
+    return ResultsFileError(
+        f"{path}: {what}", python=f"{remedy} as output", shell=f"{remedy} with -o"
+    )

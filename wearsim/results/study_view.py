@@ -1,0 +1,183 @@
+"""What the views of all results with a file have in common: origin, random inputs, repetition."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from wearsim.errors import PluginError, ScenarioError
+from wearsim.report.text import count
+from wearsim.report.view import ORIGIN, STUDY, Repetition, Row, Rows, Table, View
+from wearsim.results.content import StudyResult
+from wearsim.types import FloatArray
+from wearsim.units import in_engineers_unit
+from wearsim.uq.estimation.moments import is_constant
+
+CONSTANT = "constant"
+SAMPLING = (
+    "Intervals in brackets hold the true value with 95 % confidence for the stated scatter of the"
+    " inputs. They do not contain the errors of the contact model or of the wear law."
+)
+SAME_NUMBERS = (
+    "The same version of wearsim gives the same numbers on the same kind of machine, for any number"
+    " of workers."
+)
+
+Shown = TypeVar("Shown", bound=StudyResult[Any])
+
+
+class StudyView(View, Generic[Shown]):
+    """View of one result that is stored with its scenario.
+
+    Parameters
+    ----------
+    result : StudyResult
+    """
+
+    verb = ""  # that repeats the study
+    basis = SAMPLING
+
+    def __init__(self, result: Shown) -> None:
+        self.result = result
+        self.title = result.title
+        self.notes, self.warnings = result.notes, result.warnings
+
+    def study(self) -> Rows:
+        """Return rows on the study: how many, with which method, how long."""
+        return []
+
+    def details(self) -> list[Table]:
+        """Return tables of the kind of study."""
+        return []
+
+    def random_inputs(self) -> Rows:
+        """Return rows on the random inputs."""
+        return []
+
+    def tables(self) -> list[Table]:
+        """Return the study, its details, random inputs and origin."""
+        tables = [Table(STUDY, self.study()), *self.details()]
+        tables += [Table("Random inputs", self.random_inputs()), Table(ORIGIN, self._sources())]
+        return [table for table in tables if table.rows]
+
+    def _sources(self) -> Rows:
+        """Return rows on scenario, input files, plugins and software."""
+        raw = self.result.raw
+        plugins = [
+            f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
+            for item in raw.plugins
+        ]
+        software = (f"{name} {number}" for name, number in raw.software.items())
+        return [
+            Row("scenario", raw.scenario_file),
+            Row("input files", ", ".join(raw.files) or "none"),
+            Row("plugins", "\n".join(plugins)),
+            Row("software", ", ".join(software)),
+            Row("written", raw.created),
+        ]
+
+    def origin(self) -> dict[str, Any]:
+        """Return scenario, input files, plugins and software of the study for JSON."""
+        raw = self.result.raw
+        return {
+            "scenario_file": raw.scenario_file,
+            "scenario_sha256": raw.sha256,
+            "scenario": raw.scenario_text,
+            "files": list(raw.files),
+            "plugins": raw.plugins,
+            "software": raw.software,
+            "seed": raw.seed,
+            "created": raw.created,
+        }
+
+    def ending(self) -> dict[str, Any]:
+        """Return file, notes and warnings for JSON."""
+        path = self.result.path
+        return {
+            "output": str(path) if path else None,
+            "notes": list(self.notes),
+            "warnings": list(self.warnings),
+        }
+
+    def stored_files(self) -> list[tuple[str, str]]:
+        """Return names and texts of the scenario, which is the first, and of its input files."""
+        raw = self.result.raw
+        return [(raw.scenario_file, raw.scenario_text), *raw.files.items()]
+
+    def options(self) -> Sequence[str]:
+        """Return the options of the command that repeats the study."""
+        return []
+
+    def repetition(self) -> Repetition:
+        """Return command and files that repeat the study."""
+        files = {Path(name).name: text for name, text in self.stored_files()}
+        scenario = Path(self.result.raw.scenario_file).name
+        command = shlex.join(["wearsim", self.verb, scenario, *self.options()])
+        return Repetition(command, files, SAME_NUMBERS)
+
+
+def drawn_rows(result: StudyResult[Any]) -> Rows:
+    """Return rows on the random inputs of a study: mean and standard deviation of the draws."""
+    rows = []
+    for key, item in drawn_data(result).items():
+        mean, std, unit = float(item["mean"]), float(item["std"]), item["unit"]
+        text = f"mean {in_engineers_unit(mean, unit, 4)}"
+        if is_constant(mean, std):
+            text = f"{CONSTANT} {in_engineers_unit(mean, unit, 4)}"
+        elif math.isfinite(std):
+            text += f", std {in_engineers_unit(std, unit, 4)}"
+        rows.append(Row(f"drawn {key}", text))
+    return rows
+
+
+def drawn_data(result: StudyResult[Any]) -> dict[str, Any]:
+    """Return mean and standard deviation of the draws by key, in SI units."""
+    return {
+        item["key"]: {
+            "unit": item["unit"],
+            "mean": result.inputs[item["key"]].mean(),
+            "std": _std(result.inputs[item["key"]]),
+        }
+        for item in (result.raw.inputs if result.count else [])
+    }
+
+
+def _std(values: FloatArray) -> float:
+    return float(values.std(ddof=1)) if values.size > 1 else math.nan
+
+
+def varying_inputs(result: StudyResult[Any], drawn: Mapping[str, Any] | None) -> dict[str, str]:
+    """Return descriptions of the random inputs that are not given by one drawn value, by name.
+
+    These are fields, processes and inputs drawn at every pass. They are read from the stored
+    scenario; if one of its plugins is not installed, the reason is returned instead.
+
+    Parameters
+    ----------
+    result : StudyResult
+    drawn : mapping of str to object, optional
+        Drawn values by key; by default fields and processes are returned.
+    """
+    try:
+        random = result.scenario.random
+    except (PluginError, ScenarioError) as error:
+        return {"inputs": f"unknown, since the scenario cannot be read here: {error}"}
+    if drawn is None:
+        chosen = [item for item in random if item.role in {"field", "process"}]
+    else:
+        chosen = [item for item in random if not set(item.keys) <= set(drawn)]
+    return {item.name: item.describe() for item in chosen}
+
+
+def varying_rows(found: Mapping[str, str]) -> Rows:
+    """Return rows on random inputs with a description each."""
+    return [Row(f"random {name}", text) for name, text in found.items()]
+
+
+def progress_text(done: int, failed: int, requested: int, finished: bool) -> str:
+    """Return "24 done, 0 failed, of 24", with "unfinished" if it is not."""
+    text = f"{count(done)} done, {count(failed)} failed, of {count(requested)}"
+    return text if finished else f"{text}, unfinished"

@@ -1,0 +1,321 @@
+"""Panels of cams: motion and loads before wear, and depth, shape and lift error of a worn one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wearsim.mechanics.cam import Motion, Stations, surface_points
+from wearsim.report.measured import Measured, measured_marks
+from wearsim.report.panels import (
+    BLACK,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    Axis,
+    Image,
+    Line,
+    Mark,
+    Panel,
+    Patch,
+    Records,
+    Sheet,
+    Span,
+    Text,
+    look,
+    worn_limits,
+)
+from wearsim.report.text import PER_SI, shown
+from wearsim.studies.cam.point import Point
+from wearsim.studies.cam.study import CamStudy, peak_pressures
+from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.run.panels import (
+    HEIGHT,
+    Y,
+    caption,
+    depth_panel,
+    pressure_panel,
+    record_texts,
+)
+from wearsim.studies.run.result import Result
+from wearsim.types import FloatArray
+
+DEG = PER_SI["deg"]
+ANGLE = Axis(
+    "angle", "deg", limits=(0.0, 2.0 * np.pi), ticks=[0.25 * np.pi * place for place in range(9)]
+)
+_SAMPLES = 97  # of a panel of the turn between its stations
+_MAGNIFIED = 0.2  # greatest depth in the drawing of the worn cam, of the base radius
+
+
+def cam_sheet(study: CamStudy) -> Sheet:
+    """Return the panels of a cam: its shape, motion, pressure angle, speeds, and loads."""
+    turn = study.turn
+    samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
+    fine = turn.at_stations(Stations(turn.panels, samples))
+    lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
+    found, angle, point = fine.kinematics, fine.angle, study.point
+    shaded = " (skids shaded)" if study.skids else ""
+    gapped = between_flanks(angle, fine)
+
+    def over_angle(values: FloatArray, **style: Any) -> Line:
+        """Return values over the angle, with gaps where the flank changes."""
+        dashed = look(dash="--", right=True, colour=ORANGE) if style.pop("right", 0) else {}
+        return Line(gapped, between_flanks(values, fine), **{**dashed, **style})
+
+    motion = [
+        Line(angle, found.lift, label=f"{lift} [{unit}]"),
+        Line(angle, found.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
+        Line(angle, found.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
+    ]
+    pressures = peak_pressures(turn.scenario, fine)
+    dots = look(dash="", marker=".")
+    load: list[Mark] = [
+        Line(angle, fine.normal_force),
+        Line(point.angle, point.normal_force, **dots),
+        over_angle(pressures, right=True),
+        Line(point.angle, study.peak_pressure, colour=ORANGE, right=True, **dots),
+    ]
+    skids = [Span(skid.start, skid.stop, colour=RED, alpha=0.12) for skid in study.skids]
+    names, edges = segment_marks(turn.cam.motion), segment_marks(turn.cam.motion, names=False)
+    speed = over_angle(turn.speed * found.travel)
+    margin = (0.1, 0.0)  # the names of the segments lie below
+    inner = Axis(limits=ANGLE.limits, ticks=ANGLE.ticks, unit="deg")
+    panels = {
+        "shape": _shape(turn, fine),
+        "motion": Panel(
+            "Motion of the follower",
+            inner,
+            Axis(f"{lift} and its derivatives", per_si=PER_SI[unit], margin=(0.18, 0.18)),
+            [*motion, *names],
+            "Lift, velocity and acceleration of the follower over a turn.",
+            legend="upper right",
+            columns=3,
+        ),
+        "pressure": Panel(
+            "Pressure angle, and curvature of the cam",
+            inner,
+            Axis("pressure angle", "deg"),
+            [Line(angle, found.pressure_angle), over_angle(found.curvature, right=True), *edges],
+            "Pressure angle of the follower, and curvature of the surface of the cam.",
+            right=_right("curvature", "1/mm", found.curvature, 1.0 / PER_SI["mm"]),
+        ),
+        "load": Panel(
+            f"Normal force, and peak pressure{shaded}",
+            ANGLE,
+            Axis("normal force", "N", margin=margin),
+            [*load, *names, *skids],
+            "Force between roller and cam, and peak pressure of the fresh contact.",
+            right=_right("peak pressure", "MPa", pressures, PER_SI["MPa"], margin),
+        ),
+        "speed": Panel(
+            f"Rolling speed, and roller/cam speed{shaded}",
+            ANGLE,
+            Axis("rolling speed", "m/s"),
+            [
+                speed,
+                over_angle(found.spin, right=True),
+                *edges,
+                *skids,
+            ],
+            "Speed at which the contact rolls, and speed of the roller over that of the cam.",
+            right=_right("roller/cam speed", "1", found.spin, 1.0),
+        ),
+    }
+    rows = [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]]
+    return Sheet(turn.scenario.title, panels, rows, (12.0, 8.6), widths=[1.0, 1.25], main="motion")
+
+
+def _right(
+    name: str,
+    unit: str,
+    values: FloatArray,
+    per_si: float,
+    margin: tuple[float, float] = (0.0, 0.0),
+) -> Axis:
+    """Return the axis at the right; that of a constant reaches around it."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    limits: tuple[float | None, float | None] = (None, None)
+    if high - low <= 1e-6 * abs(high):  # constant but for rounding
+        around = 0.2 * abs(high) or 1.0
+        limits = (low - around * (1.0 + 2.4 * margin[0]), high + around)
+    return Axis(name, unit, per_si, limits=limits, margin=margin)
+
+
+def segment_marks(motion: Motion, *, names: bool = True) -> list[Mark]:
+    """Return the boundaries of the segments of a turn, and their names."""
+    marks: list[Mark] = []
+    for part, start, stop in zip(motion.segments, motion.starts, motion.starts[1:], strict=False):
+        marks.append(Span(stop, dash=":", width=0.6, colour=GREY))
+        if names and stop - start > 0.15:
+            middle, style = 0.5 * (start + stop), look(parts="y", anchor="center", size=7.0)
+            marks.append(Text(middle, 0.02, part.name, colour=GREY, **style))
+    return marks
+
+
+def between_flanks(values: FloatArray, point: Point) -> FloatArray:
+    """Return values, last axis points, with a gap where the flank of a groove changes."""
+    gaps = np.flatnonzero(np.diff(point.inner.astype(np.int64))) + 1
+    return np.insert(values, gaps, np.nan, axis=-1)
+
+
+def _curve(places: FloatArray, **options: Any) -> Line:
+    """Return a curve in the plane of the cam; places have shape (2, points)."""
+    return Line(places[0], places[1], **options)
+
+
+def _shape(turn: CamTurn, point: Point) -> Panel:
+    """Return the cam, its pitch curve and the roller at the start of the turn."""
+    centre, surface = surface_points(turn.cam.follower, point.kinematics, point.angle)
+    around = np.linspace(0.0, 2.0 * np.pi, 181)
+    circle = np.stack([np.cos(around), np.sin(around)])
+    roller = centre[:, :1] + turn.scenario.roller.radius * circle
+    marks = [
+        _curve(between_flanks(surface, point), width=1.6, label="cam"),
+        _curve(centre, width=0.8, dash="--", colour=GREY, label="pitch curve"),
+        _curve(roller, width=1.2, colour=ORANGE, label="roller at 0 deg"),
+        _curve(
+            turn.cam.base_radius * circle, width=0.6, dash=":", colour=GREY, label="base circle"
+        ),
+        _centre(),
+    ]
+    style = look(legend="below", columns=4, equal=True)
+    text = "The cam, the path of the roller's centre, and the roller at the start of a turn."
+    return Panel("Cam", Axis("x", "mm"), Axis("y", "mm"), marks, text, **style)
+
+
+def _centre() -> Line:
+    return Line([0.0], [0.0], dash="", marker="+", size=8.0, colour=BLACK)
+
+
+def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
+    """Return the panels of the run of a cam; measured profiles lie over the deepest groove."""
+    turn = CamTurn(result.scenario)
+    stations = turn.stations
+    worn = np.asarray(result.raw.records["cylinder_depth_profile"])[:, :, 0]
+    panels = {
+        "map": _map(turn, stations, worn[-1], result),
+        "shape": _worn_shape(turn, stations, worn[-1]),
+        "lift": _lift_error(turn, stations, result),
+        "groove": _groove(result, worn, measured),
+        "depth": depth_panel(result),
+        "roller": _roller(result),
+        "pressure": pressure_panel(result),
+    }
+    return Sheet(
+        f"{result.title}\n{_caption(result)}",
+        panels,
+        [["map", "map", "shape"], ["lift", "lift", "shape"], ["depth", "groove", "roller"]],
+        (12.5, 9.6),
+        heights=[1.2, 0.9, 1.1],
+        scale_beside=["roller"],
+        steps=record_texts(result),
+        main="groove",
+    )
+
+
+def _caption(result: Result) -> str:
+    final = result.final
+    error, turns = float(np.max(final["lift_error_m"])), float(np.max(final["turns"]))
+    place = float(np.max(final["depth_angle_rad"])) * DEG
+    return (
+        f"{turns:,.0f} turns, {caption(result)} at {place:.4g} deg,"
+        f" lift error {shown(error, 'um')} peak to peak"
+    )
+
+
+def _map(turn: CamTurn, stations: Stations, depth: FloatArray, result: Result) -> Panel:
+    angle, values = stations.values_at(depth, _SAMPLES)
+    deepest = values.max(axis=0)
+    extent = result.y[deepest > 1e-3 * deepest.max()] if deepest.max() > 0.0 else result.y
+    # interpolation overshoots next to an edge
+    image = Image(angle, result.y, np.maximum(values, 0.0).T, Axis("depth", "um"), "magma_r")
+    place = float(np.max(result.final["depth_angle_rad"])) * DEG
+    limits = (1.25 * extent[0], 1.05 * extent[-1])  # the names of the segments lie below
+    return Panel(
+        "Worn depth of the cam",
+        ANGLE,
+        Axis("y across the track", "mm", limits=limits),
+        [image, *segment_marks(turn.cam.motion)],
+        f"At the end the cam is deepest at {place:.4g} deg: {shown(float(depth.max()), 'um')}.",
+    )
+
+
+def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
+    fine = Stations(stations.panels, (_SAMPLES,) * len(stations.panels))
+    places = 0.5 - 0.5 * np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))
+    deepest = depth.max(axis=1)
+    worn = stations.values_between(deepest, places)
+    point = turn.at_stations(fine)
+    factor = _round(_MAGNIFIED * turn.cam.base_radius / max(float(deepest.max()), 1e-12))
+    follower, found = turn.cam.follower, point.kinematics
+    fresh = surface_points(follower, found, point.angle)[1]
+    cut = surface_points(follower, found, point.angle, factor * worn)[1]
+    marks: list[Mark] = [] if turn.cam.groove else [Patch(*cut, alpha=0.12)]
+    label = f"worn, depth x {factor:g}"
+    marks += [
+        _curve(between_flanks(fresh, point), width=0.9, colour=GREY, label="unworn"),
+        _curve(between_flanks(cut, point), width=1.4, label=label),
+    ]
+    for start in turn.cam.motion.starts[:-1]:
+        edge = fresh[:, np.argmin(np.abs(point.angle - start))]
+        marks.append(Line([0.0, edge[0]], [0.0, edge[1]], dash=":", width=0.6, colour=GREY))
+    text = f"The cam before wear, and at the end with its depth magnified {factor:g} times."
+    style = look(legend="below", columns=2, equal=True)
+    axes = Axis("x", "mm"), Axis("y", "mm")
+    return Panel("Worn cam", *axes, [*marks, _centre()], text, **style)
+
+
+def _round(value: float) -> float:
+    """Return a value rounded down to one digit."""
+    scale = 10.0 ** np.floor(np.log10(value))
+    return float(np.floor(value / scale) * scale)
+
+
+def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
+    curves = np.asarray(result.raw.records["lift_error_curve"])[:, :, 0, 0]
+    between = [stations.values_at(curve, _SAMPLES) for curve in curves]
+    angle, values = between[0][0], np.array([value for _, value in between])
+    error = shown(float(np.max(result.final["lift_error_m"])), "um")
+    dots = look(dash="", marker=".", size=3.5, colour=BLACK, label="stations")
+    return Panel(
+        "Lift error against the unworn cam",
+        ANGLE,
+        Axis("lift error", "um"),
+        [
+            Records(angle, values, result.record_passes, most=8),
+            Line(stations.angle, curves[-1], **dots),
+            *segment_marks(turn.cam.motion, names=False),
+        ],
+        f"At the end it varies by {error} over a turn.",
+        legend="upper right",
+    )
+
+
+def _groove(result: Result, worn: FloatArray, measured: Sequence[Measured]) -> Panel:
+    place = int(worn[-1].max(axis=1).argmax())
+    angle = float(result.raw.static["station_angle"][place]) * DEG
+    points = [profile.y for profile in measured]
+    limits = worn_limits(result.y, worn[:, place].max(axis=0), *points)
+    profiles = Records(result.y, result.start_height - worn[:, place], result.record_passes)
+    return Panel(
+        f"Deepest groove, at {angle:.4g} deg",
+        Axis(Y, "mm", limits=limits),
+        HEIGHT,
+        [profiles, *measured_marks(measured)],
+        f"Height across the track; it is {shown(float(worn[-1, place].max()), 'um')} deep.",
+    )
+
+
+def _roller(result: Result) -> Panel:
+    profiles = np.asarray(result.raw.records["roller_depth_profile"])[:, 0, 0]
+    marks: list[Mark] = [Records(result.y, -profiles, result.record_passes)]
+    text = f"The roller is {shown(float(profiles[-1].max()), 'um')} deep at the end."
+    if not profiles.any():
+        marks.append(Line([], [], colour=ORANGE, label="the roller does not wear"))
+        text = "The roller does not wear."
+    x = Axis(Y, "mm", limits=worn_limits(result.y, profiles.max(axis=0)))
+    return Panel("Worn profile of the roller", x, HEIGHT, marks, text, legend="lower center")

@@ -1,0 +1,165 @@
+"""View of a cam before wear: numbers of the turn, and motion, loads and contact at stations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wearsim.report.measured import Measured
+from wearsim.report.panels import Sheet
+from wearsim.report.text import NOTHING, in_unit, shown
+from wearsim.report.view import Frame, Row, Rows, Table, View
+from wearsim.studies.cam.checks import harmonic_depth
+from wearsim.studies.cam.panels import cam_sheet
+from wearsim.studies.cam.study import CamStudy
+from wearsim.types import FloatArray
+
+
+class CamView(View):
+    """Greatest pressure angle, loads, jump speed and skids of a cam.
+
+    Panels: shape, motion, pressure angle, loads, speeds. The table of pandas has the stations.
+    """
+
+    question = "Which motion, loads and contact does the cam have along its angle?"
+
+    def __init__(self, study: CamStudy) -> None:
+        self.study, self.title = study, study.turn.scenario.title
+        self.notes, self.warnings = study.notes, study.warnings
+
+    def rows(self) -> Rows:
+        """Return the numbers of the turn."""
+        study, turn = self.study, self.study.turn
+        angle, theta = study.max_pressure_angle
+        least, greatest = turn.normal_range
+        depth = shown(harmonic_depth(turn), "um", 2)
+        p, q = study.winding_ratio
+        sweeps = "" if study.sweeps is None else f", {study.sweeps:.4g} sweeps around the roller"
+        rows = [
+            Row("perimeter", shown(study.perimeter, "mm", 6)),
+            Row("integral of N ds", shown(study.load_integral, "N m", 6)),
+            Row("normal force", f"{shown(least, 'N')} to {shown(greatest, 'N')}"),
+            Row("greatest pressure angle", f"{shown(angle, 'deg')} at {turn.place(theta)}"),
+            Row("least radius of curvature", shown(study.min_radius_of_curvature, "mm")),
+            Row("speed at which the follower jumps", shown(study.jump_speed, "rpm")),
+            Row(f"harmonic limit at {depth} of wear", shown(study.harmonic_limit, "1", 3)),
+            Row("winding number", f"{study.winding_number:.6g}, nearest ratio {p}/{q}{sweeps}"),
+        ]
+        if turn.free:
+            arcs = f"{len(study.skids)} arc{'s' * (len(study.skids) > 1)}"
+            energy = sum(skid.energy for skid in study.skids)
+            text = f"{arcs}, {shown(energy, 'J', 3)} per turn" if energy else NOTHING
+            rows.append(Row("skids of the roller", text))
+        if study.weight is not None:
+            rows.append(Row("stations", f"{len(study.weight)} of a run"))
+        return rows
+
+    def tables(self) -> list[Table]:
+        """Return motion, loads and contact at the stations, in engineering units."""
+        study, point, turn = self.study, self.study.point, self.study.turn
+        found, lift = point.kinematics, "deg" if turn.cam.follower.swings else "mm"
+        columns = [
+            ("angle [deg]", point.angle, "deg"),
+            (f"lift [{lift}]", found.lift, lift),
+            ("pressure angle [deg]", found.pressure_angle, "deg"),
+            ("V [m/s]", turn.speed * found.travel, "m/s"),
+            ("roller/cam", found.spin, "1"),
+            ("N [N]", point.normal_force, "N"),
+            ("p0 [MPa]", study.peak_pressure, "MPa"),
+            ("creepage", study.contacts.longitudinal_creepage, "1"),
+            ("power [W]", study.contacts.power, "W"),
+        ]
+        if study.film is not None:
+            columns.append(("film [um]", study.film, "um"))
+        cells = [
+            [in_unit(value, unit) for value in _without_rounding(values)]
+            for _, values, unit in columns
+        ]
+        names = [turn.cam.motion.segments[number].name for number in self._segments()]
+        heads = [*(head for head, *_ in columns), "segment"]
+        return [Table("", [list(row) for row in zip(*cells, names, strict=True)], heads)]
+
+    def _segments(self) -> list[int]:
+        """Return the number of the segment of each station."""
+        study, turn = self.study, self.study.turn
+        if study.weight is None:
+            return [int(k) for k in turn.cam.motion.segment_at(study.point.angle)]
+        return [turn.stations.panels[k].segment for k in turn.stations.panel.tolist()]
+
+    def _columns(self) -> dict[str, tuple[str, Any]]:
+        """Return the values at the stations by their keys: unit and numbers in SI."""
+        study, point, turn = self.study, self.study.point, self.study.turn
+        found, unit = point.kinematics, self.study.turn.cam.lift_unit
+        columns: dict[str, tuple[str, Any]] = {
+            "angle_rad": ("rad", point.angle),
+            f"lift_{unit}": (unit, found.lift),
+            f"lift_per_rad_{unit}": (unit, found.lift_per_rad),
+            f"lift_per_rad2_{unit}": (unit, found.lift_per_rad2),
+            "pressure_angle_rad": ("rad", found.pressure_angle),
+            "curvature_per_m": ("1/m", found.curvature),
+            "rolling_speed_m_per_s": ("m/s", turn.speed * found.travel),
+            "roller_speed_ratio": ("1", found.spin),
+            "normal_force_N": ("N", point.normal_force),
+            "peak_pressure_Pa": ("Pa", study.peak_pressure),
+            "drive_torque_N_m": ("N m", point.drive_torque),
+            "patch_length_m": ("m", study.patch_length),
+            "patch_width_m": ("m", study.patch_width),
+            "longitudinal_creepage": ("1", study.contacts.longitudinal_creepage),
+            "power_W": ("W", study.contacts.power),
+        }
+        if study.weight is not None:
+            columns["weight_rad"] = ("rad", study.weight)
+        lubricant = turn.scenario.lubricant
+        if lubricant is not None and study.film is not None:
+            columns["film_thickness_m"] = ("m", study.film)
+            if lubricant.roughness is not None:
+                columns["film_ratio"] = ("1", study.film / lubricant.roughness)
+        if turn.cam.groove:
+            columns["inner_flank"] = ("1", point.inner)
+        return columns
+
+    def data(self) -> dict[str, Any]:
+        """Return the study in SI units."""
+        study, motion = self.study, self.study.turn.cam.motion
+        return {
+            "title": self.title,
+            "perimeter_m": study.perimeter,
+            "load_integral_N_m": study.load_integral,
+            "max_pressure_angle_rad": study.max_pressure_angle[0],
+            "max_pressure_angle_at_rad": study.max_pressure_angle[1],
+            "min_radius_of_curvature_m": study.min_radius_of_curvature,
+            "harmonic_limit": study.harmonic_limit,
+            "harmonic_limit_depth_m": harmonic_depth(study.turn),
+            "jump_speed_rad_per_s": study.jump_speed,
+            "winding_number": study.winding_number,
+            "winding_ratio": study.winding_ratio,
+            "sweeps": study.sweeps,
+            "segments": [
+                {"name": part.name, "start_rad": float(start), "angle_rad": part.angle}
+                for part, start in zip(motion.segments, motion.starts, strict=False)
+            ],
+            "skids": [
+                {"start_rad": skid.start, "stop_rad": skid.stop, "energy_J": skid.energy}
+                for skid in study.skids
+            ],
+            "stations": {name: values for name, (_, values) in self._columns().items()},
+            "warnings": study.warnings,
+            "notes": study.notes,
+        }
+
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return the panels; there is no profile to measure."""
+        return cam_sheet(self.study)
+
+    def frame(self) -> Frame:
+        """Return the stations, one row each."""
+        columns = [(name, unit, values) for name, (unit, values) in self._columns().items()]
+        return Frame(columns, "station", range(len(self.study.point.angle)))
+
+
+def _without_rounding(values: FloatArray) -> list[float]:
+    """Return values, with 0 for those that are zero to the rounding of the greatest."""
+    size = np.abs(values)
+    return [float(value) for value in np.where(size > 1e-11 * size.max(), values, 0.0)]

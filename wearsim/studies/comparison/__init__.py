@@ -1,0 +1,1 @@
+"""Comparison of runs and ensembles at the ends of their tests."""

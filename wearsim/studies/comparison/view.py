@@ -1,0 +1,186 @@
+"""View of a comparison of runs and ensembles: differences, estimates, and profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from wearsim.errors import ResultsFileError
+from wearsim.report.measured import Measured
+from wearsim.report.panels import Sheet
+from wearsim.report.text import NOTHING, OBSERVABLES, cells, count, si_key, si_unit, with_interval
+from wearsim.report.view import STUDY, Frame, Row, Rows, Table, View
+from wearsim.studies.comparison.compare import (
+    Comparable,
+    Compared,
+    Comparison,
+    compare,
+    observables_of,
+)
+from wearsim.studies.comparison.panels import comparison_sheet
+from wearsim.studies.comparison.rows import against, kind, length
+from wearsim.studies.ensemble.view import INTERVAL
+
+_ENDS = ("value", "low", "high")
+
+
+class ComparisonView(View):
+    """Difference of each run or ensemble from the first, and their estimates with intervals.
+
+    Panels: distributions or courses, ranges with intervals, worn profiles.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    key : str
+        Scenario key in which the results differ, of a sweep.
+    """
+
+    basis = (
+        "Intervals of ensembles are those of their means; those of runs contain the error of the"
+        " steps only."
+    )
+
+    def __init__(self, comparison: Comparison, key: str = "") -> None:
+        self.comparison, self.results, self.key = comparison, comparison.results, key
+        labels = [row.label for row in comparison.rows]
+        words = OBSERVABLES[comparison.observable].words
+        self.title = f"{', '.join(labels[:-1])} and {labels[-1]}"
+        self.question = f"How do the {words}s at the end of these tests differ?"
+        self.files = [str(result.path) for result in self.results]
+        self.warnings = _warnings(comparison)
+
+    def rows(self) -> Rows:
+        """Return the comparisons with the first, and the value of each."""
+        rows, unit = self.comparison.rows, OBSERVABLES[self.comparison.observable].unit
+        differences = [Row(*pair) for row in rows[1:] for pair in against(self.comparison, row)]
+        values = [Row(row.label, f"{with_interval(row.value, unit)}, {kind(row)}") for row in rows]
+        return [*differences, *values]
+
+    def tables(self) -> list[Table]:
+        """Return what is compared, and the estimates with their intervals."""
+        found, named = self.comparison, OBSERVABLES[self.comparison.observable]
+        what = f"{named.words} at the end" + (f", for values of {self.key}" if self.key else "")
+        described = [
+            Row(row.label, f"{kind(row)}; {length(row)}; {file}")
+            for row, file in zip(found.rows, self.files, strict=True)
+        ]
+        estimated = next((row.quantiles for row in found.rows if row.quantiles), ())
+        quantiles = (f"{100 * probability:g} %" for probability, _ in estimated)
+        heads = ["[" + named.unit + "]", "mean", "std", *quantiles]
+        lines = [line for row in found.rows for line in _lines(row, named.unit, len(heads))]
+        return [Table(STUDY, [Row("compared", what), *described]), Table("", lines, heads)]
+
+    def data(self) -> dict[str, Any]:
+        """Return the comparison in SI units; all results are compared with the first."""
+        found = self.comparison
+        return {
+            "observable": si_key(found.observable),
+            "same_length": found.equally_long,
+            "compared": [
+                _data(row, file) for row, file in zip(found.rows, self.files, strict=True)
+            ],
+            "title": self.key or None,
+        }
+
+    def frame(self) -> Frame:
+        """Return the compared results, one row each."""
+        rows, unit = self.comparison.rows, si_unit(self.comparison.observable)
+        ends = [(end, unit, np.array([getattr(row.value, end) for row in rows])) for end in _ENDS]
+        labels = ("label", "", np.array([row.label for row in rows]))
+        return Frame([labels, *ends], "result", range(1, len(rows) + 1))
+
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return the panels, with the worn profiles for a page."""
+        titles = {result.title for result in self.results}
+        shared = titles.pop() if len(titles) == 1 else ""
+        suffix = f"for values of {self.key}" if self.key else ""
+        heading = ", ".join(text for text in (shared, suffix) if text)
+        labels = (row.label for row in self.comparison.rows)
+        profiles = {
+            label: result.worn_profile()
+            for label, result in zip(labels, self.results, strict=False)
+        }
+        return comparison_sheet(self.comparison, heading, profiles)
+
+
+def comparison_view(
+    results: Sequence[Comparable], labels: Sequence[str], observable: str | None, key: str = ""
+) -> ComparisonView:
+    """Return the view of runs and ensembles that are compared, by their depths by default.
+
+    Raises
+    ------
+    ResultsFileError
+        If an ensemble has no completed realisation.
+    ResultsFileError
+        Also if one lacks the observable; the message has the known ones.
+    """
+    name = observable or "depth"
+    for label, result in zip(labels, results, strict=True):
+        if getattr(result, "count", 1) == 0:
+            raise ResultsFileError(
+                f"{result.path}: has no completed realisation; nothing to compare"
+            )
+        known = observables_of(result)
+        if name not in known:
+            raise ResultsFileError(f"{label} has no '{name}', expected one of {', '.join(known)}")
+    return ComparisonView(compare(results, labels, name), key)
+
+
+def _warnings(found: Comparison) -> list[str]:
+    """Return warnings of unequal lengths of the tests and of failed realisations."""
+    texts = []
+    if not found.equally_long:
+        ends = "; ".join(f"{row.label}: {length(row)}" for row in found.rows)
+        texts.append(f"the tests differ in length ({ends}), which contributes to the differences")
+    texts += [
+        f"{count(row.failed)} of the {count(row.done + row.failed)} realisations of {row.label}"
+        " failed; estimates from the others may be biased"
+        for row in found.rows
+        if row.failed
+    ]
+    return texts
+
+
+def _lines(row: Compared, unit: str, columns: int) -> list[list[str]]:
+    """Return the estimates of a run or an ensemble, and below them their intervals."""
+    items = [row.value]
+    if row.count > 1:
+        items += [row.std] if row.std is not None else []
+        items += [interval for _, interval in row.quantiles]
+    values, intervals = zip(*(cells(item, unit) for item in items), strict=True)
+    lines = [[row.label, *values, *[NOTHING] * (columns - 1 - len(items))]]
+    if any(intervals):
+        name = "  error estimate" if row.kind == "run" else INTERVAL
+        lines.append([name, *intervals, *[""] * (columns - 1 - len(items))])
+    return lines
+
+
+def _data(row: Compared, file: str) -> dict[str, Any]:
+    """Return one of the compared results in SI units."""
+    paired = row.paired and {
+        "share_with_more": asdict(row.paired.share),
+        "mean_difference": asdict(row.paired.difference),
+    }
+    return {
+        "label": row.label,
+        "file": file,
+        "kind": row.kind,
+        "realisations": row.count,
+        "done": row.done,
+        "failed": row.failed,
+        "requested": row.requested,
+        "finished": row.finished,
+        "passes": row.passes,
+        "time_s": row.time,
+        "value": asdict(row.value),
+        "std": asdict(row.std) if row.std is not None else None,
+        "quantiles": [{"probability": p, **asdict(found)} for p, found in row.quantiles],
+        "probability_of_more_than_first": asdict(row.deeper) if row.deeper else None,
+        "paired_with_first": paired,
+        "difference_from_first": asdict(row.difference) if row.difference else None,
+    }

@@ -1,0 +1,167 @@
+"""View of one contact: forces, patch and power, fields, strips, and a reference model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wearsim.report.measured import Measured
+from wearsim.report.panels import Sheet
+from wearsim.report.text import NOTHING, brief, footer, lapse, percent, shown
+from wearsim.report.view import Frame, Row, Rows, Table, View
+from wearsim.studies.contact.outline import patch_edges
+from wearsim.studies.contact.panels import contact_sheet
+from wearsim.studies.contact.single import ContactStudy
+
+_DIGITS = 10  # after the point, of a fraction; beyond them is rounding
+_DIFFERENCES = {
+    "dissipation": "P_l(y), L2 over the strips",
+    "greatest": "P_l(y), greatest over its maximum",
+    "power": "dissipated power",
+    "peak_pressure": "peak pressure",
+    "half_length": "greatest half-length",
+    "adhesion_fraction": "adhesion fraction, in points",
+}
+
+
+class ContactView(View):
+    """Patch, peak pressure, forces and dissipated power of one contact.
+
+    Panels: line load and dissipated power per length; with fields also pressure, traction, adhesion
+    and power density. The table of pandas has the strips.
+    """
+
+    question = "Which load and which power does one contact have along the track?"
+
+    def __init__(self, study: ContactStudy) -> None:
+        self.study, self.title = study, study.title
+        self.notes, self.warnings = study.notes, study.warnings
+        self.start: dict[str, str] = {}  # description of a measured profile
+        self.edges = patch_edges(study.solution.y, study.solution.half_length)
+
+    def rows(self) -> Rows:
+        """Return the numbers of the contact."""
+        study, point, solution = self.study, self.study.point, self.study.solution
+        rounding = 1e-12 * point.normal_force * study.grid.spacing * study.grid.strips
+        moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
+        spin = f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"
+        width = shown(self.edges[1] - self.edges[0], "mm") if self.edges else NOTHING
+        return [
+            *(Row(*pair) for pair in self.start.items()),
+            Row("contact model", study.described_model),
+            Row("strips", f"{study.grid.strips} of {shown(study.grid.spacing, 'um')}"),
+            Row("normal force", point.normal_force, "N"),
+            Row("rolling speed", point.rolling_speed, "m/s"),
+            Row("friction coefficient", float(np.mean(point.friction))),
+            Row("longitudinal creepage", solution.longitudinal_creepage),
+            Row("lateral creepage", point.creepage.lateral),
+            Row("spin", spin),
+            Row("patch length 2a", 2.0 * float(solution.half_length.max()), "mm"),
+            Row("patch width", width),
+            Row("peak pressure", solution.peak_pressure, "MPa"),
+            Row("approach", solution.approach, "um"),
+            Row("longitudinal force", solution.force_x, "N"),
+            Row("lateral force", solution.force_y, "N"),
+            Row("spin moment", moment, "N mm"),
+            Row("dissipated power", solution.power, "W"),
+            Row("adhesion fraction", round(solution.adhesion_fraction, _DIGITS), "%"),
+        ]
+
+    def tables(self) -> list[Table]:
+        """Return the differences from a reference, each with the reference's own error."""
+        reference, errors = self.study.reference, self.study.errors
+        if reference is None or errors is None:
+            return []
+        own, rows = vars(reference.own), []
+        for name, error in vars(errors).items():
+            sign = "" if name in {"dissipation", "greatest"} else "+" if error >= 0.0 else "-"
+            text = f"{sign}{shown(abs(round(error, _DIGITS)), '%', 2)}"
+            theirs = shown(round(own[name], _DIGITS), "%", 2)
+            rows.append(Row(_DIFFERENCES[name], f"{text}, its own error {theirs}"))
+        rows.append(Row("time of the reference", lapse(reference.seconds)))
+        return [Table(f"difference from '{reference.model}'", rows)]
+
+    def data(self) -> dict[str, Any]:
+        """Return the contact and its strips in SI units."""
+        study, point, solution = self.study, self.study.point, self.study.solution
+        return {
+            "title": self.title,
+            "model": study.model,
+            "described_model": study.described_model,
+            "normal_force_N": point.normal_force,
+            "rolling_speed_m_per_s": point.rolling_speed,
+            "friction": point.friction,
+            "longitudinal_creepage": solution.longitudinal_creepage,
+            "lateral_creepage": point.creepage.lateral,
+            "spin_per_m": point.creepage.spin,
+            "patch_length_m": 2.0 * float(solution.half_length.max()),
+            "patch_width_m": self.edges[1] - self.edges[0] if self.edges else 0.0,
+            "peak_pressure_Pa": solution.peak_pressure,
+            "approach_m": solution.approach,
+            "force_x_N": solution.force_x,
+            "force_y_N": solution.force_y,
+            "spin_moment_N_m": solution.spin_moment,
+            "power_W": solution.power,
+            "adhesion_fraction": solution.adhesion_fraction,
+            "iterations": solution.iterations,
+            "power_error_W": _times(study.grid_error, solution.power),
+            "peak_pressure_error_Pa": _times(study.pressure_error, solution.peak_pressure),
+            "solve_seconds": study.seconds,
+            "strips": {
+                "y_m": solution.y,
+                "half_length_m": solution.half_length,
+                "line_load_N_per_m": solution.line_load,
+                "dissipation_W_per_m": solution.dissipation,
+            },
+            "against": self._reference(),
+            "notes": self.notes,
+            "warnings": self.warnings,
+        }
+
+    def _reference(self) -> dict[str, Any] | None:
+        """Return the reference in SI units, the differences from it and its own errors."""
+        reference, errors = self.study.reference, self.study.errors
+        if reference is None or errors is None:
+            return None
+        return {
+            "model": reference.model,
+            "errors": vars(errors),
+            "own_errors": vars(reference.own),
+            "power_W": reference.power,
+            "peak_pressure_Pa": reference.peak_pressure,
+            "half_length_m": reference.half_length,
+            "adhesion_fraction": reference.adhesion_fraction,
+            "seconds": reference.seconds,
+            "strips": {
+                "y_m": reference.y,
+                "line_load_N_per_m": reference.line_load,
+                "dissipation_W_per_m": reference.dissipation,
+            },
+        }
+
+    def line(self) -> str:
+        """Return the footer of the contact, with the error estimated from a grid half as fine."""
+        study, error = self.study, ""
+        if study.grid_error is not None:
+            within = percent(study.grid_error)
+            error = f"dissipated power within {within} (estimated numerical error of the grid)"
+        time = NOTHING if study.seconds is None else brief(study.seconds)
+        return footer([study.described_model, f"{study.grid.strips} strips"], error, time)
+
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return the panels; there is no profile to measure."""
+        return contact_sheet(self.study)
+
+    def frame(self) -> Frame:
+        """Return the strips, one row each."""
+        solution = self.study.solution
+        units = {"y": "m", "half_length": "m", "line_load": "N/m", "dissipation": "W/m"}
+        columns = [(name, unit, getattr(solution, name)) for name, unit in units.items()]
+        return Frame(columns, "strip", range(len(solution.y)))
+
+
+def _times(error: float | None, value: float) -> float | None:
+    """Return an error from a relative one, if there is any."""
+    return None if error is None else error * value

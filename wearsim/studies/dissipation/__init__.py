@@ -1,0 +1,1 @@
+"""Realisations of one contact: the study, its file, its result and its view."""

@@ -1,0 +1,387 @@
+"""Panels of an ensemble: course, density, convergence, profile, lift error and Sobol indices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.report.measured import Measured, measured_marks
+from wearsim.report.panels import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    HEADROOM,
+    ORANGE,
+    Axis,
+    Band,
+    Bars,
+    Line,
+    Mark,
+    Panel,
+    Sheet,
+    Span,
+    Whiskers,
+    convergence,
+    depth_axes,
+    evenly_spaced,
+    histogram,
+    look,
+    message,
+    worn_limits,
+)
+from wearsim.report.text import (
+    NINETY_PERCENT,
+    OBSERVABLES,
+    TOO_FEW_REALISATIONS,
+    count,
+    in_unit,
+    number_of_realisations,
+    shown,
+    statistic_in_words,
+    sufficient_for,
+)
+from wearsim.studies.cam.panels import ANGLE, segment_marks
+from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.ensemble.file.data import Effect
+from wearsim.studies.ensemble.file.schema import PENDING
+from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.studies.run.panels import HEIGHT, Y
+from wearsim.types import FloatArray, IntArray
+from wearsim.units import engineers_unit
+from wearsim.uq.estimation.estimates import Target
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+
+LINES = 12  # realisations drawn as lines
+MOST_POINTS = 2000
+_MOST_EFFECTS = 14
+_DEFAULT = "depth.mean 1%"
+
+
+def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) -> Sheet:
+    """Return the panels of an ensemble, finished or not.
+
+    Measured profiles are drawn over the worn profile.
+    """
+    title = f"{result.title}\n{_caption(result)}"
+    if result.count == 0:
+        nothing = message("", "no realisation is completed: nothing to draw")
+        return Sheet(title, {"nothing": nothing}, [["nothing"]], (13.0, 7.5))
+    panels = {
+        "density": _density(result),
+        "course": _course(result),
+        "convergence": _convergence(result),
+        "profile": _profile(result, measured),
+    }
+    lower = ["profile"]
+    if result.raw.cam and len(result.profiles):
+        panels["lift"] = _lift_error(result)
+        lower.append("lift")
+    panels["effects"] = _effects(result)
+    panels |= draws_panels(result, "depth", result.at_end("depth"), Axis("depth at the end", "um"))
+    lower.append("effects")
+    rows = [["course", "density", "convergence"], lower]
+    return Sheet(title, panels, rows, (13.0, 7.5), main="course")
+
+
+def _caption(result: EnsembleResult) -> str:
+    requested, unfinished = f" of {count(result.requested)}", ", unfinished"
+    if result.finished:
+        requested = unfinished = ""
+    text = (
+        f"{number_of_realisations(result.count)}{requested}"
+        f"{f' ({count(result.failed)} failed)' if result.failed else ''}, {result.raw.plan},"
+        f" of {count(result.raw.total_passes)} roller passes"
+        f" ({result.described_model}, {result.raw.stepper}{unfinished})"
+    )
+    if result.count == 0:
+        return text
+    depth, found = result.estimate("depth", -1, NINETY_PERCENT), result.worn_profile()
+    if result.count == 1:
+        return f"{text}\ndepth {shown(depth.mean.value, 'um')}"
+    text += f"\nmean depth {shown(depth.mean.value, 'um')}"
+    if found.start.any():
+        lowest = shown(-float(found.height.min()), "um")
+        text += f" worn since the start, mean profile {lowest} below nominal"
+    if result.is_constant("depth"):
+        return f"{text}, equal in all realisations"
+    text += f", std {shown(depth.std.value, 'um', 3)}"
+    ends = [end for _, end in depth.quantiles]
+    if not all(np.isfinite(end.half_width) for end in ends):
+        return text
+    return f"{text}, 90 % range {' to '.join(in_unit(end.value, 'um', 3) for end in ends)} um"
+
+
+def _course(result: EnsembleResult) -> Panel:
+    """Return depth against roller passes: median, mean, 90 % range and some realisations."""
+    course = result.course("depth")
+    drawn, x, y = depth_axes(course.passes, course.quantiles[0.5])
+    passes, numbers = course.passes[drawn], result.numbers[:LINES]
+    first = int(numbers[0])
+    rows = result.raw.rows("depth", first, int(numbers[-1]) + 1)[numbers - first][:, drawn]
+    marks: list[Mark] = [_some(passes, rows)]
+    low, median, high = (course.quantiles[p][drawn] for p in (0.05, 0.5, 0.95))
+    if result.count > 1:
+        if sufficient_for(result.count, NINETY_PERCENT[0]):
+            marks.append(Band(passes, low, high, label="5 % to 95 %"))
+        marks.append(Line(passes, median, label="median"))
+        mean = course.mean[drawn]
+        marks.append(Line(passes, mean, dash="--", width=1.0, colour=BLACK, label="mean"))
+    text = f"The median of the depth is {shown(float(median[-1]), 'um')} at the end."
+    return Panel("Depth against roller passes", x, y, marks, text, legend="upper left")
+
+
+def _some(x: FloatArray, rows: FloatArray) -> Line:
+    """Return some realisations as thin lines."""
+    label = number_of_realisations(len(rows))
+    return Line(x, rows, width=0.6, alpha=0.6, colour=GREY, label=label)
+
+
+def _density(result: EnsembleResult) -> Panel:
+    title, depth = "Depth at the end", result.at_end("depth")
+    if result.count == 1 or result.is_constant("depth"):
+        where = "the only realisation" if result.count == 1 else f"all {count(result.count)}"
+        return message(title, f"{shown(float(depth.mean()), 'um')} in {where}: no density to draw")
+    found = result.estimate("depth", -1, (0.05, 0.5, 0.95))
+    low, median, high = (found.quantile(p).value for p in (0.05, 0.5, 0.95))
+    lines: list[tuple[float, str, str, str]] = [
+        (found.mean.value, BLACK, "--", f"mean {shown(found.mean.value, 'um')}"),
+        (median, BLUE, "-", f"median {shown(median, 'um')}"),
+    ]
+    if sufficient_for(result.count, NINETY_PERCENT[0]):
+        lines += [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", "")]
+    reach = 1.0 / (1.0 + HEADROOM)
+    marks = [
+        Span(place, colour=colour, dash=dash, label=label, width=1.1, reach=reach)
+        for place, colour, dash, label in lines
+    ]
+    ends = f"from {shown(float(depth.min()), 'um')} to {shown(float(depth.max()), 'um')}"
+    return Panel(
+        title,
+        Axis("depth", "um"),
+        Axis("probability density", "1/um", 1e-6, margin=(0.0, HEADROOM), limits=(0.0, None)),
+        [histogram(depth)[0], *marks],
+        f"Depths of {count(len(depth))} tests, {ends}.",
+        legend="upper right",
+        columns=2,
+    )
+
+
+def convergence_of(
+    result: EnsembleResult, target: Target, points: int = 40
+) -> tuple[IntArray, list[Interval]]:
+    """Return the estimates from the first realisations of an ensemble, for rising numbers of them.
+
+    Parameters
+    ----------
+    result : EnsembleResult
+        With at least one completed realisation.
+    target : Target
+        Quantity to estimate.
+    points : int
+        Approximate number of sample sizes, evenly spaced in their logarithm.
+
+    Returns
+    -------
+    counts : ndarray of int
+        Numbers of completed realisations.
+    intervals : list of Interval
+    """
+    spaced = np.geomspace(1, result.count, min(points, result.count))
+    counts = np.unique(spaced.round().astype(np.int64))
+    raw, name = result.raw, target.observable
+    # kept in memory, since a file's arrays are read again at every access
+    held = {name: raw.column(name, -1)[:, None]}
+    held |= {"control": raw.variables["control"]} if raw.control else {}
+    numbers, intervals = np.arange(raw.requested), []
+    for last in result.numbers[counts - 1]:
+        status = np.where(numbers <= last, raw.status, PENDING)
+        part = replace(result, raw=replace(raw, variables=held, status=status))
+        intervals.append(target.interval(part.estimate_for(target)))
+    return counts, intervals
+
+
+def _convergence(result: EnsembleResult) -> Panel:
+    """Return the convergence of the estimate of the target, by default of the mean depth."""
+    target = Target.parse(result.until or _DEFAULT)
+    named = OBSERVABLES[target.observable]
+    counts, found = convergence_of(result, target)
+    value, low, high = (
+        np.array([getattr(item, end) for item in found]) for end in ("value", "low", "high")
+    )
+    marks = []
+    if result.until:
+        style = look(across="y", dash="--", colour=GREEN)
+        label = f"target: ±{100 * target.width:g} %"
+        marks = [
+            Span(value[-1] * (1.0 - target.width), **style),
+            Span(value[-1] * (1.0 + target.width), **style, label=label),
+        ]
+    title = f"{statistic_in_words(target).capitalize()}, with 95 % interval"
+    return convergence(title, named.words, named.unit, counts, value, low, high, marks)
+
+
+def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
+    """Return the mean worn profile with its 95 % range, and measured profiles over it."""
+    found = result.worn_profile()
+    marks: list[Mark] = []
+    if found.label:
+        marks.append(Band(found.y, found.low, found.high, label=found.label))
+    marks.append(Line(found.y, found.height, colour=BLACK, label="mean"))
+    if found.start.any():
+        start = look(dash="--", width=1.0, colour=GREY, label="start of the tests")
+        marks.append(Line(found.y, found.start, **start))
+    limits = worn_limits(found.y, found.start - found.low, *(one.y for one in measured))
+    title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
+    title += "" if found.kept == result.count else f", of the first {count(found.kept)}"
+    deepest = shown(float((found.start - found.height).max()), "um")
+    return Panel(
+        title,
+        Axis(Y, "mm", limits=limits),
+        HEIGHT,
+        [*marks, *measured_marks(measured)],
+        f"Mean of {count(found.kept)} profiles, {deepest} deep, and the band of the tests.",
+        legend="lower right",
+    )
+
+
+def _lift_error(result: EnsembleResult) -> Panel:
+    """Return the lift error at the end over the angle, relative to its mean over a turn."""
+    curves = result.kept_values("lift_error_curve")
+    # the last angle is the first one
+    curves = curves - curves[:, :-1].mean(axis=1, keepdims=True)
+    angle = np.asarray(result.raw.variables["angle"])
+    marks: list[Mark] = [_some(angle, curves[:LINES])]
+    if len(curves) > 1:
+        if sufficient_for(len(curves), NINETY_PERCENT[0]):
+            low, high = np.quantile(curves, NINETY_PERCENT, axis=0)
+            marks.append(Band(angle, low, high, label="5 % to 95 %"))
+        marks.append(Line(angle, curves.mean(axis=0), colour=BLACK, label="mean"))
+    mean = shown(result.estimate("lift_error", -1, ()).mean.value, "um")
+    return Panel(
+        "Lift error at the end",
+        ANGLE,
+        Axis("difference from its mean", "um"),
+        [*marks, *segment_marks(CamTurn(result.scenario).cam.motion, names=False)],
+        f"Change of the lift by wear. Peak to peak it is {mean} in the mean of"
+        f" {count(result.count)} tests.",
+    )
+
+
+def _effects(result: EnsembleResult) -> Panel:
+    """Return first-order Sobol indices of the depth, and total indices if available."""
+    title = "Sobol indices of the depth at the end"
+    if result.count == 1 or not (effects := known_effects(result, "depth")):
+        return message(title, too_few(result))
+    if result.is_constant("depth"):
+        return message(title, "none, the depth is equal in all realisations")
+    return effects_panel(title, "the depth", effects)
+
+
+def known_effects(result: EnsembleResult, name: str) -> list[Effect]:
+    """Return the effects of the inputs on an observable, none if no index is known."""
+    effects = result.sensitivity(name)
+    return effects if any(np.isfinite(item.first.value) for item in effects) else []
+
+
+def effects_panel(title: str, of: str, effects: list[Effect]) -> Panel:
+    """Return Sobol indices as bars with their intervals."""
+    effects, largest = effects[:_MOST_EFFECTS], effects[0]
+    places = np.arange(float(len(effects)))
+    first, total = [item.first for item in effects], [item.total or UNKNOWN for item in effects]
+    colours = [GREY if item.without_effect else BLUE for item in effects]
+    widths = [np.nan_to_num(index.value) for index in first]
+    bars = Bars(places - 0.3, places + 0.3, widths, horizontal=True, colour=colours, alpha=0.55)
+    marks: list[Mark] = [bars, _intervals(places, first, BLACK)]
+    if any(item.total for item in effects):
+        below = places + 0.38
+        marks.append(_intervals(below, total, ORANGE))
+        style = look(dash="", marker="D", colour=ORANGE, label="total, with interactions")
+        marks.append(Line([index.value for index in total], below, **style))
+    share = f"{100.0 * largest.first.value:.0f} % of the variance"
+    return Panel(
+        title,
+        Axis("first-order index: part of the variance", "%", limits=(0.0, 1.0)),
+        Axis(
+            ticks=places.tolist(),
+            names=[_label(item) for item in effects],
+            limits=(len(effects) - 0.4, -0.6),
+        ),
+        marks,
+        f"{largest.name} explains {share} of {of}.",
+        legend="lower right",
+    )
+
+
+def _label(item: Effect) -> str:
+    if not np.isfinite(item.first.value):
+        return f"{item.name} ({TOO_FEW_REALISATIONS})"
+    return f"{item.name} (not significant)" if item.without_effect else item.name
+
+
+def _intervals(places: FloatArray, found: list[Interval], colour: str) -> Whiskers:
+    known = [np.isfinite(index.value) for index in found]
+    low, high = (
+        np.where(known, np.clip([getattr(index, end) for index in found], 0.0, 1.0), np.nan)
+        for end in ("low", "high")
+    )
+    return Whiskers(places, low, high, horizontal=True, colour=colour)
+
+
+def draws_panels(
+    result: EnsembleResult, name: str, values: FloatArray, axis: Axis
+) -> dict[str, Panel]:
+    """Return the values of an observable against the input with the largest effect, for a page.
+
+    Parameters
+    ----------
+    result : EnsembleResult
+    name : str
+        The observable, "depth" or "life".
+    values : ndarray, shape (count,)
+        Its values.
+    axis : Axis
+        Axis of the values.
+    """
+    effects = [] if result.count < 2 else known_effects(result, name)
+    if not effects:
+        return {}
+    item = next(item for item in result.raw.inputs if item["input"] == effects[0].name)
+    unit, size = engineers_unit(item["unit"])
+    drawn = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1)
+    finite = np.flatnonzero(np.isfinite(values))
+    every = finite[evenly_spaced(len(finite), MOST_POINTS)]
+    style = look(dash="", marker="o", alpha=0.5)
+    points = Line(drawn[every], values[every], **style, more={"realisation": (every, "1")})
+    title = f"{name.capitalize()} against {item['key']}"
+    text = f"One point for each of {count(len(every))} tests."
+    return {"draws": Panel(title, Axis(item["key"], unit, 1.0 / size), axis, [points], text)}
+
+
+def too_few(result: EnsembleResult, names: list[str] | None = None) -> str:
+    """Return a message with the sample size that Sobol indices require.
+
+    Parameters
+    ----------
+    result : EnsembleResult
+    names : list of str, optional
+        Random inputs; all by default.
+    """
+    from wearsim.uq.sensitivity import sobol_indices  # noqa: PLC0415
+
+    groups = [item["name"] for item in result.raw.groups]
+    if result.plan == "saltelli":
+        needed = sobol_indices.FEWEST_BASES * (len(groups) + 2)
+    else:
+        names = groups if names is None else names
+        needed = max(sobol_indices.fewest_realisations(_different(result, n)) for n in names)
+    return f"{TOO_FEW_REALISATIONS}, {count(needed)} are sufficient"
+
+
+def _different(result: EnsembleResult, name: str) -> int:
+    """Return the number of columns of an input; equal ones carry the same information."""
+    keys = [item["key"] for item in result.raw.inputs if item["input"] == name]
+    columns = np.column_stack([result.inputs[key].reshape(result.count, -1) for key in keys])
+    return int(np.unique(columns, axis=1).shape[1])

@@ -1,0 +1,383 @@
+"""View of an ensemble: estimates with intervals, Sobol indices, random inputs, realisations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any, TypeVar
+
+import numpy as np
+
+from wearsim.report.csv_files import computed, drawn
+from wearsim.report.measured import ComputedProfile, Measured
+from wearsim.report.panels import Sheet
+from wearsim.report.text import (
+    NINETY_PERCENT,
+    NOTHING,
+    OBSERVABLES,
+    TOO_FEW_REALISATIONS,
+    cells,
+    count,
+    footer,
+    in_unit,
+    lapse,
+    number_of_realisations,
+    part_with_interval,
+    shown,
+    si_key,
+    simulated,
+    within,
+)
+from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table
+from wearsim.results.study_view import (
+    CONSTANT,
+    StudyView,
+    drawn_data,
+    drawn_rows,
+    progress_text,
+    varying_inputs,
+    varying_rows,
+)
+from wearsim.studies.ensemble.file.data import Band, Effect, EnsembleData
+from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, LIFE, PENDING
+from wearsim.studies.ensemble.panels import ensemble_sheet, too_few
+from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.uq.estimation.estimates import Estimate, Target
+
+QUANTILES = (0.05, 0.5, 0.95)
+INTERVAL = "  95 % interval"
+_HEADS = ("at the end", "mean", "std", "5 %", "median", "95 %")
+_SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")
+_BLOCK = 16384  # realisations in memory at a time
+
+Shown = TypeVar("Shown", bound=EnsembleResult)
+
+
+class RealisationsView(StudyView[Shown]):
+    """What ensembles and lives have in common: failures, realisations, random inputs."""
+
+    @property
+    def failures(self) -> str:  # type: ignore[override]
+        """Number of failed realisations, the first error, and what can be done."""
+        result = self.result
+        if not result.failed:
+            return ""
+        first, text = next(iter(result.errors.items()))
+        return (
+            f"{count(result.failed)} of {count(result.count + result.failed)} realisations"
+            f" failed; the first is number {first}: {text}\n"
+            "the same draws fail again unless the scenario or the software changes; after a lack of"
+            " memory, a killed worker or an updated plugin repeat them with:"
+            f" wearsim resume {result.path} --failed"
+        )
+
+    def random_inputs(self) -> Rows:
+        """Return the draws of the random inputs, and descriptions of those that vary in time."""
+        groups = {item["name"]: item["text"] for item in self.result.raw.groups}
+        varying = varying_inputs(self.result, self.result.inputs)
+        return [*drawn_rows(self.result), *varying_rows(groups | varying)]
+
+    def frame(self) -> Frame:
+        """Return the successful realisations, one row each, at the end of the test."""
+        result = self.result
+        columns = [
+            (
+                name,
+                item.unit,
+                result.at_end(name) if name in result.observables else result.values(name),
+            )
+            for name, item in result.raw.schema.variables.items()
+            if item.dims[0] == "realisation" and name not in {"status", "error"}
+        ]
+        return Frame(columns, "realisation", result.numbers)
+
+    def columns(self) -> Mapping[str, Columns]:
+        """Return realisations, courses, and profile and lift error at the end."""
+        result = self.result
+        tables: dict[str, Columns] = {"realisations.csv": _realisations(result.raw)}
+        if result.count:
+            tables["courses.csv"] = [list(_courses(result))]
+            tables["profile.csv"] = [_band("y", "m", "depth", result.band())]
+        if result.count and result.raw.cam:
+            band = result.band("lift_error_curve")
+            tables["lift_error.csv"] = [_band("angle", "rad", "lift error", band)]
+        if result.failed:
+            numbers, errors = zip(*result.errors.items(), strict=True)
+            failures = [
+                Column("realisation", list(map(str, numbers))),
+                Column("error", list(errors)),
+            ]
+            tables["failures.csv"] = [failures]
+        return tables
+
+
+class EnsembleView(RealisationsView[EnsembleResult]):
+    """Mean depth with its interval, further estimates, and what the scatter is due to.
+
+    Panels: density, course, convergence, profile, Sobol indices, values against the first input; of
+    a cam also the lift error. Files: realisations, courses, profile; the table of pandas has the
+    realisations.
+    """
+
+    verb = "ensemble"
+
+    def __init__(self, result: EnsembleResult) -> None:
+        super().__init__(result)
+        time = simulated(result.raw.total_time)
+        self.question = (
+            f"How deep do {number_of_realisations(result.count)} of a test of"
+            f" {count(result.raw.total_passes)} roller passes ({time}) wear the cylinder?"
+        )
+
+    def rows(self) -> Rows:
+        """Return the estimates with their intervals, the mean depth first."""
+        result = self.result
+        if result.count == 0:
+            return [Row("depth", "no test is completed")]
+        depth = result.estimate("depth", -1, (*NINETY_PERCENT, 0.5))
+        rows = [Row("mean depth", depth.mean, "um")]
+        if result.count > 1 and not result.is_constant("depth"):
+            low, high = (depth.quantile(p) for p in NINETY_PERCENT)
+            tests = f"{in_unit(low.value, 'um', 3)} to {shown(high.value, 'um', 3)}"
+            rows += [
+                Row("90 % of the tests", tests),
+                Row("median", depth.quantile(0.5), "um"),
+                Row("95 % of the tests are below", high, "um"),
+                Row("standard deviation", depth.std, "um"),
+            ]
+        for name in ("width", "worn_volume", "roller_depth", "dissipated_energy", "peak_pressure"):
+            if result.at_end(name).any():
+                words, unit = OBSERVABLES[name]
+                rows.append(Row(f"mean {words}", result.estimate(name, -1, ()).mean, unit))
+        return rows
+
+    def study(self) -> Rows:
+        """Return rows on realisations, design, method, precision and effort."""
+        result, raw = self.result, self.result.raw
+        done = progress_text(result.count, result.failed, result.requested, result.finished)
+        wall, ended = raw.wall_seconds, result.count + result.failed
+        effort = lapse(wall)
+        if wall and ended:
+            effort += f", {shown(ended / wall, '1', 3)} realisations per second"
+        rows = [
+            Row("realisations", done),
+            Row("sampling design", f"{raw.plan}, seed {raw.seed}"),
+            Row(
+                "length of a test",
+                f"{count(raw.total_passes)} passes, {shown(raw.total_time, 'min')}",
+            ),
+            Row("contact model", result.described_model),
+            Row("stepper", f"{raw.stepper}, tolerance {raw.tolerance:g}"),
+        ]
+        if result.count and result.plan != "monte-carlo":
+            rows.append(Row("95 % intervals", result.estimate("depth", -1, ()).method))
+        return [*rows, *self._precision(), Row("wall time", effort)]
+
+    def _precision(self) -> Rows:
+        """Return rows on the target and on the variance removed by a control variate."""
+        result, rows = self.result, list[Row]()
+        if not result.count:
+            return rows
+        if result.until:
+            reached = _target_met(result, Target.parse(result.until))
+            rows.append(Row(f"precision {result.until}", reached))
+        saved = result.estimate("depth", -1, ()).variance_saved
+        if saved is not None:
+            text = f"removes {shown(saved, '%', 3)} of the variance of the mean depth"
+            if saved < 1.0:
+                text += (
+                    f", equivalent to {count(result.count / (1.0 - saved))} realisations without"
+                )
+            rows.append(Row("control variate", text))
+        return rows
+
+    def details(self) -> list[Table]:
+        """Return the estimates of all observables, and the Sobol indices of the depth."""
+        result = self.result
+        if not result.count:
+            return []
+        names = [name for name in result.observables if result.at_end(name).any()]
+        lines = [line for name in names for line in _lines(result, name)]
+        return [Table("", lines, _HEADS), self._effects()]
+
+    def _effects(self) -> Table:
+        """Return the Sobol indices of the depth."""
+        result, head = self.result, "Sobol indices of the depth"
+        constant = result.is_constant("depth")
+        effects = [] if result.count == 1 or constant else result.sensitivity("depth")
+        if not any(math.isfinite(item.first.value) for item in effects):
+            equal = result.count > 1 and constant
+            why = "none, the depth is equal in all realisations" if equal else too_few(result)
+            return Table("", [[f"{head}: {why}"]], [""])
+        totals = any(item.total is not None for item in effects)
+        order = sorted(effects, key=lambda item: item.without_effect)
+        heads = [head, "first order", *(["total"] if totals else [])]
+        return Table("", [_effect(result, item, totals) for item in order], heads)
+
+    def data(self) -> dict[str, Any]:
+        """Return the estimates in SI units."""
+        result, raw = self.result, self.result.raw
+        is_reached = None
+        if result.until:
+            target = Target.parse(result.until)
+            is_reached = bool(result.count) and bool(target.reached(result.estimate_for(target)))
+        return {
+            "title": result.title,
+            "model": raw.model,
+            "stepper": raw.stepper,
+            "plan": raw.plan,
+            "seed": raw.seed,
+            "requested": result.requested,
+            "realisations": result.count,
+            "failed": result.failed,
+            "errors": dict(result.errors.items()),
+            "finished": result.finished,
+            "until": raw.until or None,
+            "until_reached": is_reached,
+            "total_passes": raw.total_passes,
+            "total_time_s": raw.total_time,
+            **{si_key(name): _estimate(result.estimate(name)) for name in result.observables},
+            "sensitivity_of_depth": [
+                {
+                    "input": item.name,
+                    "first_order": asdict(item.first),
+                    "total": asdict(item.total) if item.total else None,
+                    "without_effect": bool(item.without_effect),
+                }
+                for item in (result.sensitivity("depth") if result.count else [])
+            ],
+            "inputs": drawn_data(result),
+            "random": varying_inputs(result, result.inputs),
+            "record_passes": result.record_passes,
+            "wall_seconds": raw.wall_seconds,
+            **self.ending(),
+        }
+
+    def line(self) -> str:
+        """Return the footer of the ensemble, with its sampling errors."""
+        result, raw, error = self.result, self.result.raw, ""
+        used = [result.described_model, raw.stepper, f"tolerance {raw.tolerance:g}", raw.plan]
+        used.append(f"{count(result.count)} realisations")
+        if result.count:
+            depth = result.estimate("depth", -1, (0.95,))
+            items = ("mean depth", depth.mean), ("its 95 % quantile", depth.quantiles[0][1])
+            errors = [within(name, item.half_width, item.value) for name, item in items]
+            error = f"{', '.join(errors)} (95 % intervals)"
+        return footer(used, error, lapse(raw.wall_seconds))
+
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return the panels; measured profiles are drawn over the mean profile."""
+        return ensemble_sheet(self.result, measured)
+
+    def profile(self) -> ComputedProfile:
+        """Return the mean profile, with which measured ones are compared."""
+        return self.result.worn_profile()
+
+    def options(self) -> Sequence[str]:
+        """Return the options of the command that repeats the ensemble."""
+        raw = self.result.raw
+        options = ["-n", str(self.result.requested), "--plan", raw.plan, "--seed", str(raw.seed)]
+        return [*options, *(["--precision", raw.until] if raw.until else [])]
+
+
+def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
+    """Return the estimates of an observable, and below them their intervals."""
+    named, found = OBSERVABLES[name], result.estimate(name, -1, QUANTILES)
+    if result.is_constant(name) and result.count > 1:
+        value, _ = cells(found.mean, named.unit)
+        return [(named.label, value, CONSTANT, *[NOTHING] * len(QUANTILES))]
+    items = [found.mean, found.std, *(interval for _, interval in found.quantiles)]
+    texts = [cells(item, named.unit) for item in items]
+    if named.unit == "deg":  # the mean of 359 and 1 deg is not 180 deg
+        texts[:2] = [(NOTHING, "")] * 2
+    values, intervals = zip(*texts, strict=True)
+    if result.count == 1:
+        return [(named.label, values[0], *[NOTHING] * (len(items) - 1))]
+    return [(named.label, *values), (INTERVAL, *intervals)]
+
+
+def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
+    """Return the Sobol indices of a random input as cells."""
+    if not math.isfinite(item.first.value):
+        return [item.name, too_few(result, [item.name]), *([""] if totals else [])]
+    indices = [index for index in (item.first, item.total) if index]
+    if item.without_effect:
+        bounds = (shown(index.high, "%", 2) for index in indices)
+        return [item.name, *(f"not significant, at most {bound}" for bound in bounds)]
+    return [item.name, *map(part_with_interval, indices)]
+
+
+def _target_met(result: EnsembleResult, target: Target) -> str:
+    """Return whether a target is reached, and the half-width of the interval."""
+    found = result.estimate_for(target)
+    interval, achieved = target.interval(found), target.achieved(found)
+    is_reached, realisations = target.reached(found), f"{count(result.count)} realisations"
+    word = "reached" if is_reached else "not reached"
+    if not math.isfinite(interval.half_width) or math.isnan(interval.value):
+        return f"{word}: {TOO_FEW_REALISATIONS}"
+    if interval.half_width == 0.0:
+        text = f"{word}: equal in all {realisations}"
+    elif math.isinf(achieved):
+        text = f"{word}: the estimate is 0, its relative half-width is undefined"
+    else:
+        text = f"{word}: within {shown(achieved, '%', 2)} with {realisations}"
+    # the interval is narrow by chance in a small sample
+    too_small = achieved <= target.width and not is_reached
+    return f"{text}, but the sample is too small" if too_small else text
+
+
+def _estimate(found: Estimate) -> dict[str, Any]:
+    data = asdict(found)
+    data["quantiles"] = [{"probability": p, **asdict(interval)} for p, interval in found.quantiles]
+    return data
+
+
+def _realisations(raw: EnsembleData) -> Iterator[list[Column]]:
+    """Yield drawn values and results of all realisations except pending ones, in blocks."""
+    for start in range(0, raw.requested, _BLOCK):
+        stop = min(start + _BLOCK, raw.requested)
+        chosen = raw.status[start:stop] != PENDING
+        yield [column._replace(values=column.values[chosen]) for column in _block(raw, start, stop)]
+
+
+def _block(raw: EnsembleData, start: int, stop: int) -> Iterator[Column]:
+    failed = raw.status[start:stop] == FAILED
+    yield Column("realisation", np.arange(start, stop, dtype=np.float64))
+    yield Column("failed", failed.astype(np.float64))
+    for item in raw.inputs:
+        key, values = item["key"], raw.rows(item["key"], start, stop)
+        if values.ndim == 1:
+            yield drawn(key, values, item["unit"])
+        else:
+            for number, column in enumerate(values.T, 1):
+                yield drawn(f"{key} roller {number}", column, item["unit"])
+    for name in (*ALL_OBSERVABLES, *_SCALARS, *LIFE):
+        if name in raw.schema.variables:
+            values = raw.rows(name, start, stop)
+            final = np.where(failed, np.nan, values[:, -1] if values.ndim > 1 else values)
+            yield computed(name, final, raw.schema.variables[name].unit)
+
+
+def _courses(result: EnsembleResult) -> Iterator[Column]:
+    """Yield the estimates of each observable at every record."""
+    yield Column("passes", result.record_passes)
+    yield computed("time", result.record_time, "s")
+    for name in result.observables:
+        course, unit = result.course(name), ALL_OBSERVABLES[name].unit
+        columns = {
+            "mean": course.mean,
+            "mean low": course.mean_low,
+            "mean high": course.mean_high,
+            "std": course.std,
+            **{f"{100.0 * p:g} %": values for p, values in course.quantiles.items()},
+        }
+        for ending, values in columns.items():
+            yield computed(f"{name} {ending}", values, unit, name)
+
+
+def _band(axis: str, unit: str, what: str, band: Band) -> list[Column]:
+    """Return mean and band of a curve at the end."""
+    parts = ("mean", "std", "low", "high")
+    curves = [computed(f"{what} {part}", getattr(band, part), "m") for part in parts]
+    return [computed(axis, band.y, unit), *curves]

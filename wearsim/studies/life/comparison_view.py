@@ -1,0 +1,126 @@
+"""View of the lives of several designs, each compared with the first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from wearsim.errors import ResultsFileError
+from wearsim.report.measured import Measured
+from wearsim.report.panels import Sheet
+from wearsim.report.text import part_with_interval
+from wearsim.report.view import Row, Rows, Table, View
+from wearsim.studies.life.panels import life_sheet, swept_variable
+from wearsim.studies.life.result import LifeResult
+from wearsim.studies.life.stored_settings import DesignVariable, LifeComparison
+from wearsim.studies.life.view import ERROR, lives_table
+from wearsim.uq.estimation.intervals import Interval
+
+
+class LivesView(View):
+    """Lives of several designs, each compared with the first: ratio of B10, and probabilities.
+
+    Parameters
+    ----------
+    results : sequence of LifeResult
+    labels : sequence of str
+
+    Raises
+    ------
+    ResultsFileError
+        If the units of lives differ.
+    """
+
+    basis = ERROR
+
+    def __init__(self, results: Sequence[LifeResult], labels: Sequence[str]) -> None:
+        self.results, self.labels = list(results), list(labels)
+        self.title = f"{', '.join(labels[:-1])} and {labels[-1]}"
+        first, *others = results
+        self.question = f"Which design lasts more {first.unit}?"
+        try:
+            self.compared = [first.compare(other) for other in others]
+        except ValueError as error:
+            raise ResultsFileError(str(error)) from error
+
+    def rows(self) -> Rows:
+        """Return the comparison of each design with the first one."""
+        first, rows = self.labels[0], list[Row]()
+        for label, found in zip(self.labels[1:], self.compared, strict=True):
+            of = "" if len(self.compared) == 1 else f", {first} against {label}"
+            ratio = f"{first} has {_factor(found.b10_ratio)} times the B10 of {label}"
+            machine = "unknown: the studies have no common draws"
+            if found.same_machine is not None:
+                machine = (
+                    f"{first} outlives {label} on {part_with_interval(found.same_machine)} of the"
+                    " machines, each with the same drawn values for both designs"
+                )
+            specimens = (
+                f"a specimen of {first} outlives a specimen of {label}, drawn separately, with"
+                f" probability {part_with_interval(found.two_specimens)}"
+            )
+            rows += [Row(f"B10 ratio{of}", ratio), Row(f"same machine{of}", machine)]
+            rows.append(Row(f"two specimens{of}", specimens))
+        return rows
+
+    def tables(self) -> list[Table]:
+        """Return the lives of all designs."""
+        return [lives_table(self.labels, self.results)]
+
+    def data(self) -> dict[str, Any]:
+        """Return all designs and their comparison with the first."""
+        first, *others = self.results
+        designs = [result.view.data() for result in self.results]
+        data: dict[str, Any] = {"unit": first.unit, "designs": designs, "labels": self.labels}
+        if len(others) == 1:
+            data |= _comparison(self.compared[0])
+        else:
+            data["compared_with_first"] = [_comparison(other.compare(first)) for other in others]
+        if variable := swept_variable(self.results):
+            data["against"] = _against(variable, self.results)
+        return data
+
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return the panels of all designs."""
+        return life_sheet(self.results, self.labels)
+
+
+def lives_view(
+    results: Sequence[LifeResult], labels: Sequence[str], observable: str | None
+) -> View:
+    """Return the view of several designs; there is one observable, the life."""
+    return LivesView(results, labels)
+
+
+def _factor(found: Interval) -> str:
+    if not math.isfinite(found.value):
+        return "an unknown number of"
+    if not math.isfinite(found.half_width):
+        return f"{found.value:.3f} [unbounded]"
+    if found.half_width == 0.0:
+        return f"{found.value:.3f}"
+    return f"{found.value:.3f} [{found.low:.3f}, {found.high:.3f}]"
+
+
+def _comparison(found: LifeComparison) -> dict[str, Any]:
+    return {
+        "b10_ratio": asdict(found.b10_ratio),
+        "same_machine": asdict(found.same_machine) if found.same_machine else None,
+        "two_specimens": asdict(found.two_specimens),
+        "pairs": found.count,
+    }
+
+
+def _against(variable: DesignVariable, results: Sequence[LifeResult]) -> dict[str, Any]:
+    """Return the lives of designs against the design variable, both in the given order."""
+    return {
+        "key": variable.key,
+        "unit": variable.unit,
+        "values": [one.variable.value for one in results if one.variable],
+        "b": {
+            f"{share:g}": [asdict(one.b(share)) for one in results]
+            for share in results[0].settings.shares
+        },
+    }

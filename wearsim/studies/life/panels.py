@@ -1,0 +1,361 @@
+"""Panels of lives: survival, probability plots, effects, limits, and lives of a sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wearsim.report.panels import (
+    BLACK,
+    DASHES,
+    Axis,
+    Band,
+    Bars,
+    Line,
+    Mark,
+    Panel,
+    Sheet,
+    Span,
+    Text,
+    Whiskers,
+    evenly_spaced,
+    look,
+    message,
+    several_colours,
+)
+from wearsim.report.text import count
+from wearsim.studies.cam.panels import ANGLE
+from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
+from wearsim.studies.life.result import LifeResult
+from wearsim.studies.life.stored_settings import DesignVariable
+from wearsim.types import FloatArray
+from wearsim.units import engineers_unit
+from wearsim.uq.survival.fits import FAMILIES, Family
+from wearsim.uq.survival.lives import cumulative_incidence, median_positions, survival_curve
+
+_POINTS = 200  # of a curve
+_MOST_MARKS = 500
+_PERCENT = (0.1, 1.0, 5.0, 10.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0, 99.9)
+_SHARE = (0.0, 1.02)  # of an axis of shares
+_DARK, _PALE = "0.3", "0.85"
+
+
+@dataclass(frozen=True)
+class _Design:
+    """A design with its label and colour; `several` if it is one of several."""
+
+    result: LifeResult
+    label: str
+    colour: str
+    several: bool
+
+    @property
+    def named(self) -> str:
+        """Label in a legend, empty for one design alone."""
+        return self.label if self.several else ""
+
+    def words(self, name: str) -> str:
+        """Return the name of a limit, after the label of one of several designs."""
+        words = name.replace("_", " ")
+        return f"{self.label}: {words}" if self.several else words
+
+
+def life_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
+    """Return the panels of the lives of designs.
+
+    Parameters
+    ----------
+    results : sequence of LifeResult
+        One design, or several with the same unit of life.
+    labels : sequence of str
+
+    Returns
+    -------
+    Sheet
+        Survival with its 95 % band and ticks where lives are censored; probability plots on the
+        scales of both fits; the effect of each input; the limits that were reached first, for a
+        cam by angle; for a sweep also the lives against the design variable.
+    """
+    pairs = zip(results, labels, several_colours(len(results)), strict=True)
+    designs = [_Design(*pair, len(results) > 1) for pair in pairs]
+    titles = {result.title for result in results}
+    axis = Axis("life", results[0].unit, 1.0)
+    panels = {"survival": _survival(designs, axis)}
+    panels |= {family: _probabilities(designs, family, axis) for family in FAMILIES}
+    panels |= {"tornado": _tornado(designs), "incidence": _incidence(designs, axis)}
+    panels["limits"] = _limits(designs)
+    rows: list[list[str]] = [["survival", *FAMILIES], ["tornado", "incidence", "limits"]]
+    if swept_variable(results) is not None:
+        panels["against"] = _against(designs)
+        rows = [[*row, "against"] for row in rows]
+    (result, *others) = results
+    if not (others or result.are_equal or result.settings.alone):
+        if effects := known_effects(result, "life"):
+            title = "What the scatter of the life is due to (Sobol indices)"
+            panels["indices"] = effects_panel(title, "ln life", effects)
+        panels |= draws_panels(result, "life", result.lives, axis)
+    title = titles.pop() if len(titles) == 1 else "lives of designs"
+    return Sheet(title, panels, rows, (18.5 if len(rows[0]) > 3 else 14.0, 8.4))
+
+
+def swept_variable(results: Sequence[LifeResult]) -> DesignVariable | None:
+    """Return the design variable whose value differs between results of a sweep, if there is one.
+
+    Parameters
+    ----------
+    results : sequence of LifeResult
+
+    Returns
+    -------
+    DesignVariable or None
+        That of the first; None unless all have the same variable with different values.
+    """
+    found = [one.variable for one in results if one.variable]
+    keys, values = {(one.key, one.unit) for one in found}, {one.value for one in found}
+    return found[0] if len(keys) == 1 and len(values) == len(results) > 1 else None
+
+
+def _against(designs: Sequence[_Design]) -> Panel:
+    """Return the lives of the shares with their intervals against the variable of a sweep."""
+    results = [design.result for design in designs]
+    variable = swept_variable(results)
+    assert variable is not None
+    unit, size = engineers_unit(variable.unit)
+    by_value = sorted(
+        ((one.variable.value, one) for one in results if one.variable), key=lambda pair: pair[0]
+    )
+    shares, marks = results[0].settings.shares, list[Mark]()
+    for share, colour in zip(shares, several_colours(len(shares)), strict=True):
+        found = [(value, one.b(share)) for value, one in by_value]
+        known = [(value, life) for value, life in found if np.isfinite(life.value)]
+        if not known:
+            continue
+        values, lives = zip(*known, strict=True)
+        low, high = ([_or_nan(getattr(life, end)) for life in lives] for end in ("low", "high"))
+        style: dict[str, Any] = {"colour": colour, "label": f"B{share:g}", "marker": "o"}
+        marks += [
+            Whiskers(values, low, high, colour=colour),
+            Line(values, [life.value for life in lives], **style),
+        ]
+    if not marks:
+        return message("Life against the design", "all lives are censored")
+    return Panel(
+        "Life, with 95 % intervals",
+        Axis(variable.key, unit, 1.0 / size),
+        Axis("life", results[0].unit, 1.0, limits=(0.0, None)),
+        marks,
+        f"Lives, with their 95 % intervals, against {variable.key}.",
+    )
+
+
+def _or_nan(end: float) -> float:
+    return end if np.isfinite(end) else np.nan
+
+
+def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
+    """Return the survival of designs with its 95 % band, censored lives and target."""
+    if all(design.result.at_once == design.result.count for design in designs):
+        return message("Survival", "every life is 0")
+    marks: list[Mark] = [
+        Span(1.0 - share, across="y", colour=_PALE, width=0.8) for share in (0.1, 0.5)
+    ]
+    for design in designs:
+        result, colour = design.result, design.colour
+        life, survival, low, high = survival_of(result)
+        steps = not result.is_exact
+        marks += [
+            Band(life, low, high, steps=steps, colour=colour, alpha=0.2),
+            Line(life, survival, steps=steps, colour=colour, label=design.named),
+        ]
+        if result.censored and len(survival):
+            end, dash = float(survival[-1]), look(dash="", marker="|", size=12.0)
+            text = f"{result.censored} censored"
+            style = look(offset=(-4.0, 6.0), anchor="right")
+            marks += [
+                Line([result.most], [end], colour=colour, **dash),
+                Text(result.most, end, text, colour=colour, **style),
+            ]
+    text = "Share of the machines that outlast a life, with its 95 % band."
+    for target in {design.result.target for design in designs}:
+        if target is not None:
+            marks += [
+                Span(target, dash=":", colour="0.4"),
+                Text(target, 0.02, "target", colour=BLACK, offset=(3.0, 0.0), size=9.0),
+            ]
+            text += f" Dotted: the target of {count(target)} {axis.unit}."
+    x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
+    y = Axis("survival", "%", limits=_SHARE)
+    return Panel("Survival, with 95 % band", x, y, marks, text)
+
+
+def survival_of(result: LifeResult) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return lives, and the survival with its band at each."""
+    if not result.is_exact:
+        curve = survival_curve(np.minimum(result.lives, result.most), result.observed)
+        start, one = np.zeros(1), np.ones(1)
+        end = curve.survival[-1:] if len(curve.life) else one
+        last = np.array([result.most]) if result.censored else curve.life[-1:]
+        return (
+            np.concatenate([start, curve.life, last]),
+            np.concatenate([one, curve.survival, end]),
+            np.concatenate([one, curve.low, curve.low[-1:] if len(curve.low) else one]),
+            np.concatenate([one, curve.high, curve.high[-1:] if len(curve.high) else one]),
+        )
+    distribution = result.distribution
+    end_of_life: float = min(distribution.quantile_of_mean(0.999), result.most)
+    life = np.linspace(0.0, end_of_life, _POINTS)[1:]
+    found = [distribution.probability_before(float(n)) for n in life]
+    survival, low, high = (
+        np.array([1.0, *(1.0 - getattr(item, name) for item in found)])
+        for name in ("value", "high", "low")
+    )
+    # the survival falls, so that a bound at one life is one for those before or after it
+    low, high = np.maximum.accumulate(low[::-1])[::-1], np.minimum.accumulate(high)
+    return np.append(0.0, life), survival, low, high
+
+
+def _scale(family: Family) -> Callable[[FloatArray], FloatArray]:
+    from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
+
+    if family == "log-normal":
+        return lambda p: np.asarray(ndtri(p))
+    return lambda p: np.log(-np.log1p(-p))
+
+
+def _probabilities(designs: Sequence[_Design], family: Family, axis: Axis) -> Panel:
+    """Return lives on the probability scale of a family, on which its fit is a straight line."""
+    scale, ends, marks = _scale(family), list[float](), list[Mark]()
+    title = f"{family[:1].upper()}{family[1:]} probability plot"
+    for design in designs:
+        result, colour = design.result, design.colour
+        lives = np.sort(result.lives[result.observed & (result.lives > 0.0)])
+        if not len(lives):
+            continue
+        part = median_positions(result.count)[result.at_once :][: len(lives)]
+        picks = evenly_spaced(len(lives), _MOST_MARKS)
+        dots = look(dash="", marker=".", colour=colour, label=design.label)
+        marks.append(Line(lives[picks], scale(part[picks]), **dots))
+        ends += [float(lives[0]), float(lives[-1])]
+        fit = next((item for item in result.fits if item.family == family), None)
+        if fit is not None:
+            across = np.geomspace(0.7 * lives[0], 1.3 * lives[-1], _POINTS)
+            line = np.clip(fit.probability_before(across), 1e-4, 1.0 - 1e-4)
+            inside = (line > 1e-4) & (line < 1.0 - 1e-4)
+            best = result.fits[0] is fit
+            style = look(colour=colour, dash="-" if best else "--", width=1.4)
+            label = f"fit{', lower AIC' if best else ''}"
+            marks.append(Line(across[inside], scale(line[inside]), label=label, **style))
+        if result.is_exact:
+            first, last = 0.7 * lives[0], 1.3 * lives[-1]
+            if result.settings.alone:  # one test, which is a point of the distribution
+                first, last = (result.distribution.quantile_of_mean(p) for p in (0.002, 0.998))
+                ends += [first, last]
+            across = np.geomspace(first, last, _POINTS)
+            mean = np.clip(result.distribution.failed(across).mean(axis=0), 1e-4, 1.0 - 1e-4)
+            style = look(colour=_DARK, dash=":", width=0.9, label="exact K/H")
+            marks.append(Line(across, scale(mean), **style))
+    if not ends:
+        return message(title, "no life above 0 ended")
+    low, high = (float(value) for value in scale(np.array([5e-4, 0.9995])))
+    ticks = scale(np.array(_PERCENT) / 100.0).tolist()
+    return Panel(
+        title,
+        Axis("life", axis.unit, 1.0, log=True, limits=(0.75 * min(ends), 1.3 * max(ends))),
+        Axis(
+            "failed [%]", limits=(low, high), ticks=ticks, names=[f"{tick:g}" for tick in _PERCENT]
+        ),
+        marks,
+        f"Lives on a scale on which a {family} distribution is a straight line.",
+    )
+
+
+def _tornado(designs: Sequence[_Design]) -> Panel:
+    """Return how far each input moves the life from its median, and the 95 % intervals."""
+    title, results = "What moves the life", [design.result for design in designs]
+    effects = [{} if result.are_equal else result.tornado() for result in results]
+    names = list(dict.fromkeys(name for found in effects for name in found))
+    if not names:
+        alone = {result.settings.factor for result in results if result.settings.alone}
+        text = f"only {', '.join(alone)}" if alone else "too few realisations, or equal lives"
+        obstacles = [result.effects_obstacle for result in results if result.effects_obstacle]
+        lines = [line for obstacle in obstacles for line in obstacle.split("; ")]
+        return message(title, *(lines or [text]))
+    height, marks = 0.7 / len(designs), list[Mark]()
+    for number, (found, design) in enumerate(zip(effects, designs, strict=True)):
+        middle = (number - 0.5 * (len(designs) - 1)) * height
+        places = np.array([names.index(name) for name in found], dtype=float) + middle
+        for end, alpha in enumerate((0.35, 0.8)):
+            ends = [effect.factors[end] for effect in found.values()]
+            value = [factor.value for factor in ends]
+            low, high = ([getattr(factor, side) for factor in ends] for side in ("low", "high"))
+            style = look(colour=design.colour, alpha=alpha)
+            label = design.named if end else ""
+            bars = (places - 0.5 * height, places + 0.5 * height, value, 1.0, True)
+            marks += [
+                Bars(*bars, label=label, **style),
+                Whiskers(places, low, high, horizontal=True, colour="0.2"),
+            ]
+    name = "factor of the life, input at its 10 % (pale) and 90 % quantile"
+    return Panel(
+        title,
+        Axis(name, margin=(0.05, 0.05)),
+        Axis(ticks=range(len(names)), names=names, limits=(len(names) - 0.5, -0.5)),
+        [*marks, Span(1.0, colour=_DARK, width=0.8)],
+        f"{names[0]} moves the life most.",
+    )
+
+
+def _incidence(designs: Sequence[_Design], axis: Axis) -> Panel:
+    """Return the share that each limit has ended, against the life."""
+    title, marks = "Share ended by each limit", list[Mark]()
+    for design in designs:
+        result = design.result
+        cause = np.where(result.observed, result.values("first_limit"), -1).astype(np.int64)
+        lives = np.minimum(result.lives, result.most)
+        ends, incidence = cumulative_incidence(lives, cause, len(result.limits))
+        for place, name in enumerate(result.limits):
+            if len(ends) and incidence[place, -1] > 0.0:
+                curve = np.append(0.0, ends), np.append(0.0, incidence[place])
+                style = look(colour=design.colour, dash=DASHES[place % len(DASHES)])
+                marks.append(Line(*curve, steps=True, label=design.words(name), **style))
+    if not marks:
+        return message(title, "no limit was reached")
+    x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
+    text = "Share of the machines whose life has ended at each limit."
+    return Panel(title, x, Axis("ended", "%", limits=_SHARE), marks, text)
+
+
+def _limits(designs: Sequence[_Design]) -> Panel:
+    """Return which limit was first: of cams by angle, else as bars."""
+    if any(design.result.angles for design in designs):
+        marks = list[Mark]()
+        edges: FloatArray = np.radians(5.0 * np.arange(73))
+        share_axis = Axis("share", "%", limits=(0.0, None))
+        for design in designs:
+            for number, (name, angles) in enumerate(design.result.angles.items()):
+                share = np.histogram(angles % (2.0 * np.pi), edges)[0] / design.result.count
+                style = look(colour=design.colour, alpha=0.8 - 0.4 * (number % 2))
+                words = design.words(name)
+                marks.append(Bars(edges[:-1], edges[1:], share, label=words, **style))
+        caption = "Share of the machines by the angle at which the limit was reached."
+        return Panel("Angle at which the limit is reached", ANGLE, share_axis, marks, caption)
+    if not any(design.result.observed.any() for design in designs):
+        return message("Limit reached first", "no limit was reached")
+    names = list(dict.fromkeys(name for design in designs for name in design.result.first_limits))
+    width, bars = 0.7 / len(designs), list[Mark]()
+    for number, design in enumerate(designs):
+        shares = [design.result.first_limits.get(name, 0.0) for name in names]
+        left = np.arange(len(names)) + (number - 0.5 * len(designs)) * width
+        style = look(colour=design.colour, alpha=0.8, label=design.named)
+        bars.append(Bars(left, left + width, shares, **style))
+    shown_names = [name.replace("_", " ") for name in names]
+    return Panel(
+        "Limit reached first",
+        Axis(ticks=range(len(names)), names=shown_names, limits=(-1.0, max(len(names), 1.0))),
+        Axis("share", "%", limits=_SHARE),
+        bars,
+        "Share of the machines by the limit that they reached first.",
+    )

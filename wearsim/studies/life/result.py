@@ -1,0 +1,388 @@
+"""Result of an ensemble of tests that end at a limit: the life of a design, in SI."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wearsim.studies.ensemble.file.data import EnsembleData
+from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.studies.life.rare_estimates import rare_estimates
+from wearsim.studies.life.stored_settings import LifeComparison, LifeTarget
+from wearsim.studies.life.values import LifeValues
+from wearsim.types import IntArray
+from wearsim.uq.estimation.estimates import Target
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+from wearsim.uq.sensitivity.effects import TAIL, SignedEffect
+from wearsim.uq.survival.distributions import (
+    CountedLives,
+    FactorMixture,
+    LifeDistribution,
+)
+from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
+from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
+from wearsim.uq.survival.rare_events import RareProbability
+
+_QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
+_FEWEST = 32  # realisations below which a target is not reached
+
+
+@dataclass(frozen=True, eq=False)
+class LifeResult(LifeValues):
+    """Life of a design, from the tests that ended at a limit.
+
+    Parameters
+    ----------
+    raw : EnsembleData
+    path : Path, optional
+    law : Distribution, optional
+        Distribution of the wear factor, instead of that of the scenario.
+
+    Examples
+    --------
+    >>> lives = wearsim.open_results("rig-life.h5")
+    >>> lives
+    <LifeResult 'a wear test': 16 lives, B10 8.5e+05 passes>
+    >>> lives.limits, lives.is_exact
+    (('depth',), True)
+    """
+
+    def __repr__(self) -> str:
+        b10 = self.b(10).value
+        return f"<LifeResult '{self.title}': {self.count} lives, B10 {b10:.4g} {self.unit}>"
+
+    def with_settings(self, **changed: Any) -> LifeResult:
+        """Return the result with other settings: `target` [passes] or `shares` [per cent].
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.with_settings(target=1e6).target
+        1000000.0
+        """
+        return replace(self, raw=replace(self.raw, life={**self.raw.life, **changed}))
+
+    @property
+    def method(self) -> str:
+        """Method of the intervals of lives, in words."""
+        if self.settings.alone:
+            return "none: the wear factor is integrated exactly, and nothing else is random"
+        if self.is_exact:
+            return "Student's t of the probability of failure on the logit scale, inverted"
+        if self.censored:
+            return "exact, between order statistics; lives beyond the maximum are censored"
+        return "exact, between order statistics"
+
+    def with_wear_factor(self, table: Mapping[str, object]) -> LifeResult:
+        """Return the lives with another distribution of the wear factor, without new tests.
+
+        Parameters
+        ----------
+        table : mapping of str to object
+            Random input as in a scenario, {"distribution": "lognormal", ...}.
+
+        Raises
+        ------
+        ValueError
+            If the wear factor is not integrated exactly, is correlated with other inputs, or takes
+            single values with a probability, which do not say at which quantile they are.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> faster = {"distribution": "lognormal", "median": "2.2e-11 1/Pa", "factor": 1.5}
+        >>> print(f"{lives.b(10).value / lives.with_wear_factor(faster).b(10).value:.3f}")
+        2.000
+        """
+        settings = self.settings
+        if not settings.factor or settings.spread < 1.0:
+            reason = settings.reason or "it is correlated with other inputs"
+            raise ValueError(f"the distribution of the wear factor cannot be replaced: {reason}")
+        if len(atoms := self._drawn_score.atoms):
+            raise ValueError(
+                f"the distribution of the wear factor cannot be replaced: {settings.factor} takes"
+                f" the value {atoms[0]:g} with a probability; run the study with the other one"
+            )
+        changed = self.scenario.changed({settings.factor: table})
+        inputs = {item.name: item for item in changed.random}
+        return replace(self, law=inputs[settings.factor].scalar)
+
+    def b(self, percent: float) -> Interval:
+        """Return the life that a percentage of the specimens does not reach, as B10.
+
+        Parameters
+        ----------
+        percent : float
+            10 for B10.
+
+        Returns
+        -------
+        Interval
+            Sampling interval; the value is nan beyond the censoring and with too few counted lives
+            (69 for B1, 7 for B10), and -inf an end for which there are too few. See `b_error` for
+            the numerical error.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> found = lives.b(10)
+        >>> print(f"{found.value:.3g}, 95 % interval {found.low:.3g} to {found.high:.3g}")
+        8.5e+05, 95 % interval 7.98e+05 to 9.08e+05
+        """
+        return self._b(percent, "life")
+
+    def b_error(self, percent: float) -> tuple[float, float]:
+        """Return the life of a percentage if all lives are in error by their numerical bounds.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> low, high = lives.b_error(10)
+        >>> low < lives.b(10).value < high
+        True
+        """
+        low, high = (self._b(percent, name).value for name in ("life_low", "life_high"))
+        return low, high
+
+    def _b(self, percent: float, name: str) -> Interval:
+        if not self.count:
+            return UNKNOWN
+        share = percent / 100.0
+        if not self.is_exact:
+            lives = self._lives(name)
+            return life_quantile(np.minimum(lives, self.most), np.isfinite(lives), share)
+        found = self._distribution(name).quantile(share)
+        if found.value <= self.most:
+            return Interval(
+                found.value, found.low, found.high if found.high <= self.most else math.inf
+            )
+        return Interval(math.nan, min(found.low, self.most), math.inf)
+
+    def lower_bound(self, percent: float) -> float:
+        """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown.
+
+        It is that of the lives as counted.
+
+        Examples
+        --------
+        >>> wearsim.open_results("rig-life.h5").lower_bound(10)  # takes 29 lives
+        -inf
+        """
+        lives = np.minimum(self.lives, self.most)
+        return lower_bound(lives, self.observed, percent / 100.0)
+
+    def probability_before(self, life: float) -> Interval:
+        """Return the probability of a life below `life`; unknown beyond the censoring.
+
+        It is also unknown if `probability_obstacle` has a reason.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> print(f"{lives.probability_before(675_000).value:.2%}")
+        3.36%
+        """
+        if not self.count or life > self.most:
+            return UNKNOWN
+        if self.is_exact:
+            obstacle = self.probability_obstacle(life)
+            return UNKNOWN if obstacle else self.distribution.probability_before(life)
+        return probability_before(np.minimum(self.lives, self.most), self.observed, life)
+
+    def survival(self, life: float) -> Interval:
+        """Return the probability of a life above `life`.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> print(f"{lives.survival(675_000).value:.2%}")
+        96.64%
+        """
+        found = self.probability_before(life)
+        return Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low)
+
+    @cached_property
+    def fits(self) -> list[LifeFit]:
+        """Fits to the lives above zero, best first by Akaike's criterion."""
+        positive = self.lives > 0.0
+        lives = np.minimum(self.lives[positive], self.most)
+        if not len(lives):
+            return []
+        found = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
+        return sorted((fit for fit in found if fit is not None), key=lambda fit: fit.aic)
+
+    def _indices(
+        self, name: str, groups: list[str]
+    ) -> Mapping[str, tuple[Interval, Interval | None]]:
+        """Return first-order indices; those of "life" are of its logarithm, or unknown."""
+        if name != "life":
+            return super()._indices(name, groups)
+        if self.effects_obstacle:
+            return dict.fromkeys(groups, (UNKNOWN, None))
+        from wearsim.uq.sensitivity.sobol_indices import first_order  # noqa: PLC0415  (rarely needed)
+
+        found = first_order(self.log_lives, self.drawn_numbers(groups))
+        return {group: (index, None) for group, index in found.items()}
+
+    def tornado(self) -> dict[str, SignedEffect]:
+        """Return the effect of each input on the logarithm of life, by its name, greatest first.
+
+        Returns
+        -------
+        dict of str to SignedEffect
+            At the 10 % and the 90 % quantile of the input, relative to its median, the others
+            unchanged. That of a wear factor which is integrated exactly has no sampling error, and
+            adds none to the others. None where more than 2 % of the lives are censored or zero,
+            see `effects_obstacle`.
+
+        Examples
+        --------
+        >>> found = wearsim.open_results("rig-life.h5").tornado()
+        >>> for name, effect in found.items():
+        ...     low, high = effect.factors
+        ...     print(name, f"{low.value:.2f} {high.value:.2f}")
+        wear.cylinder.k_over_h 1.68 0.59
+        friction.coefficient 1.17 0.87
+        """
+        from wearsim.uq.sensitivity.effects import (  # noqa: PLC0415  (rarely needed)
+            effects,
+            exact_effect,
+            normal_scores,
+        )
+
+        if self.effects_obstacle:
+            return {}
+        drawn = self.drawn_numbers([item["name"] for item in self.raw.groups])
+        factor, logs, found = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
+        if factor in drawn and self.is_known_throughout and not self.at_once:
+            # life is kappa/K: kappa holds all that the other inputs change
+            logs = np.log(self.values("life") * self.values(factor))
+            low, middle, high = np.log((self.law or self._drawn_law).quantile(_QUANTILES)).tolist()
+            found[factor] = exact_effect(middle - low, middle - high)
+            del drawn[factor]
+        laws = {one.name: one.scalar for one in self.scenario.random if one.role == "scalar"}
+        scores = {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
+        found |= effects(logs, scores)
+        return dict(sorted(found.items(), key=lambda item: -item[1].size))
+
+    def compare(self, other: LifeResult) -> LifeComparison:
+        """Compare the lives with those of another design.
+
+        Parameters
+        ----------
+        other : LifeResult
+            With the same unit of life; common draws if it has the same seed.
+
+        Raises
+        ------
+        ValueError
+            If the units differ.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> faster = {"distribution": "lognormal", "median": "2.2e-11 1/Pa", "factor": 1.5}
+        >>> found = lives.compare(lives.with_wear_factor(faster))
+        >>> print(f"{found.b10_ratio.value:.2f} {found.same_machine.value:.2f}")
+        2.00 1.00
+        >>> print(f"{found.two_specimens.value:.2f}")
+        0.88
+        """
+        from wearsim.uq.survival.comparison import (  # noqa: PLC0415  (rarely needed)
+            quantile_ratio,
+            same_machine,
+            two_specimens,
+        )
+
+        if self.unit != other.unit:
+            raise ValueError(
+                f"{self.title} is in {self.unit} and {other.title} in {other.unit}; their lives"
+                " cannot be compared"
+            )
+        # kappa is known beyond the maximum, and with it the survival
+        both = (self, other)
+        most = (
+            math.inf
+            if all(item.is_known_throughout for item in both)
+            else min(item.most for item in both)
+        )
+        paired = self.raw.seed == other.raw.seed
+        first, second = self.distribution, other.distribution
+        name = "known_lives" if math.isinf(most) else "lives"
+        one, two = (getattr(item, name) for item in both)
+        common = np.intersect1d(self.numbers, other.numbers)
+        if paired and not (first.exact and second.exact):
+            places = [np.searchsorted(item.numbers, common) for item in both]
+            if first.exact or second.exact:
+                paired = False
+            else:
+                first, second = _at(first, places[0]), _at(second, places[1])
+                one, two = one[places[0]], two[places[1]]
+        machine = same_machine(one, two, most) if paired and len(one) == len(two) else None
+        if machine and all(item.settings.alone for item in both):  # for any wear factor
+            machine = Interval(machine.value, machine.value, machine.value)
+        return LifeComparison(
+            quantile_ratio(first, second, 0.1, most, paired),
+            machine,
+            two_specimens(first, second, most, paired),
+            len(common),
+        )
+
+    def estimate_for(self, target: Target | LifeTarget) -> Any:
+        """Return the estimate to which a target applies.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> from wearsim.studies.life.stored_settings import LifeTarget
+        >>> lives.estimate_for(LifeTarget.parse("b10 3%")).value  # takes 32 realisations
+        nan
+        """
+        if isinstance(target, Target):
+            return super().estimate_for(target)
+        return self.b(100.0 * target.share) if self.count >= _FEWEST else UNKNOWN
+
+    @property
+    def rare(self) -> RareProbability | None:
+        """Probability of a life before the target from tests for rare events, if requested.
+
+        It is that of the last method in `rare_estimates`.
+        """
+        return next(reversed(self.rare_estimates.values()), None)
+
+    @cached_property
+    def rare_estimates(self) -> dict[str, RareProbability]:
+        """Estimates by "importance sampling" and "subset simulation", as far as they were used."""
+        return rare_estimates(self) if self.settings.rare else {}
+
+    def final_estimates(self) -> dict[str, Any]:
+        """Return lives and estimates at their ends, as plain values.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.final_estimates()["life"]["b10"]["value"] == lives.b(10).value
+        True
+        """
+        lives = {f"b{share:g}": asdict(self.b(share)) for share in self.settings.shares}
+        return {**super().final_estimates(), "life": lives}
+
+
+def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
+    """Return the distribution of some realisations."""
+    if isinstance(distribution, FactorMixture):
+        shift = np.broadcast_to(np.asarray(distribution.shift), distribution.kappa.shape)
+        return replace(distribution, kappa=distribution.kappa[places], shift=shift[places])
+    assert isinstance(distribution, CountedLives)
+    return CountedLives(distribution.life[places])
+
+
+def ensemble_result(data: EnsembleData, path: Path | None = None) -> EnsembleResult:
+    """Return the result of an ensemble, a `LifeResult` if its tests ended at a limit."""
+    return (LifeResult if data.life else EnsembleResult)(data, path)

@@ -1,0 +1,428 @@
+"""Views of lives: lives with intervals, probabilities, what moves them, and comparisons."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wearsim.report.measured import Measured
+from wearsim.report.panels import Sheet
+from wearsim.report.text import (
+    NOTHING,
+    count,
+    lapse,
+    part_with_interval,
+    shown,
+)
+from wearsim.report.view import Row, Rows, Table
+from wearsim.results.study_view import SAMPLING
+from wearsim.studies.ensemble.panels import too_few
+from wearsim.studies.ensemble.view import RealisationsView
+from wearsim.studies.life.panels import life_sheet
+from wearsim.studies.life.result import LifeResult
+from wearsim.units import kind_of
+from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.sensitivity.effects import SignedEffect
+from wearsim.uq.survival.lives import fewest_lives, least_survival
+from wearsim.uq.survival.rare_events import RareProbability
+
+RARE_TESTS = 200  # that are proposed for a probability that is not stated
+_SMALL = 0.01  # probability below which more digits are shown
+ERROR = (
+    f"{SAMPLING} The numerical error of the lives is stated beside them; it does not contain the"
+    " error of the model."
+)
+_LIMIT_UNITS = {"volume": "mm^3", "peak_pressure": "MPa"}
+_EFFECTS = "what moves the life: Sobol indices of its logarithm"
+
+
+class LifeView(RealisationsView[LifeResult]):
+    """Lives that percentages of the machines do not reach, with intervals and numerical errors.
+
+    Panels: survival, probability plots, effects of the inputs, limits. Files: as of an ensemble.
+    """
+
+    verb = "life"
+    basis = ERROR
+
+    def __init__(self, result: LifeResult) -> None:
+        super().__init__(result)
+        limits = ", ".join(limit_texts(result.scenario.limit.given))
+        self.question = (
+            f"How many {result.unit} does the design last, until the first of: {limits}?"
+        )
+        self.warnings = (*result.warnings, *remarks(result))
+
+    def rows(self) -> Rows:
+        """Return the lives of the shares, B10 first, and the probability of the target."""
+        result = self.result
+        if result.count == 0:
+            return [Row("life", "no test is completed")]
+        shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
+        rows = [Row(f"B{share:g}", life_text(result, share)) for share in shares]
+        if result.target is not None:
+            name = f"P(life < {count(result.target)} {result.unit})"
+            rows.append(Row(name, target_text(result)))
+            obstacle = result.probability_obstacle(result.target)
+            if obstacle and result.rare is None and not result.settings.alone:
+                command = f"`{rare_command(result)}`"
+                rows.append(Row("tests that sample the other inputs", command))
+        for method, estimate in result.rare_estimates.items():
+            rows.append(Row(f"by {method}", rare_text(estimate)))
+        if result.rare is not None and not result.rare.is_reliable:
+            rows.append(Row("small probability", "not stated; give a greater --rare"))
+        if not result.observed.any() and not result.is_exact:
+            bound = f"at least {shown(least_survival(result.count), '%', 3)}"
+            text = f"{bound} survive {count(result.most)} {result.unit}, with 95 % confidence"
+            rows.append(Row("no life ended", text))
+        return rows
+
+    def study(self) -> Rows:
+        """Return rows on limits, realisations, wear factor, ends of the lives and effort."""
+        result, settings = self.result, self.result.settings
+        done = f"{count(result.count)} done, {count(result.failed)} failed"
+        done += f", of {count(settings.plain)}" if result.requested > 1 else ""
+        limits = ", ".join(limit_texts(result.scenario.limit.given))
+        factor = f"lives are counted: {settings.reason}"
+        if settings.factor:
+            factor = f"{settings.factor} is integrated exactly"
+            alone = "; nothing else is random, so that one test is sufficient"
+            factor += alone if settings.alone else ""
+        ends = f"{count(int(result.observed.sum()))} ended by a limit"
+        ends += f", {count(result.censored)} censored at {count(result.most)} {result.unit}"
+        if result.at_once:
+            ends += f"; {count(result.at_once)} reached a limit at once, when fresh"
+        return [
+            Row("life", f"{result.unit} until the first of: {limits}"),
+            Row("realisations", done if result.finished else f"{done}, unfinished"),
+            Row("wear factor", factor),
+            Row("lives", ends),
+            *([Row("95 % intervals", result.method)] if result.count else []),
+            Row("contact model", result.described_model),
+            Row("wall time", lapse(result.raw.wall_seconds)),
+        ]
+
+    def details(self) -> list[Table]:
+        """Return numerical errors, fits, the limits that were first, and effects of the inputs."""
+        result = self.result
+        if not result.count:
+            return []
+        tables = [lives_table([""], [result])]
+        if len(result.fits) >= 2:
+            tables.append(self._fits())
+        lines = [
+            [name.replace("_", " "), shown(share, "%", 3), self._angle(name)]
+            for name, share in result.first_limits.items()
+        ]
+        tables.append(Table("", lines, ["first limit", "share", ""]))
+        return [*tables, self._effects()]
+
+    def _fits(self) -> Table:
+        """Return the fitted distributions, best first."""
+        result, shares, lines = self.result, self.result.settings.shares, []
+        for fit in result.fits:
+            intervals = [fit.interval(share / 100.0) for share in shares]
+            cells = [
+                "{1} ({0}..{2})".format(*rounded_lives(one.low, one.value, one.high))
+                for one in intervals
+            ]
+            scale = f"{count(math.exp(fit.mu))} {result.unit}"
+            parameters = (
+                f"median {scale}, sigma {fit.sigma:.3f}"
+                if fit.family == "log-normal"
+                else f"scale {scale}, shape {1.0 / fit.sigma:.3f}"
+            )
+            lines.append([fit.family, *cells, f"{fit.aic - result.fits[0].aic:+.1f}", parameters])
+        heads = [f"fit [{result.unit}]", *(f"B{share:g}" for share in shares)]
+        return Table("", lines, [*heads, "AIC", "parameters"])
+
+    def _angle(self, name: str) -> str:
+        """Return where on a cam a limit was reached, empty for other limits."""
+        if name not in self.result.angles:
+            return ""
+        angles = self.result.angles[name]
+        low, middle, high = np.degrees(np.quantile(angles, (0.05, 0.5, 0.95)))
+        where = f"at {middle:.1f} deg"
+        return where + (f" (90 % in {low:.1f} to {high:.1f} deg)" if high - low > 0.05 else "")
+
+    def _effects(self) -> Table:
+        """Return the Sobol indices of the life, and its change by each input."""
+        result = self.result
+        if why := self._no_effects():
+            return Table("", [[f"{_EFFECTS}: {why}"]], [""])
+        changes = result.tornado()
+        lines = [
+            [
+                item.name,
+                f"not significant, at most {shown(item.first.high, '%', 2)}"
+                if item.without_effect
+                else part_with_interval(item.first),
+                *(effect_cells(changes[item.name]) if item.name in changes else (NOTHING, NOTHING)),
+            ]
+            for item in result.sensitivity("life")
+        ]
+        return Table("", lines, [_EFFECTS, "first order", "life, input at 10 %", "input at 90 %"])
+
+    def _no_effects(self) -> str:
+        """Return why there are no effects, or an empty text."""
+        result = self.result
+        if result.settings.alone:
+            return result.settings.factor
+        if result.count == 1:
+            return "too few realisations"
+        if result.are_equal:
+            return "nothing, no two lives differ"
+        if result.effects_obstacle:
+            return f"not stated\n{result.effects_obstacle}"
+        effects = result.sensitivity("life")
+        return "" if any(math.isfinite(i.first.value) for i in effects) else too_few(result)
+
+    def data(self) -> dict[str, Any]:
+        """Return the life of the design, lives in its unit."""
+        result, settings, target = self.result, self.result.settings, self.result.target
+        probability = None
+        if target is not None:
+            obstacle = result.probability_obstacle(target)
+            probability = {
+                "target": target,
+                **asdict(result.probability_before(target)),
+                "not_stated_because": obstacle or None,
+                "command": rare_command(result) if obstacle and not settings.rare else None,
+            }
+        lives = {}
+        for share in settings.shares:
+            low, high = result.b_error(share)
+            lives[f"{share:g}"] = {
+                **asdict(result.b(share)),
+                "lower_bound": result.lower_bound(share) if not result.is_exact else None,
+                "numerical_low": low,
+                "numerical_high": high,
+            }
+        return {
+            "title": result.title,
+            "unit": result.unit,
+            "limits": result.scenario.limit.given,
+            "realisations": result.count,
+            "failed": result.failed,
+            "errors": dict(result.errors),
+            "censored": result.censored,
+            "reached_at_once": result.at_once,
+            "maximum": result.most,
+            "variable": settings.variable or None,
+            "finished": result.finished,
+            "b": lives,
+            "probability_before_target": probability,
+            "rare": self._rare(),
+            "first_limits": result.first_limits,
+            "angles_deg": {name: np.degrees(found) for name, found in result.angles.items()},
+            "fits": [
+                {
+                    "family": fit.family,
+                    "aic": fit.aic,
+                    "mu": fit.mu,
+                    "sigma": fit.sigma,
+                    "b": {f"{p:g}": asdict(fit.interval(p / 100.0)) for p in settings.shares},
+                }
+                for fit in result.fits
+            ],
+            "sensitivity_of_life": [
+                {"input": item.name, "first_order": asdict(item.first)}
+                for item in (result.sensitivity("life") if result.count > 1 else [])
+            ],
+            "sensitivity_not_stated_because": result.effects_obstacle or None,
+            "effects_on_life": [
+                {
+                    "input": name,
+                    "sign": effect.sign,
+                    "factor_at_10_percent": asdict(effect.factors[0]),
+                    "factor_at_90_percent": asdict(effect.factors[1]),
+                }
+                for name, effect in ({} if result.are_equal else result.tornado()).items()
+            ],
+            "exact_wear_factor": settings.factor or None,
+            "counted_because": settings.reason or None,
+            "interval_method": result.method,
+            "seed": result.raw.seed,
+            "wall_seconds": result.raw.wall_seconds,
+            "output": str(result.path) if result.path else None,
+            "notes": list(result.notes),
+            "warnings": list(result.warnings),
+        }
+
+    def _rare(self) -> dict[str, Any] | None:
+        if self.result.rare is None:
+            return None
+        tried = {}
+        for method, item in self.result.rare_estimates.items():
+            known = asdict(item.probability) if item.is_reliable else None
+            tried[method] = {**asdict(item), "probability": known, "refused": not item.is_reliable}
+        method = next(reversed(tried))
+        return {**tried[method], "method": method, "tried": tried}
+
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return the panels; there is no profile to measure."""
+        return life_sheet([self.result], [self.title])
+
+    def options(self) -> Sequence[str]:
+        """Return the options of the command that repeats the study."""
+        settings, options = self.result.settings, study_options(self.result)
+        if self.result.raw.until:
+            options += ["--precision", self.result.raw.until]
+        if settings.rare:
+            options += ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
+        return options
+
+
+def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
+    """Return lives, their intervals, and the lives with the numerical errors of the tests."""
+    lines = []
+    for label, result in zip(labels, results, strict=True):
+        for share in result.settings.shares:
+            ends = result.b_error(share)
+            low, high = rounded_lives(*ends)
+            error = f"{low}..{high}" if all(map(math.isfinite, ends)) else NOTHING
+            lines.append([f"{label} B{share:g}".strip(), *life_cells(result, share), error])
+    heads = [f"life [{results[0].unit}]", "estimate", "95 % interval", "numerical error"]
+    return Table("", lines, heads)
+
+
+def limit_texts(limits: Mapping[str, float]) -> list[str]:
+    """Return limits of a life by name in SI units as texts, "depth 50.00 um"."""
+    units = ((name, _LIMIT_UNITS.get(name, "um"), value) for name, value in limits.items())
+    return [f"{name.replace('_', ' ')} {shown(value, unit)}" for name, unit, value in units]
+
+
+def life_text(result: LifeResult, share: float) -> str:
+    """Return a life with its unit and its interval."""
+    value, interval = life_cells(result, share)
+    return f"{value} {result.unit}" + (f" [{interval}]" if interval else "")
+
+
+def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
+    """Return the life that a percentage does not reach, and its interval, which may be empty."""
+    found, most = result.b(share), count(result.most)
+    low, value, high = rounded_lives(found.low, found.value, found.high)
+    if math.isnan(found.value):
+        fewest = fewest_lives(0.01 * share)
+        if result.count < fewest and not result.is_exact:
+            return f"takes {fewest} lives", ""
+        return f"above {most}", f"from {low}" if math.isfinite(found.low) else NOTHING
+    if found.low == found.high:
+        ends = result.b_error(share)
+        return rounded_lives(ends[0], found.value, ends[1])[1], ""
+    if math.isfinite(found.low):
+        return value, f"{low}..{high}" if math.isfinite(found.high) else f"from {low}"
+    bound = result.lower_bound(share)  # of a small sample
+    return value, f"from {rounded_lives(bound)[0]} (one-sided)" if math.isfinite(
+        bound
+    ) else "too few lives"
+
+
+def rounded_lives(*lives: float) -> list[str]:
+    """Return lives with the digits that the range between them supports: its first two.
+
+    Lives have six digits at most.
+    """
+    known = [abs(life) for life in lives if math.isfinite(life)]
+    least = max(known, default=0.0) * 1e-4
+    width = max(max(known) - min(known), least) if len(known) > 1 else least
+    unit = 10.0 ** max(math.floor(math.log10(width)) - 1, 0) if width > 0.0 else 1.0
+    return [count(round(life / unit) * unit) if math.isfinite(life) else NOTHING for life in lives]
+
+
+def effect_cells(effect: SignedEffect) -> tuple[str, str]:
+    """Return the change of life at the 10 % and the 90 % quantile of an input, with intervals."""
+    low, high = effect.factors
+    return _change(low), _change(high)
+
+
+def _change(factor: Interval) -> str:
+    change = [100.0 * (one - 1.0) for one in (factor.value, factor.low, factor.high)]
+    if not math.isfinite(factor.half_width):
+        return NOTHING
+    if factor.half_width == 0.0:
+        return f"{change[0]:+.1f} %"
+    return "{:+.1f} % [{:+.1f}, {:+.1f}]".format(*change)
+
+
+def study_options(result: LifeResult) -> list[str]:
+    """Return the options of a study of lives without those of its precision and rare events."""
+    shares = ",".join(f"{share:g}" for share in result.settings.shares)
+    options = ["-n", str(result.settings.plain), "--seed", str(result.raw.seed), "--b", shares]
+    options += ["--max", f"{result.most:.17g}"]
+    if result.target is not None:
+        options += ["--target", f"{result.target:.17g}"]
+    return options
+
+
+def rare_command(result: LifeResult) -> str:
+    """Return the command for a small probability of a life before the target."""
+    given = _limits_in_si(result.scenario.limit.given)
+    limits = [text for limit in given for text in ("--limit", limit)]
+    options = [*study_options(result), *limits, "--rare", str(RARE_TESTS)]
+    stem = Path(result.raw.scenario_file).stem.removesuffix("-life")
+    output = ["-o", f"{stem}-rare-life.h5"]
+    return shlex.join(["wearsim", "life", result.raw.scenario_file, *options, *output])
+
+
+def _limits_in_si(limits: Mapping[str, float]) -> list[str]:
+    """Return limits of a life as arguments of --limit, "depth=5e-05 m"."""
+    units = ((name, kind_of(_LIMIT_UNITS.get(name, "um")).unit) for name in limits)
+    return [f"{name}={limits[name]:.12g} {unit}" for name, unit in units]
+
+
+def target_text(result: LifeResult) -> str:
+    """Return the probability of a life before the target, or why it is not stated."""
+    assert result.target is not None
+    if obstacle := result.probability_obstacle(result.target):
+        return f"not stated: {obstacle}"
+    found = result.probability_before(result.target)
+    if not 0.0 < found.value < _SMALL:
+        return part_with_interval(found)
+    interval = f" [{found.low:.2g}, {found.high:.2g}]" if found.low < found.high else ""
+    return f"{found.value:.3g}{interval}"
+
+
+def rare_text(found: RareProbability) -> str:
+    """Return the probability of a rare event, or why there is none."""
+    if not found.is_reliable:
+        return f"refused, {found.obstacle}"
+    chance = found.probability
+    text = f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(found.tests)} tests"
+    text += f", variation {shown(found.variation, '%', 2)}"
+    if found.effective_size is not None:
+        text += f", effective sample size {found.effective_size:.0f}"
+    return text
+
+
+def remarks(result: LifeResult) -> list[str]:
+    """Return what a user should know of the lives."""
+    remarks = []
+    if result.count and result.at_once == result.count:
+        remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
+    elif result.at_once:
+        remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
+    if result.count and not result.observed.any():
+        greatest, known = [], result.known_lives[np.isfinite(result.known_lives)]
+        # tests with an exact wear factor are run up to its greatest value, and further than `most`
+        if result.is_exact and len(known):
+            greatest.append(f"the shortest drawn life is {rounded_lives(known.min())[0]}")
+        elif result.is_exact:
+            greatest.append("with the greatest wear factor")
+        for name, limit in () if len(known) else result.scenario.limit.given.items():
+            stored = {"volume": "worn_volume"}.get(name, name)
+            if stored in result.observables:
+                part = float(result.at_end(stored).max()) / limit
+                greatest.append(f"{name.replace('_', ' ')} up to {100.0 * part:.3g} % of its limit")
+        reached = f" ({', '.join(greatest)})" if greatest else ""
+        remarks.append(
+            f"no realisation reaches a limit within {result.most:,.0f} {result.unit}{reached};"
+            " give a greater --max or other limits"
+        )
+    return remarks

@@ -1,0 +1,226 @@
+"""Panels of a run: profiles, depth, dissipated power, normal force and peak pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wearsim.errors import WearsimError
+from wearsim.report.measured import Measured, measured_marks
+from wearsim.report.panels import (
+    BLACK,
+    COLOURS,
+    DASHES,
+    GREY,
+    ORANGE,
+    Axis,
+    Band,
+    Line,
+    Mark,
+    Panel,
+    Records,
+    Sheet,
+    depth_axes,
+    look,
+    worn_limits,
+)
+from wearsim.report.text import count, shown, simulated
+from wearsim.report.view import Row
+from wearsim.studies.run.result import Result
+from wearsim.types import FloatArray
+
+Y = "y"
+HEIGHT = Axis("height above nominal", "um")
+
+
+def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
+    """Return the panels of a run; measured profiles are drawn over the computed ones."""
+    power = np.asarray(result.dissipation).reshape(-1, len(result.y)).max(axis=0)
+    limits = worn_limits(result.y, power, *(profile.y for profile in measured))
+    panels = {
+        "profiles": _profiles(result, limits, measured),
+        "depth": depth_panel(result),
+        "dissipation": _dissipation(result, limits),
+        "load": _normal_force(result),
+        "pressure": pressure_panel(result),
+    }
+    return Sheet(
+        f"{result.title}\n{caption(result)}",
+        panels,
+        [["profiles", "depth"], ["dissipation", "load"]],
+        (11.0, 7.6),
+        widths=[1.15, 1.0],
+        scale_beside=["profiles", "dissipation"],
+        steps=record_texts(result),
+    )
+
+
+def record_texts(result: Result) -> list[str]:
+    """Return passes and time of each record, for the slider of a page."""
+    ends = zip(result.record_passes, result.record_time, strict=True)
+    return [f"pass {count(passes)}, {simulated(time)}" for passes, time in ends]
+
+
+def caption(result: Result) -> str:
+    """Return passes, time, model, depth and width of a run in words."""
+    depth = f"depth {shown(float(np.max(result.depth[-1])), 'um')}"
+    if result.start_height.any():
+        below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
+        depth = f"{depth} worn since the start, depth below nominal {below}"
+    unfinished = "" if result.finished else ", failed" if result.failure else ", unfinished"
+    if result.until:
+        unfinished = f", stopped at {result.until}"
+    return (
+        f"{count(float(result.passes[-1]))} roller passes in"
+        f" {simulated(float(result.time[-1]))}"
+        f" ({result.described_model}, {result.stepper}{unfinished})\n"
+        f"{depth}, width {width_of(result, np.max(result.width[-1]))}"
+    )
+
+
+def width_of(result: Result, width: Any) -> str:
+    """Return widths of the groove, or the depth that it has not reached."""
+    if not np.any(width):
+        return f"0 mm, not deeper than {shown(result.raw.width_threshold, 'um')}"
+    return Row("width", width, "mm").text
+
+
+def _profiles(result: Result, limits: tuple[float, float], measured: Sequence[Measured]) -> Panel:
+    worn, passes = np.asarray(result.profiles), result.record_passes
+    marks: list[Mark] = [Records(result.y, result.start_height - worn, passes)]
+    rollers = np.asarray(result.roller_profiles)
+    rollers = rollers if rollers.ndim == 3 else rollers[:, None]
+    for number in range(rollers.shape[1]):
+        if rollers[-1, number].max() > 0.0:
+            name = "roller" if rollers.shape[1] == 1 else f"roller {number + 1}"
+            style = look(dash="--", width=1.0, colour=BLACK)
+            marks.append(Line(result.y, -rollers[-1, number], label=f"{name}, at the end", **style))
+    return Panel(
+        "Worn profile of the cylinder (black: start of the run)",
+        Axis(Y, "mm", limits=limits),
+        HEIGHT,
+        [*marks, *measured_marks(measured)],
+        "Height across the track; at the end the cylinder is"
+        f" {shown(float(worn[-1].max()), 'um')} deep.",
+        legend="lower right",
+    )
+
+
+def depth_panel(result: Result) -> Panel:
+    """Return the depth against the roller passes, with its estimated error."""
+    title = "Depth worn since the start" if result.start_height.any() else "Depth"
+    drawn, x, y = depth_axes(result.passes, result.depth, title.lower())
+    passes, depth, error, time = (
+        values[drawn] for values in (result.passes, result.depth, result.depth_error, result.time)
+    )
+    visible, marks = bool((error > 0.05 * depth).any()), list[Mark]()
+    estimate = f"estimated error {shown(float(error[-1]), 'um', 2)} at the end"
+    if visible:
+        low = np.maximum(depth - error, 0.05 * depth) if y.log else depth - error
+        marks.append(Band(passes, low, depth + error, label=estimate, colour=ORANGE, alpha=0.35))
+    marker, label = "", "depth"
+    if result.stepper == "per-pass":
+        estimate = "no stepping error: every roller pass is solved"
+    elif len(passes) <= 80:
+        marker, label = "o", "depth, one dot per step"
+    label += "" if visible else f"\n({estimate})"
+    more = {"time": (time, "min"), "estimated error": (error, "um")}
+    marks.append(Line(passes, depth, marker=marker, size=2.6, label=label, more=more))
+    first, last = (shown(float(value), "um") for value in (depth[0], depth[-1]))
+    text = f"The depth grows from {first} at pass {count(passes[0])} to {last} at the end."
+    return Panel(title, x, y, marks, text, legend="upper left")
+
+
+def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
+    power = np.asarray(result.dissipation)
+    power = power if power.ndim == 3 else power[:, None]  # (record, roller, strip)
+    rollers = power.shape[1]
+    marks = [
+        Records(
+            result.y,
+            power[:, number],
+            result.record_passes,
+            dash=DASHES[number % len(DASHES)],
+            most=10 if rollers == 1 else 5,
+            label="" if rollers == 1 else f"roller {number + 1}",
+            colour=COLOURS[number % len(COLOURS)],
+        )
+        for number in range(rollers)
+    ]
+    return Panel(
+        "Dissipated power per length (black: start of the run)",
+        Axis(Y, "mm", limits=limits),
+        Axis("$P_l$", "W/mm", limits=(0.0, None)),
+        marks,
+        "Power across the track: high and narrow on fresh bodies, low and wide in a groove.",
+        legend="upper right",
+    )
+
+
+def _normal_force(result: Result) -> Panel:
+    force = _by_roller(result.normal_force)
+    base, rollers, marks = _base_load(result), force.shape[1], list[Mark]()
+    if base is not None:
+        marks.append(Line(*base, width=0.8, colour=GREY, label="without feedback"))
+    # between the steps, a line would contradict the load; at many of them, the dots are a line
+    style = look(dash="", marker="o") if base is not None else {}
+    more = {"passes": (result.passes, "1")}
+    for roller in range(rollers):
+        label = "" if rollers == 1 and base is None else f"roller {roller + 1}"
+        label = "at the steps" if rollers == 1 and base is not None else label
+        colour = COLOURS[roller % len(COLOURS)]
+        values = force[:, roller]
+        marks.append(
+            Line(result.time, values, size=2.6, label=label, colour=colour, more=more, **style)
+        )
+    y = _force_axis("normal force", "N", force if base is None else np.array([0.0, 1.0]))
+    title, text = "Normal force of one roller", _first_and_last(force, "N")
+    return Panel(title, Axis("time", "min", margin=(0.02, 0.02)), y, marks, text)
+
+
+def pressure_panel(result: Result) -> Panel:
+    """Return the peak pressure of the rollers against time."""
+    values = _by_roller(result.peak_pressure)
+    marks = [
+        Line(
+            result.time,
+            values[:, number],
+            label="" if values.shape[1] == 1 else f"roller {number + 1}",
+            colour=COLOURS[number % len(COLOURS)],
+            more={"passes": (result.passes, "1")},
+        )
+        for number in range(values.shape[1])
+    ]
+    y, text = _force_axis("peak pressure", "MPa", values), _first_and_last(values, "MPa")
+    return Panel("Peak pressure of the rollers", Axis("time", "min"), y, marks, text)
+
+
+def _force_axis(name: str, unit: str, values: FloatArray) -> Axis:
+    """Return the axis of values, which shows a constant as such."""
+    greatest = float(values.max())
+    constant = np.ptp(values) < 0.02 * greatest
+    return Axis(name, unit, limits=(0.0, 1.25 * greatest) if constant else (None, None))
+
+
+def _by_roller(values: FloatArray) -> FloatArray:
+    """Return a history by roller, or one column if it is the same on all."""
+    columns = np.asarray(values).reshape(len(values), -1)
+    equal = np.ptp(columns, axis=1).max() < 1e-6 * columns.max()
+    return columns[:, :1] if equal else columns
+
+
+def _first_and_last(values: FloatArray, unit: str) -> str:
+    first, last = (shown(float(row.max()), unit) for row in (values[0], values[-1]))
+    return f"It is {first} at the start and {last} at the end."
+
+
+def _base_load(result: Result) -> tuple[FloatArray, FloatArray] | None:
+    """Return times [s] and the load without feedback [N], or None if constant or unknown."""
+    times = np.linspace(0.0, float(result.time[-1]), 2001)
+    try:
+        force = result.scenario.load.build().force(times)
+    except WearsimError:  # a plugin of the scenario is not installed
+        return None
+    return (times, force) if np.ptp(force) > 1e-3 * force.max() else None

@@ -1,0 +1,389 @@
+"""Results of one wear test: content of the file, and the result in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+
+from wearsim.errors import unknown_name
+from wearsim.report.measured import ComputedProfile
+from wearsim.results.content import (
+    Array,
+    Arrays,
+    Schema,
+    Stored,
+    StudyData,
+    StudyResult,
+)
+from wearsim.results.io.files import read_study
+from wearsim.studies.run.schema import CAM_RUN, RUN
+from wearsim.types import FloatArray
+
+_ARRAYS = ("static", "history", "records", "checkpoint")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunData(StudyData):
+    """Data of a run, in SI, in addition to `StudyData`.
+
+    Parameters
+    ----------
+    stepper : str
+        Name of the stepper.
+    tolerance : float
+        Required relative error of the final depth and worn volume.
+    width_threshold : float
+        Worn depth above which the profile counts towards the width [m].
+    total_passes : float
+        Roller passes of the whole test.
+    kinematics : dict of str to float
+        rolling_speed [m/s], cylinder_radius, roller_radius, crown_radius [m], pass_rate [1/s],
+        physical_rollers.
+    static, history, records : dict of str to ndarray
+        The variables of `wearsim.studies.run.schema`, by kind and name.
+    checkpoint : dict of str to ndarray
+        State for resuming the run.
+    drawn : dict of str to dict
+        Drawn values of the random inputs by scenario key: `values`, one for the test or one per
+        roller, and their SI `unit`.
+    until : str
+        Limit at which the run stops, or has stopped if it is finished, "depth 50 um"; empty
+        without one.
+    failure, failed_at : str
+        Error that ended the run, and the time when it did, ISO 8601; empty if it did not fail.
+    """
+
+    separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(_ARRAYS)
+    optional: ClassVar[frozenset[str]] = frozenset({"until", "failure", "failed_at"})
+
+    stepper: str
+    tolerance: float
+    width_threshold: float
+    total_passes: float
+    kinematics: dict[str, float]
+    static: Arrays
+    history: Arrays
+    records: Arrays
+    checkpoint: Arrays
+    drawn: dict[str, dict[str, Any]] = field(default_factory=dict)
+    until: str = ""
+    failure: str = ""
+    failed_at: str = ""
+
+    base_schema: ClassVar[Schema] = RUN
+
+    @property
+    def schema(self) -> Schema:
+        """Schema of the results file."""
+        return self.schema_of({}, self.static)
+
+    @classmethod
+    def schema_of(cls, attributes: Mapping[str, Any], names: Container[str]) -> Schema:
+        """Return the schema of a file by its attributes and the names of its variables."""
+        return CAM_RUN if "station_angle" in names else RUN
+
+    @classmethod
+    def from_variables(
+        cls, attributes: Mapping[str, Any], variables: Arrays, checkpoint: Arrays
+    ) -> RunData:
+        """Return the content of a file from its fields, variables and checkpoint."""
+        groups = {"static": "static", "history": "history", "records": "record"}
+        known = cls.schema_of(attributes, variables).variables
+        by_kind = {
+            group: {name: variables[name] for name, item in known.items() if item.kind == kind}
+            for group, kind in groups.items()
+        }
+        parts: dict[str, Any] = {**attributes, **by_kind}
+        return cls(**parts, checkpoint=checkpoint)
+
+    @property
+    def variables(self) -> Arrays:
+        """Variables of all kinds by name."""
+        return {**self.static, **self.history, **self.records}
+
+
+def read_results(path: str | Path) -> RunData:
+    """Read the results file of a run; errors as of `read_study`."""
+    data: RunData = read_study(path, RunData)
+    return data
+
+
+Number: TypeAlias = float | list[float]
+
+_DROPPED = {"station", "roller", "realisation"}
+
+
+@dataclass(frozen=True, eq=False)
+class Result(StudyResult[RunData]):
+    """Result of a run, finished or not.
+
+    The axes station, roller and realisation are dropped where their length is one.
+
+    Examples
+    --------
+    >>> result = wearsim.run("rig.toml")
+    >>> result
+    <Result 'a wear test': 1350000 roller passes, depth 48.11 um>
+    >>> result.y.shape == result.profiles[-1].shape  # the groove at the end
+    True
+    >>> f"{result.final['relative_depth_error']:.1%}"
+    '0.0%'
+    """
+
+    passes = Stored(
+        "passes", "Roller passes after each step, all rollers together; the first row is 0."
+    )
+    time = Stored("time", "Simulated time after each step [s].")
+    depth = Stored(
+        "depth", "Greatest depth of the cylinder worn since the start, after each step [m]."
+    )
+    width = Stored("width", "Width of the groove in the cylinder after each step [m].")
+    worn_volume = Stored("worn_volume", "Worn volume of the cylinder after each step [m^3].")
+    roller_depth = Stored(
+        "roller_depth", "Greatest depth of each roller worn since the start, after each step [m]."
+    )
+    roller_worn_volume = Stored(
+        "roller_worn_volume", "Worn volume of one physical roller after each step [m^3]."
+    )
+    dissipated_energy = Stored(
+        "dissipated_energy",
+        "Energy dissipated by all rollers since the start, after each step [J].",
+    )
+    power = Stored("power", "Dissipated power of all rollers after each step [W].")
+    normal_force = Stored("normal_force", "Normal force of each roller after each step [N].")
+    peak_pressure = Stored(
+        "peak_pressure", "Greatest normal pressure of each roller after each step [Pa]."
+    )
+    descent = Stored("descent", "Worn descent of each roller since the start, after each step [m].")
+    elastic_approach = Stored(
+        "elastic_approach", "Elastic approach of each roller and the cylinder after each step [m]."
+    )
+    longitudinal_creepage = Stored(
+        "longitudinal_creepage", "Mean longitudinal creepage of each roller after each step."
+    )
+    depth_error = Stored(
+        "depth_error", "Estimated error of the depth of either body after each step [m]."
+    )
+    volume_error = Stored(
+        "volume_error", "Estimated error of the volume worn off both bodies, after each step [m^3]."
+    )
+    profile_error = Stored(
+        "profile_error",
+        "Estimated error of the profiles of all bodies after each step: its root mean square over"
+        " the strips, relative to that of the depths.",
+    )
+    depth_error_by_steps = Stored(
+        "depth_error_by_steps", "Part of `depth_error` that is due to the steps [m]."
+    )
+    volume_error_by_steps = Stored(
+        "volume_error_by_steps", "Part of `volume_error` that is due to the steps [m^3]."
+    )
+    profile_error_by_steps = Stored(
+        "profile_error_by_steps", "Part of `profile_error` that is due to the steps."
+    )
+    depth_error_by_strips = Stored(
+        "depth_error_by_strips",
+        "Part of `depth_error` that is due to the strips [m]; not a number where it is not"
+        " estimated.",
+    )
+    volume_error_by_strips = Stored(
+        "volume_error_by_strips", "Part of `volume_error` that is due to the strips [m^3]."
+    )
+    profile_error_by_strips = Stored(
+        "profile_error_by_strips", "Part of `profile_error` that is due to the strips."
+    )
+    rejected = Stored("rejected", "Rejected steps so far, after each step.")
+    solves = Stored("solves", "Contact solves of accepted steps so far, after each step.")
+    full_solves = Stored("full_solves", "Roller passes solved in full so far, after each step.")
+    y = Stored("y", "Axial position of the strips [m].")
+    start_height = Stored(
+        "start_height",
+        "Height of the cylinder above its nominal shape at the start, shape (strips,) [m].",
+    )
+    record_passes = Stored("record_passes", "Roller passes at each record.")
+    record_time = Stored("record_time", "Simulated time at each record [s].")
+    profiles = Stored(
+        "cylinder_depth_profile",
+        "Worn depth of the cylinder at each record, positive down, (record, y) [m].",
+    )
+    roller_profiles = Stored(
+        "roller_depth_profile",
+        "Worn depth of each roller at each record, positive into the roller [m].",
+    )
+    line_load = Stored(
+        "line_load", "Normal force per axial length of each contact at each record [N/m]."
+    )
+    dissipation = Stored(
+        "dissipation", "Dissipated power per axial length of each contact at each record [W/m]."
+    )
+
+    @property
+    def is_cam(self) -> bool:
+        """Whether it is the run of a cam."""
+        return "station_angle" in self.raw.static
+
+    def worn_profile(self) -> ComputedProfile:
+        """Return the profile at the end of the run, of a cam that of its first station.
+
+        Examples
+        --------
+        >>> found = wearsim.run("rig.toml").worn_profile()
+        >>> print(f"{-found.height.min() * 1e6:.1f} um")
+        48.1 um
+        """
+        start = self.start_height
+        height = start - np.asarray(self.profiles[-1])
+        return ComputedProfile(self.y, height, height, height, start)
+
+    def __repr__(self) -> str:
+        passes, total = float(self.passes[-1]), self.raw.total_passes
+        done = f"{passes:.12g}" if self.finished else f"{passes:.12g} of {total:.12g}"
+        depth = float(np.max(self.depth[-1])) * 1e6
+        return f"<Result '{self.title}': {done} roller passes, depth {depth:.4g} um>"
+
+    def values(self, name: str) -> Array:
+        """Return a variable of the results file, axes of length one dropped as above.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable, such as "half_length".
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none; it lists the known ones.
+
+        Examples
+        --------
+        >>> result = wearsim.run("rig.toml")
+        >>> print(f"{result.values('half_length').max() * 1e3:.2f} mm")
+        0.14 mm
+        """
+        variables = self.raw.schema.variables
+        if name not in variables:
+            raise unknown_name(name, "a variable of a run", variables)
+        array = self.raw.variables[name]
+        dims = zip(variables[name].dims, array.shape, strict=True)
+        return array.reshape([n for dim, n in dims if n != 1 or dim not in _DROPPED])
+
+    @property
+    def drawn(self) -> dict[str, tuple[float, ...]]:
+        """Drawn values of the random inputs by scenario key, one or one per roller [SI].
+
+        Inputs that vary during the run (processes, draws at every pass) are not included.
+        """
+        return {key: tuple(item["values"]) for key, item in self.raw.drawn.items()}
+
+    @property
+    def until(self) -> str:
+        """Limit at which the run has stopped, "depth 50 um"; empty at the end of the test."""
+        return self.raw.until if self.finished else ""
+
+    @property
+    def stepper(self) -> str:
+        """Name of the stepper."""
+        return self.raw.stepper
+
+    @property
+    def failure(self) -> str:
+        """Error that ended the run; empty if it did not fail."""
+        return self.raw.failure
+
+    @property
+    def depth_below_nominal(self) -> FloatArray:
+        """Greatest depth of the cylinder below its nominal shape at each record [m].
+
+        It differs from `depth` (worn since the start) if the cylinder has a start profile.
+        """
+        below = self.raw.records["cylinder_depth_profile"] - self.start_height
+        deepest: FloatArray = below.max(axis=(1, 3))
+        return deepest[:, 0] if deepest.shape[1] == 1 else deepest
+
+    @property
+    def steps(self) -> int:
+        """Number of accepted steps; the history may have fewer rows."""
+        return int(np.sum(self.raw.checkpoint.get("steps", len(self.passes) - 1)))
+
+    @property
+    def final(self) -> dict[str, Number]:
+        """Final state in SI, ready for JSON.
+
+        Quantities that differ between rollers are the maximum over the rollers. With several
+        realisations each value is a list. A relative error is 0 if nothing is worn.
+        """
+        last = {name: array[-1] for name, array in self.raw.history.items()}
+        per_roller = (
+            *("roller_depth", "roller_worn_volume", "normal_force", "peak_pressure"),
+            *("descent", "elastic_approach"),
+        )
+        last.update({name: last[name].max(axis=0) for name in per_roller})
+        # the estimated errors apply to the deeper body and to the volume of both bodies
+        deepest = np.maximum(last["depth"], last["roller_depth"])
+        rollers = self.raw.static["multiplicity"] @ self.raw.history["roller_worn_volume"][-1]
+        below_nominal = (
+            {"depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1]))}
+            if self.start_height.any()
+            else {}
+        )
+        return {
+            "passes": _number(last["passes"]),
+            **self._final_of_cam(last),
+            "time_s": _number(last["time"]),
+            "depth_m": _number(last["depth"]),
+            **below_nominal,
+            "width_m": _number(last["width"]),
+            "worn_volume_m3": _number(last["worn_volume"]),
+            "roller_depth_m": _number(last["roller_depth"]),
+            "roller_worn_volume_m3": _number(last["roller_worn_volume"]),
+            "dissipated_energy_J": _number(last["dissipated_energy"]),
+            "power_W": _number(last["power"]),
+            "normal_force_N": _number(last["normal_force"]),
+            "peak_pressure_Pa": _number(last["peak_pressure"]),
+            "descent_m": _number(last["descent"]),
+            "elastic_approach_m": _number(last["elastic_approach"]),
+            "depth_error_m": _number(last["depth_error"]),
+            "volume_error_m3": _number(last["volume_error"]),
+            "relative_profile_error": _number(last["profile_error"]),
+            "relative_depth_error": _number(_relative(last["depth_error"], deepest)),
+            "relative_volume_error": _number(
+                _relative(last["volume_error"], last["worn_volume"] + rollers)
+            ),
+        }
+
+    def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
+        """Return the final state of a cam, and depth and lift error per station."""
+        if "turns" not in last:
+            return {}
+        curve = self.raw.records["lift_error_curve"][-1].mean(axis=(1, 2))
+        worst = self.raw.history["peak_pressure"][-1].argmax(axis=0)[None]
+        places = last["peak_pressure_angle"]
+        numbers = self.raw.static["station_segment"].tolist()
+        dwells = [k for k, number in enumerate(numbers) if numbers.count(number) == 1]
+        dwell = curve[dwells[0] if dwells else 0]  # a dwell has one station
+        return {
+            "turns": _number(last["turns"]),
+            "depth_angle_rad": _number(last["depth_angle"]),
+            "lift_error_m": _number(last["lift_error"].max(axis=0)),
+            "peak_pressure_angle_rad": _number(np.take_along_axis(places, worst, axis=0)),
+            "lift_error_greatest_at_rad": float(self.raw.static["station_angle"][curve.argmax()]),
+            "lift_error_smallest_at_rad": float(self.raw.static["station_angle"][curve.argmin()]),
+            "station_angle_rad": self.raw.static["station_angle"].tolist(),
+            "station_depth_m": last["station_depth"].mean(axis=-1).tolist(),
+            "station_lift_error_m": curve.tolist(),
+            "station_lift_error_from_dwell_m": (curve - dwell).tolist(),
+        }
+
+
+def _number(values: Array) -> Number:
+    numbers: list[float] = values.astype(float).ravel().tolist()
+    return numbers[0] if len(numbers) == 1 else numbers
+
+
+def _relative(error: FloatArray, value: FloatArray) -> FloatArray:
+    worn = value > 0.0
+    return np.asarray(worn * error / (value + ~worn))  # without division by zero

@@ -1,0 +1,279 @@
+"""View of a run: end state with estimated errors, panels, history and records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from wearsim.report.csv_files import computed
+from wearsim.report.measured import ComputedProfile, Measured
+from wearsim.report.panels import Sheet
+from wearsim.report.text import count, footer, lapse, percent, shown, simulated, within
+from wearsim.report.view import Column, Columns, Frame, Row, Rows
+from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
+from wearsim.studies.run.panels import run_sheet, width_of
+from wearsim.studies.run.result import Result
+from wearsim.studies.run.schema import ALL_VARIABLES, AXES
+from wearsim.types import FloatArray
+from wearsim.units import engineers_unit
+
+NO_STEPPING_ERROR = "Every roller pass is solved: there is no stepping error."
+_NOT_MODEL = (
+    "The stated error is that of the steps in time. It does not contain the errors of the contact"
+    " model, of the wear law or of the inputs."
+)
+_CAM_ANGLES = (
+    *("depth_angle", "peak_pressure_angle"),
+    *("lift_error_greatest_at", "lift_error_smallest_at"),
+)
+_RECORDS = {
+    "cylinder_depth_profiles.csv": "cylinder_depth_profile",
+    "roller_depth_profiles.csv": "roller_depth_profile",
+    "line_load.csv": "line_load",
+    "dissipation.csv": "dissipation",
+}
+
+
+class RunView(StudyView[Result]):
+    """End state of a run with its estimated error, of a cam also angles and lift error.
+
+    Panels: profiles, depth, dissipated power, normal force, peak pressure; of a cam also the map
+    of the depth, the worn shape and the lift error. Files: history and records; the table of pandas
+    has the history.
+    """
+
+    verb = "run"
+
+    def __init__(self, result: Result) -> None:
+        super().__init__(result)
+        raw, is_exact = result.raw, result.stepper == "per-pass"
+        body, length = "cylinder", f"{count(raw.total_passes)} roller passes"
+        if result.is_cam:
+            turns = raw.total_passes / raw.kinematics["physical_rollers"]
+            body, length = "cam", f"{count(turns)} turns"
+        time = simulated(raw.total_passes / raw.kinematics["pass_rate"])
+        self.question = f"How deep does the {body} wear in {length} ({time})?"
+        self.heading = "end state" if result.finished else "current state"
+        if result.failure:
+            self.heading = "state before the failure"
+        self.basis = NO_STEPPING_ERROR if is_exact else _NOT_MODEL
+
+    def standing(self) -> str:
+        """Return the passes and the simulated time that the run has reached."""
+        result = self.result
+        passes, total = float(result.passes[-1]), float(result.raw.total_passes)
+        time = simulated(float(result.time[-1]))
+        if result.until:
+            return f"stopped at {result.until}: pass {count(passes)} of {count(total)}, {time}"
+        if result.finished:
+            return f"finished: {count(passes)} passes, {time}"
+        part = f"{100.0 * passes / total:.1f} %"
+        word = "failed after" if result.failure else "unfinished:"
+        return f"{word} pass {count(passes)} of {count(total)} ({part}), {time}"
+
+    def rows(self) -> Rows:
+        """Return the observables at the end of the run, the depth with its error first."""
+        result, is_exact = self.result, self.result.stepper == "per-pass"
+        error = None if is_exact else float(np.max(result.depth_error[-1]))
+        rows = [Row("depth", result.depth[-1], "um", error)]
+        if result.start_height.any():
+            below = Row("depth below nominal", result.depth_below_nominal[-1], "um")
+            rows = [rows[0]._replace(label="depth worn since the start"), below]
+        if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
+            rows.insert(1, Row("roller depth", result.roller_depth[-1], "um"))
+        rows += [
+            Row("width", width_of(result, result.width[-1])),
+            Row("worn volume", result.worn_volume[-1], "mm^3"),
+            Row("dissipated energy", result.dissipated_energy[-1], "J"),
+            Row("dissipated power", result.power[-1], "W"),
+            Row("normal force", result.normal_force[-1], "N"),
+            Row("peak pressure", result.peak_pressure[-1], "MPa"),
+            Row("worn descent", result.descent[-1], "um"),
+            Row("elastic approach", result.elastic_approach[-1], "um"),
+            *self._of_cam(),
+        ]
+        if error is None:
+            return [*rows, Row("error of depth", NO_STEPPING_ERROR)]
+        # the error refers to the greatest depth on either body
+        depth = float(max(np.max(result.depth[-1]), np.max(result.roller_depth[-1])))
+        part = f", {shown(error / depth, '%', 2)}" if depth > 0.0 else ""
+        return [*rows, Row("estimated error of depth", f"{shown(error, 'um', 2)}{part}")]
+
+    def _of_cam(self) -> Rows:
+        """Return rows on angles and lift error of a cam; none of a cylinder."""
+        final = self.result.final
+        if "turns" not in final:
+            return []
+        rows = {name: Row("", final[f"{name}_rad"], "deg").text for name in _CAM_ANGLES}
+        return [
+            Row("turns of the cam", count(float(np.max(final["turns"])))),
+            Row("angle of the depth", rows["depth_angle"]),
+            Row("angle of the peak pressure", rows["peak_pressure_angle"]),
+            Row("lift error, peak to peak", final["lift_error_m"], "um"),
+            Row("least wear of the lift", f"at {rows['lift_error_greatest_at']}"),
+            Row("greatest wear of the lift", f"at {rows['lift_error_smallest_at']}"),
+        ]
+
+    def study(self) -> Rows:
+        """Return rows on the test, its failure, and the effort of the computation."""
+        result, solves = self.result, count(_last(self.result.solves))
+        first, last = (count(float(result.record_passes[place])) for place in (0, -1))
+        failure = [Row("failure", result.failure), Row("failed at", result.raw.failed_at)]
+        if result.stepper == "per-pass":
+            solves += f", {count(_last(result.full_solves))} roller passes solved in full"
+        return [
+            Row("test", self.standing()),
+            *(failure if result.failure else []),
+            Row("contact model", result.described_model),
+            Row("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
+            Row("seed", str(result.raw.seed)),
+            Row("records", f"{len(result.record_passes)}, at passes {first} to {last}"),
+            Row("strips", str(len(result.y))),
+            Row("steps", f"{count(_last(result.steps))}, {count(_last(result.rejected))} rejected"),
+            Row("contact solves", solves),
+            Row("wall time", lapse(result.raw.wall_seconds)),
+        ]
+
+    def random_inputs(self) -> Rows:
+        """Return drawn values, and inputs that vary in time."""
+        drawn = self.result.raw.drawn
+        rows = [Row("random inputs", "one realisation, not the means")] if drawn else []
+        for key, item in drawn.items():
+            unit, size = engineers_unit(item["unit"])
+            text = " / ".join(f"{value / size:.6g}" for value in item["values"])
+            rows.append(Row(f"drawn {key}", text if unit == "1" else f"{text} {unit}"))
+        return [*rows, *varying_rows(varying_inputs(self.result, drawn))]
+
+    def data(self) -> dict[str, Any]:
+        """Return the end state and the effort of the run in SI units."""
+        result = self.result
+        return {
+            **result.final,
+            "title": result.title,
+            "model": result.model,
+            "stepper": result.stepper,
+            "tolerance": result.raw.tolerance,
+            "strips": len(result.y),
+            "finished": bool(result.finished),
+            "until": result.until or None,
+            "failure": result.failure or None,
+            "failed_at": result.raw.failed_at or None,
+            "steps": _last(result.steps),
+            "rejected": _last(result.rejected),
+            "solves": _last(result.solves),
+            "full_solves": _last(result.full_solves),
+            "wall_seconds": result.raw.wall_seconds,
+            "drawn": result.raw.drawn,
+            "random": varying_inputs(result, result.raw.drawn),
+            **self.ending(),
+        }
+
+    def origin(self) -> dict[str, Any]:
+        """Return length, records, scenario, files, plugins and software for JSON."""
+        result = self.result
+        own = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
+        return {**own, **super().origin()}
+
+    def line(self) -> str:
+        """Return the footer of the run, with the estimated errors of its steps and strips."""
+        result = self.result
+        used = [result.described_model, f"{len(result.y)} strips", result.stepper]
+        error = "no stepping error"
+        known = bool(np.isfinite(result.profile_error_by_strips[-1]).all())
+        if result.stepper != "per-pass":
+            used.append(f"tolerance {result.raw.tolerance:g}")
+        if result.stepper != "per-pass" or known:
+            depth = max(np.max(result.depth[-1]), np.max(result.roller_depth[-1]))
+            volume = np.max(result.worn_volume[-1])
+            text, parts = within("depth", np.max(result.depth_error[-1]), depth), "steps"
+            if known:
+                parts = "steps and strips"
+                by = (
+                    np.max(part[-1])
+                    for part in (result.depth_error_by_steps, result.depth_error_by_strips)
+                )
+                steps, strips = (percent(part / depth if depth > 0.0 else 0.0) for part in by)
+                text += f" (steps {steps}, strips {strips})"
+            volume_text = within("worn volume", np.max(result.volume_error[-1]), volume)
+            profile = within("profile", np.max(result.profile_error[-1]), 1.0)
+            error = (
+                f"{text}, {profile}, {volume_text} (estimated numerical error of the {parts}, not"
+                " of model or inputs)"
+            )
+        return footer(used, error, lapse(result.raw.wall_seconds))
+
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return the panels; measured profiles are drawn over the groove."""
+        if not self.result.is_cam:
+            return run_sheet(self.result, measured)
+        from wearsim.studies.cam.panels import cam_run_sheet  # noqa: PLC0415  (not of a cylinder)
+
+        return cam_run_sheet(self.result, measured)
+
+    def profile(self) -> ComputedProfile:
+        """Return the worn profile with which measured ones are compared."""
+        return self.result.worn_profile()
+
+    def columns(self) -> Mapping[str, Columns]:
+        """Return history, records, and of a cam its worn surface."""
+        raw = self.result.raw
+        history = [
+            column
+            for name, variable in raw.schema.variables.items()
+            if variable.kind == "history"
+            for column in _columns(name, raw.history[name], variable.dims, name)
+        ]
+        tables: dict[str, Columns] = {"history.csv": [history]}
+        for file, name in _RECORDS.items():
+            if name != "roller_depth_profile" or raw.records[name].any():
+                tables[file] = [list(self._records(name))]
+        if self.result.is_cam:
+            from wearsim.studies.cam.export import worn_cam  # noqa: PLC0415
+
+            worn = worn_cam(self.result)
+            tables["worn_cam.csv"] = [[Column(name, values) for name, values in worn.items()]]
+        return tables
+
+    def _records(self, name: str) -> Iterator[Column]:
+        """Yield y, and a column for every record and contact."""
+        raw = self.result.raw
+        yield from _columns("y", raw.static["y"], ("y",), "y")
+        dims = ("y", *ALL_VARIABLES[name].dims[1:-1])
+        quantity = "depth" if name.endswith("depth_profile") else name
+        for passes, array in zip(raw.records["record_passes"], raw.records[name], strict=True):
+            title = f"{quantity} at {passes:.12g} passes"
+            yield from _columns(name, np.moveaxis(array, -1, 0), dims, title)
+
+    def frame(self) -> Frame:
+        """Return the history, one row for each step."""
+        result = self.result
+        columns = [
+            (name, item.unit, result.values(name))
+            for name, item in result.raw.schema.variables.items()
+            if item.kind == "history"
+        ]
+        return Frame(columns, "step", range(len(result.passes)))
+
+    def options(self) -> Sequence[str]:
+        """Return the options of the command that repeats the run."""
+        until = self.result.raw.until
+        return ("--until", until) if until else ()
+
+
+def _columns(name: str, array: FloatArray, dims: Sequence[str], title: str) -> Iterator[Column]:
+    """Yield the columns of an array with rows along the first axis, the others in the titles."""
+    for index in np.ndindex(array.shape[1:]):
+        labels = [
+            f"{dim} {number + AXES[dim].first}"
+            for dim, number, length in zip(dims[1:], index, array.shape[1:], strict=True)
+            if length > 1
+        ]
+        values = array[(slice(None), *index)]
+        yield computed(" ".join([title, *labels]), values, ALL_VARIABLES[name].unit, name)
+
+
+def _last(value: Any) -> int:
+    """Return the last value of a history, or the number itself."""
+    return int(np.ravel(value)[-1])
