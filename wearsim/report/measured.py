@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.report.panels import MARKS, RED, Line
 from wearsim.report.text import count, shown
 from wearsim.types import FloatArray
 
@@ -144,20 +142,3 @@ def _middle(y: FloatArray, depth: FloatArray) -> float:
     """Return the centroid of the deep part of a groove [m]."""
     deep = np.maximum(depth - _DEEP * depth.max(), 0.0)
     return float((deep * y).sum() / deep.sum())
-
-
-def measured_marks(measured: Sequence[Measured]) -> list[Line]:
-    """Return measured profiles as points of a panel."""
-    return [
-        Line(
-            profile.y,
-            profile.height,
-            dash="",
-            marker=MARKS[number % len(MARKS)],
-            size=3.2,
-            open=True,
-            colour=RED,
-            label=f"measured: {profile.label}",
-        )
-        for number, profile in enumerate(measured)
-    ]

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
 from wearsim.report.text import PER_SI, count, pass_unit
 from wearsim.types import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from wearsim.report.measured import Measured
 
 BLUE, ORANGE, GREEN, RED, GREY = "#2066a8", "#d1701c", "#3a8a5c", "#b3282d", "#8a8a8a"
 BLACK = "black"
@@ -473,3 +476,20 @@ def several_colours(number: int) -> list[str]:
         return list(COLOURS[:number])
     places = np.linspace(0, len(_VIRIDIS) - 1, number).round().astype(int)
     return [_VIRIDIS[place] for place in places]
+
+
+def measured_marks(measured: Sequence[Measured]) -> list[Line]:
+    """Return measured profiles as points of a panel."""
+    return [
+        Line(
+            profile.y,
+            profile.height,
+            dash="",
+            marker=MARKS[number % len(MARKS)],
+            size=3.2,
+            open=True,
+            colour=RED,
+            label=f"measured: {profile.label}",
+        )
+        for number, profile in enumerate(measured)
+    ]

@@ -251,6 +251,11 @@ def part_with_interval(found: Interval) -> str:
     return f"{value} % " + (f"[{low}, {high}]" if math.isfinite(found.half_width) else TOO_FEW)
 
 
+def too_few(sufficient: int) -> str:
+    """Return a message with the number of realisations that is sufficient."""
+    return f"{TOO_FEW_REALISATIONS}, {count(sufficient)} are sufficient"
+
+
 def sufficient_for(realisations: int, probability: float) -> bool:
     """Return whether a quantile is drawn: if one realisation is beyond it on average.
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from wearsim.report.panels import Sheet
 from wearsim.report.text import shown, with_interval
 from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
     from wearsim.report.measured import ComputedProfile, Measured
+    from wearsim.report.panels import Sheet
 
 
 class Row(NamedTuple):
@@ -55,6 +55,13 @@ class Row(NamedTuple):
 
 
 Rows: TypeAlias = list[Row]
+
+
+def width_row(width: Any, threshold: float) -> Row:
+    """Return widths of the groove, or the depth that it has not reached, in SI."""
+    if not np.any(width):
+        return Row("width", f"0 mm, not deeper than {shown(threshold, 'um')}")
+    return Row("width", width, "mm")
 
 
 class Table(NamedTuple):

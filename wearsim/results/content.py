@@ -281,6 +281,9 @@ class StudyResult(Viewed, Generic[Data]):
     raw: Data
     path: Path | None = None
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} '{self.title}'>"
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name == "raw" or hasattr(type(self), name):
             return object.__getattribute__(self, name)  # raises the error of the attribute

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from wearsim.errors import ResultsFileError
-from wearsim.report.csv_files import write_csv
-from wearsim.report.measured import Measured
-from wearsim.report.page.page import save_page
-from wearsim.report.view import View
 from wearsim.results.kinds import kind_of, open_study
 from wearsim.results.viewed import Viewed, kind_of_result
-from wearsim.studies.dissipation.result import DissipationResult, read_dissipation
-from wearsim.studies.ensemble.file.parts import read_ensemble
-from wearsim.studies.ensemble.result import EnsembleResult
+
+if TYPE_CHECKING:
+    from wearsim.report.measured import Measured
+    from wearsim.report.view import View
+    from wearsim.studies.dissipation.result import DissipationResult
+    from wearsim.studies.ensemble.result import EnsembleResult
 
 
 def open_results(path: str | Path) -> Any:
@@ -58,6 +57,11 @@ def open_dissipation(path: str | Path) -> DissipationResult:
     >>> wearsim.open_dissipation("powers.h5").count
     10
     """
+    from wearsim.studies.dissipation.result import (  # noqa: PLC0415  (not of other kinds)
+        DissipationResult,
+        read_dissipation,
+    )
+
     return DissipationResult(read_dissipation(path), Path(path))
 
 
@@ -69,6 +73,8 @@ def open_ensemble(path: str | Path) -> EnsembleResult:
     >>> wearsim.open_ensemble("rig-ensemble.h5").plan
     'monte-carlo'
     """
+    from wearsim.studies.ensemble.file.parts import read_ensemble  # noqa: PLC0415
+
     data, kind = read_ensemble(path), kind_of(path)
     found: EnsembleResult = kind.load("result")(data, Path(path))
     return found
@@ -135,6 +141,8 @@ def save_report(results: Sequence[Any], path: Path, measured: Sequence[Measured]
     ResultsFileError
         If the page cannot be written, or the results cannot be compared.
     """
+    from wearsim.report.page.page import save_page  # noqa: PLC0415  (only of pages)
+
     save_page(views_of(results), path, measured)
 
 
@@ -169,4 +177,6 @@ def export_csv(
     ValueError
         If the decimal sign is neither a point nor a comma.
     """
+    from wearsim.report.csv_files import write_csv  # noqa: PLC0415  (only of exports)
+
     return write_csv(result.view, folder, force=force, decimal=decimal)

@@ -45,6 +45,9 @@ class StudyKindFixture:
     spec: StudyKind
     result: Any
 
+    def __str__(self) -> str:
+        return f"study kind '{self.spec.name}'"
+
     @cached_property
     def view(self) -> View:
         """View of the result."""

@@ -165,7 +165,7 @@ def life(
         for option, value in given.items():
             if value is not None:
                 raise typer.BadParameter("has no meaning for results files", param_hint=option)
-        from wearsim.studies.life.panels import swept_variable
+        from wearsim.studies.life.stored_settings import swept_variable
 
         results = [_opened(path, target, shares) for path in designs]
         labels = _labels(designs)

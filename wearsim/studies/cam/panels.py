@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.mechanics.cam import Motion, Stations, surface_points
-from wearsim.report.measured import Measured, measured_marks
+from wearsim.report.measured import Measured
 from wearsim.report.panels import (
     BLACK,
     GREEN,
@@ -26,6 +26,7 @@ from wearsim.report.panels import (
     Span,
     Text,
     look,
+    measured_marks,
     worn_limits,
 )
 from wearsim.report.text import PER_SI, shown

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.report.measured import Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import NOTHING, in_unit, shown
 from wearsim.report.view import Frame, Row, Rows, Table, View
 from wearsim.studies.cam.checks import harmonic_depth
-from wearsim.studies.cam.panels import cam_sheet
 from wearsim.studies.cam.study import CamStudy
 from wearsim.types import FloatArray
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 
 
 class CamView(View):
@@ -151,6 +152,8 @@ class CamView(View):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; there is no profile to measure."""
+        from wearsim.studies.cam.panels import cam_sheet  # noqa: PLC0415  (only of figures)
+
         return cam_sheet(self.study)
 
     def frame(self) -> Frame:

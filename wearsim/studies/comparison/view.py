@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.errors import ResultsFileError
 from wearsim.report.measured import Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import NOTHING, OBSERVABLES, cells, count, si_key, si_unit, with_interval
 from wearsim.report.view import STUDY, Frame, Row, Rows, Table, View
 from wearsim.studies.comparison.compare import (
@@ -20,9 +19,11 @@ from wearsim.studies.comparison.compare import (
     compare,
     observables_of,
 )
-from wearsim.studies.comparison.panels import comparison_sheet
 from wearsim.studies.comparison.rows import against, kind, length
 from wearsim.studies.ensemble.view import INTERVAL
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 
 _ENDS = ("value", "low", "high")
 
@@ -95,6 +96,8 @@ class ComparisonView(View):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels, with the worn profiles for a page."""
+        from wearsim.studies.comparison.panels import comparison_sheet  # noqa: PLC0415  (only of figures)
+
         titles = {result.title for result in self.results}
         shared = titles.pop() if len(titles) == 1 else ""
         suffix = f"for values of {self.key}" if self.key else ""

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.report.measured import Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import NOTHING, brief, footer, lapse, percent, shown
 from wearsim.report.view import Frame, Row, Rows, Table, View
 from wearsim.studies.contact.outline import patch_edges
-from wearsim.studies.contact.panels import contact_sheet
 from wearsim.studies.contact.single import ContactStudy
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 
 _DIGITS = 10  # after the point, of a fraction; beyond them is rounding
 _DIFFERENCES = {
@@ -152,6 +153,8 @@ class ContactView(View):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; there is no profile to measure."""
+        from wearsim.studies.contact.panels import contact_sheet  # noqa: PLC0415  (only of figures)
+
         return contact_sheet(self.study)
 
     def frame(self) -> Frame:

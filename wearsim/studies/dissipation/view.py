@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.report.csv_files import drawn
 from wearsim.report.measured import Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import (
     NOTHING,
     Named,
@@ -31,10 +30,12 @@ from wearsim.results.study_view import (
     varying_inputs,
     varying_rows,
 )
-from wearsim.studies.dissipation.panels import dissipation_sheet
 from wearsim.studies.dissipation.result import DissipationResult
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import is_constant
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 
 QUANTITIES = {
     "power": Named("dissipated power", "W"),
@@ -170,6 +171,8 @@ class DissipationView(StudyView[DissipationResult]):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; there is no profile to measure."""
+        from wearsim.studies.dissipation.panels import dissipation_sheet  # noqa: PLC0415  (only of figures)
+
         return dissipation_sheet(self.result)
 
     def columns(self) -> Mapping[str, Columns]:

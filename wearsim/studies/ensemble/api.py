@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -134,17 +135,8 @@ def ensemble(
     request = checked_request(scenario, realisations, plan, precision)
     path = Path(output)
     check_output(path, force, scenario.paths)
-    with (
-        shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
-        executor(
-            scheduler,
-            workers,
-            on_notice=on_notice or getattr(watch, "notice", None),
-            stop_requested=stop_requested,
-            preload=PRELOAD,
-            realisations=request.realisations,
-        ) as pool,
-    ):
+    hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
+    with hands.open(scenario, request.realisations) as (watch, pool):
         grid = profile_axis(scenario)
         content = ensemble_content(scenario, request, grid)
         with EnsembleFile.create(path, *content, storage) as file:
@@ -291,38 +283,98 @@ def resume_ensemble(
     if realisations is not None:
         checked_count(scenario, realisations)
         check_plan(scenario, plan, "more realisations")
-        if realisations < total or (data.finished and realisations == total):
-            raise ResultsFileError(
-                f"{path}: has {total} realisations",
-                python="give a larger number of realisations to extend it",
-                shell="give a larger number with -n to extend it",
-            )
-        total = realisations
+        total = more_realisations(path, total, realisations, data.finished)
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
     runner = RealisationRunner(scenario, plan, total, grid)
+    hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
+    finish = EnsembleWork.run_failed_again if failed else EnsembleWork.finish
+    continue_work(path, data, runner, target, hands, finish, storage)
+    return open_ensemble(path)
+
+
+def more_realisations(path: Path, held: int, realisations: int, finished: bool) -> int:
+    """Return a new number of realisations of a file that holds some.
+
+    Raises
+    ------
+    ResultsFileError
+        If it is not greater.
+    """
+    if realisations < held or (finished and realisations == held):
+        raise ResultsFileError(
+            f"{path}: has {held} realisations",
+            python="give a larger number of realisations to extend it",
+            shell="give a larger number with -n to extend it",
+        )
+    return realisations
+
+
+class Workers(NamedTuple):
+    """Who computes realisations, and who watches; fields as the parameters of `ensemble`."""
+
+    workers: int | None
+    scheduler: str
+    progress: bool
+    on_progress: Watcher | None
+    stop_requested: Callable[[], bool] | None
+    on_notice: Callable[[str], None] | None
+
+    @contextmanager
+    def open(self, scenario: Scenario, realisations: int) -> Iterator[tuple[Any, Any]]:
+        """Give the watcher of the progress and the executor of batches."""
+        shown = shown_progress(self.progress, "EnsembleWatcher", self.on_progress, scenario)
+        with (
+            shown as watch,
+            executor(
+                self.scheduler,
+                self.workers,
+                on_notice=self.on_notice or getattr(watch, "notice", None),
+                stop_requested=self.stop_requested,
+                preload=PRELOAD,
+                realisations=realisations,
+            ) as pool,
+        ):
+            yield watch, pool
+
+
+def continue_work(
+    path: Path,
+    data: EnsembleData,
+    runner: RealisationRunner,
+    target: Any,
+    hands: Workers,
+    finish: Callable[[EnsembleWork], None],
+    storage: Storage,
+    **grown: Any,
+) -> None:
+    """Continue an ensemble or lives in a file, which grows to the realisations of the runner.
+
+    Parameters
+    ----------
+    path, data
+        The file and its content.
+    runner : RealisationRunner
+        Runs realisations; it has their new number.
+    target : Target or LifeTarget, optional
+        Target that ends the ensemble early.
+    hands : Workers
+    finish : callable
+        Runs the remaining or the failed realisations.
+    storage : Storage
+    **grown
+        Fields of the file that change with its size.
+    """
     with (
-        shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
-        executor(
-            scheduler,
-            workers,
-            on_notice=on_notice or getattr(watch, "notice", None),
-            stop_requested=stop_requested,
-            preload=PRELOAD,
-            realisations=data.requested,
-        ) as pool,
+        hands.open(runner.scenario, runner.total) as (watch, pool),
         EnsembleFile.open(path, storage) as opened,
     ):
         runner.compile_kernels()
-        if total > data.requested:
-            opened.grow(total)
-        work = EnsembleWork(opened, runner, target, pool, watch, stop_requested)
-        work.warn(changed_origins(data, scenario))
-        if failed:
-            work.run_failed_again()
-        else:
-            work.finish()
-    return open_ensemble(path)
+        if runner.total > data.requested:
+            opened.grow(runner.total, **grown)
+        work = EnsembleWork(opened, runner, target, pool, watch, hands.stop_requested)
+        work.warn(changed_origins(data, runner.scenario))
+        finish(work)
 
 
 def ensemble_content(

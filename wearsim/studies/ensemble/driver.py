@@ -21,7 +21,6 @@ from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.execution.processes import Executor
-from wearsim.studies.life.result import ensemble_result
 from wearsim.studies.life.stored_settings import LifeTarget
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.types import FloatArray
@@ -334,7 +333,7 @@ class EnsembleWork:
 
     def result(self) -> Any:
         """Return the present content of the file."""
-        return ensemble_result(
+        return self.runner.result(
             replace(self.file.data, status=self.file.status.copy()), self.file.path
         )
 
@@ -347,7 +346,7 @@ class EnsembleWork:
 
     def _complete(self, data: EnsembleData) -> tuple[dict[str, object], dict[str, FloatArray]]:
         """Return the final fields of a complete ensemble, and its statistics."""
-        result = ensemble_result(data, self.file.path)
+        result = self.runner.result(data, self.file.path)
         self.warn(ensemble_warnings(result, self.target, self._reached))
         final = {"finished": True, "statistics": result.final_estimates()}
         return self._state() | final, result.statistics() if result.count else {}

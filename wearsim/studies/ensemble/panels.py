@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.report.measured import Measured, measured_marks
+from wearsim.report.measured import Measured
 from wearsim.report.panels import (
     BLACK,
     BLUE,
@@ -29,6 +29,7 @@ from wearsim.report.panels import (
     evenly_spaced,
     histogram,
     look,
+    measured_marks,
     message,
     worn_limits,
 )
@@ -42,6 +43,7 @@ from wearsim.report.text import (
     shown,
     statistic_in_words,
     sufficient_for,
+    too_few,
 )
 from wearsim.studies.cam.panels import ANGLE, segment_marks
 from wearsim.studies.cam.turn import CamTurn
@@ -274,7 +276,7 @@ def _effects(result: EnsembleResult) -> Panel:
     """Return first-order Sobol indices of the depth, and total indices if available."""
     title = "Sobol indices of the depth at the end"
     if result.count == 1 or not (effects := known_effects(result, "depth")):
-        return message(title, too_few(result))
+        return message(title, too_few(result.fewest_for_indices()))
     if result.is_constant("depth"):
         return message(title, "none, the depth is equal in all realisations")
     return effects_panel(title, "the depth", effects)
@@ -358,30 +360,3 @@ def draws_panels(
     title = f"{name.capitalize()} against {item['key']}"
     text = f"One point for each of {count(len(every))} tests."
     return {"draws": Panel(title, Axis(item["key"], unit, 1.0 / size), axis, [points], text)}
-
-
-def too_few(result: EnsembleResult, names: list[str] | None = None) -> str:
-    """Return a message with the sample size that Sobol indices require.
-
-    Parameters
-    ----------
-    result : EnsembleResult
-    names : list of str, optional
-        Random inputs; all by default.
-    """
-    from wearsim.uq.sensitivity import sobol_indices  # noqa: PLC0415
-
-    groups = [item["name"] for item in result.raw.groups]
-    if result.plan == "saltelli":
-        needed = sobol_indices.FEWEST_BASES * (len(groups) + 2)
-    else:
-        names = groups if names is None else names
-        needed = max(sobol_indices.fewest_realisations(_different(result, n)) for n in names)
-    return f"{TOO_FEW_REALISATIONS}, {count(needed)} are sufficient"
-
-
-def _different(result: EnsembleResult, name: str) -> int:
-    """Return the number of columns of an input; equal ones carry the same information."""
-    keys = [item["key"] for item in result.raw.inputs if item["input"] == name]
-    columns = np.column_stack([result.inputs[key].reshape(result.count, -1) for key in keys])
-    return int(np.unique(columns, axis=1).shape[1])

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, sources
-from wearsim.studies.ensemble.file.data import Outcome
+from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
 from wearsim.studies.failures import explained
 from wearsim.studies.kernels import kernels_of
 from wearsim.studies.roller_ends import ends_roller
@@ -27,6 +28,10 @@ from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import extent_of, lattice, shared_strips, start_of, strips_of_run
 from wearsim.types import FloatArray, Grid
+
+if TYPE_CHECKING:
+    from wearsim.studies.ensemble.result import EnsembleResult
+
 
 DRAWS = 1_000_000  # draws from which the mean of the control variate is computed
 _BLOCK = 65536
@@ -207,6 +212,12 @@ class RealisationRunner:
         self.text, self.file, self.files = scenario.text, scenario.file, dict(scenario.files)
         self.plan, self.total, self.grid = plan, total, grid
         self._prepared: dict[object, ContactModel] = {}
+
+    def result(self, data: EnsembleData, path: Path | None) -> EnsembleResult:
+        """Return the result of the realisations in a file."""
+        from wearsim.studies.ensemble.result import EnsembleResult  # noqa: PLC0415  (not of workers)
+
+        return EnsembleResult(data, path)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes to be sent, without those that each process derives from them."""

@@ -258,6 +258,29 @@ class EnsembleResult(EnsembleValues):
         values, drawn = self.at_end(name), self.drawn_numbers(groups)
         return {group: (index, None) for group, index in first_order(values, drawn).items()}
 
+    def fewest_for_indices(self, names: list[str] | None = None) -> int:
+        """Return the number of realisations from which Sobol indices are known.
+
+        Parameters
+        ----------
+        names : list of str, optional
+            Random inputs; all by default.
+
+        Examples
+        --------
+        >>> wearsim.open_results("rig-ensemble.h5").fewest_for_indices()
+        8
+        """
+        from wearsim.uq.sensitivity import sobol_indices  # noqa: PLC0415  (rarely needed)
+
+        groups = [item["name"] for item in self.raw.groups]
+        if self.plan == "saltelli":
+            return sobol_indices.FEWEST_BASES * (len(groups) + 2)
+        drawn = self.drawn_numbers(groups if names is None else names)
+        # equal columns carry the same information
+        columns = (np.unique(numbers, axis=1).shape[1] for numbers in drawn.values())
+        return max(sobol_indices.fewest_realisations(int(number)) for number in columns)
+
     def drawn_numbers(self, groups: list[str]) -> dict[str, FloatArray]:
         """Return the values of random inputs by name, each (count, numbers of a draw).
 

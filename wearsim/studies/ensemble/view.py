@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from wearsim.report.csv_files import computed, drawn
 from wearsim.report.measured import ComputedProfile, Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import (
     NINETY_PERCENT,
     NOTHING,
@@ -27,6 +26,7 @@ from wearsim.report.text import (
     shown,
     si_key,
     simulated,
+    too_few,
     within,
 )
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table
@@ -41,9 +41,11 @@ from wearsim.results.study_view import (
 )
 from wearsim.studies.ensemble.file.data import Band, Effect, EnsembleData
 from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, LIFE, PENDING
-from wearsim.studies.ensemble.panels import ensemble_sheet, too_few
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.uq.estimation.estimates import Estimate, Target
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 
 QUANTILES = (0.05, 0.5, 0.95)
 INTERVAL = "  95 % interval"
@@ -208,7 +210,11 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         effects = [] if result.count == 1 or constant else result.sensitivity("depth")
         if not any(math.isfinite(item.first.value) for item in effects):
             equal = result.count > 1 and constant
-            why = "none, the depth is equal in all realisations" if equal else too_few(result)
+            why = (
+                "none, the depth is equal in all realisations"
+                if equal
+                else too_few(result.fewest_for_indices())
+            )
             return Table("", [[f"{head}: {why}"]], [""])
         totals = any(item.total is not None for item in effects)
         order = sorted(effects, key=lambda item: item.without_effect)
@@ -268,6 +274,8 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over the mean profile."""
+        from wearsim.studies.ensemble.panels import ensemble_sheet  # noqa: PLC0415  (only of figures)
+
         return ensemble_sheet(self.result, measured)
 
     def profile(self) -> ComputedProfile:
@@ -300,7 +308,11 @@ def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
 def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
     """Return the Sobol indices of a random input as cells."""
     if not math.isfinite(item.first.value):
-        return [item.name, too_few(result, [item.name]), *([""] if totals else [])]
+        return [
+            item.name,
+            too_few(result.fewest_for_indices([item.name])),
+            *([""] if totals else []),
+        ]
     indices = [index for index in (item.first, item.total) if index]
     if item.without_effect:
         bounds = (shown(index.high, "%", 2) for index in indices)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import tomlkit
 
 from wearsim.report.measured import Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import NOTHING, lapse, shown, with_range
 from wearsim.report.view import Column, Columns, Frame, Repetition, Row, Rows, Table
 from wearsim.results.study_view import StudyView
-from wearsim.studies.identify.panels import identification_sheet
 from wearsim.studies.identify.result import IdentificationResult
 
 _SCALE = 1e12  # K/H is shown in 1e-12 1/Pa
@@ -32,6 +30,9 @@ _HEADS = (
     "K/H [1e-12 1/Pa]",
     "residuals",
 )
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 _NEXT = ("median_per_Pa", "low_per_Pa", "high_per_Pa")
 
 
@@ -127,6 +128,8 @@ class IdentificationView(StudyView[IdentificationResult]):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; the measured profiles are those of the study."""
+        from wearsim.studies.identify.panels import identification_sheet  # noqa: PLC0415  (only of figures)
+
         return identification_sheet(self.result)
 
     def columns(self) -> Mapping[str, Columns]:

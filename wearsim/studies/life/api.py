@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, cast
@@ -16,14 +17,20 @@ from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.results.io.outputs import check_output
 from wearsim.scenario import Scenario, as_scenario, parse_scenario
 from wearsim.studies.automatic import with_chosen_model
-from wearsim.studies.ensemble.api import PRELOAD, Watcher, checked_request, ensemble_content
+from wearsim.studies.ensemble.api import (
+    Watcher,
+    Workers,
+    checked_request,
+    continue_work,
+    ensemble_content,
+    more_realisations,
+)
 from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.file.data import EnsembleData
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import profile_axis
 from wearsim.studies.ensemble.sweep import path_of
-from wearsim.studies.execution.factory import executor
 from wearsim.studies.life.rare import next_stages
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
 from wearsim.studies.life.result import LifeResult
@@ -36,8 +43,7 @@ from wearsim.studies.life.settings import (
 )
 from wearsim.studies.life.stored_settings import LifeSettings, LifeTarget
 from wearsim.studies.opening import open_ensemble
-from wearsim.studies.preparation import changed_origins, check_plugins
-from wearsim.studies.progress import shown_progress
+from wearsim.studies.preparation import check_plugins
 from wearsim.types import FloatArray, Grid
 
 
@@ -129,16 +135,9 @@ def life(
         check_output(output, force, scenario.paths)
     runner, content = _prepared(scenario, settings, aim)
     with _results_path(output) as path:
+        hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
         with (
-            shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
-            executor(
-                scheduler,
-                workers,
-                on_notice=on_notice or getattr(watch, "notice", None),
-                stop_requested=stop_requested,
-                preload=PRELOAD,
-                realisations=settings.plain,
-            ) as pool,
+            hands.open(scenario, settings.plain) as (watch, pool),
             EnsembleFile.create(path, *content, storage) as file,
         ):
             runner.compile_kernels()
@@ -222,40 +221,17 @@ def resume_life(
         raise ResultsFileError(
             f"{path}: has tests for rare events after its realisations, and cannot be extended"
         )
-    total = settings.plain if realisations is None else realisations
-    if realisations is not None and (
-        total < settings.plain or (data.finished and not failed and total == settings.plain)
-    ):
-        raise ResultsFileError(
-            f"{path}: has {settings.plain} realisations",
-            python="give a larger number of realisations to extend it",
-            shell="give a larger number with -n to extend it",
-        )
+    total = settings.plain
+    if realisations is not None:
+        total = more_realisations(path, total, realisations, data.finished and not failed)
     settings = replace(settings, plain=total)
     grid = Grid(data.variables["y"], data.strip_width)
     runner = LifeRunner(scenario, total, grid, settings, data.life["base"])
     aim = LifeTarget.parse(data.until) if data.until else None
-    with (
-        shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
-        executor(
-            scheduler,
-            workers,
-            on_notice=on_notice or getattr(watch, "notice", None),
-            stop_requested=stop_requested,
-            preload=PRELOAD,
-            realisations=total,
-        ) as pool,
-        EnsembleFile.open(path, storage) as opened,
-    ):
-        runner.compile_kernels()
-        if total > data.requested:
-            opened.grow(total, life={**data.life, "plain": total})
-        work = EnsembleWork(opened, runner, aim, pool, watch, stop_requested)
-        work.warn(changed_origins(data, scenario))
-        if failed:
-            work.run_failed_again()
-        else:
-            _finish_stages(work, runner)
+    hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
+    finish = EnsembleWork.run_failed_again if failed else partial(_finish_stages, runner=runner)
+    grown = {"life": {**data.life, "plain": total}}
+    continue_work(path, data, runner, aim, hands, finish, storage, **grown)
     return cast("LifeResult", open_ensemble(path))
 
 

@@ -5,18 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from wearsim.errors import ResultsFileError
 from wearsim.report.measured import Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import part_with_interval
 from wearsim.report.view import Row, Rows, Table, View
-from wearsim.studies.life.panels import life_sheet, swept_variable
 from wearsim.studies.life.result import LifeResult
-from wearsim.studies.life.stored_settings import DesignVariable, LifeComparison
+from wearsim.studies.life.stored_settings import (
+    DesignVariable,
+    LifeComparison,
+    swept_variable,
+)
 from wearsim.studies.life.view import ERROR, lives_table
 from wearsim.uq.estimation.intervals import Interval
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 
 
 class LivesView(View):
@@ -84,6 +89,8 @@ class LivesView(View):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels of all designs."""
+        from wearsim.studies.life.panels import life_sheet  # noqa: PLC0415  (only of figures)
+
         return life_sheet(self.results, self.labels)
 
 

@@ -30,7 +30,7 @@ from wearsim.report.text import count
 from wearsim.studies.cam.panels import ANGLE
 from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
 from wearsim.studies.life.result import LifeResult
-from wearsim.studies.life.stored_settings import DesignVariable
+from wearsim.studies.life.stored_settings import swept_variable
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.survival.fits import FAMILIES, Family
@@ -99,23 +99,6 @@ def life_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
         panels |= draws_panels(result, "life", result.lives, axis)
     title = titles.pop() if len(titles) == 1 else "lives of designs"
     return Sheet(title, panels, rows, (18.5 if len(rows[0]) > 3 else 14.0, 8.4))
-
-
-def swept_variable(results: Sequence[LifeResult]) -> DesignVariable | None:
-    """Return the design variable whose value differs between results of a sweep, if there is one.
-
-    Parameters
-    ----------
-    results : sequence of LifeResult
-
-    Returns
-    -------
-    DesignVariable or None
-        That of the first; None unless all have the same variable with different values.
-    """
-    found = [one.variable for one in results if one.variable]
-    keys, values = {(one.key, one.unit) for one in found}, {one.value for one in found}
-    return found[0] if len(keys) == 1 and len(values) == len(results) > 1 else None
 
 
 def _against(designs: Sequence[_Design]) -> Panel:

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from wearsim.errors import failure_text
 from wearsim.evolution.limits import Limit
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
-from wearsim.studies.ensemble.file.data import Outcome
+from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
 from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths
 from wearsim.studies.life.batch import LifeRun, observe_lives
 from wearsim.studies.life.draws import changes_of, log_weight
@@ -22,6 +23,10 @@ from wearsim.studies.life.factor import NEGLIGIBLE, RARE, ExactFactor, exact_fac
 from wearsim.studies.life.stored_settings import LifeSettings
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
+
+if TYPE_CHECKING:
+    from wearsim.studies.life.result import LifeResult
+
 
 EXTENSION = 4.0  # ratio of the lengths of successive attempts to reach a limit
 _SAMPLE = 256  # realisations from which the length of the first attempt is chosen
@@ -121,6 +126,12 @@ class LifeRunner(RealisationRunner):
         super().__init__(scenario, "monte-carlo", total, grid)
         self.settings, self.base = settings, base
         self._levels: dict[tuple[int, int], LevelRunner] = {}
+
+    def result(self, data: EnsembleData, path: Path | None) -> LifeResult:
+        """Return the result of the realisations in a file."""
+        from wearsim.studies.life.result import LifeResult  # noqa: PLC0415  (not of workers)
+
+        return LifeResult(data, path)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes to be sent, without those that each process derives from them."""

@@ -6,13 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from wearsim.studies.ensemble.file.data import EnsembleData
-from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.life.rare_estimates import rare_estimates
 from wearsim.studies.life.stored_settings import LifeComparison, LifeTarget
 from wearsim.studies.life.values import LifeValues
@@ -381,8 +378,3 @@ def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
         return replace(distribution, kappa=distribution.kappa[places], shift=shift[places])
     assert isinstance(distribution, CountedLives)
     return CountedLives(distribution.life[places])
-
-
-def ensemble_result(data: EnsembleData, path: Path | None = None) -> EnsembleResult:
-    """Return the result of an ensemble, a `LifeResult` if its tests ended at a limit."""
-    return (LifeResult if data.life else EnsembleResult)(data, path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -178,3 +179,20 @@ class LifeComparison:
     same_machine: Interval | None
     two_specimens: Interval
     count: int
+
+
+def swept_variable(results: Sequence[Any]) -> DesignVariable | None:
+    """Return the design variable whose value differs between results of a sweep, if there is one.
+
+    Parameters
+    ----------
+    results : sequence of LifeResult
+
+    Returns
+    -------
+    DesignVariable or None
+        That of the first; None unless all have the same variable with different values.
+    """
+    found = [one.variable for one in results if one.variable]
+    keys, values = {(one.key, one.unit) for one in found}, {one.value for one in found}
+    return found[0] if len(keys) == 1 and len(values) == len(results) > 1 else None

@@ -7,24 +7,22 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.report.measured import Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import (
     NOTHING,
     count,
     lapse,
     part_with_interval,
     shown,
+    too_few,
 )
 from wearsim.report.view import Row, Rows, Table
 from wearsim.results.study_view import SAMPLING
-from wearsim.studies.ensemble.panels import too_few
 from wearsim.studies.ensemble.view import RealisationsView
-from wearsim.studies.life.panels import life_sheet
 from wearsim.studies.life.result import LifeResult
 from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
@@ -38,6 +36,9 @@ ERROR = (
     f"{SAMPLING} The numerical error of the lives is stated beside them; it does not contain the"
     " error of the model."
 )
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 _LIMIT_UNITS = {"volume": "mm^3", "peak_pressure": "MPa"}
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
@@ -181,7 +182,11 @@ class LifeView(RealisationsView[LifeResult]):
         if result.effects_obstacle:
             return f"not stated\n{result.effects_obstacle}"
         effects = result.sensitivity("life")
-        return "" if any(math.isfinite(i.first.value) for i in effects) else too_few(result)
+        return (
+            ""
+            if any(math.isfinite(i.first.value) for i in effects)
+            else too_few(result.fewest_for_indices())
+        )
 
     def data(self) -> dict[str, Any]:
         """Return the life of the design, lives in its unit."""
@@ -267,6 +272,8 @@ class LifeView(RealisationsView[LifeResult]):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; there is no profile to measure."""
+        from wearsim.studies.life.panels import life_sheet  # noqa: PLC0415  (only of figures)
+
         return life_sheet([self.result], [self.title])
 
     def options(self) -> Sequence[str]:

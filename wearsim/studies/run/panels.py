@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from wearsim.errors import WearsimError
-from wearsim.report.measured import Measured, measured_marks
+from wearsim.report.measured import Measured
 from wearsim.report.panels import (
     BLACK,
     COLOURS,
@@ -24,10 +23,11 @@ from wearsim.report.panels import (
     Sheet,
     depth_axes,
     look,
+    measured_marks,
     worn_limits,
 )
 from wearsim.report.text import count, shown, simulated
-from wearsim.report.view import Row
+from wearsim.report.view import width_row
 from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray
 
@@ -76,15 +76,8 @@ def caption(result: Result) -> str:
         f"{count(float(result.passes[-1]))} roller passes in"
         f" {simulated(float(result.time[-1]))}"
         f" ({result.described_model}, {result.stepper}{unfinished})\n"
-        f"{depth}, width {width_of(result, np.max(result.width[-1]))}"
+        f"{depth}, width {width_row(np.max(result.width[-1]), result.raw.width_threshold).text}"
     )
-
-
-def width_of(result: Result, width: Any) -> str:
-    """Return widths of the groove, or the depth that it has not reached."""
-    if not np.any(width):
-        return f"0 mm, not deeper than {shown(result.raw.width_threshold, 'um')}"
-    return Row("width", width, "mm").text
 
 
 def _profiles(result: Result, limits: tuple[float, float], measured: Sequence[Measured]) -> Panel:

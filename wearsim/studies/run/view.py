@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.report.csv_files import computed
 from wearsim.report.measured import ComputedProfile, Measured
-from wearsim.report.panels import Sheet
 from wearsim.report.text import count, footer, lapse, percent, shown, simulated, within
-from wearsim.report.view import Column, Columns, Frame, Row, Rows
+from wearsim.report.view import Column, Columns, Frame, Row, Rows, width_row
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
-from wearsim.studies.run.panels import run_sheet, width_of
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.schema import ALL_VARIABLES, AXES
 from wearsim.types import FloatArray
@@ -28,6 +26,9 @@ _CAM_ANGLES = (
     *("depth_angle", "peak_pressure_angle"),
     *("lift_error_greatest_at", "lift_error_smallest_at"),
 )
+
+if TYPE_CHECKING:
+    from wearsim.report.panels import Sheet
 _RECORDS = {
     "cylinder_depth_profiles.csv": "cylinder_depth_profile",
     "roller_depth_profiles.csv": "roller_depth_profile",
@@ -84,7 +85,7 @@ class RunView(StudyView[Result]):
         if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
             rows.insert(1, Row("roller depth", result.roller_depth[-1], "um"))
         rows += [
-            Row("width", width_of(result, result.width[-1])),
+            width_row(result.width[-1], result.raw.width_threshold),
             Row("worn volume", result.worn_volume[-1], "mm^3"),
             Row("dissipated energy", result.dissipated_energy[-1], "J"),
             Row("dissipated power", result.power[-1], "W"),
@@ -206,6 +207,8 @@ class RunView(StudyView[Result]):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over the groove."""
+        from wearsim.studies.run.panels import run_sheet  # noqa: PLC0415  (only of figures)
+
         if not self.result.is_cam:
             return run_sheet(self.result, measured)
         from wearsim.studies.cam.panels import cam_run_sheet  # noqa: PLC0415  (not of a cylinder)
