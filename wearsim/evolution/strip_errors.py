@@ -18,6 +18,7 @@ import numpy as np
 
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import Advance, Evolution
+from wearsim.evolution.observables import depth, roller_depth
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
@@ -66,7 +67,7 @@ class Course:
 
 def sizes_of(problem: WearProblem, state: WearState) -> FloatArray:
     """Return greatest depth of cylinder and rollers [m] and volume [m^3], (3, realisations)."""
-    depths = (worn.max(axis=(0, 1, 3)) for worn in state.depths)
+    depths = depth(problem, state), roller_depth(problem, state)
     return np.array([*depths, volume_of(problem, state.depths)])
 
 

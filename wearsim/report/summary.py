@@ -90,15 +90,12 @@ def _of_cam(result: Result) -> Rows:
         ("angle of the depth", angles["depth_angle"]),
         ("angle of the peak pressure", angles["peak_pressure_angle"]),
         ("lift error, peak to peak", _by_roller(final["lift_error_m"], "um")),
-        ("least wear of the lift", f"at {angles['lift_error_greatest_at']}"),
-        ("greatest wear of the lift", f"at {angles['lift_error_smallest_at']}"),
+        ("least wear of the lift", f"at {angles['least_wear_angle']}"),
+        ("greatest wear of the lift", f"at {angles['greatest_wear_angle']}"),
     ]
 
 
-_CAM_ANGLES = (
-    *("depth_angle", "peak_pressure_angle"),
-    *("lift_error_greatest_at", "lift_error_smallest_at"),
-)
+_CAM_ANGLES = "depth_angle", "peak_pressure_angle", "least_wear_angle", "greatest_wear_angle"
 
 
 def draws(result: Result) -> Rows:

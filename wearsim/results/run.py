@@ -342,8 +342,12 @@ class Result(StudyResult[RunData]):
         if "turns" not in last:
             return {}
         curve = self.raw.records["lift_error_curve"][-1].mean(axis=(1, 2))
-        worst = self.raw.history["peak_pressure"][-1].argmax(axis=0)[None]
-        places = last["peak_pressure_angle"]
+
+        def of_worst(name: str, quantity: str) -> Number:
+            """Return a value of the roller of which a quantity is greatest."""
+            worst = self.raw.history[quantity][-1].argmax(axis=0)[None]
+            return _number(np.take_along_axis(last[name], worst, axis=0))
+
         numbers = self.raw.static["station_segment"].tolist()
         dwells = [k for k, number in enumerate(numbers) if numbers.count(number) == 1]
         dwell = curve[dwells[0] if dwells else 0]  # a dwell has one station
@@ -351,9 +355,9 @@ class Result(StudyResult[RunData]):
             "turns": _number(last["turns"]),
             "depth_angle_rad": _number(last["depth_angle"]),
             "lift_error_m": _number(last["lift_error"].max(axis=0)),
-            "peak_pressure_angle_rad": _number(np.take_along_axis(places, worst, axis=0)),
-            "lift_error_greatest_at_rad": float(self.raw.static["station_angle"][curve.argmax()]),
-            "lift_error_smallest_at_rad": float(self.raw.static["station_angle"][curve.argmin()]),
+            "peak_pressure_angle_rad": of_worst("peak_pressure_angle", "peak_pressure"),
+            "least_wear_angle_rad": of_worst("least_wear_angle", "lift_error"),
+            "greatest_wear_angle_rad": of_worst("greatest_wear_angle", "lift_error"),
             "station_angle_rad": self.raw.static["station_angle"].tolist(),
             "station_depth_m": last["station_depth"].mean(axis=-1).tolist(),
             "station_lift_error_m": curve.tolist(),

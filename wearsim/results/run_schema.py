@@ -119,6 +119,21 @@ VARIABLES: Mapping[str, Variable] = by_name(
     )
 )
 
+_AT_STATIONS = {
+    "depth": (_TEST, "m", "greatest depth of the cam"),
+    "peak_pressure": (_ROLLER, "Pa", "greatest peak pressure"),
+}
+_EXTREMES = {
+    "lift_error": (_ROLLER, "m", "greatest less smallest change of the lift by wear"),
+    "depth_angle": (_TEST, "rad", "angle of the greatest depth of the cam"),
+    "peak_pressure_angle": (_ROLLER, "rad", "angle of the greatest peak pressure"),
+    "least_wear_angle": (_ROLLER, "rad", "angle of the greatest change of the lift, with its sign"),
+    "greatest_wear_angle": (
+        _ROLLER,
+        "rad",
+        "angle of the smallest change of the lift, with its sign",
+    ),
+}
 _CURVE = ("record", "station", "roller", "realisation")
 #: further variables of the run of a cam
 CAM_VARIABLES: Mapping[str, Variable] = by_name(
@@ -146,21 +161,24 @@ CAM_VARIABLES: Mapping[str, Variable] = by_name(
             "greatest depth of the cam at a station",
             "history",
         ),
-        Variable("depth_angle", _TEST, "rad", "angle of the greatest depth of the cam", "history"),
-        Variable(
-            "peak_pressure_angle", _ROLLER, "rad", "angle of the greatest peak pressure", "history"
+        *(
+            Variable(name, dims, unit, long_name, "history")
+            for name, (dims, unit, long_name) in _EXTREMES.items()
         ),
-        Variable(
-            "lift_error",
-            _ROLLER,
-            "m",
-            "greatest less smallest change of the lift by wear over the angle",
-            "history",
+        *(
+            Variable(
+                f"{name}_error_by_stations",
+                dims,
+                unit,
+                f"estimated error of the {long_name} due to the stations",
+                "history",
+            )
+            for name, (dims, unit, long_name) in {**_AT_STATIONS, **_EXTREMES}.items()
         ),
         Variable("lift_error_curve", _CURVE, "m", "change of the lift by wear", "record"),
     )
 )
 ALL_VARIABLES: Mapping[str, Variable] = {**VARIABLES, **CAM_VARIABLES}
 
-RUN = Schema("wearsim-run", 7, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Schema("wearsim-run", 8, "a wear test, from `wearsim run`", AXES, VARIABLES)
 CAM_RUN = replace(RUN, variables=ALL_VARIABLES)

@@ -92,7 +92,7 @@ def _profile(result: Result, measured: Sequence[Measured]) -> Plot:
             hover(plot, [line], ("y", "@y{0.000} mm"), (name, "@shown{0.000} um"))
     add_measured(plot, measured)
     legend(plot)
-    deepest = shown(float(worn[-1].max()), "um")
+    deepest = shown(float(np.max(result.depth[-1])), "um")
     text = f"Height across the track; at the end the {body} is {deepest} deep."
     return Plot(f"Worn profile of the {body}{where}", text, plot)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
+from wearsim.evolution.observables import depth_error_by_stations
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
@@ -158,8 +159,8 @@ class RunObservations:
     scalars : dict of str to float
         Error estimates, and numbers of steps and contact solutions.
     curves : dict of str to ndarray
-        At the end: "depth_profile", the worn depth of the cylinder or of the deepest station of a
-        cam, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
+        At the end: "depth_profile", the worn depth of the cylinder or of a cam where it is
+        deepest, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
     grid : Grid
         Strips at the end.
     """
@@ -224,14 +225,25 @@ def curves_at_end(
     scenarios : sequence of Scenario
         Scenario of each realisation.
     """
-    depths = state.cylinder_depth[:, 0]  # of a cam, the groove at the deepest station is stored
-    deepest = depths.max(axis=-1).argmax(axis=0)
-    found = [{"depth_profile": depths[station, v]} for v, station in enumerate(deepest)]
-    if problem.kinematics.cam is not None:
-        stations = [turn_of(scenario).stations for scenario in scenarios]
-        for curves, curve in zip(found, lift_curves(problem, state, stations), strict=True):
-            curves["lift_error_curve"] = curve
+    depths, cam = state.cylinder_depth[:, 0], problem.kinematics.cam
+    if cam is None:
+        return [{"depth_profile": profile} for profile in depths[0]]
+    angles = cam.greatest(depths.max(axis=-1)).angle.tolist()
+    found = [
+        {"depth_profile": np.maximum(cam.at_angle(depths[:, v], angle), 0.0)}
+        for v, angle in enumerate(angles)
+    ]
+    stations = [turn_of(scenario).stations for scenario in scenarios]
+    for curves, curve in zip(found, lift_curves(problem, state, stations), strict=True):
+        curves["lift_error_curve"] = curve
     return found
+
+
+def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:
+    """Return the scalars of a state of one realisation, by the names of `SCALARS`."""
+    scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
+    scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0])
+    return scalars
 
 
 def observe(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]:
@@ -268,8 +280,8 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         scenarios = [runs[number].draws.scenario for number in numbers]
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
         for place, number, found in zip(over.tolist(), numbers, curves, strict=True):
-            scalars = {name: float(getattr(end, name)[place]) for name in SCALARS}
-            grid = advance.problem.grid
+            chosen, grid = np.array([place]), advance.problem.grid
+            scalars = scalars_of(advance.problem.at(chosen), end.at(chosen))
             results[number] = RunObservations(rows[number], scalars, found, grid)
     add_strip_errors(runs, problem, courses, results)
     results |= tests.failures

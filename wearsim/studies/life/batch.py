@@ -11,12 +11,16 @@ import numpy as np
 
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.limits import Crossings, Limit, first_crossings, ratios, take_side_step
-from wearsim.evolution.observables import depth
+from wearsim.evolution.observables import (
+    depth,
+    depth_error_by_stations,
+    lift_errors,
+    peak_pressures,
+)
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.strip_errors import Course, add_step
 from wearsim.studies.ensemble.batch import (
-    SCALARS,
     Observables,
     RealisationRun,
     RunObservations,
@@ -24,6 +28,7 @@ from wearsim.studies.ensemble.batch import (
     curves_at_end,
     joined_problem,
     observables_of,
+    scalars_of,
 )
 from wearsim.types import FloatArray, IntArray
 
@@ -157,13 +162,14 @@ class _Group:
         """Store the tests that have reached a limit, with the numerical error of their lives."""
         state, problem = crossing.state, crossing.problem
         slope, of_depth = self._slopes(crossing)
-        depth_error = state.depth_error / np.maximum(depth(problem, state), 1e-300)
+        error_of_depth = state.depth_error + depth_error_by_stations(problem, state)
+        depth_error = error_of_depth / np.maximum(depth(problem, state), 1e-300)
         for place, number in enumerate(advance.numbers[crossing.places].tolist()):
             test, chosen = self.tests[number], np.array([place])
             test.limit = int(crossing.limit[place])
             limit, passes = self.limits[test.limit], float(state.passes[place])
             if limit.unit == "m" and limit.quantity != "width":
-                error = float(state.depth_error[place]) / limit.value
+                error = float(error_of_depth[place]) / limit.value
             elif limit.quantity == "volume":
                 error = float(state.volume_error[place]) / limit.value
             else:  # by way of the passes that correspond to the error of the depth
@@ -243,8 +249,8 @@ class _Group:
         """Store the result of a test that ends in the given state, of one realisation."""
         test = self.tests[number]
         rows = [self.first_rows[number], *self._observed(problem, state)]
-        scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
-        scalars |= {
+        scalars = {
+            **scalars_of(problem, state),
             **life,
             "first_limit": float(test.limit),
             "limit_angle": self._angle(test.limit, problem, state),
@@ -258,15 +264,12 @@ class _Group:
         if cam is None or limit < 0:
             return math.nan
         if self.limits[limit].quantity == "peak pressure":
-            values = problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
-            place = int(values.max(axis=(1, 2)).argmax())
+            values = peak_pressures(problem, state).max(axis=1)
         elif self.limits[limit].quantity == "lift error":
-            from wearsim.evolution.observables import lift_errors  # noqa: PLC0415
-
-            place = int(np.abs(lift_errors(problem, state)).max(axis=(1, 2)).argmax())
+            values = np.abs(lift_errors(problem, state)).max(axis=1)
         else:
-            place = int(state.cylinder_depth[:, 0].max(axis=(1, 2)).argmax())
-        return float(cam.angle.ravel()[place])
+            values = state.cylinder_depth[:, 0].max(axis=-1)
+        return float(cam.greatest(values).angle[0])
 
     def _ratios(self, problem: WearProblem, state: WearState) -> FloatArray:
         return ratios(self.limits, self.stepper, problem, state)

@@ -13,7 +13,7 @@ from wearsim.errors import Interrupted, ResultsFileError, SolverError, StepError
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
-from wearsim.evolution.observables import present_batch
+from wearsim.evolution.observables import depth_error_by_stations, present_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
@@ -199,16 +199,20 @@ class RunInProgress:
         sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
         errors = state.depth_error, state.volume_error
         by_strips = np.nan_to_num(self.recorder.errors_by_strips[:, -1:])
+        by_stations = depth_error_by_stations(problem, state), np.zeros(1)
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [
-                errors[kind] + by_strips[kind],
+                errors[kind] + by_strips[kind] + by_stations[kind],
                 state.quadrature[kind],
                 SIGMAS * np.sqrt(state.scatter[kind]),
                 by_strips[kind],
+                by_stations[kind],
             ]
             size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
-            relative, quadrature, scatter, strips = (float((part / size).max()) for part in parts)
+            relative, quadrature, scatter, strips, stations = (
+                float((part / size).max()) for part in parts
+            )
             if relative <= tolerance:
                 continue
             remedy = "a lower evolution.tolerance or evolution.step decreases it"
@@ -220,6 +224,8 @@ class RunInProgress:
             elif strips > 0.5 * relative:
                 strips_here = self.scenario.contact.strips or self.present.grid.strips
                 remedy = f"more contact.strips than {strips_here} decrease it"
+            elif stations > 0.5 * relative:
+                remedy = "more cam.stations decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
         for remedy, found in beyond.items():
             names, errors_text = map(" and ".join, zip(*found, strict=True))

@@ -299,13 +299,15 @@ class Recorder:
     def history(self) -> dict[str, FloatArray]:
         """The history as arrays, first axis step.
 
-        Errors are sums of those due to steps and, where they are known, due to strips.
+        Errors are sums of those due to steps, to the stations of a cam and, where they are known,
+        to strips.
         """
         columns = _columns(self._history)
         for name, part in zip(ERRORS, self.errors_by_strips, strict=True):
             by_steps = columns[f"{name}_by_steps"]
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
             columns[name] = by_steps + np.nan_to_num(part)[:, None]
+            columns[name] = columns[name] + columns.get(f"{name}_by_stations", 0.0)
         return columns
 
     def column(self, name: str) -> FloatArray:
