@@ -16,7 +16,7 @@ from wearsim.results.content import (
     StudyData,
     StudyResult,
 )
-from wearsim.results.run_schema import CAM_RUN, RUN
+from wearsim.results.run_schema import CAM_RUN, ESTIMATED, RUN
 from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray
 
@@ -194,6 +194,26 @@ class Result(StudyResult[RunData]):
         "dissipation", "Dissipated power per axial length of each contact at each record [W/m]."
     )
 
+    @property
+    def errors(self) -> dict[str, FloatArray]:
+        """Estimated numerical errors after each step, by the name of the quantity [SI].
+
+        They are due to steps, strips and the stations of a cam; not a number where they are not
+        estimated. That of the depth applies to either body, and that of the worn volume to both.
+
+        Examples
+        --------
+        >>> result = wearsim.run("rig.toml")
+        >>> bool(result.errors["power"][-1] < 1e-3 * result.power[-1])
+        True
+        """
+        estimated = (name for name in ESTIMATED if name in self.raw.history)
+        return {
+            "depth": self.depth_error,
+            "worn_volume": self.volume_error,
+            **{name: self.values(f"{name}_error") for name in estimated},
+        }
+
     def __repr__(self) -> str:
         passes, total = float(self.passes[-1]), self.raw.total_passes
         done = f"{passes:.12g}" if self.finished else f"{passes:.12g} of {total:.12g}"
@@ -330,12 +350,25 @@ class Result(StudyResult[RunData]):
             "elastic_approach_m": _number(last["elastic_approach"]),
             "depth_error_m": _number(last["depth_error"]),
             "volume_error_m3": _number(last["volume_error"]),
+            **self._final_errors(last),
             "relative_profile_error": _number(last["profile_error"]),
             "relative_depth_error": _number(_relative(last["depth_error"], deepest)),
             "relative_volume_error": _number(
                 _relative(last["volume_error"], last["worn_volume"] + rollers)
             ),
         }
+
+    def _final_errors(self, last: Arrays) -> dict[str, Number]:
+        """Return the estimated errors of the final state, the greatest one over the rollers."""
+        variables = self.raw.schema.variables
+        found: dict[str, Number] = {}
+        for name in ESTIMATED:
+            error = last.get(f"{name}_error")
+            if error is not None:
+                over_rollers = "roller" in variables[name].dims
+                greatest = error.max(axis=0) if over_rollers else error
+                found[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
+        return found
 
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
         """Return the final state of a cam, and depth and lift error per station."""

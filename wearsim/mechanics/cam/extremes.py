@@ -10,6 +10,7 @@ depth with 4 to 13.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -75,9 +76,11 @@ def greatest(stations: Stations, values: FloatArray) -> Extreme:
     )
     # the greatest value may lie on another panel
     rival = ~equal & (peak + error >= largest - own)
-    away = np.where(rival, np.abs(angle - at) + angle_error, 0.0).max(axis=0)
+    apart = np.abs(angle - at)
+    apart = np.minimum(apart, math.tau - apart) + angle_error
+    away = np.where(rival, apart, 0.0).max(axis=0)
     bound = np.where(equal | rival, peak + error, -np.inf).max(axis=0) - largest
-    return Extreme(largest, at, bound, np.maximum(own_angle, away))
+    return Extreme(largest, at, bound, np.clip(away, own_angle, math.pi))
 
 
 def _first_of_equal(values: FloatArray, axis: int) -> IntArray:

@@ -14,6 +14,7 @@ from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.observables import depth_error_by_stations, present_batch
+from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
@@ -26,6 +27,7 @@ from wearsim.results import (
     Storage,
     write_results,
 )
+from wearsim.results.run_schema import ESTIMATED
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, station_columns
 from wearsim.studies.contact.comparison import REFERENCE, excess
@@ -44,9 +46,10 @@ from wearsim.studies.run.recorder import (
     Started,
     Stepped,
     Warned,
+    history_row,
 )
 from wearsim.studies.run.schedule import RecordSchedule
-from wearsim.types import Grid
+from wearsim.types import FloatArray, Grid
 
 Watcher = Callable[[Event], None]
 
@@ -182,7 +185,12 @@ class RunInProgress:
             column("worn_volume")[:, 0] + rollers,
         ]
         last, most = passes[-1:], self.scenario.evolution.max_steps
-        (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most)
+
+        def observe(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
+            row = history_row(stepper, problem, state, None, self.recorder.threshold)
+            return {name: row[name] for name in ESTIMATED if name in row}
+
+        (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most, observe)
         if coarse is None:
             self.warn(
                 "error by strips: not estimated, as the test fails on strips of twice the width"
@@ -191,6 +199,7 @@ class RunInProgress:
         profiles = [record[f"{body}_depth_profile"][:, 0] for body in ("cylinder", "roller")]
         end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
         self.recorder.strip_errors = strip_errors(coarse, passes, np.array(sizes), end)
+        self.recorder.observed_errors = observed_errors(coarse, passes, self.recorder.observed)
 
     def _check_errors(self) -> None:
         """Warn if estimated errors exceed the tolerance."""

@@ -20,7 +20,7 @@ from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem
 from wearsim.evolution.strips import averaged, same_strips
-from wearsim.results.run_schema import ALL_VARIABLES
+from wearsim.results.run_schema import ALL_VARIABLES, ESTIMATED
 from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
 from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import FloatArray, Grid
@@ -223,12 +223,15 @@ class Recorder:
         self.schedule = schedule
         self.threshold = threshold
         sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
+        sums |= {f"{name}_error" for name in ESTIMATED}
         steps = {name: column for name, column in (history or {}).items() if name not in sums}
         self._history = _rows(steps) or [
             _single(history_row(stepper, problem, state, None, threshold))
         ]
         #: errors of the finished test due to its strips, see `strip_errors.strip_errors`
         self.strip_errors: FloatArray | None = None
+        #: errors of observables of the finished test, see `observed_errors`
+        self.observed_errors: Mapping[str, FloatArray] = {}
         rows = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
         self._records = [(problem.grid, row) for row in rows]
         self._kept = len(self._history), len(self._records), state, problem.grid
@@ -308,7 +311,16 @@ class Recorder:
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
             columns[name] = by_steps + np.nan_to_num(part)[:, None]
             columns[name] = columns[name] + columns.get(f"{name}_by_stations", 0.0)
+        for name in self.observed:
+            unknown = np.full_like(columns[name], np.nan)
+            by_stations = np.nan_to_num(columns.get(f"{name}_error_by_stations", 0.0))
+            columns[f"{name}_error"] = self.observed_errors.get(name, unknown) + by_stations
         return columns
+
+    @property
+    def observed(self) -> dict[str, FloatArray]:
+        """The observables that have an estimated error besides depth and volume."""
+        return {name: self.column(name) for name in ESTIMATED if name in self._history[0]}
 
     def column(self, name: str) -> FloatArray:
         """Return a variable of the history except errors, first axis step."""
