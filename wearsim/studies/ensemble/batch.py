@@ -9,12 +9,19 @@ import numpy as np
 
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.observables import depth_error_by_stations
+from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
-from wearsim.evolution.strip_errors import Course, add_step, coarse_courses, strip_errors
+from wearsim.evolution.strip_errors import (
+    Course,
+    Observe,
+    add_step,
+    coarse_courses,
+    strip_errors,
+)
 from wearsim.plugins import BODIES
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import cam_observables, lift_curves
@@ -293,7 +300,8 @@ def add_strip_errors(
     problem: WearProblem,
     courses: Sequence[Course],
     results: Mapping[int, RunObservations | Exception],
-) -> dict[int, FloatArray]:
+    observe: Observe | None = None,
+) -> dict[int, tuple[FloatArray, dict[str, FloatArray]]]:
     """Add the errors due to the strips to those of the results, by the same tests on coarse ones.
 
     Parameters
@@ -304,12 +312,14 @@ def add_strip_errors(
     courses : sequence of Course
         Of each test.
     results : mapping of int to RunObservations or Exception
+    observe : callable, optional
+        Returns the observables that the courses have.
 
     Returns
     -------
-    dict of int to ndarray, shape (3,)
-        Added errors of depth [m], volume [m^3] and profile by number; none where they are not
-        estimated.
+    dict of int to tuple
+        By number the added errors of depth [m], volume [m^3] and profile, shape (3,), and those
+        of the observables by steps and strips at the end; none where they are not estimated.
     """
     stepper = coarse_stepper(runs[0].draws, problem)
     ended = [number for number, course in enumerate(courses) if course.passes and number in results]
@@ -317,14 +327,19 @@ def add_strip_errors(
         return {}
     places, steps = np.array(ended), runs[0].draws.scenario.evolution.max_steps
     needed = np.array([courses[number].passes[-1] for number in ended])
-    added = {}
-    coarse = coarse_courses(problem.at(places), stepper, runs[0].stop, needed, steps)
+    added: dict[int, tuple[FloatArray, dict[str, FloatArray]]] = {}
+    coarse = coarse_courses(problem.at(places), stepper, runs[0].stop, needed, steps, observe)
     for number, other in zip(ended, coarse, strict=True):
         course, result = courses[number], results[number]
         passes, sizes = np.array(course.passes), np.array(course.sizes).T
         errors = strip_errors(other, passes, sizes, course)[:, -1]
         if isinstance(result, RunObservations) and np.isfinite(errors).all():
-            added[number] = errors
+            observed = {
+                name: np.array([item[name] for item in course.observed])
+                for name in (course.observed[0] if course.observed else ())
+            }
+            found = observed_errors(other, np.append(0.0, passes), observed)
+            added[number] = errors, {name: values[-1] for name, values in found.items()}
             result.scalars["depth_error"] += float(errors[0])
             result.scalars["volume_error"] += float(errors[1])
     return added
