@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.errors import PluginError, ScenarioError
+from wearsim.evolution.limits import Limit
 from wearsim.report.text import (
     NINETY_PERCENT,
     NOTHING,
@@ -24,7 +25,7 @@ from wearsim.report.text import (
 )
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.types import FloatArray
-from wearsim.units import engineers_unit, in_engineers_unit, kind_of
+from wearsim.units import LONG, engineers_unit, in_engineers_unit, kind_of
 from wearsim.uq.estimation.moments import is_constant
 
 if TYPE_CHECKING:
@@ -230,12 +231,39 @@ def standing(result: Result) -> str:
     passes, total = float(result.passes[-1]), float(result.raw.total_passes)
     time = simulated(float(result.time[-1]))
     if result.until:
-        return f"stopped at {result.until}: pass {count(passes)} of {count(total)}, {time}"
+        reached, error = count(passes), passes_error(result)
+        if error is not None and error > _ROUNDING * passes:
+            digits = max(math.floor(math.log10(error)), 0)  # those that the error leaves
+            reached = f"{count(round(passes, -digits))} ± {in_unit(error, '1', 2)}"
+            seconds, rate = np.array(result.time[-1]), result.raw.kinematics["pass_rate"]
+            time = with_error(seconds, error / rate, "min" if seconds < LONG else "h")
+        return f"stopped at {result.until}: pass {reached} of {count(total)}, {time}"
     if result.finished:
         return f"finished: {count(passes)} passes, {time}"
     part = f"{100.0 * passes / total:.1f} %"
     word = "failed after" if result.failure else "unfinished:"
     return f"{word} pass {count(passes)} of {count(total)} ({part}), {time}"
+
+
+def passes_error(result: Result) -> float | None:
+    """Return the error of the passes at which a run has reached its limit; None if not known.
+
+    It is the estimated error of the limited quantity, over its growth per pass in the last step.
+    """
+    if not result.until or len(result.passes) < 2:
+        return None
+    name = Limit.parse(result.until).variable
+    error = result.errors.get(name)
+    if error is None:
+        return None
+    values = np.asarray(getattr(result, name)).reshape(len(result.passes), -1)
+    place = int(values[-1].argmax())
+    growth = abs(float(values[-1, place] - values[-2, place]))
+    step = float(result.passes[-1] - result.passes[-2])
+    greatest = float(np.max(error[-1]))
+    if not (math.isfinite(greatest) and growth > 0.0):
+        return None
+    return min(greatest * step / growth, float(result.passes[-1]))
 
 
 def _last(value: Any) -> int:
@@ -291,6 +319,7 @@ def run_json(result: Result) -> dict[str, Any]:
         "strips": len(result.y),
         "finished": bool(result.finished),
         "until": result.until or None,
+        "passes_error": passes_error(result),
         "failure": result.failure or None,
         "failed_at": result.raw.failed_at or None,
         "steps": _last(result.steps),

@@ -186,7 +186,7 @@ def _map(result: Result, stations: Stations) -> Plot:
     tips = ("angle", "$x{0.0} deg"), ("y", "$y{0.00} mm"), ("depth", "@image{0.00} um")
     hover(plot, [picture], *tips)
     place = float(np.max(result.final["depth_angle_rad"])) * DEG
-    deepest = shown(float(worn.max()), "um")
+    deepest = shown(float(np.max(result.depth[-1])), "um")
     text = f"At the end the cam is deepest at {place:.4g} deg: {deepest}."
     return Plot("Worn depth over angle and width", text, plot)
 
