@@ -6,9 +6,10 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.evolution.contacts import at_least, contact_batch
+from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import CamStations, mean_along, width, worn_volume
+from wearsim.evolution.quantities import CamStations, mean_along, sum_in_order, width, worn_volume
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents
@@ -17,7 +18,7 @@ from wearsim.evolution.steppers.single_step import (
     present_problem,
     solve_at_record,
 )
-from wearsim.mechanics.cam import Extreme
+from wearsim.mechanics.cam import Extreme, integral_error
 from wearsim.types import FloatArray
 
 
@@ -94,6 +95,24 @@ def depth_error_by_stations(problem: WearProblem, state: WearState) -> FloatArra
     if cam is None:
         return np.zeros(len(state.passes))
     return np.nan_to_num(cam.greatest(state.cylinder_depth[:, 0].max(axis=-1)).error)
+
+
+def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the error of the volume worn off both bodies by a sum over the stations of a cam.
+
+    The relative error is that of the integral of the worn cross-section over the cam's surface,
+    shape (realisations,) [m^3].
+    """
+    cam = problem.kinematics.cam
+    if cam is None or cam.panels is None:
+        return np.zeros(len(state.passes))
+    area = state.cylinder_depth[:, 0].sum(axis=-1)[cam.places]
+    weight = cam.panels.weight[:, None]
+    per_angle = area * cam.along.length[:, 0] / weight
+    total = sum_in_order(weight * per_angle, axis=0)
+    error = integral_error(cam.panels, per_angle)
+    relative = error / np.where(total > 0.0, total, np.inf)
+    return np.asarray(relative * volume_of(problem, state.depths))
 
 
 def depth(problem: WearProblem, state: WearState) -> FloatArray:

@@ -169,6 +169,7 @@ VARIABLES: Mapping[str, Variable] = by_name(
 
 _AT_STATIONS = {
     "depth": (_TEST, "m", "greatest depth of the cam"),
+    "volume": (_TEST, "m^3", "volume worn off both bodies"),
     "peak_pressure": (_ROLLER, "Pa", "greatest peak pressure"),
 }
 _EXTREMES = {

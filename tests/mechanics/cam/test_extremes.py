@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from wearsim.mechanics.cam import Panel, Stations, greatest
+from wearsim.mechanics.cam import Panel, Stations, greatest, integral_error
 
 HALVES = Panel(0, 0.0, 2.5, dwell=False), Panel(1, 2.5, 2.0 * math.pi, dwell=False)
 
@@ -68,4 +68,22 @@ def test_dwell_has_no_error_and_a_rise_with_one_station_is_unknown():
     flat = greatest(Stations(panels, (1, 5)), np.ones(6))
     assert (flat.value, flat.error) == (1.0, 0.0)
     unknown = greatest(Stations(panels, (1, 1)), np.array([1.0, 3.0]))
-    assert unknown.error == 2.0
+    assert unknown.error == 3.0
+
+
+def test_angle_of_a_dwell_is_uncertain_where_the_rise_beside_it_may_be_greater():
+    panels = Panel(0, 0.0, 3.0, dwell=True), Panel(1, 3.0, 2.0 * math.pi, dwell=False)
+    rise = np.array([2.0, 1.9, 1.2, 1.1])
+    found = greatest(Stations(panels, (1, 4)), np.append(2.0, rise))
+    assert found.angle_error > 1.0
+
+
+@pytest.mark.parametrize("place", [0.7, 3.9])
+@pytest.mark.parametrize("number", [3, 4, 5, 7, 9, 13])
+def test_stated_error_of_an_integral_covers_the_true_one(number, place):
+    exact = stations(60)
+    integral = exact.weight @ bump(exact.angle, place, 1.2)
+    few = stations(number)
+    values = bump(few.angle, place, 1.2)
+    error = abs(few.weight @ values - integral)
+    assert error <= integral_error(few, values) <= max(300.0 * error, 2.0)

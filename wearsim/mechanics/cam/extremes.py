@@ -17,10 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.cam.stations import Stations, interpolation
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 
 _PER_STATION = 4  # samples from one station to the next
 _EQUAL = 1e-9  # relative difference of values that count as equal
+_TWIN = 1e-3  # relative difference of the errors of panels that count as the same
 _ROUNDING = 1e-13  # relative gain of a value by less is round-off
 _ITERATIONS = 3  # of Newton's method, from the greatest sample
 
@@ -65,8 +66,10 @@ def greatest(stations: Stations, values: FloatArray) -> Extreme:
         chosen = np.flatnonzero(numbers == number)
         rows = values[stations.first[chosen, None] + np.arange(number)]
         panels[:, chosen] = _of_panels(rows, starts[chosen], widths[chosen])
-    moving = (numbers == 1) & np.array([not panel.dwell for panel in stations.panels])
-    panels[2, moving] = np.ptp(values, axis=0)  # one station says nothing about a rise
+    # a station, or two at the ends, say nothing about what is between them
+    panels[2, _with_few(stations, 2)] = np.abs(values).max(axis=0)
+    few = _with_few(stations, 3)
+    panels[3, few] = 0.5 * widths[few]
     peak, angle, error, angle_error = panels
     first = _first_of_equal(peak, axis=0)
     largest = np.take_along_axis(peak, first, axis=0)[0]
@@ -74,13 +77,46 @@ def greatest(stations: Stations, values: FloatArray) -> Extreme:
     at, own, own_angle = (
         np.take_along_axis(a, first, axis=0)[0] for a in (angle, error, angle_error)
     )
-    # the greatest value may lie on another panel
-    rival = ~equal & (peak + error >= largest - own)
+    # the greatest value may lie on another panel, except one that is the same as the first
+    twin = equal & (np.abs(error - own) <= _TWIN * own)
+    rival = ~twin & (peak + error >= largest - own)
     apart = np.abs(angle - at)
     apart = np.minimum(apart, math.tau - apart) + angle_error
     away = np.where(rival, apart, 0.0).max(axis=0)
-    bound = np.where(equal | rival, peak + error, -np.inf).max(axis=0) - largest
+    bound = np.where(twin | rival, peak + error, -np.inf).max(axis=0) - largest
     return Extreme(largest, at, bound, np.clip(away, own_angle, math.pi))
+
+
+def integral_error(stations: Stations, values: FloatArray) -> FloatArray:
+    """Return the estimated error of an integral over a turn, shape (...).
+
+    The last two coefficients of a panel of n stations contribute to its integral by 1/(n - 2)^2 of
+    their size.
+
+    Parameters
+    ----------
+    stations : Stations
+    values : ndarray, shape (stations, ...)
+        What is integrated over the angle [rad].
+    """
+    error = np.zeros(values.shape[1:])
+    each = zip(
+        stations.panels, stations.numbers, stations.first, _with_few(stations, 2), strict=True
+    )
+    for panel, number, first, unknown in each:
+        rows = values[first : first + number]
+        part = np.abs(rows).max(axis=0) if unknown else np.zeros_like(error)
+        if number > 2:
+            cosines = _product(_transform(number), rows[None])[0]
+            part = np.abs(cosines[number - 2 :]).sum(axis=0) / (number - 2) ** 2
+        error = error + (panel.stop - panel.start) * part
+    return error
+
+
+def _with_few(stations: Stations, most: int) -> BoolArray:
+    """Return which panels, without dwells, have at most a number of stations, (panels,)."""
+    moving = np.array([not panel.dwell for panel in stations.panels])
+    return np.asarray(moving & (np.array(stations.numbers) <= most))
 
 
 def _first_of_equal(values: FloatArray, axis: int) -> IntArray:
@@ -104,9 +140,8 @@ def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[F
         middle = np.broadcast_to(start + 0.5 * width, rows[:, 0].shape)
         return [rows[:, 0], middle, np.zeros_like(middle), np.zeros_like(middle)]
     count = _PER_STATION * (number - 1)
-    samples = _product(
-        interpolation(number, 0.5 - 0.5 * np.cos(np.pi / count * np.arange(count + 1))), rows
-    )
+    points = 0.5 - 0.5 * np.cos(np.pi / count * np.arange(count + 1))
+    samples = _product(interpolation(number, points), rows)
     place = _first_of_equal(samples, axis=1)
     value = np.take_along_axis(samples, place, axis=1)[:, 0]
     first = np.pi / count * place[:, 0]
@@ -124,14 +159,21 @@ def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[F
     higher = gain > _ROUNDING * np.abs(value)
     value, phi = np.where(higher, value + gain, value), np.where(higher, phi, first)
     error = np.abs(cosines[:, max(number - 2, 1) :]).sum(axis=1)
+    part_of_panel = 0.5 - 0.5 * np.cos(phi)
+    # the vertex lies where samples are within twice the error
+    beside = points[np.minimum(place + 1, count)] - points[np.maximum(place - 1, 0)]
+    at = points.reshape(-1, *(1,) * (rows.ndim - 2))
+    within = samples >= (value - 2.0 * error)[:, None]
+    apart = np.abs(at - part_of_panel[:, None]) * width[:, None]
+    apart = np.where(within, np.minimum(apart, math.tau - apart), 0.0)
+    moved = apart.max(axis=1) + width * beside[:, 0]
     # the error is at most a cosine of the order of the polynomial, whose slope moves the vertex
     curved = bend > 0.0
-    part = error / np.where(curved, bend, 1.0)
-    moved = np.where(curved, np.minimum(number * part, np.sqrt(4.0 * part)), np.pi)
-    moved = np.where(error > 0.0, np.minimum(moved, np.pi), 0.0)
-    most = np.maximum(np.abs(np.sin(phi)), 0.5 * moved)
-    angle = start + width * (0.5 - 0.5 * np.cos(phi))
-    return [value, angle, error, 0.5 * width * moved * most]
+    turned = number * error / np.where(curved, bend, 1.0)
+    by_slope = 0.5 * width * turned * np.maximum(np.abs(np.sin(phi)), 0.5 * turned)
+    moved = np.where(curved, np.minimum(by_slope, moved), moved)
+    moved = np.where(error > 0.0, np.minimum(moved, math.pi), 0.0)
+    return [value, start + width * part_of_panel, error, moved]
 
 
 @lru_cache

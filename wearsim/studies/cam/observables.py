@@ -6,7 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wearsim.evolution.observables import extremes, lift_errors, peak_to_peak
+from wearsim.evolution.observables import (
+    extremes,
+    lift_errors,
+    peak_to_peak,
+    volume_error_by_stations,
+)
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.mechanics.cam import Stations
@@ -29,6 +34,7 @@ def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]
         "lift_error": least.value + greatest.value,
         **{f"{name}_angle": extreme.angle for name, extreme in found.items()},
         "depth_error_by_stations": found["depth"].error,
+        "volume_error_by_stations": volume_error_by_stations(problem, state),
         "peak_pressure_error_by_stations": found["peak_pressure"].error,
         "lift_error_error_by_stations": least.error + greatest.error,
         **{f"{n}_angle_error_by_stations": item.angle_error for n, item in found.items()},

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
-from wearsim.evolution.observables import depth_error_by_stations
+from wearsim.evolution.observables import depth_error_by_stations, volume_error_by_stations
 from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
@@ -250,6 +250,7 @@ def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:
     """Return the scalars of a state of one realisation, by the names of `SCALARS`."""
     scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
     scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0])
+    scalars["volume_error"] += float(volume_error_by_stations(problem, state)[0])
     return scalars
 
 

@@ -16,6 +16,7 @@ from wearsim.evolution.observables import (
     extremes,
     lift_errors,
     peak_pressures,
+    volume_error_by_stations,
 )
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
@@ -183,6 +184,7 @@ class _Group:
         slope, of_depth = self._slopes(crossing)
         by_stations = self._errors_by_stations(problem, state)
         error_of_depth = state.depth_error + by_stations["depth"]
+        error_of_volume = state.volume_error + volume_error_by_stations(problem, state)
         depth_error = error_of_depth / np.maximum(depth(problem, state), 1e-300)
         for place, number in enumerate(advance.numbers[crossing.places].tolist()):
             test, chosen = self.tests[number], np.array([place])
@@ -191,7 +193,7 @@ class _Group:
             if limit.unit == "m" and limit.quantity != "width":
                 error = float(error_of_depth[place]) / limit.value
             elif limit.quantity == "volume":
-                error = float(state.volume_error[place]) / limit.value
+                error = float(error_of_volume[place]) / limit.value
             else:  # by way of the passes that correspond to the error of the depth
                 error = float(depth_error[place] * abs(slope[place]) / max(of_depth[place], FLAT))
             if limit.quantity in {"lift error", "peak pressure"}:

@@ -13,7 +13,11 @@ from wearsim.errors import Interrupted, ResultsFileError, SolverError, StepError
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
-from wearsim.evolution.observables import depth_error_by_stations, present_batch
+from wearsim.evolution.observables import (
+    depth_error_by_stations,
+    present_batch,
+    volume_error_by_stations,
+)
 from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located
@@ -208,7 +212,9 @@ class RunInProgress:
         sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
         errors = state.depth_error, state.volume_error
         by_strips = np.nan_to_num(self.recorder.errors_by_strips[:, -1:])
-        by_stations = depth_error_by_stations(problem, state), np.zeros(1)
+        by_stations = [
+            of(problem, state) for of in (depth_error_by_stations, volume_error_by_stations)
+        ]
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [

@@ -72,6 +72,11 @@ class Finished:
     wall_seconds: float
 
 
+#: means and sums over a turn of a cam
+_OF_TURN = {
+    *("roller_depth", "roller_worn_volume", "dissipated_energy", "power", "normal_force"),
+    *("descent", "elastic_approach"),
+}
 ERRORS = "depth_error", "volume_error", "profile_error"
 Event: TypeAlias = Started | Stepped | Warned | Checkpointed | Finished
 Variables = dict[str, FloatArray]
@@ -222,6 +227,7 @@ class Recorder:
         self.stepper = stepper
         self.schedule = schedule
         self.threshold = threshold
+        self._multiplicity = problem.kinematics.multiplicity
         sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
         sums |= {f"{name}_error" for name in ESTIMATED}
         steps = {name: column for name, column in (history or {}).items() if name not in sums}
@@ -311,11 +317,26 @@ class Recorder:
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
             columns[name] = by_steps + np.nan_to_num(part)[:, None]
             columns[name] = columns[name] + columns.get(f"{name}_by_stations", 0.0)
+        of_turn = self._error_of_turn(columns)
         for name in self.observed:
             unknown = np.full_like(columns[name], np.nan)
             by_stations = np.nan_to_num(columns.get(f"{name}_error_by_stations", 0.0))
-            columns[f"{name}_error"] = self.observed_errors.get(name, unknown) + by_stations
+            if name in _OF_TURN:
+                by_stations = np.abs(columns[name]) * of_turn.reshape(
+                    -1, *(1,) * (columns[name].ndim - 1)
+                )
+            error = self.observed_errors.get(name, unknown) + by_stations
+            columns[f"{name}_error"] = np.minimum(error, np.pi) if name.endswith("angle") else error
         return columns
+
+    def _error_of_turn(self, columns: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the relative error of sums over the stations of a cam, that of its volume."""
+        error = columns.get("volume_error_by_stations")
+        if error is None:
+            return np.zeros(len(self._history))
+        rollers = columns["roller_worn_volume"][..., 0] @ self._multiplicity
+        total = columns["worn_volume"][:, 0] + rollers
+        return np.asarray(error[:, 0] / np.where(total > 0.0, total, np.inf))
 
     @property
     def observed(self) -> dict[str, FloatArray]:
