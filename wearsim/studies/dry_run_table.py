@@ -41,6 +41,7 @@ def plan(data: Data) -> TableRows:
         ("load", _load_text(data["load"])),
         *_log_rows(data["log"]),
         *([("friction", f"{data['friction']:.4g}")] if "friction" in data else []),
+        *([("creep factor", f"{factor:.4g}")] if (factor := data["creep_factor"]) < 1.0 else []),
         *_creepage_rows(data["creepage"]),
         *_random_rows(data),
         ("contact model", f"{data['contact_model']}: {data['contact_model_summary']}"),

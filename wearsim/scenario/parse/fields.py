@@ -188,6 +188,7 @@ OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
 OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
 #: roles of the distributions that need a marginal distribution
 WITH_MARGINAL = ("field", "process")
+CREEP_FACTOR = "friction.creep_factor"
 RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
 
 
@@ -209,7 +210,8 @@ class RandomInputTable(Options):
 def can_be_random(name: str) -> bool:
     """Return whether the value at a dotted key can be random."""
     tables = {"load", "friction", "creepage", "wear"}
-    return name.split(".", maxsplit=1)[0] in tables or name == "roller.offset"
+    of_table = name.split(".", maxsplit=1)[0] in tables and name != CREEP_FACTOR
+    return of_table or name == "roller.offset"
 
 
 def amount(value: float, quantity: Quantity | None) -> str:

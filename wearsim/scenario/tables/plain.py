@@ -57,6 +57,13 @@ class FrictionTable(Options):
     """Friction between roller and cylinder."""
 
     coefficient: float = Field(gt=0.0, description="Coefficient of friction.")
+    creep_factor: float = Field(
+        default=1.0,
+        gt=0.0,
+        le=1.0,
+        description="Kalker's reduction factor, below 1 for a third body between the surfaces:"
+        " initial slope of traction against creepage over that of ideal bodies.",
+    )
 
 
 def _refuse(value: object) -> None:

@@ -293,7 +293,8 @@ class RunInProgress:
         problem = self.present
         batch = present_batch(problem, state)
         tolerance, grid = choice.auto.tolerance, problem.grid
-        if text := excess(REFERENCE, choice, grid, materials, batch, tolerance):
+        factor = self.scenario.friction.creep_factor
+        if text := excess(REFERENCE, problem.model, grid, materials, batch, tolerance, factor):
             self.warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
 
     def warn(self, message: str) -> None:
