@@ -166,7 +166,9 @@ def test_creep_factor_changes_no_sliding_contact_of_different_materials():
     film = model.with_creep_factor(0.5).solve_one(20.0 * GRID.y**2, 90.0, point)
     # the power extrapolated from coarser elements is that of the tolerance there
     assert film.power == pytest.approx(ideal.power, rel=1e-4)
-    np.testing.assert_allclose(film.line_load, ideal.line_load, rtol=1e-4)
+    np.testing.assert_allclose(
+        film.line_load, ideal.line_load, rtol=0.0, atol=3e-4 * ideal.line_load.max()
+    )
     partly = model.with_creep_factor(0.5).solve_one(
         20.0 * GRID.y**2, 90.0, OperatingPoint(300.0, 1.0, Creepage(2e-3), 0.3)
     )
