@@ -164,7 +164,7 @@ def factors(scenario: Scenario) -> tuple[float, float]:
     """Return the wear factors of cylinder and roller [1/Pa]."""
     assert scenario.wear is not None
     options: Any = scenario.wear.options
-    return float(options.cylinder.k_over_h), float(options.roller.k_over_h)
+    return float(options.cylinder.wear_factor), float(options.roller.wear_factor)
 
 
 def with_factors(scenario: Scenario, cylinder: float, roller: float) -> Scenario:
