@@ -29,7 +29,11 @@ if TYPE_CHECKING:
 
 GROUP = "wearsim.commands"
 #: distributions of this project that add a verb
-FIRST_PARTY = {"bench": "wearsim-bench", "reproduce": "wearsim-chevalier2005"}
+FIRST_PARTY = {
+    "bench": "wearsim-bench",
+    "reproduce": "wearsim-chevalier2005",
+    "validate": "wearsim-validation",
+}
 
 
 #: built-in verbs with their help lines, in the order of the help
