@@ -4,6 +4,7 @@
 # make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; six minutes
 # make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
 # make bench-ensembles the same of persistence, ensembles and intervals of lives; a quarter of an hour
+# make validate        published tests compared: out/validation, docs/measurements/validation.json; two minutes
 # make docs            the site: docs/_build/html/index.html; three minutes, no network; make linkcheck looks at external links
 # make clean           remove what these targets made, including the environment
 
@@ -12,7 +13,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test test-slow lint bench bench-docs bench-ensembles docs linkcheck clean
+.PHONY: demo test test-slow lint bench bench-docs bench-ensembles validate docs linkcheck clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -36,7 +37,11 @@ lint: $(VENV)/.installed-dev
 
 # a topic that fails leaves the file of the last measurement; references do not depend on the stepper
 MEASURED := docs/measurements
-bench-docs: $(VENV)/.installed-dev
+bench-validate: $(VENV)/.installed-dev
+	$(BIN)/wearsim validate -o out/validation --force
+	cp out/validation/validation.json $(MEASURED)
+
+docs: $(VENV)/.installed-dev
 	mkdir -p out
 	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
 	$(BIN)/wearsim bench stated-errors --tests 200 --seed 3 --references out/references -j $$(nproc) -o out/bench --force \

@@ -12,7 +12,7 @@ import numpy as np
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.types import BoolArray, FloatArray
 from wearsim_validation.case import VERDICTS, Case, Series, Verdict
-from wearsim_validation.compute import computed, sampled_depths
+from wearsim_validation.compute import computed, sampled_depths, scenario_of, wear_rate
 
 OnProgress = Callable[[str], None]
 _SIGMA = 1.96
@@ -121,7 +121,9 @@ def compare(case: Case, on_progress: OnProgress) -> Outcome:
         x, published = case.columns[series.x], case.columns[series.published]
         one = Comparison(series, published.unit, x.unit, x.values, published.values)
         if case.file.kind == "ensemble":
-            _judge_depths(one, sampled_depths(case, series) / published.si)
+            depths = sampled_depths(case, series) / published.si
+            _judge_depths(one, depths)
+            _add_wear_factor(one, depths, wear_rate(scenario_of(case, series)))
         else:
             values = partial(_values, case, series)
             one.columns["computed"] = values(None)
@@ -288,6 +290,16 @@ def _add_spread(one: Comparison, rows: BoolArray) -> None:
     one.facts.append(
         f"{inside} of {len(published)} rows are within the range of what is not published"
     )
+
+
+def _add_wear_factor(one: Comparison, depths: FloatArray, factor: float) -> None:
+    """Add the wear factor of the tests, from that of the computed ones.
+
+    Depths grow with its power 2/3, as of rigid bodies in full slip.
+    """
+    ratio = np.exp(1.5 * (np.log(one.published).mean() - np.log(depths).mean()))
+    text = f"{1e9 * factor * ratio:.2g} mm^3/J, by the dissipated energy that is computed"
+    one.facts.append(f"K/H of the tests: about {text}")
 
 
 def _judge_depths(one: Comparison, depths: FloatArray) -> None:

@@ -130,12 +130,12 @@ def rigid_depth(scenario: wearsim.Scenario, passes: FloatArray) -> FloatArray:
     c = (K/H) mu xi, so that the depth is (3 c N n / (4 sqrt(2 R)))^(2/3).
     """
     creepage, load = scenario.creepage.longitudinal, scenario.load.build()
-    rate = _wear_rate(scenario) * scenario.friction.coefficient * abs(creepage or 0.0)
+    rate = wear_rate(scenario) * scenario.friction.coefficient * abs(creepage or 0.0)
     area = rate * float(load.mean(0.0, scenario.total_time)) * passes
     return np.asarray((0.75 * area / np.sqrt(2.0 * scenario.roller.crown_radius)) ** (2.0 / 3.0))
 
 
-def _wear_rate(scenario: wearsim.Scenario) -> float:
+def wear_rate(scenario: wearsim.Scenario) -> float:
     """Return the K/H by which the bodies of a contact wear together in a roller pass [1/Pa].
 
     A place on a roller touches less often than one on the cylinder, or more.
@@ -159,7 +159,7 @@ def jumped(scenario: wearsim.Scenario, jump: Jump) -> tuple[FloatArray, FloatArr
         Passes of a step, and the smoothing of the wear across the track.
     """
     contact = wearsim.study_contact(scenario)
-    y, rate = contact.solution.y, _wear_rate(scenario) / contact.point.rolling_speed
+    y, rate = contact.solution.y, wear_rate(scenario) / contact.point.rolling_speed
     worn, depths, passes = np.zeros_like(y), [0.0], [0]
     weight = _smoothing(y, jump.smoothing)
     while passes[-1] < (scenario.operation.passes or 0):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Sequence
 from datetime import date
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -124,8 +125,18 @@ def as_json(outcomes: Sequence[Outcome], command: str) -> dict[str, Any]:
     return found
 
 
-def _machine() -> dict[str, str]:
-    return {"date": date.today().isoformat(), "python": platform.python_version()}
+def _machine() -> dict[str, Any]:
+    """Return the machine in the form of `wearsim bench`; no times are stated."""
+    from wearsim.studies.execution.factory import available_processors
+
+    return {
+        "processor": platform.processor() or platform.machine(),
+        "cores": available_processors(),
+        "python": platform.python_version(),
+        "libraries": {name: version(name) for name in ("wearsim", "numba", "numpy", "scipy")},
+        "yardstick": None,
+        "date": date.today().isoformat(),
+    }
 
 
 def write_files(outcomes: Sequence[Outcome], data: dict[str, Any], folder: Path) -> list[Path]:
