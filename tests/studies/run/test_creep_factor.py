@@ -115,3 +115,27 @@ def test_reference_model_takes_creep_factor():
     changes = {FACTOR: 0.4, "creepage.longitudinal": 1e-3}
     study = wearsim.study_contact(shipped_scenario("rig-450min", changes), against="semi-hertzian")
     assert abs(study.errors.power) < 0.01
+
+
+def test_free_roller_of_a_cam_wears_with_creep_factor():
+    turns = {"operation.turns": 2000, "outputs.records": 2, "creepage.drive": "free"}
+    free = {**turns, "creepage": {"drive": "free", "bearing_torque": "20 N mm"}}
+    del free["creepage.drive"]
+    ideal, film = (
+        wearsim.run(shipped_scenario("cam-eccentric", {**free, FACTOR: factor}))
+        for factor in (1.0, 0.01)
+    )
+    # the torque is balanced by the same tractions, at a hundred times the creepage
+    assert film.power[0] / ideal.power[0] == pytest.approx(100.0, rel=0.02)
+
+
+def test_ensemble_with_creep_factor_equals_single_runs(tmp_path):
+    changes = {
+        **SHORT,
+        FACTOR: 0.5,
+        "friction.coefficient": {"distribution": "uniform", "low": 0.08, "high": 0.12},
+    }
+    scenario = shipped_scenario("rig-450min", changes)
+    tests = wearsim.ensemble(scenario, 3, tmp_path / "tests.h5", workers=1)
+    single = wearsim.run(scenario.changed({"sampling.realisation": 2}))
+    assert tests.values("depth")[2, -1] == single.depth[-1]
