@@ -4,7 +4,7 @@
 # make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; six minutes
 # make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
 # make bench-ensembles the same of persistence, ensembles and intervals of lives; a quarter of an hour
-# make validate        published tests compared: out/validation, docs/measurements/validation.json; two minutes
+# make validate        published tests compared: out/validation, docs/measurements/validation.json; less than two minutes
 # make docs            the site: docs/_build/html/index.html; three minutes, no network; make linkcheck looks at external links
 # make clean           remove what these targets made, including the environment
 
@@ -38,6 +38,7 @@ lint: $(VENV)/.installed-dev
 # a topic that fails leaves the file of the last measurement; references do not depend on the stepper
 MEASURED := docs/measurements
 bench-validate: $(VENV)/.installed-dev
+	mkdir -p out
 	$(BIN)/wearsim validate -o out/validation --force
 	cp out/validation/validation.json $(MEASURED)
 
