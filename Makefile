@@ -37,12 +37,7 @@ lint: $(VENV)/.installed-dev
 
 # a topic that fails leaves the file of the last measurement; references do not depend on the stepper
 MEASURED := docs/measurements
-bench-validate: $(VENV)/.installed-dev
-	mkdir -p out
-	$(BIN)/wearsim validate -o out/validation --force
-	cp out/validation/validation.json $(MEASURED)
-
-docs: $(VENV)/.installed-dev
+bench-docs: $(VENV)/.installed-dev
 	mkdir -p out
 	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
 	$(BIN)/wearsim bench stated-errors --tests 200 --seed 3 --references out/references -j $$(nproc) -o out/bench --force \
@@ -63,6 +58,11 @@ bench-ensembles: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.ensembles -o $(MEASURED)/ensembles.json
 	$(BIN)/python -m tests.uq.survival.coverage_study $(MEASURED)/life-coverage.json
 	$(BIN)/python -m tests.uq.survival.small_probabilities $(MEASURED)/life-small.json
+
+validate: $(VENV)/.installed-dev
+	mkdir -p out
+	$(BIN)/wearsim validate -o out/validation --force
+	cp out/validation/validation.json $(MEASURED)
 
 docs: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
