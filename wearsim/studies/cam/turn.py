@@ -284,7 +284,8 @@ class CamTurn:
         """Return the torque of the bearing, against the roller's rotation [N m]."""
         creepage = self.scenario.creepage
         arm = 0.5 * creepage.bearing_friction * (creepage.bearing_diameter or 0.0)
-        return np.asarray((creepage.bearing_torque or 0.0) + arm * self.carried(point))
+        friction = arm * self.carried(point) if arm else np.zeros(len(point.angle))
+        return np.asarray((creepage.bearing_torque or 0.0) + friction)
 
     def torque(self, point: Point) -> FloatArray:
         """Return the torque that the traction gives the rolling roller [N m]."""
