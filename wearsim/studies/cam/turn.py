@@ -299,6 +299,12 @@ class CamTurn:
         tolerance = PART_OF_TOLERANCE * self.scenario.evolution.tolerance
         return choose_stations(self.parts, self._represented, tolerance, self.cam.stations)
 
+    @property
+    def varies(self) -> bool:
+        """Whether a run has more than one station."""
+        single = self.parts[0].dwell or self.cam.stations == 1
+        return len(self.parts) > 1 or not single
+
     def _represented(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return what the stations must represent: depth in full slip, N ds, traction and slip."""
         point = self.at(panel, theta)
