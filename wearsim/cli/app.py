@@ -304,7 +304,11 @@ def main() -> None:
     """Run the command with the arguments of this process.
 
     Garbage is not collected until a verb reports progress: almost all objects of the imports
-    remain, and collecting among them takes a fifth of the start.
+    remain, and collecting among them takes a fifth of the start. At the end they are left to the
+    operating system, since collecting them takes a quarter of a second where numba is loaded.
     """
     gc.disable()
-    app(prog_name="wearsim")
+    try:
+        app(prog_name="wearsim")
+    finally:
+        gc.freeze()

@@ -10,8 +10,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from wearsim.errors import ContactError
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.relocation import FALLEN, SMALL, preload_of
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
@@ -34,6 +37,9 @@ _BISECTIONS = 5  # for the pass of a failure
 _OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn contacts
 _PASS = 0.06  # time of a pass in compiled code, over that of a solve
 _STABLE = 0.03  # wear of the longest stable step, over the line load through pi E*
+_STEPS_OF_RESTART = 2.0  # of the stepper, where skids of a cam's roller have moved
+_SOLVES_OF_RESTART = 6.0
+_STATIONS = 0.08  # to choose the stations again [s]
 _START = 1.0  # of the process: imports and kernels read from the disk [s]
 _SYSTEM = 4.0  # bytes of a coefficient between two strips, few of which are in contact
 _MEMORY = 210e6  # of a process with its kernels [bytes]
@@ -162,6 +168,23 @@ def _warnings(
         yield f"forecast of the time: about {effort.seconds / 60.0:.2g} min; {less} takes less"
 
 
+def restarts_of(problem: WearProblem, depth: float) -> float:
+    """Return how often the stepper restarts because skids of a cam's roller have moved.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    depth : float
+        Worn depth of both bodies at the end [m].
+    """
+    cam = problem.kinematics.cam
+    if cam is None or cam.relocated is None:
+        return 0.0
+    force = np.abs(problem.at_stations(preload_of(problem)).ravel())
+    force = np.maximum(force, SMALL * force.max())
+    return float((cam.stiffness.ravel() * depth / force).max()) / FALLEN
+
+
 def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effort:
     """Return what a run takes.
 
@@ -187,7 +210,8 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
         steps = passes / scenario.evolution.step
     if stepper == "per-pass":
         steps = passes
-    steps = max(min(steps, passes), 1.0)
+    restarts = restarts_of(problem, wear["clearance"])
+    steps = max(min(steps + _STEPS_OF_RESTART * restarts, passes), 1.0)
     groove, solve = forecast.seconds_of_groove, forecast.seconds
     each = _STAGES if stepper == "stabilised" else 1.0
     if stepper == "stabilised":
@@ -210,7 +234,7 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     return Effort(
         steps=math.ceil(steps),
         solves=math.ceil(steps * each) * problem.contacts_each,
-        seconds=_START + steps * per_step,
+        seconds=_START + steps * per_step + restarts * (_STATIONS + _SOLVES_OF_RESTART * groove),
         memory=_MEMORY + 5.0 * size + _SYSTEM * system,
         file_size=size,
     )

@@ -284,7 +284,8 @@ class CamTurn:
         """Return the torque of the bearing, against the roller's rotation [N m]."""
         creepage = self.scenario.creepage
         arm = 0.5 * creepage.bearing_friction * (creepage.bearing_diameter or 0.0)
-        return np.asarray((creepage.bearing_torque or 0.0) + arm * self.carried(point))
+        friction = arm * self.carried(point) if arm else np.zeros(len(point.angle))
+        return np.asarray((creepage.bearing_torque or 0.0) + friction)
 
     def torque(self, point: Point) -> FloatArray:
         """Return the torque that the traction gives the rolling roller [N m]."""
@@ -297,6 +298,12 @@ class CamTurn:
         """Stations of a run, by the tolerance of the scenario."""
         tolerance = PART_OF_TOLERANCE * self.scenario.evolution.tolerance
         return choose_stations(self.parts, self._represented, tolerance, self.cam.stations)
+
+    @property
+    def varies(self) -> bool:
+        """Whether a run has more than one station."""
+        single = self.parts[0].dwell or self.cam.stations == 1
+        return len(self.parts) > 1 or not single
 
     def _represented(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return what the stations must represent: depth in full slip, N ds, traction and slip."""
