@@ -61,6 +61,7 @@ def test_warning_states_noise_and_its_effect_on_acceleration_and_force(tmp_path)
     (text,) = noise_warnings(turn_of(found))
     own, unit_force = found.cam.measured, 0.5 * found.operation.speed**2
     assert f"scatter by {1e6 * own.noise:.2g} um" in text
+    assert f"points.csv: its noise of {1e6 * own.noise:.2g} um is smoothed" in found.notes[0]
     assert f"{1e3 * own.error:.2g} mm/rad^2 and the force by {unit_force * own.error:.2g} N" in text
     # a spline through every point is as bad as the warning says
     through = LiftSpline(*closed(lift_rows(2e-3)), closed=True)
@@ -128,6 +129,20 @@ def test_corner_of_a_noisy_lift_is_refused(tmp_path):
     noisy = triangle + 2e-3 * np.random.default_rng(0).standard_normal(360)
     with pytest.raises(ScenarioError, match="slope of the lift jumps at, got 180"):
         measured(tmp_path, np.stack([DEGREES, noisy], axis=1))
+
+
+def test_lift_at_uneven_angles_is_smoothed(tmp_path):
+    degrees = np.sort(np.random.default_rng(2).uniform(0.0, 360.0, 500))
+    found = measured(tmp_path, lift_rows(2e-3, degrees=degrees))
+    assert found.cam.measured.noise == pytest.approx(2e-6, rel=0.15)
+    true = exact().cam.motion.lift(FINE + math.radians(degrees[0]))[2]  # 0 is the first angle
+    away = found.cam.motion.lift(FINE)[2] - true
+    assert float(np.sqrt((away**2).mean())) < 0.02 * np.abs(true).max()
+
+
+def test_few_points_are_followed(tmp_path):
+    found = measured(tmp_path, lift_rows(2e-3, degrees=np.arange(0.0, 360.0, 10.0)))
+    assert found.cam.measured is None
 
 
 def test_ends_of_a_noisy_turn_may_differ_by_the_noise(tmp_path):

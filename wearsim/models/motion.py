@@ -311,8 +311,8 @@ def read_lift(text: str, path: str, unit: str) -> tuple[FloatArray, FloatArray]:
     return columns["angle"], columns["lift"]
 
 
-def _isolated(values: FloatArray, size: float) -> IntArray:
-    """Return the places of values that exceed those around them, and a size, several times."""
+def _isolated(values: FloatArray, size: FloatArray) -> IntArray:
+    """Return the places of values that exceed sizes, and those around them several times."""
     values = np.abs(values)
     around = np.full_like(values, np.inf)
     reach = 3  # a corner between two points shows in both
@@ -330,18 +330,20 @@ def kinks(angle: FloatArray, lift: FloatArray, noise: float = 0.0) -> tuple[Floa
     ----------
     angle, lift : ndarray, shape (points,)
     noise : float
-        Standard deviation of the errors of the lift, which hide small jumps.
+        Standard deviation of the errors of the lift, which hide small jumps of the slope.
     """
     slope = np.diff(lift) / np.diff(angle)
     middle = 0.5 * (angle[1:] + angle[:-1])
     second = np.diff(slope) / np.diff(middle)
     third = np.diff(second) / np.diff(angle[1:-1])
     jump = np.diff(slope)
-    step = float(np.median(np.diff(angle)))
-    floor = max(1e-3 * np.abs(slope).max(), _FLOOR * noise * math.sqrt(6.0) / step)
+    # standard deviation of a difference of slopes by that of three points
+    before, after = 1.0 / np.diff(angle)[:-1], 1.0 / np.diff(angle)[1:]
+    scatter = noise * np.sqrt(before**2 + after**2 + (before + after) ** 2)
+    floor = np.maximum(1e-3 * np.abs(slope).max(), _FLOOR * scatter)
     corners = angle[1:-1][_isolated(jump, floor)]
-    floor = max(0.05 * np.abs(second).max(), _FLOOR * noise * math.sqrt(20.0) / step**2)
-    steps = middle[1:-1][_isolated(third * np.diff(angle[1:-1]), floor)]
+    least = np.full(len(third), 0.05 * np.abs(second).max())
+    steps = middle[1:-1][_isolated(third * np.diff(angle[1:-1]), least)]
     return corners, steps
 
 

@@ -20,7 +20,7 @@ from wearsim.models.motion import (
     kinks,
     refuse_kinks,
 )
-from wearsim.quantities import InputFile, Quantity
+from wearsim.quantities import Quantity
 from wearsim.scenario.tables.cam_points import (
     CHOICE,
     MeasuredPoints,
@@ -59,7 +59,8 @@ def motion_of_lift(
     """
     assert table.lift is not None
     tolerance, path = _tolerance(table.lift_tolerance, follower), table.lift.path
-    angle, lift = _one_turn(path, *_lift_table(table.lift, table, follower))
+    read = read_lift_table(table.lift.text, path, table.columns, table.units, follower)
+    angle, lift = one_turn(path, *read)
     return motion_of_table(notes, path, angle, lift, "rad" if follower.swings else "m", tolerance)
 
 
@@ -77,36 +78,55 @@ def _tolerance(text: str | None, follower: Follower) -> float | None:
     return Quantity(LENGTH, "not negative").parse(text)
 
 
-def _lift_table(
-    file: InputFile, table: CamTable, follower: Follower
+def read_lift_table(
+    text: str,
+    path: str,
+    names: tuple[str, str] | None,
+    units: tuple[str, str] | None,
+    follower: Follower,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return angles [rad] and lifts of a file; lengths of an arm are arcs of the roller's path."""
-    angle, lift = table.columns or ("angle", "lift")
-    aliases = {} if table.columns else {angle: ANGLE_NAMES, lift: LIFT_NAMES}
-    units = dict(zip((angle, lift), table.units or (), strict=False))
-    heads = units_of_columns(file.text, {lift: aliases.get(lift, ())})
-    written = units.get(lift) or heads.get(lift)
-    length = not follower.swings or has_dimension(written, "m")
+    """Return angles [rad] and lifts of a file, in metres or, of an arm, in radians.
+
+    Lengths of an arm are arcs of its roller's path.
+
+    Parameters
+    ----------
+    text, path : str
+        Content of the file, and its name for messages.
+    names, units : tuple of str, optional
+        Names of the columns, and their units where the file has none.
+    follower : Follower
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes of the file.
+    """
+    angle, lift = names or ("angle", "lift")
+    aliases = {} if names else {angle: ANGLE_NAMES, lift: LIFT_NAMES}
+    given = dict(zip((angle, lift), units or (), strict=False))
+    heads = units_of_columns(text, {lift: aliases.get(lift, ())})
+    length = not follower.swings or has_dimension(given.get(lift) or heads.get(lift), "m")
     columns = read_columns(
-        file.text,
-        file.path,
+        text,
+        path,
         {angle: "rad", lift: "m" if length else "rad"},
         aliases=aliases,
-        units=units,
+        units=given,
         rising=angle,
         either_way=True,
         choice=CHOICE.format("LIFT"),
     )
     found = columns[lift] / follower.arm_length if follower.swings and length else columns[lift]
-    refuse_few(file.path, len(found), FEWEST_ROWS, "rows for a quintic spline")
+    refuse_few(path, len(found), FEWEST_ROWS, "rows for a quintic spline")
     return columns[angle], found
 
 
-def _one_turn(path: str, angle: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def one_turn(path: str, angle: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a table from its first angle to the same one after a turn [rad]."""
     turn = float(angle[-1] - angle[0])
     if abs(turn - math.tau) > 1e-9:
-        step = float(np.median(np.diff(angle)))
+        step = float(np.diff(angle).max())
         if not 0.0 < math.tau - turn < 1.5 * step + 1e-6:
             got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
             what = "the angles do not span a turn"

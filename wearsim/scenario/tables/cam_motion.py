@@ -65,7 +65,13 @@ def read_motion(
         if table.shape is not None:
             return _from_shape(table, follower), None
         read = motion_of_lift if way == "lift" else motion_of_profile
-        return read(mistakes.notes, table, follower)
+        motion, measured = read(mistakes.notes, table, follower)
+        if measured is not None:
+            noise = f"{1e6 * measured.noise:.2g} u{measured.unit}"
+            mistakes.notes.append(
+                f"{measured.file}: its noise of {noise} is smoothed; wearsim cam shows residuals"
+            )
+        return motion, measured
     except ScenarioError as error:
         mistakes.add_file(error, "cam", way)
     except QuantityError as error:

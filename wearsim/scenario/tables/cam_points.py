@@ -25,6 +25,7 @@ from wearsim.units import measure
 
 POINTS = 1440  # of a turn, on which a motion is evaluated or fitted
 _VISIBLE = 0.005  # change of the acceleration by noise, of its peak, that is smoothed
+_FEWEST = 48  # points in whose differences noise can be seen
 _NO_NOISE = 1e-12  # of the range of a table: rounding of doubles
 CHOICE = 'choose other names with columns = ["ANGLE", "{}"] in [cam]'
 
@@ -71,7 +72,7 @@ def smoothed_points(
     """Return the smoothing spline of a closed table, or None if its points shall be followed."""
     if tolerance is not None:
         return smoothed(angle, values, tolerance) if tolerance > 0.0 else None
-    noise = estimated_noise(angle, values)
+    noise = estimated_noise(angle, values) if len(angle) >= _FEWEST else 0.0
     if noise <= _NO_NOISE * float(np.ptp(values)):
         return None
     curve = smoothed(angle, values)
