@@ -7,12 +7,14 @@ fits to measured runs, which they meet within a factor of three.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from wearsim.errors import ContactError
+from wearsim.evolution.limits import Limit
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import FALLEN, SMALL, preload_of
 from wearsim.scenario import Scenario
@@ -33,6 +35,7 @@ _STEP = 1.3  # time of an implicit step
 _EXPLICIT = 0.7  # time of an explicit step
 _WHOLE = 0.95  # of the width of a roller
 _CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
+_HALVINGS = 20  # for the passes at which a limit is reached
 _BISECTIONS = 5  # for the pass of a failure
 _OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn contacts
 _PASS = 0.06  # time of a pass in compiled code, over that of a solve
@@ -69,7 +72,7 @@ class Effort:
 
 def forecast_data(
     draws: Draws, problem: WearProblem, stepper: str
-) -> tuple[dict[str, float | None], list[str]]:
+) -> tuple[dict[str, Any], list[str]]:
     """Return the forecast of a run in SI units, and warnings.
 
     Parameters
@@ -96,7 +99,8 @@ def forecast_data(
     if scenario.contact.width is not None:
         _check_strips(forecast, _CERTAIN * passes)
     effort = effort_of(scenario, forecast, stepper)
-    data: dict[str, float | None] = {
+    data: dict[str, Any] = {
+        "limits": _limits(scenario, forecast, wear),
         "depth_m": wear["depth"],
         "roller_depth_m": wear["roller_depth"],
         "width_m": wear["width"],
@@ -111,6 +115,27 @@ def forecast_data(
         "file_bytes": effort.file_size,
     }
     return data, list(_warnings(scenario, forecast, wear, effort))
+
+
+def _limits(
+    scenario: Scenario, forecast: WearForecast, wear: Mapping[str, float]
+) -> list[dict[str, Any]]:
+    """Return the limits of [limit] with the values at the end, and when they are reached."""
+    total, found = float(scenario.total_passes), []
+    for key, value in scenario.limit.given.items():
+        reached = None
+        if forecast.at(1.0)[key] >= value:
+            reached = 0.0
+        elif wear[key] >= value:
+            low, high = 0.0, 1.0  # parts of the test
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                worn = forecast.at(middle * total)[key] >= value
+                low, high = (low, middle) if worn else (middle, high)
+            reached = high * total
+        item = {"quantity": key, "unit": Limit(key.replace("_", " "), value, key).unit}
+        found.append({**item, "limit": value, "at_end": wear[key], "reached_at_passes": reached})
+    return found
 
 
 def _check_strips(forecast: WearForecast, passes: float) -> None:

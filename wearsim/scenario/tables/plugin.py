@@ -256,6 +256,13 @@ def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | Non
     own, spec, rest = _choose(mistakes, "wear", raw)
     options = validate(mistakes, spec.options, rest, "wear", WearTable) if spec else None
     mistakes.notes += _rate_notes(rest)
+    if {"wear.factor", "wear.cylinder.k_over_h"} <= mistakes.random.keys():
+        what = "is random, and so is wear.cylinder.k_over_h: the scatter of K/H counts twice"
+        remedy = (
+            "one of them: delete factor under [wear], or [wear.factor], if the distribution of"
+            " k_over_h holds the scatter between specimens, as that of identify --posterior does"
+        )
+        mistakes.add("wear", "factor", what, None, remedy)
     return WearChoice(own.law, options) if own and options is not None else None
 
 

@@ -18,6 +18,7 @@ from wearsim.mechanics.cam import (
     choose_stations,
     extreme,
     skid_arcs,
+    surface_points,
 )
 from wearsim.models.loads import FollowerLoad
 from wearsim.scenario import Scenario
@@ -373,6 +374,7 @@ class CamTurn:
             expected = f"more than {1e3 * radius:.6g} mm, by a greater base_radius,"
             expected += " a smaller roller or a gentler motion"
             mistakes.append(Mistake("cam", "base_radius", what, got, expected))
+        mistakes += self._reach_mistakes()
         least, theta = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
         if -least <= 0.0 and not self.cam.groove:
             got = f"{-least:.4g} N at {self.place(theta)}"
@@ -385,6 +387,25 @@ class CamTurn:
             raise ScenarioError(self.scenario.file, mistakes)
         self.arcs  # noqa: B018  (raises where the roller rolls nowhere)
         return self
+
+    def _reach_mistakes(self) -> list[Mistake]:
+        """Return a mistake if the cam of a swinging arm reaches its pivot."""
+        follower = self.cam.follower
+        if not follower.swings or self.cam.groove:
+            return []
+
+        def radius(panel: Panel, theta: FloatArray) -> FloatArray:
+            point = self.at(panel, theta)
+            x, y = surface_points(follower, point.kinematics, point.angle)[1]
+            return np.asarray(np.hypot(x, y))
+
+        greatest, theta = extreme(self.panels, radius)
+        if greatest < follower.centre_distance:
+            return []
+        got = f"{1e3 * greatest:.6g} mm at {self.place(theta)}"
+        what = "the cam reaches the pivot of the arm: its greatest radius is"
+        expected = f"less than {1e3 * follower.centre_distance:.6g} mm, follower.centre_distance"
+        return [Mistake("cam", "base_radius", what, got, expected)]
 
     def _undercut(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the curvature of the pitch curve times the roller's radius, 1 at a cusp."""
