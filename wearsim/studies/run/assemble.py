@@ -275,7 +275,8 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
         fresh = fresh_state(found)
         full = volume_of(problem, explicit_step(found, fresh, one).depths)
         half = volume_of(problem, explicit_step(*half_quadrature(found, fresh), one).depths)
-        if (np.abs(full - half) <= 0.5 * evolution.tolerance * full).all():
+        error = np.abs(full - half) + found.quadrature_error * full
+        if (error <= 0.5 * evolution.tolerance * full).all():
             return found
         count *= 2
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, Redraw
 from wearsim.models.loads import FollowerLoad
@@ -137,6 +139,11 @@ def _load_mistake(scenario: Scenario, what: str, got: str, expected: str) -> Sce
 MAX_NODES = 128
 REFERENCE_POINTS = 2**15  # Sobol points of the exact means
 LEAST_WEIGHT = 0.1  # of an equal weight; a negative weight would add material
+_OTHERS = (0.7, 1.4, 2.0)  # full-slip creepages, over that of the unworn bodies, of the error
+_ACROSS, _SHARES = np.polynomial.legendre.leggauss(24)  # points across half of a Hertz contact
+_ROOT = np.sqrt(1.0 - (0.5 * _ACROSS + 0.5) ** 2)  # half-length of its strips over the greatest one
+_SHARES = 0.75 * _SHARES * _ROOT**2  # of its load
+_MEAN_LENGTH = float(_SHARES @ _ROOT)  # mean half-length by load over the greatest one
 
 
 def _with_values(
@@ -189,8 +196,10 @@ def with_nodes(
     """Return the problem with `count` contacts for each roller, a quadrature over its passes.
 
     The nodes are scrambled Sobol points. Their weights are the nearest to equal ones that integrate
-    the wear in full slip, and its moments in the tilt, exactly. The quadrature error is then that
-    of the difference between the wear and these functions.
+    exactly the wear of the unworn bodies by Carter's theory of partial slip, and its moments in the
+    tilt. The quadrature error is then that of the difference between the wear and these functions.
+    One part of it, as where the saturation changes with the groove, is found from wear by the same
+    theory at other full-slip creepages; its exact means are known too.
 
     Parameters
     ----------
@@ -215,29 +224,68 @@ def with_nodes(
     (load,) = problem.loads
     force = float(load.force(np.zeros(1))[0]) or float(problem.greatest_load[0])  # 0 in a pause
     inputs, reference = inputs_of(count), inputs_of(REFERENCE_POINTS)
-    weights = []
-    for number in range(problem.rollers):
-        values, exact = (
-            _wear_functions(some, force, slice(number * points, (number + 1) * points))
-            for some, points in ((inputs, count), (reference, REFERENCE_POINTS))
+    weights, error = [], 0.0
+    for number, full_slip in enumerate(_full_slip_creepages(problem)):
+        points, others = (
+            slice(number * points, (number + 1) * points) for points in (count, REFERENCE_POINTS)
         )
+        functions = partial(_wear_functions, force=force, full_slip=full_slip)
+        values, means = functions(inputs, points), functions(reference, others).mean(axis=1)
         # both halves of the points are quadratures too
         halves = values[:, : count // 2], values[:, count // 2 :]
-        weights += [0.5 * _calibrated(half, exact.mean(axis=1)) for half in halves]
+        weight = np.concatenate([0.5 * _calibrated(half, means) for half in halves])
+        weights.append(weight)
+        for factor in _OTHERS:
+            functions = partial(_wear, force=force, full_slip=factor * full_slip)
+            mean = float(functions(reference, others).mean())
+            if mean > 0.0:
+                error = max(error, abs(float(weight @ functions(inputs, points)) / mean - 1.0))
     return replace(
         problem,
         inputs=inputs,
         roller=np.repeat(rollers, count),
         weight=np.concatenate(weights),
+        quadrature_error=error,
         passes_per_draw=float(max(per_turn * scenario.operation.rollers, 1)),
     )
 
 
-def _wear_functions(inputs: ContactInputs, force: float, part: slice) -> FloatArray:
-    """Return functions of the inputs that approximate wear, shape (functions, draws)."""
+def _full_slip_creepages(problem: WearProblem) -> list[float]:
+    """Return the creepage of full slip over friction, of each roller on the unworn bodies.
+
+    By Carter's theory it is the half-length times the curvature along rolling. It is that at the
+    middle of a Hertz contact with the same mean half-length, and the mean over the stations.
+    """
+    batch = unworn_contacts(problem)
+    solution = problem.model.solve(batch)
+    load, length = solution.line_load, solution.half_length
+    mean = (load * length).sum(axis=1) / np.maximum(load.sum(axis=1), 1e-300) / _MEAN_LENGTH
+    each = (mean * np.abs(batch.longitudinal_curvature)).reshape(problem.shape)
+    return list(map(float, each.mean(axis=(0, 2))))
+
+
+def _wear(inputs: ContactInputs, part: slice, force: float, full_slip: float) -> FloatArray:
+    """Return wear in partial slip by Carter's theory, to a factor, shape (draws,).
+
+    The strips of a Hertz contact slip fully from the creepage on that is friction times half-length
+    times curvature (Carter, Proc. R. Soc. A 112 (1926), DOI 10.1098/rspa.1926.0100); below it, the
+    traction is smaller.
+    """
     load = np.maximum(force + inputs.normal_force_offset[part, 0], 0.0)
-    slip = np.hypot(inputs.longitudinal[part, 0], inputs.yaw[part, 0])
-    wear, tilt = load * inputs.friction[part, 0] * slip, inputs.tilt[part, 0]
+    slip, friction = (
+        np.hypot(inputs.longitudinal[part, 0], inputs.yaw[part, 0]),
+        inputs.friction[part, 0],
+    )
+    middle = np.maximum(friction * full_slip * np.cbrt(load / force), 1e-300)
+    saturation = np.minimum((slip / middle)[:, None] / _ROOT, 1.0)
+    return np.asarray(load * friction * slip * ((saturation * (2.0 - saturation)) @ _SHARES))
+
+
+def _wear_functions(
+    inputs: ContactInputs, part: slice, force: float, full_slip: float
+) -> FloatArray:
+    """Return functions of the inputs that approximate wear, shape (functions, draws)."""
+    wear, tilt = _wear(inputs, part, force, full_slip), inputs.tilt[part, 0]
     one = np.ones_like(tilt)
     return np.array([one, wear, wear * tilt, wear * tilt**2, tilt, tilt**2, wear * tilt**3])
 
