@@ -29,13 +29,8 @@ from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import growth_of, strips_of_run
 from wearsim.studies.run.groove import predicted_half_width
-from wearsim.studies.run.inputs import (
-    MAX_NODES,
-    contact_inputs,
-    minimum_nodes,
-    redrawing,
-    with_nodes,
-)
+from wearsim.studies.run.inputs import contact_inputs
+from wearsim.studies.run.nodes import MAX_NODES, minimum_nodes, redrawing, with_nodes
 from wearsim.types import FloatArray, Grid
 from wearsim.units import in_engineers_unit
 
