@@ -259,7 +259,7 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
     """Return the problem with quadrature nodes for the inputs that are drawn at every pass.
 
     Unless the scenario gives their number, they are doubled until the initial wear has converged to
-    half the tolerance, or `MAX_NODES` are reached.
+    half the tolerance, as has the known part of its error, or `MAX_NODES` are reached.
     """
     evolution = draws.scenario.evolution
     count, one = evolution.nodes or minimum_nodes(draws.passes), np.ones(1)
@@ -270,7 +270,7 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
         fresh = fresh_state(found)
         full = volume_of(problem, explicit_step(found, fresh, one).depths)
         half = volume_of(problem, explicit_step(*half_quadrature(found, fresh), one).depths)
-        error = np.abs(full - half) + found.quadrature_error * full
+        error = np.maximum(np.abs(full - half), found.quadrature_error * full)
         if (error <= 0.5 * evolution.tolerance * full).all():
             return found
         count *= 2
