@@ -20,7 +20,7 @@ from tests.results_compared import differences
 from wearsim.errors import ResultsFileError
 from wearsim.results.io.files import write_results
 from wearsim.studies.run.result import read_results
-from wearsim.studies.run.schema import AXES, VARIABLES
+from wearsim.studies.run.schema import AXES, RUN, VARIABLES
 
 TEXT = st.text(max_size=40)
 PATH = st.text(st.characters(exclude_characters="\0"), min_size=1, max_size=10)
@@ -178,12 +178,12 @@ def test_hdf5_of_another_program_is_refused(tmp_path: Path) -> None:
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 8
+    file.attrs["format_version"] = RUN.version + 1
     del file["depth"]
 
 
 def _older(file: h5py.File) -> None:
-    file.attrs["format_version"] = 6
+    file.attrs["format_version"] = RUN.version - 1
 
 
 def _incomplete(file: h5py.File) -> None:
@@ -209,14 +209,16 @@ def _with_about(text: str) -> Callable[[h5py.File], None]:
         (
             _newer,
             (
-                "has layout 8 of wearsim-run, and this wearsim reads layout 7; update wearsim to"
+                f"has layout {RUN.version + 1} of wearsim-run, and this wearsim reads layout"
+                f" {RUN.version}; update wearsim to"
                 " read it"
             ),
         ),
         (
             _older,
             (
-                "has layout 6 of wearsim-run, and this wearsim reads layout 7; repeat the"
+                f"has layout {RUN.version - 1} of wearsim-run, and this wearsim reads layout"
+                f" {RUN.version}; repeat the"
                 " computation, or read it with the version of wearsim that wrote it"
             ),
         ),

@@ -27,7 +27,7 @@ _UNITS = {
     "N/m": ("N/mm", 1e3),
     "rad": ("deg", math.radians(1.0)),
 }
-_IN_MM = {"y", "width", "half_length"}  # other lengths are written in um
+_IN_MM = {"y", "width", "width_error", "half_length"}  # other lengths are written in um
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]\d+)?")
 
 

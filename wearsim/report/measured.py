@@ -24,11 +24,14 @@ class Measured:
         Axial position [m].
     height : ndarray, shape (points,)
         Height above the nominal surface [m]; worn material is negative.
+    angle : float, optional
+        Angle of the cam at which it was measured [rad]; by default where it is deepest.
     """
 
     label: str
     y: FloatArray
     height: FloatArray
+    angle: float | None = None
 
 
 class ComputedProfile(NamedTuple):

@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from wearsim.types import FloatArray
 from wearsim.units import LONG
 
 if TYPE_CHECKING:
@@ -310,3 +313,36 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+ROUNDING = 1e-9  # relative error that is not printed
+
+
+def by_roller(values: Any, unit: str) -> str:
+    """Return one value per roller, or one value if all are equal."""
+    texts = [shown(float(value), unit) for value in np.ravel(values)]
+    if len(set(texts)) == 1:
+        return texts[0]
+    return " / ".join(text.removesuffix(f" {unit}") for text in texts) + f" {unit}"
+
+
+def with_error(values: FloatArray, error: float | None, unit: str) -> str:
+    """Return one value per roller with their error, with the digits that it leaves, "262 ± 4 MPa".
+
+    Parameters
+    ----------
+    values : ndarray
+        In SI.
+    error : float, optional
+        In SI; None and values that are not finite are left out.
+    unit : str
+        A key of `PER_SI`.
+    """
+    size = float(np.abs(values).max())
+    if error is None or not math.isfinite(error) or error <= ROUNDING * size:
+        return by_roller(values, unit)
+    # the last digit is that below the first digit of the error
+    digits = 2 + math.floor(math.log10(size / error)) if size > 0.0 else 1
+    texts = [in_unit(float(value), unit, min(max(digits, 1), 4)) for value in np.ravel(values)]
+    text = texts[0] if len(set(texts)) == 1 else " / ".join(texts)
+    return f"{text} ± {shown(error, unit, 2)}"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from wearsim.report.text import shown, with_interval
+from wearsim.report.text import by_roller, shown, with_interval
 from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
@@ -47,11 +47,8 @@ class Row(NamedTuple):
             return self.quantity
         if isinstance(self.quantity, Interval):
             return with_interval(self.quantity, self.unit)
-        values = [shown(float(value), self.unit) for value in np.ravel(self.quantity)]
-        if len(set(values)) > 1:
-            numbers = (value.removesuffix(f" {self.unit}") for value in values)
-            return " / ".join(numbers) + f" {self.unit}"
-        return values[0] + ("" if self.error is None else f" ± {shown(self.error, self.unit, 2)}")
+        stated = "" if self.error is None else f" ± {shown(self.error, self.unit, 2)}"
+        return by_roller(self.quantity, self.unit) + stated
 
 
 Rows: TypeAlias = list[Row]
@@ -135,6 +132,7 @@ class View(ABC):
     notes: Sequence[str] = ()
     warnings: Sequence[str] = ()
     failures: str = ""  # remark on realisations that failed
+    has_angles: bool = False  # whether the worn profile depends on the angle of a cam
 
     @abstractmethod
     def rows(self) -> Rows:
@@ -182,6 +180,12 @@ class View(ABC):
         """Return scenario, files, plugins and software for JSON, if they are stored."""
         return {}
 
-    def profile(self) -> ComputedProfile | None:
-        """Return the worn profile with which measured ones are compared, if there is one."""
+    def profile(self, angle: float | None = None) -> ComputedProfile | None:
+        """Return the worn profile with which measured ones are compared, if there is one.
+
+        Parameters
+        ----------
+        angle : float, optional
+            Angle of the run of a cam [rad]; by default where it is worn deepest.
+        """
         return None

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from study_examples import short
 
-from wearsim.studies.run.schedule import MOST_RECORDS, RecordSchedule
+from wearsim.studies.schedule import MOST_RECORDS, RecordSchedule
 
 LONG = 1e12  # passes of a first run that is not prolonged
 

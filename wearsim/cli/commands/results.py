@@ -19,6 +19,7 @@ from wearsim.cli.shared import (
     Row,
     Units,
     check_figure,
+    checking,
     note,
     profile_choice,
     write_notes,
@@ -42,6 +43,16 @@ MeasuredFiles = Annotated[
         show_default=False,
     ),
 ]
+Angle = Annotated[
+    str | None,
+    typer.Option(
+        "--angle",
+        metavar="ANGLE",
+        help="Angle of the cam at which --measured was measured: '112 deg'; default: where the cam"
+        " is worn deepest.",
+        show_default=False,
+    ),
+]
 Level = Annotated[
     bool,
     typer.Option(
@@ -56,6 +67,7 @@ def plot(
     file: ResultsFile,
     figure: Figure = None,
     measured: MeasuredFiles = None,
+    angle: Angle = None,
     level: Level = False,
     columns: Columns = None,
     units: Units = None,
@@ -79,21 +91,32 @@ def plot(
             f"requires wear tests; {file} holds none: {view.question}", param_hint="--measured"
         )
     choice = profile_choice(columns, units, row, mean_rows, at)
-    draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level)), path)
+    draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path)
     note(f"figure: {path}")
 
 
 def measured_profiles(
-    files: Sequence[Path], choice: ProfileChoice, views: Sequence[View], level: bool
+    files: Sequence[Path],
+    choice: ProfileChoice,
+    views: Sequence[View],
+    level: bool,
+    angle: str | None = None,
 ) -> list[Measured]:
     """Return the profiles of measured files, levelled against the first profile if required.
 
     How signs were read and the residuals go to stderr.
     """
     if not files:
-        if level:
-            raise typer.BadParameter("needs a measured profile, --measured", param_hint="--level")
+        for name, given in (("--level", level), ("--angle", angle)):
+            if given:
+                raise typer.BadParameter("needs a measured profile, --measured", param_hint=name)
         return []
+    at = None
+    if angle is not None:
+        from wearsim.quantities import quantity
+
+        with checking("--angle"):
+            at = quantity(angle, "rad")
     from wearsim.errors import ScenarioError
     from wearsim.profiles import load_profile, sign_note
     from wearsim.report.measured import Measured, levelled, residual_text, rms
@@ -102,8 +125,15 @@ def measured_profiles(
     read = {file: load_profile(file, choice) for file in files}
     signs = (sign_note(profile, choice, str(file)) for file, profile in read.items())
     write_notes(filter(None, signs))
-    profiles = [Measured(file.stem, profile.y, profile.height) for file, profile in read.items()]
-    computed = next(filter(None, (view.profile() for view in views)), None)
+    profiles = [
+        Measured(file.stem, profile.y, profile.height, at) for file, profile in read.items()
+    ]
+    test = next((view for view in views if view.profile() is not None), None)
+    if at is not None and not (test is not None and test.has_angles):
+        raise typer.BadParameter(
+            "is for the run of a cam; ensembles hold the deepest groove", param_hint="--angle"
+        )
+    computed = None if test is None else test.profile(at)
     if computed is None:
         return profiles
     for place, profile in enumerate(profiles):

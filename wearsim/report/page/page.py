@@ -116,7 +116,10 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> Part:
     sheet: Sheet = view.panels(measured)
     tables, computed = view.tables(), view.profile()
     if measured and computed is not None:
-        residuals = [Row(one.label, residual_text(one, computed)) for one in measured]
+        residuals = [
+            Row(one.label, residual_text(one, view.profile(one.angle) or computed))
+            for one in measured
+        ]
         tables.insert(-1, Table("Measured profiles", residuals))
     remarks = [*filter(None, [view.failures]), *view.warnings, *view.notes]
     return Part(view, view.rows(), tables, remarks, *plots_of(sheet))

@@ -29,7 +29,9 @@ from wearsim.report.panels import (
     measured_marks,
     worn_limits,
 )
-from wearsim.report.text import PER_SI, shown
+from wearsim.report.text import PER_SI, shown, with_error
+from wearsim.scenario.tables.cam_points import MeasuredPoints
+from wearsim.studies.cam.grooves import grooves_at
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
 from wearsim.studies.cam.turn import CamTurn
@@ -127,7 +129,13 @@ def cam_sheet(study: CamStudy) -> Sheet:
         ),
     }
     rows = [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]]
-    return Sheet(turn.scenario.title, panels, rows, (12.0, 8.6), widths=[1.0, 1.25], main="motion")
+    height = 8.6
+    if (measured := turn.cam.measured) is not None:
+        panels["residuals"] = _residuals(turn.cam.motion, measured)
+        rows, height = [*rows, ["residuals", "residuals"]], 10.8
+    return Sheet(
+        turn.scenario.title, panels, rows, (12.0, height), widths=[1.0, 1.25], main="motion"
+    )
 
 
 def _right(
@@ -201,7 +209,7 @@ def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
         "map": _map(turn, stations, worn[-1], result),
         "shape": _worn_shape(turn, stations, worn[-1]),
         "lift": _lift_error(turn, stations, result),
-        "groove": _groove(result, worn, measured),
+        "groove": _groove(result, measured),
         "depth": depth_panel(result),
         "roller": _roller(result),
         "pressure": pressure_panel(result),
@@ -220,11 +228,11 @@ def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
 
 def _caption(result: Result) -> str:
     final = result.final
-    error, turns = float(np.max(final["lift_error_m"])), float(np.max(final["turns"]))
+    turns, stated = float(np.max(final["turns"])), float(np.max(final["lift_error_error_m"]))
     place = float(np.max(final["depth_angle_rad"])) * DEG
     return (
         f"{turns:,.0f} turns, {caption(result)} at {place:.4g} deg,"
-        f" lift error {shown(error, 'um')} peak to peak"
+        f" lift error {with_error(np.asarray(final['lift_error_m']), stated, 'um')} peak to peak"
     )
 
 
@@ -235,13 +243,14 @@ def _map(turn: CamTurn, stations: Stations, depth: FloatArray, result: Result) -
     # interpolation overshoots next to an edge
     image = Image(angle, result.y, np.maximum(values, 0.0).T, Axis("depth", "um"), "magma_r")
     place = float(np.max(result.final["depth_angle_rad"])) * DEG
+    deepest = shown(float(np.max(result.depth[-1])), "um")
     limits = (1.25 * extent[0], 1.05 * extent[-1])  # the names of the segments lie below
     return Panel(
         "Worn depth of the cam",
         ANGLE,
         Axis("y across the track", "mm", limits=limits),
         [image, *segment_marks(turn.cam.motion)],
-        f"At the end the cam is deepest at {place:.4g} deg: {shown(float(depth.max()), 'um')}.",
+        f"At the end the cam is deepest at {place:.4g} deg: {deepest}.",
     )
 
 
@@ -296,19 +305,35 @@ def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
     )
 
 
-def _groove(result: Result, worn: FloatArray, measured: Sequence[Measured]) -> Panel:
-    place = int(worn[-1].max(axis=1).argmax())
-    angle = float(result.raw.static["station_angle"][place]) * DEG
+def _groove(result: Result, measured: Sequence[Measured]) -> Panel:
+    given = measured[0].angle if measured else None
+    worn, angle = grooves_at(result, given)
     points = [profile.y for profile in measured]
-    limits = worn_limits(result.y, worn[:, place].max(axis=0), *points)
-    profiles = Records(result.y, result.start_height - worn[:, place], result.record_passes)
+    limits = worn_limits(result.y, worn.max(axis=0), *points)
+    which = "Deepest groove, at" if given is None else "Groove at"
+    profiles = Records(result.y, result.start_height - worn, result.record_passes)
     return Panel(
-        f"Deepest groove, at {angle:.4g} deg",
+        f"{which} {angle * DEG:.4g} deg",
         Axis(Y, "mm", limits=limits),
         HEIGHT,
         [profiles, *measured_marks(measured)],
-        f"Height across the track; it is {shown(float(worn[-1, place].max()), 'um')} deep.",
+        f"Height across the track; it is {shown(float(worn[-1].max()), 'um')} deep.",
     )
+
+
+def _residuals(motion: Motion, measured: MeasuredPoints) -> Panel:
+    """Return the residuals of a table about its smoothing spline, along the angle."""
+    unit = "um" if measured.unit == "m" else "mrad"
+    noise = 2.0 * measured.noise
+    dots = look(dash="", marker=".", size=3.0)
+    marks: list[Mark] = [
+        Span(-noise, noise, across="y", colour=GREY, alpha=0.15),
+        Line(measured.angle, measured.residual, **dots),
+        *segment_marks(motion, names=False),
+    ]
+    title = f"Residuals of the {measured.quantity}, and twice its noise (shaded)"
+    text = "What was measured, less the spline that smooths it."
+    return Panel(title, ANGLE, Axis("measured less spline", unit), marks, text)
 
 
 def _roller(result: Result) -> Panel:

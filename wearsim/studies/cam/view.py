@@ -55,6 +55,13 @@ class CamView(View):
             rows.append(Row("skids of the roller", text))
         if study.weight is not None:
             rows.append(Row("stations", f"{len(study.weight)} of a run"))
+        if measured := turn.cam.measured:
+            away, unit = np.abs(measured.residual), "um" if measured.unit == "m" else "mrad"
+            rms = shown(float(np.sqrt((away**2).mean())), unit, 3)
+            most, noise = shown(float(away.max()), unit, 3), shown(measured.noise, unit, 3)
+            place = shown(float(measured.angle[away.argmax()]), "deg")
+            words = f"rms {rms}, at most {most} at {place}; noise {noise}"
+            rows.append(Row(f"residuals of the {measured.quantity}", words))
         return rows
 
     def tables(self) -> list[Table]:
@@ -124,6 +131,18 @@ class CamView(View):
     def data(self) -> dict[str, Any]:
         """Return the study in SI units."""
         study, motion = self.study, self.study.turn.cam.motion
+        measured, smoothing = self.study.turn.cam.measured, {}
+        if measured is not None:
+            unit = measured.unit
+            smoothing["smoothing"] = {
+                "file": measured.file,
+                "quantity": measured.quantity,
+                f"noise_{unit}": measured.noise,
+                "scatter_of_acceleration_per_rad2": measured.scatter,
+                "error_of_acceleration_per_rad2": measured.error,
+                "angle_rad": measured.angle,
+                f"residual_{unit}": measured.residual,
+            }
         return {
             "title": self.title,
             "perimeter_m": study.perimeter,
@@ -145,6 +164,7 @@ class CamView(View):
                 {"start_rad": skid.start, "stop_rad": skid.stop, "energy_J": skid.energy}
                 for skid in study.skids
             ],
+            **smoothing,
             "stations": {name: values for name, (_, values) in self._columns().items()},
             "warnings": study.warnings,
             "notes": study.notes,

@@ -44,7 +44,7 @@ from wearsim.studies.preparation import (
 from wearsim.studies.progress import shown_progress
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import Drawer, draw, units_of
-from wearsim.studies.run.schedule import RecordSchedule
+from wearsim.studies.schedule import RecordSchedule
 from wearsim.types import FloatArray, Grid
 from wearsim.uq.estimation.estimates import Target
 

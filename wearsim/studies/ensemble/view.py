@@ -278,7 +278,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
         return ensemble_sheet(self.result, measured)
 
-    def profile(self) -> ComputedProfile:
+    def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the mean profile, with which measured ones are compared."""
         return self.result.worn_profile()
 

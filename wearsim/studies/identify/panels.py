@@ -84,8 +84,11 @@ def _trace(result: IdentificationResult, place: int) -> tuple[Panel, Panel]:
     text = depth_text("Model's depth", test["model_depth_interval_m"])
     if test["depth_interval_m"] is not None:
         text = f"{depth_text('Measured depth', test['depth_interval_m'])}. {text}"
-    x = Axis("y", "mm", limits=(float(y.min()), float(y.max())))
-    upper = Panel(title, x, Axis("height", "um"), marks, f"{text}.", legend="lower right")
+    lift = test.get("quantity") == "lift"
+    ends = float(y.min()), float(y.max())
+    x = Axis("angle", "deg", limits=ends) if lift else Axis("y", "mm", limits=ends)
+    name = "change of the lift" if lift else "height"
+    upper = Panel(title, x, Axis(name, "um"), marks, f"{text}.", legend="lower right")
     noise = test["noise_m"] or 0.0
     residuals: list[Mark] = [
         Line(y, height - fitted, colour=GREY, width=0.6),

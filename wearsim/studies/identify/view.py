@@ -184,7 +184,10 @@ class IdentificationView(StudyView[IdentificationResult]):
         if raw.measured:
             files = {**files, self._tests_file: tomlkit.dumps({"test": raw.measured})}
         profiles = dict.fromkeys(
-            test[key] for test in raw.measured for key in ("profile", "before") if key in test
+            test[key]
+            for test in raw.measured
+            for key in ("profile", "lift", "before")
+            if key in test
         )
         if not raw.measured:
             remark = (
@@ -243,7 +246,7 @@ def _cells(test: Mapping[str, Any]) -> tuple[str, ...]:
         test["levelled_on"],
         NOTHING if measured is None else with_range(test["depth_m"], measured, 1e6),
         with_range(test["model_depth_m"], depth, 1e6),
-        with_range(test["area_m2"], area, 1e6),
+        NOTHING if area is None else with_range(test["area_m2"], area, 1e6),
         with_range(k["value"], (k["low"], k["high"]), _SCALE),
         residuals,
     )

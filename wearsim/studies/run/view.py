@@ -2,29 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wearsim.errors import WearsimError
+from wearsim.evolution.limits import SAME_VALUE, Limit
 from wearsim.report.csv_files import computed
 from wearsim.report.measured import ComputedProfile, Measured
-from wearsim.report.text import count, footer, lapse, percent, shown, simulated, within
+from wearsim.report.text import (
+    ROUNDING,
+    count,
+    footer,
+    in_unit,
+    lapse,
+    percent,
+    shown,
+    simulated,
+    with_error,
+    within,
+)
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, width_row
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.schema import ALL_VARIABLES, AXES
 from wearsim.types import FloatArray
-from wearsim.units import engineers_unit
+from wearsim.units import LONG, engineers_unit
 
 NO_STEPPING_ERROR = "Every roller pass is solved: there is no stepping error."
 _NOT_MODEL = (
     "The stated error is that of the steps in time. It does not contain the errors of the contact"
     " model, of the wear law or of the inputs."
-)
-_CAM_ANGLES = (
-    *("depth_angle", "peak_pressure_angle"),
-    *("lift_error_greatest_at", "lift_error_smallest_at"),
 )
 
 if TYPE_CHECKING:
@@ -59,6 +69,7 @@ class RunView(StudyView[Result]):
         self.heading = "end state" if result.finished else "current state"
         if result.failure:
             self.heading = "state before the failure"
+        self.has_angles = result.is_cam
         self.basis = NO_STEPPING_ERROR if is_exact else _NOT_MODEL
 
     def standing(self) -> str:
@@ -67,7 +78,13 @@ class RunView(StudyView[Result]):
         passes, total = float(result.passes[-1]), float(result.raw.total_passes)
         time = simulated(float(result.time[-1]))
         if result.until:
-            return f"stopped at {result.until}: pass {count(passes)} of {count(total)}, {time}"
+            reached, error = count(passes), passes_error(result)
+            if error is not None and error > ROUNDING * passes:
+                digits = max(math.floor(math.log10(error)), 0)  # those that the error leaves
+                reached = f"{count(round(passes, -digits))} ± {in_unit(error, '1', 2)}"
+                seconds, rate = np.array(result.time[-1]), result.raw.kinematics["pass_rate"]
+                time = with_error(seconds, error / rate, "min" if seconds < LONG else "h")
+            return f"stopped at {result.until}: pass {reached} of {count(total)}, {time}"
         if result.finished:
             return f"finished: {count(passes)} passes, {time}"
         part = f"{100.0 * passes / total:.1f} %"
@@ -77,22 +94,31 @@ class RunView(StudyView[Result]):
     def rows(self) -> Rows:
         """Return the observables at the end of the run, the depth with its error first."""
         result, is_exact = self.result, self.result.stepper == "per-pass"
+        errors = {name: float(np.max(values[-1])) for name, values in result.errors.items()}
+
+        def stated(label: str, name: str, unit: str) -> Row:
+            values = np.asarray(getattr(result, name)[-1])
+            return Row(label, with_error(values, errors.get(name), unit))
+
         error = None if is_exact else float(np.max(result.depth_error[-1]))
         rows = [Row("depth", result.depth[-1], "um", error)]
         if result.start_height.any():
             below = Row("depth below nominal", result.depth_below_nominal[-1], "um")
             rows = [rows[0]._replace(label="depth worn since the start"), below]
         if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
-            rows.insert(1, Row("roller depth", result.roller_depth[-1], "um"))
+            rows.insert(1, stated("roller depth", "roller_depth", "um"))
+        width = width_row(result.width[-1], result.raw.width_threshold)
+        width = stated("width", "width", "mm") if np.any(result.width[-1]) else width
         rows += [
-            width_row(result.width[-1], result.raw.width_threshold),
-            Row("worn volume", result.worn_volume[-1], "mm^3"),
-            Row("dissipated energy", result.dissipated_energy[-1], "J"),
-            Row("dissipated power", result.power[-1], "W"),
-            Row("normal force", result.normal_force[-1], "N"),
-            Row("peak pressure", result.peak_pressure[-1], "MPa"),
-            Row("worn descent", result.descent[-1], "um"),
-            Row("elastic approach", result.elastic_approach[-1], "um"),
+            *limit_rows(result),
+            width,
+            stated("worn volume", "worn_volume", "mm^3"),
+            stated("dissipated energy", "dissipated_energy", "J"),
+            stated("dissipated power", "power", "W"),
+            stated("normal force", "normal_force", "N"),
+            stated("peak pressure", "peak_pressure", "MPa"),
+            stated("worn descent", "descent", "um"),
+            stated("elastic approach", "elastic_approach", "um"),
             *self._of_cam(),
         ]
         if error is None:
@@ -107,14 +133,18 @@ class RunView(StudyView[Result]):
         final = self.result.final
         if "turns" not in final:
             return []
-        rows = {name: Row("", final[f"{name}_rad"], "deg").text for name in _CAM_ANGLES}
+
+        def stated(name: str, unit: str, key: str) -> str:
+            error = final[f"{name}_error_{key}"]
+            return with_error(np.asarray(final[f"{name}_{key}"]), float(np.max(error)), unit)
+
         return [
             Row("turns of the cam", count(float(np.max(final["turns"])))),
-            Row("angle of the depth", rows["depth_angle"]),
-            Row("angle of the peak pressure", rows["peak_pressure_angle"]),
-            Row("lift error, peak to peak", final["lift_error_m"], "um"),
-            Row("least wear of the lift", f"at {rows['lift_error_greatest_at']}"),
-            Row("greatest wear of the lift", f"at {rows['lift_error_smallest_at']}"),
+            Row("angle of the depth", stated("depth_angle", "deg", "rad")),
+            Row("angle of the peak pressure", stated("peak_pressure_angle", "deg", "rad")),
+            Row("lift error, peak to peak", stated("lift_error", "um", "m")),
+            Row("least wear of the lift", f"at {stated('least_wear_angle', 'deg', 'rad')}"),
+            Row("greatest wear of the lift", f"at {stated('greatest_wear_angle', 'deg', 'rad')}"),
         ]
 
     def study(self) -> Rows:
@@ -159,6 +189,7 @@ class RunView(StudyView[Result]):
             "strips": len(result.y),
             "finished": bool(result.finished),
             "until": result.until or None,
+            "passes_error": passes_error(result),
             "failure": result.failure or None,
             "failed_at": result.raw.failed_at or None,
             "steps": _last(result.steps),
@@ -169,6 +200,7 @@ class RunView(StudyView[Result]):
             "drawn": result.raw.drawn,
             "random": varying_inputs(result, result.raw.drawn),
             **self.ending(),
+            "limits": limits_json(result),
         }
 
     def origin(self) -> dict[str, Any]:
@@ -215,9 +247,9 @@ class RunView(StudyView[Result]):
 
         return cam_run_sheet(self.result, measured)
 
-    def profile(self) -> ComputedProfile:
-        """Return the worn profile with which measured ones are compared."""
-        return self.result.worn_profile()
+    def profile(self, angle: float | None = None) -> ComputedProfile:
+        """Return the worn profile with which measured ones are compared, of a cam at an angle."""
+        return self.result.worn_profile(angle)
 
     def columns(self) -> Mapping[str, Columns]:
         """Return history, records, and of a cam its worn surface."""
@@ -280,3 +312,87 @@ def _columns(name: str, array: FloatArray, dims: Sequence[str], title: str) -> I
 def _last(value: Any) -> int:
     """Return the last value of a history, or the number itself."""
     return int(np.ravel(value)[-1])
+
+
+def passes_error(result: Result) -> float | None:
+    """Return the error of the passes at which a run has reached its limit; None if not known.
+
+    It is the estimated error of the limited quantity, over its growth per pass in the last step.
+    """
+    if not result.until or len(result.passes) < 2:
+        return None
+    name = Limit.parse(result.until).variable
+    error = result.errors.get(name)
+    if error is None:
+        return None
+    values = np.asarray(getattr(result, name)).reshape(len(result.passes), -1)
+    place = int(values[-1].argmax())
+    growth = abs(float(values[-1, place] - values[-2, place]))
+    step = float(result.passes[-1] - result.passes[-2])
+    greatest = float(np.max(error[-1]))
+    if not (math.isfinite(greatest) and growth > 0.0):
+        return None
+    return min(greatest * step / growth, float(result.passes[-1]))
+
+
+_UNITS = {"volume": "mm^3", "peak_pressure": "MPa", "width": "mm"}  # the others in um
+
+
+def limits_json(result: Result) -> list[dict[str, Any]]:
+    """Return the limits of a run's scenario and how far the run is from them, in SI units."""
+    try:
+        given: Mapping[str, float] = result.scenario.limit.given
+    except WearsimError:  # a plugin of the scenario is not installed
+        return []
+    return [_of(result, key, value) for key, value in given.items()]
+
+
+def _of(result: Result, key: str, value: float) -> dict[str, Any]:
+    limit = Limit(key.replace("_", " "), value, key)
+    history = np.asarray(result.values(limit.variable), dtype=float)
+    course = history.reshape(len(history), -1).max(axis=1)
+    passes = np.asarray(result.passes, dtype=float)
+    above = np.flatnonzero(course >= value * (1.0 - SAME_VALUE))
+    reached = None
+    if len(above):
+        place = int(above[0])
+        reached = float(passes[place])
+        if place:
+            low, high = course[place - 1 : place + 1]
+            part = (value - low) / (high - low) if high > low else 1.0
+            reached = float(np.interp(part, [0.0, 1.0], passes[place - 1 : place + 1]))
+    return {
+        "quantity": key,
+        "unit": limit.unit,
+        "limit": value,
+        "at_end": float(course[-1]),
+        "reached": reached is not None,
+        "reached_at_passes": reached,
+        "excess": float(course[-1] / value - 1.0),
+    }
+
+
+def limit_rows(result: Result) -> Rows:
+    """Return a row for each limit of [limit]: passed or not, when, and by how much."""
+    rows = list[Row]()
+    for item in limits_json(result):
+        unit = _UNITS.get(item["quantity"], "um")
+        end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)}"
+        name = item["quantity"].replace("_", " ")
+        by = f"{abs(100.0 * item['excess']):.3g} %"
+        if not item["reached"]:
+            rows.append(Row(f"limit of {name}", f"not reached: {end} at the end, {by} below"))
+            continue
+        passes = item["reached_at_passes"]
+        when = f"{count(round(passes))} passes"
+        if result.is_cam:
+            when = f"{count(round(passes / result.raw.kinematics['physical_rollers']))} turns"
+        time = simulated(passes / result.raw.kinematics["pass_rate"])
+        side = "above" if item["excess"] >= 0.0 else "below"
+        rows.append(
+            Row(
+                f"limit of {name}",
+                f"reached after about {when}, {time}: {end} at the end, {by} {side}",
+            )
+        )
+    return rows
