@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from typer.testing import CliRunner
-from wearsim.report.limits import limit_rows, limits_json
 
 import wearsim
+from tests.report.drawn import page_of
 from tests.studies.cam.cam_text import prescribed
 from wearsim.cli.app import app
-from wearsim.report.page.page import page_of
 from wearsim.scenario import Scenario
 from wearsim.studies.dry_run import dry_run
 from wearsim.studies.dry_run_table import plan
 from wearsim.studies.run.result import Result
+from wearsim.studies.run.view import limit_rows, limits_json
 
 LIMITS = {"depth": "5 um", "lift_error": "1 mm", "volume": "1 mm^3", "peak_pressure": "500 MPa"}
 
@@ -49,7 +49,7 @@ def test_limit_is_reached_when_and_by_how_much_the_history_says(result):
 
 
 def test_rows_and_page_say_reached_or_not(result):
-    rows = dict(limit_rows(result))
+    rows = {row.label: row.text for row in limit_rows(result)}
     turns = limits_json(result)[0]["reached_at_passes"]
     assert f"reached after about {turns:,.0f} turns" in rows["limit of depth"]
     assert "of 5.000 um at the end" in rows["limit of depth"]

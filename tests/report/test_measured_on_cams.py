@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 import wearsim
 from tests.studies.cam.cam_text import prescribed
 from wearsim.cli.app import app
-from wearsim.report.measured import Measured, computed_profile, grooves_at, residual_text
+from wearsim.report.measured import Measured, residual_text
+from wearsim.studies.cam.grooves import grooves_at
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.result import Result
 
@@ -49,8 +50,8 @@ def test_residual_of_a_trace_is_that_of_its_angle(file):
     result = wearsim.open_results(file)
     worn, angle = grooves_at(result, math.radians(112.0))
     trace = Measured("t", result.y, -worn[-1], angle)
-    assert residual_text(trace, computed_profile(result, angle)).startswith("residual rms 0 ")
-    elsewhere = computed_profile(result, math.radians(225.0))
+    assert residual_text(trace, result.worn_profile(angle)).startswith("residual rms 0 ")
+    elsewhere = result.worn_profile(math.radians(225.0))
     assert not residual_text(trace, elsewhere).startswith("residual rms 0 ")
 
 

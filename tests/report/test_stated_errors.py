@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wearsim.report.summary import end_state, passes_error, run_json, standing, with_error
 
 import wearsim
+from wearsim.report.text import with_error
 from wearsim.studies.run.run import run
+from wearsim.studies.run.view import passes_error
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 
@@ -46,12 +47,12 @@ def test_passes_at_a_limit_have_the_error_of_the_limited_quantity(limited):
     error = passes_error(limited)
     assert abs(limited.passes[-1] - true) <= error <= 5e-3 * true
     assert error == pytest.approx(1.5 * limited.depth_error[-1] / 20e-6 * true, rel=0.05)
-    assert f" ± {round(error, -1):.0f} of" in standing(limited)
-    assert run_json(limited)["passes_error"] == error
+    assert f" ± {round(error, -1):.0f} of" in limited.view.standing()
+    assert limited.view.data()["passes_error"] == error
 
 
 def test_table_states_the_error_of_every_quantity(limited):
-    rows = dict(end_state(limited))
+    rows = {row.label: row.text for row in limited.view.rows()}
     for name in ("width", "worn volume", "dissipated energy", "peak pressure", "worn descent"):
         assert " ± " in rows[name], name
     assert rows["normal force"] == "300.0 N"  # it is given

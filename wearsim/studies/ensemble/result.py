@@ -269,7 +269,7 @@ class EnsembleResult(EnsembleValues):
         Examples
         --------
         >>> wearsim.open_results("rig-ensemble.h5").fewest_for_indices()
-        8
+        24
         """
         from wearsim.uq.sensitivity import sobol_indices  # noqa: PLC0415  (rarely needed)
 
