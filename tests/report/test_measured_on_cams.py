@@ -65,7 +65,7 @@ def test_trace_at_an_angle_is_plotted_and_reported(file, tmp_path, verb, output)
     assert "t112: residual rms" in done.output
     if verb == "report":
         page = path.read_text()
-        assert "Worn profile of the cam at 112 deg" in page
+        assert "Groove at 112 deg" in page
     rms = float(re.search(r"t112: residual rms (\S+) um", done.output)[1])
     assert rms < 1e-3
     other = tmp_path / f"other-{output}"
