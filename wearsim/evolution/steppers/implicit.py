@@ -17,8 +17,13 @@ from wearsim.evolution.error_estimates import (
     with_pass_errors,
 )
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.base import Attempt, Step
+from wearsim.evolution.steppers.edges import (
+    resolves_edges,
+    separated_bodies,
+    starting_edges,
+)
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
 from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
@@ -45,14 +50,14 @@ PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power o
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
 
-_PAST = attrgetter("past_wear", "past_energy", "past_feedback", "past_spans", "order")
+_PAST = attrgetter("past_wear", "past_sums", "past_feedback", "past_spans", "order")
 
 
 class Past(NamedTuple):
     """Rates, differences and past points of a state; see `WearState`."""
 
     wear: FloatArray
-    energy: FloatArray
+    sums: FloatArray
     feedback: FloatArray | None
     spans: FloatArray
     order: IntArray
@@ -97,7 +102,8 @@ class ImplicitStepper(StepDoublingStepper):
         own, order = np.empty_like(depths), np.empty_like(past.order)
         part, aim = (passes / stop) ** PART_EXPONENT, SHARE * self.tolerance
         over, ratio = next_steps(
-            past.wear, past.spans, depths, past.order, part, aim, KEEP, own, order
+            *(past.wear, past.spans, depths, past.order, part, aim, KEEP),
+            *(_loaded_parts(problem, end), own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
         if step.min() <= WHOLE_PASSES:
@@ -128,7 +134,8 @@ class ImplicitStepper(StepDoublingStepper):
         part = (end.passes / stop) ** PART_EXPONENT
         scale = part / self.tolerance
         over, ratio = next_steps(
-            past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, own, order
+            *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0),
+            *(_loaded_parts(problem, end), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
@@ -220,9 +227,15 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, exposure)
     wear, energy = _wear_per_pass(here, state.contacts)
+    separation = whole = None
+    if resolves_edges(problem, state.contacts):
+        separation, whole = starting_edges(problem, state.contacts)
+    sums = _sums_per_pass(wear if whole is not None else None, energy)
     return state.replaced(
+        separation=separation,
+        whole=whole,
         past_wear=_starting(wear, exposure),
-        past_energy=_starting(energy, exposure),
+        past_sums=_starting(sums, exposure[None])[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
@@ -251,6 +264,27 @@ def _energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> Fl
     """Return the energy that all contacts dissipate in a roller pass, shape (N,) [J]."""
     power = problem.total_power(problem.values_of(contacts, "power"))
     return np.asarray(power / problem.kinematics.pass_rate)
+
+
+def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
+    """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
+    sums = energy[None] if wear is None else np.concatenate([wear.sum(axis=-1), energy[None]])
+    return np.asarray(sums[..., None])
+
+
+def _loaded_parts(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return 1 where a body is loaded and else 0, as `WearState.stacked`; 1 without edges.
+
+    The formulas also continue the separation of strips that are not in contact.
+    """
+    parts = np.ones(state.stacked.shape)
+    if state.separation is None:
+        return parts
+    loaded = problem.values_of(state.contacts, "line_load") > 0.0
+    stations = len(state.cylinder_depth)
+    parts[:stations] = loaded.any(axis=1)
+    parts[stations:] = loaded.any(axis=0)
+    return parts
 
 
 @dataclass(frozen=True)
@@ -348,25 +382,29 @@ def _step(
     Both have one entry per realisation, as has `order`.
     """
     realisations, start, past = len(passes), state.stacked, Past.of(state)
+    level = start if state.separation is None else start - separated_bodies(state)
     half_pass = np.where(passes > WHOLE_PASSES, 0.5, 0.0)
     weights = np.empty((2, ROWS, realisations))
     factor, spans = np.empty(realisations), np.empty((ROWS - 1, realisations))
     formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
     added, guess = extrapolated(weights, past.wear)
-    old_energy = past.energy[:, None, :, None]
-    energy = extrapolated(weights, old_energy)[0]
+    old_sums = past.sums[..., None]
+    sums = extrapolated(weights, old_sums)[0]
     feedback = None
     if past.feedback is not None:
         old = past.feedback.reshape(ROWS, -1, realisations, 1)
         feedback = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
         feedback = feedback.reshape(problem.shape)
-    base = start + added
-    step = EndOfStep(problem, state, base, conditions.force, passes, worn_passes)
-    end, worn, feedback = step.solved(start + guess, feedback)
-    rate = _energy_per_pass(problem, end.contacts)[None, :, None]
-    energy = energy + worn_passes[:, None] * rate
-    new_energy = new_differences(rate, energy, half_pass, old_energy, spans)
+    step = EndOfStep(problem, state, level + added, conditions.force, passes, worn_passes)
+    end, worn, feedback, parts = step.solved(level + guess, feedback)
+    rates, change = worn / worn_passes[:, None], added + worn
+    energy_rate = _energy_per_pass(problem, end.contacts)
+    sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
+    sums = sums + worn_passes[:, None] * sum_rates
+    if parts is not None:
+        end = _with_volume(end, parts, sums[:-1, :, 0] - (end.stacked - start).sum(axis=-1))
+        change = end.stacked - separated_bodies(end) - level
     past_feedback = None
     if feedback is not None:
         new = feedback.reshape(-1, realisations, 1)
@@ -374,13 +412,33 @@ def _step(
         past_feedback = past_feedback.reshape(ROWS, *problem.shape)
     end = end.replaced(
         passes=state.passes + passes,
-        energy=state.energy + energy[0, :, 0],
+        energy=state.energy + sums[-1, :, 0],
         past_wear=new_differences(
-            worn / worn_passes[:, None], added + worn, half_pass, past.wear, spans
+            rates, change, half_pass, past.wear, spans
         ),
-        past_energy=new_energy[:, 0, :, 0],
+        past_sums=new_differences(sum_rates, sums, half_pass, old_sums, spans)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
     )
-    decreased = (base + worn < start).any(axis=(0, 2)) | (energy[0, :, 0] < 0.0)
+    decreased = (end.stacked < start).any(axis=(0, 2)) | (sums[-1, :, 0] < 0.0)
     return end, decreased
+
+
+def _with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearState:
+    """Return the end of a step with the volume that the formula gives.
+
+    The depths of strips partly in contact follow from their shape, which keeps no volume. What is
+    missing is added evenly where the bodies are in contact, which changes no pressure.
+
+    Parameters
+    ----------
+    end : WearState
+    parts : ndarray
+        Part of each strip that is in contact, as `WearState.stacked`.
+    missing : ndarray, shape (stations + rollers, realisations)
+        Sum over the strips of the depths to be added [m].
+    """
+    width = parts.sum(axis=-1)
+    added = np.divide(missing, width, out=np.zeros_like(missing), where=width > 0.0)
+    cylinder, roller = separated(end.stacked + added[..., None] * parts, len(end.cylinder_depth))
+    return end.replaced(cylinder_depth=cylinder, roller_depth=roller)

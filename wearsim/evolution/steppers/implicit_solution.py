@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
+from wearsim.evolution.steppers.edges import Edges, of_contacts
 from wearsim.evolution.steppers.loads import (
     APPROACH_EXPONENT,
     advanced_terms,
@@ -68,6 +70,27 @@ class _Slope:
         return self._exponent
 
 
+class Solved(NamedTuple):
+    """Solution of an implicit step.
+
+    Parameters
+    ----------
+    end : WearState
+        Depths, contacts, load terms and number of solves at the end.
+    worn : ndarray, shape (stations + rollers, realisations, strips)
+        Wear of the bodies by the formula [m].
+    feedback : ndarray, shape (stations, contacts, realisations), optional
+        Part of the loads due to springs and load terms, in equilibrium with them [N].
+    parts : ndarray, shape (stations + rollers, realisations, strips), optional
+        Part of each strip that is in contact, where edges are resolved within a strip.
+    """
+
+    end: WearState
+    worn: FloatArray
+    feedback: FloatArray | None
+    parts: FloatArray | None
+
+
 @dataclass(frozen=True)
 class EndOfStep:
     """Equations of an implicit step: depths ``base + wear of worn_passes at the end``.
@@ -95,9 +118,7 @@ class EndOfStep:
     passes: FloatArray
     worn_passes: FloatArray
 
-    def solved(
-        self, guess: FloatArray, feedback: FloatArray | None
-    ) -> tuple[WearState, FloatArray, FloatArray | None]:
+    def solved(self, guess: FloatArray, feedback: FloatArray | None) -> Solved:
         """Solve contacts, wear and loads together.
 
         The wear enters the contact problem as a compliance: it is linearised in the line load about
@@ -114,12 +135,7 @@ class EndOfStep:
 
         Returns
         -------
-        end : WearState
-            Depths, contacts, load terms and number of solves at the end.
-        worn : ndarray
-            Wear of the bodies, shape as `base` [m].
-        feedback : ndarray, optional
-            That part, in equilibrium with springs and load terms.
+        Solved
 
         Raises
         ------
@@ -134,23 +150,29 @@ class EndOfStep:
             loads = np.maximum(prescribed + feedback, LEAST_GUESS * np.minimum(prescribed, before))
         target = loads
         stations, depths, contacts = problem.shape[0], guess, start.contacts
+        edges = None if start.separation is None else Edges.of(problem, start, self.base)
         gap = problem.gap(*separated(self.base, stations))
+        level = np.zeros(()) if edges is None else of_contacts(guess, problem.body_rows)
         # line loads and wear about which the wear is linearised
         line_load, wear = contacts.line_load, self._parts(contacts)
         shape = line_load.shape
         exponents = np.asarray(start.wear_exponents).reshape(shape)
         active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
         iterations = np.zeros(len(active), dtype=np.int64)
+        gaps, slopes, linear = gap.reshape(shape), np.ones(shape), np.empty(shape)
         worn = np.empty_like(self.base)
         for iteration in range(1, MAX_FIXED_POINT + 1):
+            if edges is not None:
+                gaps, slopes = edges.linearised(level)
             opened = np.empty(shape)
             compliance = np.empty((len(active), len(problem.bodies), 2, shape[1]))
             constant = linearised_wear(
                 line_load,
                 wear,
                 exponents,
+                slopes,
                 problem.body_rows,
-                gap.reshape(shape),
+                gaps,
                 compliance,
                 opened,
             )
@@ -171,7 +193,12 @@ class EndOfStep:
                 MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT,
                 exponents,
                 worn,
+                linear,
             )
+            if edges is not None:
+                new_level = gaps + linear - solved.separation - edges.gap
+                level = self._for_active(active, new_level, level)
+                rest = self._rest_of_edges(edges, level, solved, worn)
             if np.count_nonzero(active) < len(active):  # of realisations that have converged
                 each = exponents.reshape(-1, len(active), shape[1])
                 each[:, ~active] = known.reshape(each.shape)[:, ~active]
@@ -195,16 +222,21 @@ class EndOfStep:
             converged = CONVERGED * problem.iteration_tolerance * relaxation
             active &= ~(change <= converged * depth)
             if not np.count_nonzero(active):
+                parts = None
+                if edges is not None:
+                    depths, parts, edge_state = self._end_of_edges(edges, level, solved, new, worn)
                 cylinder, roller = separated(depths, stations)
                 end = start.replaced(
                     cylinder_depth=cylinder,
                     roller_depth=roller,
+                    **({} if edges is None else edge_state),
                     solves=start.solves + iterations * problem.contacts_each,
                     contacts=solved,
                     terms=self._terms(solved),
                     wear_exponents=exponents.reshape(*problem.shape, -1),
                 )
-                return end, worn, None if feedback is None else target - prescribed
+                feedback = None if feedback is None else target - prescribed
+                return Solved(end, worn, feedback, parts)
             contacts, loads = solved, target
             if iteration < DAMPED_FROM:
                 line_load, wear = solved.line_load, new
@@ -215,6 +247,54 @@ class EndOfStep:
             f" not converge (last relative change {(change / depth).max():.1e})",
             start.to_arrays(),
         )
+
+    def _for_active(
+        self, active: BoolArray, new: FloatArray, old: FloatArray
+    ) -> FloatArray:
+        """Return new values of the contacts of the active realisations, and old ones of others."""
+        if np.count_nonzero(active) == len(active):
+            return new
+        shape = -1, len(active), new.shape[-1]
+        every = np.where(active[:, None], new.reshape(shape), old.reshape(shape))
+        return every.reshape(new.shape)
+
+    def _rest_of_edges(
+        self, edges: Edges, level: FloatArray, solved: ContactBatchSolution, worn: FloatArray
+    ) -> FloatArray:
+        """Return the greatest difference between the wear and that of the depths, (N,) [m]."""
+        mean = edges.mean_wear(level)
+        mean = np.where(solved.line_load > 0.0, mean, np.maximum(mean, 0.0))
+        difference = np.abs(mean - of_contacts(worn, edges.bodies))
+        shape = -1, len(self.passes), level.shape[-1]
+        return np.asarray(difference.reshape(shape).max(axis=(0, 2)))
+
+    def _end_of_edges(
+        self,
+        edges: Edges,
+        level: FloatArray,
+        solved: ContactBatchSolution,
+        wear: FloatArray,
+        worn: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return depths, `Solved.parts`, and fields of the state at the end of the step."""
+        problem, start, loaded = self.problem, self.start, solved.line_load > 0.0
+        growth, opening = edges.growth(level, loaded), of_contacts(worn, edges.bodies)
+        ratio = np.divide(growth, opening, out=np.zeros_like(growth), where=opening > 0.0)
+        part_of_contact = np.where(loaded, edges.parts(level), 0.0)
+        # a strip of a body follows the formula where all of its contacts do
+        crossed, depths = np.zeros(worn.shape, np.bool_), np.zeros_like(worn)
+        parts = np.zeros_like(worn)
+        for c, rows in enumerate(edges.bodies.tolist()):
+            places = slice(c * len(self.passes), (c + 1) * len(self.passes))
+            for side, row in enumerate(rows):
+                crossed[row] |= ~edges.whole[places]
+                depths[row] += ratio[places] * wear[side, places]
+                np.maximum(parts[row], part_of_contact[places], out=parts[row])
+        depths = np.where(crossed, start.stacked + depths, self.base + worn)
+        separation, whole = edges.separation(level, of_contacts(depths, edges.bodies), loaded)
+        shape = *problem.shape, problem.grid.strips
+        fields = {"separation": separation.reshape(shape), "whole": whole.reshape(shape)}
+        return depths, parts, fields
 
     def _parts(self, contacts: ContactBatchSolution) -> FloatArray:
         """Return the contributions of the contacts to the wear, shape (2, contacts, strips) [m]."""

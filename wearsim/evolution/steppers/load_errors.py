@@ -50,7 +50,7 @@ def next_steps_of_loads(
     relative = (feedback / scale).reshape(ROWS, -1, scale.shape[-1], 1)
     order, own = np.empty_like(orders), np.empty(relative.shape[1:])
     ones = np.ones_like(own)
-    found = next_steps(relative, spans, ones, orders, part, aim, keep, own, order)
+    found = next_steps(relative, spans, ones, orders, part, aim, keep, ones, own, order)
     errors = np.abs(own.reshape(scale.shape) * scale)
     springs = np.broadcast_to(problem.stiffness, scale.shape)
     displaced = np.divide(errors, springs, out=np.zeros_like(errors), where=springs > 0.0)
