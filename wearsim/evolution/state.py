@@ -14,7 +14,7 @@ from wearsim.errors import CapabilityError
 from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import is_every
-from wearsim.types import BoolArray, FloatArray, IntArray
+from wearsim.types import FloatArray, IntArray
 
 HERTZ = 2.0 / 3.0  # approach of unworn bodies as a power of the load
 
@@ -47,7 +47,7 @@ _AXES = {
     "approach_factor": 2,
     "wear_exponents": 2,
     "separation": 2,
-    "whole": 2,
+    "part": 2,
     "past_wear": 2,
     "past_sums": 2,
     "past_feedback": 3,
@@ -118,8 +118,8 @@ class WearState:
     separation : ndarray, shape (stations, contacts, realisations, strips), optional
         Mean distance between the deformed surfaces in each strip, 0 in those wholly in contact [m];
         None where the edge of a contact is not resolved within a strip, see `edges`.
-    whole : ndarray of bool, shape as `separation`, optional
-        Strips that are wholly in contact.
+    part : ndarray, shape as `separation`, optional
+        Part of each strip that is in contact.
     past_wear : ndarray, shape (6, stations + rollers, realisations, strips), optional
         Wear per roller pass of cylinder and rollers [m], and divided differences of order 1 to 5 of
         their depths less separations over the exposure (see `implicit`) at the present and at past
@@ -164,7 +164,7 @@ class WearState:
     approach_factor: FloatArray | None = None
     wear_exponents: FloatArray | None = None
     separation: FloatArray | None = None
-    whole: BoolArray | None = None
+    part: FloatArray | None = None
     past_wear: FloatArray | None = None
     past_sums: FloatArray | None = None
     past_feedback: FloatArray | None = None

@@ -27,7 +27,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.types import BoolArray, FloatArray, IntArray
 
-FLAT = 1e-12  # least rise of a gap across a strip, over the greatest gap
+FLAT = 1e-15  # least rise of a gap across a strip [m]
 
 
 def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool:
@@ -43,11 +43,11 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
 
 def starting_edges(
     problem: WearProblem, contacts: ContactBatchSolution
-) -> tuple[FloatArray, BoolArray]:
-    """Return `separation` and `whole` of a state from its contacts."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return `separation` and `part` of a state from its contacts."""
     loaded = problem.values_of(contacts, "line_load") > 0.0
     separation = np.where(loaded, 0.0, problem.values_of(contacts, "separation"))
-    return separation, loaded
+    return separation, np.where(loaded, 1.0, 0.0)
 
 
 def separated_bodies(state: WearState) -> FloatArray:
@@ -90,8 +90,6 @@ class Edges:
         Rise r of the gap across each strip [m].
     part : ndarray
         Part f at the start.
-    whole : ndarray of bool
-        Strips wholly in contact at the start, and so throughout the step unless they lose it.
     """
 
     bodies: IntArray
@@ -102,64 +100,70 @@ class Edges:
     first: FloatArray
     rise: FloatArray
     part: FloatArray
-    whole: BoolArray
 
     @classmethod
     def of(cls, problem: WearProblem, state: WearState, base: FloatArray) -> Edges:
         """Return the strips of a step from a state; `base` is that of the bodies [m]."""
+        assert state.separation is not None
+        assert state.part is not None
         bodies = problem.body_rows
         depth = of_contacts(state.stacked, bodies)
-        shape = depth.shape
-        separation = np.asarray(state.separation).reshape(shape)
-        gap = np.broadcast_to(problem.nominal_gap, (*problem.shape, shape[-1])).reshape(shape)
-        whole = np.asarray(state.whole).reshape(shape)
-        slope = np.empty_like(gap)
-        slope[:, 1:-1] = 0.5 * (gap[:, 2:] - gap[:, :-2])
-        slope[:, 0], slope[:, -1] = gap[:, 1] - gap[:, 0], gap[:, -1] - gap[:, -2]
-        least = FLAT * gap.max(axis=1, keepdims=True)
-        rise = np.maximum(np.abs(slope), least)
-        part = _part_of(separation, rise, whole)
-        first = depth - 0.5 * rise * part**2
-        # worn surfaces ahead of the edge
-        change = np.diff(first, axis=1)
-        outward = np.zeros_like(gap)
-        outward[:, :-1] = np.where(slope[:, :-1] > 0.0, change, 0.0)
-        outward[:, 1:] += np.where(slope[:, 1:] < 0.0, -change, 0.0)
-        rise = np.maximum(rise + np.where(whole, 0.0, outward), least)
-        part = _part_of(separation, rise, whole)
-        first = depth - 0.5 * rise * part**2
+        separation, part = state.separation.reshape(depth.shape), state.part.reshape(depth.shape)
+        rise = _rises(separation, part)
+        gap = np.broadcast_to(problem.nominal_gap, state.separation.shape).reshape(depth.shape)
         return cls(
             bodies,
             gap,
             of_contacts(base, bodies),
             depth,
             depth - separation,
-            first,
+            depth - 0.5 * rise * part**2,
             rise,
             part,
-            whole,
         )
 
     def parts(self, level: FloatArray) -> FloatArray:
         """Return f at a depth l."""
         part = np.clip(0.5 + (level - self.first) / self.rise, 0.0, 1.0)
-        return np.where(self.whole, 1.0, part)
+        return np.where(self.part < 1.0, part, 1.0)
 
-    def mean_wear(self, level: FloatArray) -> FloatArray:
-        """Return f (l - l_0), the mean wear at a depth l that agrees with the formula [m]."""
-        part = self.parts(level)
-        return np.where(part < 1.0, np.maximum(part * (level - self.base), 0.0), level - self.base)
+    def mean_wear(self, level: FloatArray, others: FloatArray) -> FloatArray:
+        """Return f (l - l_0), the mean wear at a depth l that agrees with the formula [m].
 
-    def linearised(self, level: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return gap without wear [m] and slope of the mean wear, both about a depth l."""
-        part, worn = self.parts(level), np.maximum(level - self.base, 0.0)
+        `others` is the mean wear of the same strips by other contacts, which l_0 leaves out.
+        """
+        return self.parts(level) * (level - self.base - others)
+
+    def linearised(self, level: FloatArray, others: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return depth without any wear [m] and slope of the mean wear, both about a depth l.
+
+        The slope is infinite where the strip is not in contact, and the depth then is l.
+        """
+        part, worn = self.parts(level), level - self.base - others
         inside = (part > 0.0) & (part < 1.0)
-        slope = np.where(inside, part + worn / self.rise, part)
-        tangent = level - np.divide(part * worn, slope, out=np.zeros_like(level), where=slope > 0.0)
-        tangent = np.where(part < 1.0, tangent, self.base)
+        slope = np.where(inside, part + np.maximum(worn, 0.0) / self.rise, part)
         apart = slope <= 0.0
-        gap = self.gap + np.where(apart, np.maximum(level, self.depth), tangent)
-        return gap, np.where(apart, np.inf, slope)
+        cut = level - np.divide(part * worn, slope, out=np.zeros_like(level), where=~apart)
+        tangent = np.where(part < 1.0, cut - others, self.base)
+        apart_at = np.maximum(level, self.depth)
+        return np.where(apart, apart_at, tangent), np.where(apart, np.inf, slope)
+
+    def by_others(self, wear: FloatArray) -> FloatArray:
+        """Return the wear of each contact's bodies by other contacts, (contacts, strips) [m].
+
+        Parameters
+        ----------
+        wear : ndarray, shape (2, contacts, strips)
+            Contributions of the contacts to the wear of their bodies [m].
+        """
+        if len(self.bodies) == 1:
+            return np.zeros(())
+        each = wear.reshape(2, len(self.bodies), -1, wear.shape[-1])
+        rows = np.zeros((self.bodies.max() + 1, *each.shape[2:]))
+        for contact, both in enumerate(self.bodies.tolist()):
+            for side, row in enumerate(both):
+                rows[row] += each[side, contact]
+        return of_contacts(rows, self.bodies) - wear.sum(axis=0)
 
     def growth(self, level: FloatArray, loaded: BoolArray) -> FloatArray:
         """Return the increase of the mean depth in the step, which ends at a depth l [m]."""
@@ -168,29 +172,23 @@ class Edges:
         grown = np.where(part < 1.0, cut, level - self.depth)
         return np.where(loaded, np.maximum(grown, 0.0), 0.0)
 
-    def separation(
-        self, level: FloatArray, depth: FloatArray, loaded: BoolArray
-    ) -> tuple[FloatArray, BoolArray]:
-        """Return the mean separation at a depth l [m], and which strips are wholly in contact.
-
-        Parameters
-        ----------
-        level, depth : ndarray
-            Depth l and mean depth at the end of the step [m].
-        loaded : ndarray of bool
-            Strips with a load.
-        """
-        part = self.parts(level)
-        whole = loaded & (part >= 1.0)
+    def separation(self, level: FloatArray, depth: FloatArray, part: FloatArray) -> FloatArray:
+        """Return the mean separation at a depth l, a mean depth and a part f [m]."""
         cut = 0.5 * self.rise * (1.0 - part) ** 2
-        apart = np.where(loaded & (part > 0.0), cut, np.maximum(depth - level, 0.0))
-        return np.where(whole, 0.0, apart), whole
+        return np.where(part > 0.0, cut, np.maximum(depth - level, 0.0))
 
 
-def _part_of(separation: FloatArray, rise: FloatArray, whole: BoolArray) -> FloatArray:
-    """Return the part of each strip that is in contact from its mean separation."""
-    part = np.maximum(1.0 - np.sqrt(2.0 * separation / rise), 0.0)
-    return np.where(whole, 1.0, part)
+def _rises(separation: FloatArray, part: FloatArray) -> FloatArray:
+    """Return r of each strip from separation and f.
+
+    Ahead of an edge the deformed surfaces of a strip touch at its inner end, or not yet.
+    """
+    ahead = np.full_like(separation, -np.inf)
+    ahead[:, :-1] = separation[:, 1:]
+    np.maximum(ahead[:, 1:], separation[:, :-1], out=ahead[:, 1:])
+    apart = np.clip(ahead - separation, 0.0, 2.0 * separation)
+    cut = np.divide(2.0 * separation, (1.0 - part) ** 2, out=np.ones_like(part), where=part < 1.0)
+    return np.maximum(np.where(part > 0.0, cut, apart), FLAT)
 
 
 def of_contacts(rows: FloatArray, bodies: IntArray) -> FloatArray:

@@ -47,6 +47,7 @@ COVER = np.array([[5.0], [2.0], [6.0]])  # safety factors on the errors of depth
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
+COUNTED = 1.0
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
 
@@ -103,7 +104,7 @@ class ImplicitStepper(StepDoublingStepper):
         part, aim = (passes / stop) ** PART_EXPONENT, SHARE * self.tolerance
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, part, aim, KEEP),
-            *(_loaded_parts(problem, end), own, order),
+            *(_parts_of_bodies(end), own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
         if step.min() <= WHOLE_PASSES:
@@ -135,7 +136,7 @@ class ImplicitStepper(StepDoublingStepper):
         scale = part / self.tolerance
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0),
-            *(_loaded_parts(problem, end), own, order),
+            *(_parts_of_bodies(end), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
@@ -227,15 +228,15 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, exposure)
     wear, energy = _wear_per_pass(here, state.contacts)
-    separation = whole = None
+    separation = part = None
     if resolves_edges(problem, state.contacts):
-        separation, whole = starting_edges(problem, state.contacts)
-    sums = _sums_per_pass(wear if whole is not None else None, energy)
+        separation, part = starting_edges(problem, state.contacts)
+    sums = _sums_per_pass(wear if part is not None else None, energy)
     return state.replaced(
         separation=separation,
-        whole=whole,
+        part=part,
         past_wear=_starting(wear, exposure),
-        past_sums=_starting(sums, exposure[None])[..., 0],
+        past_sums=_starting(sums, exposure)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
@@ -266,12 +267,6 @@ def _energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> Fl
     return np.asarray(power / problem.kinematics.pass_rate)
 
 
-def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
-    """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
-    sums = energy[None] if wear is None else np.concatenate([wear.sum(axis=-1), energy[None]])
-    return np.asarray(sums[..., None])
-
-
 def _loaded_parts(problem: WearProblem, state: WearState) -> FloatArray:
     """Return 1 where a body is loaded and else 0, as `WearState.stacked`; 1 without edges.
 
@@ -285,6 +280,24 @@ def _loaded_parts(problem: WearProblem, state: WearState) -> FloatArray:
     parts[:stations] = loaded.any(axis=1)
     parts[stations:] = loaded.any(axis=0)
     return parts
+
+
+def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
+    """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
+    sums = energy[None] if wear is None else np.concatenate([wear.sum(axis=-1), energy[None]])
+    return np.asarray(sums[..., None])
+
+
+def _parts_of_bodies(state: WearState) -> FloatArray:
+    """Return the part of each strip's error that counts, as `WearState.stacked`.
+
+    The formulas also continue the separation of strips that are not in contact.
+    """
+    if state.part is None:
+        return np.ones(state.stacked.shape)
+    assert state.past_wear is not None
+    parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
+    return np.where(state.past_wear[0] > 0.0, np.minimum(COUNTED * parts, 1.0), 0.0)
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,11 @@ class EndOfStep:
         worn = np.empty_like(self.base)
         for iteration in range(1, MAX_FIXED_POINT + 1):
             if edges is not None:
-                gaps, slopes = edges.linearised(level)
+                others = edges.by_others(wear)
+                without, slopes = edges.linearised(level, others)
+                # the wear over the slope is that of the contact's own part of a strip
+                scaled = edges.by_others(np.where(np.isinf(slopes), 0.0, (1.0 / slopes - 1.0) * wear))
+                gaps = edges.gap + without - scaled
             opened = np.empty(shape)
             compliance = np.empty((len(active), len(problem.bodies), 2, shape[1]))
             constant = linearised_wear(
@@ -191,6 +195,7 @@ class EndOfStep:
                 problem.body_rows,
                 self.base,
                 MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT,
+                slopes,
                 exponents,
                 worn,
                 linear,
@@ -198,7 +203,8 @@ class EndOfStep:
             if edges is not None:
                 new_level = gaps + linear - solved.separation - edges.gap
                 level = self._for_active(active, new_level, level)
-                rest = self._rest_of_edges(edges, level, solved, worn)
+                edge_rest = self._rest_of_edges(edges, level, slopes, solved, new)
+                rest = np.maximum(rest, edge_rest)
             if np.count_nonzero(active) < len(active):  # of realisations that have converged
                 each = exponents.reshape(-1, len(active), shape[1])
                 each[:, ~active] = known.reshape(each.shape)[:, ~active]
@@ -258,15 +264,37 @@ class EndOfStep:
         every = np.where(active[:, None], new.reshape(shape), old.reshape(shape))
         return every.reshape(new.shape)
 
+    def _greatest(self, values: FloatArray) -> FloatArray:
+        """Return the greatest value of each realisation, (N,), from (contacts, strips)."""
+        if not values.ndim:
+            return values
+        return np.asarray(values.reshape(-1, len(self.passes), values.shape[-1]).max(axis=(0, 2)))
+
     def _rest_of_edges(
-        self, edges: Edges, level: FloatArray, solved: ContactBatchSolution, worn: FloatArray
+        self,
+        edges: Edges,
+        level: FloatArray,
+        slopes: FloatArray,
+        solved: ContactBatchSolution,
+        wear: FloatArray,
     ) -> FloatArray:
-        """Return the greatest difference between the wear and that of the depths, (N,) [m]."""
-        mean = edges.mean_wear(level)
-        mean = np.where(solved.line_load > 0.0, mean, np.maximum(mean, 0.0))
-        difference = np.abs(mean - of_contacts(worn, edges.bodies))
-        shape = -1, len(self.passes), level.shape[-1]
-        return np.asarray(difference.reshape(shape).max(axis=(0, 2)))
+        """Return the greatest difference of mean wear between formula and linearisation, (N,) [m].
+
+        Parameters
+        ----------
+        level : ndarray, shape (contacts, strips)
+            Depth at the end of the step [m].
+        slopes : ndarray
+            From `Edges.linearised`.
+        solved : ContactBatchSolution
+        wear : ndarray, shape (2, contacts, strips)
+            Wear of the contacts [m].
+        """
+        loaded, apart = solved.line_load > 0.0, np.isinf(slopes)
+        others = edges.by_others(wear)
+        mean, own = edges.mean_wear(level, others), wear.sum(axis=0)
+        rest = np.where(apart, own, np.abs(mean - own))
+        return self._greatest(np.where(loaded, rest, np.maximum(mean, 0.0)))
 
     def _end_of_edges(
         self,
@@ -280,20 +308,20 @@ class EndOfStep:
         problem, start, loaded = self.problem, self.start, solved.line_load > 0.0
         growth, opening = edges.growth(level, loaded), of_contacts(worn, edges.bodies)
         ratio = np.divide(growth, opening, out=np.zeros_like(growth), where=opening > 0.0)
-        part_of_contact = np.where(loaded, edges.parts(level), 0.0)
+        part = np.where(loaded, edges.parts(level), 0.0)
         # a strip of a body follows the formula where all of its contacts do
         crossed, depths = np.zeros(worn.shape, np.bool_), np.zeros_like(worn)
         parts = np.zeros_like(worn)
         for c, rows in enumerate(edges.bodies.tolist()):
             places = slice(c * len(self.passes), (c + 1) * len(self.passes))
             for side, row in enumerate(rows):
-                crossed[row] |= ~edges.whole[places]
+                crossed[row] |= edges.part[places] < 1.0
                 depths[row] += ratio[places] * wear[side, places]
-                np.maximum(parts[row], part_of_contact[places], out=parts[row])
+                np.maximum(parts[row], part[places], out=parts[row])
         depths = np.where(crossed, start.stacked + depths, self.base + worn)
-        separation, whole = edges.separation(level, of_contacts(depths, edges.bodies), loaded)
+        separation = edges.separation(level, of_contacts(depths, edges.bodies), part)
         shape = *problem.shape, problem.grid.strips
-        fields = {"separation": separation.reshape(shape), "whole": whole.reshape(shape)}
+        fields = {"separation": separation.reshape(shape), "part": part.reshape(shape)}
         return depths, parts, fields
 
     def _parts(self, contacts: ContactBatchSolution) -> FloatArray:

@@ -102,6 +102,7 @@ def wear_of_bodies(
     bodies: IntArray,
     base: FloatArray,
     greatest: float,
+    slopes: FloatArray,
     exponents: FloatArray,
     worn: FloatArray,
     linear: FloatArray,
@@ -122,6 +123,8 @@ def wear_of_bodies(
         Depths without this wear [m].
     greatest : float
         Upper bound of the exponents.
+    slopes : ndarray, shape (contacts, strips)
+        As in `linearised_wear`.
     exponents : ndarray, shape (contacts, strips)
         Updated by the two solutions in strips whose load has changed.
     worn : ndarray, shape (bodies, realisations, strips)
@@ -137,17 +140,18 @@ def wear_of_bodies(
     """
     contacts, n = loads.shape
     rows, realisations = worn.shape[0], worn.shape[1]
-    part = np.empty((rows, realisations, n))
+    part, scaled = np.empty((rows, realisations, n)), np.empty((rows, realisations, n))
     for b in range(rows):
         for v in range(realisations):
             for i in range(n):
-                worn[b, v, i] = part[b, v, i] = 0.0
+                worn[b, v, i] = part[b, v, i] = scaled[b, v, i] = 0.0
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for side in range(2):
             body = bodies[c, side]
             for i in range(n):
                 worn[body, v, i] += wear[side, k, i]
+                scaled[body, v, i] += wear[side, k, i] / slopes[k, i]
                 part[body, v, i] += constant[side, k, i] + compliance[v, c, side, i] * loads[k, i]
         for i in range(n):
             new, old = wear[0, k, i] + wear[1, k, i], old_wear[0, k, i] + old_wear[1, k, i]
@@ -166,8 +170,10 @@ def wear_of_bodies(
                 opening = worn[one, v, i] + worn[other, v, i]
                 depth = base[one, v, i] + base[other, v, i] + opening
                 opened = part[one, v, i] + part[other, v, i]
-                linear[c * realisations + v, i] = opened
-                difference = max(difference, abs(opening - opened))
+                k = c * realisations + v
+                linear[k, i] = opened
+                rest = scaled[one, v, i] + scaled[other, v, i] - opened
+                difference = max(difference, abs(rest) * min(slopes[k, i], 1.0))
                 greatest_opening = max(greatest_opening, opening)
                 deepest = max(deepest, depth)
         sizes[0, v], sizes[1, v] = difference, greatest_opening
@@ -334,7 +340,7 @@ def compile_linearised_wear() -> None:
     constant = linearised_wear(strip, wear, strip, strip, rows, strip, compliance, np.ones((1, 1)))
     wear_of_bodies(
         *(strip, strip, wear, wear, compliance, constant, rows),
-        *(worn, 1.0, np.ones((1, 1)), worn, np.ones((1, 1))),
+        *(worn, 1.0, strip, np.ones((1, 1)), worn, np.ones((1, 1))),
     )
     one = np.ones(1)
     carried_errors(
