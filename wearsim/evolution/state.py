@@ -48,6 +48,7 @@ _AXES = {
     "wear_exponents": 2,
     "separation": 2,
     "part": 2,
+    "whole_steps": 2,
     "past_wear": 2,
     "past_sums": 2,
     "past_feedback": 3,
@@ -120,6 +121,8 @@ class WearState:
         None where the edge of a contact is not resolved within a strip, see `edges`.
     part : ndarray, shape as `separation`, optional
         Part of each strip that is in contact.
+    whole_steps : ndarray, shape as `separation`, optional
+        Steps since each strip has been wholly in contact, at most `edges.SETTLED`.
     past_wear : ndarray, shape (6, stations + rollers, realisations, strips), optional
         Wear per roller pass of cylinder and rollers [m], and divided differences of order 1 to 5 of
         their depths less separations over the exposure (see `implicit`) at the present and at past
@@ -165,6 +168,7 @@ class WearState:
     wear_exponents: FloatArray | None = None
     separation: FloatArray | None = None
     part: FloatArray | None = None
+    whole_steps: FloatArray | None = None
     past_wear: FloatArray | None = None
     past_sums: FloatArray | None = None
     past_feedback: FloatArray | None = None

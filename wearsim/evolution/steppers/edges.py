@@ -19,14 +19,18 @@ formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.single_step import REALISATION
+from wearsim.mechanics.numerics.multistep import ROWS
 from wearsim.types import BoolArray, FloatArray, IntArray
 
+SETTLED = float(ROWS)  # steps after which all points of a formula lie in contact
 FLAT = 1e-15  # least rise of a gap across a strip [m]
 
 
@@ -43,29 +47,59 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
 
 def starting_edges(
     problem: WearProblem, contacts: ContactBatchSolution
-) -> tuple[FloatArray, FloatArray]:
-    """Return `separation` and `part` of a state from its contacts."""
+) -> dict[str, FloatArray]:
+    """Return `separation`, `part` and `whole_steps` of a state from its contacts."""
     loaded = problem.values_of(contacts, "line_load") > 0.0
-    separation = np.where(loaded, 0.0, problem.values_of(contacts, "separation"))
-    return separation, np.where(loaded, 1.0, 0.0)
+    return {
+        "separation": np.where(loaded, 0.0, problem.values_of(contacts, "separation")),
+        "part": np.where(loaded, 1.0, 0.0),
+        "whole_steps": np.where(loaded, SETTLED, 0.0),
+    }
 
 
-def separated_bodies(state: WearState) -> FloatArray:
+def separated_bodies(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the separation of the contacts as parts of the bodies, as `WearState.stacked` [m].
 
-    The sum of the two bodies of a contact is its separation.
+    The sum of the two bodies of a contact is its separation, which their wear closes together.
     """
-    separation, wear = state.separation, state.past_wear
+    separation = state.separation
     assert separation is not None
-    assert wear is not None
-    stations, contacts, realisations, strips = separation.shape
-    parts = np.zeros((stations + state.roller_depth.shape[1], realisations, strips))
+    stations, _, realisations, strips = separation.shape
+    parts = np.zeros((stations + problem.rollers, realisations, strips))
     parts[:stations] = separation.min(axis=1)
-    if stations == 1:  # the remainder, and everything where the cylinder does not wear
-        wears = wear[0, :stations].any(axis=(0, 2))
-        parts[:stations] *= wears[:, None]
-        parts[stations:] = separation[0] - parts[:stations]
+    if stations == 1:
+        parts[0] *= _cylinder_share(problem)[:, None]
+        parts[1:] = separation[0] - parts[0]
     return parts
+
+
+def _cylinder_share(problem: WearProblem) -> FloatArray:
+    """Return the part of the wear of a contact with a cylinder that is the cylinder's, (N,)."""
+    if not problem.linear_wear:
+        return np.full(problem.shape[REALISATION], 0.5)
+    factors, shares = problem.wear_factors, problem.wear_shares
+    cylinder, rollers = (
+        shares[body].sum() * np.asarray(factors[body]) for body in ("cylinder", "roller")
+    )
+    return cylinder / np.maximum(cylinder + rollers / problem.rollers, np.finfo(float).tiny)
+
+
+class Others(NamedTuple):
+    """Wear of the strips of each contact by the other contacts of its bodies.
+
+    Parameters
+    ----------
+    wear : ndarray, shape (contacts, strips)
+        Wear at the end of the step, which l_0 leaves out [m].
+    growth : ndarray
+        Increase of the depth in the step [m].
+    """
+
+    wear: FloatArray
+    growth: FloatArray
+
+
+ALONE = Others(np.zeros(()), np.zeros(()))
 
 
 @dataclass(frozen=True)
@@ -80,6 +114,8 @@ class Edges:
         As `WearProblem.body_rows`.
     gap : ndarray
         Gap before wear [m].
+    before : ndarray, shape (stations + rollers, realisations, strips)
+        Increase of the depths in the step without the wear at its end [m].
     base : ndarray
         Depth l_0 of the formula [m].
     depth, level : ndarray
@@ -90,22 +126,27 @@ class Edges:
         Rise r of the gap across each strip [m].
     part : ndarray
         Part f at the start.
+    settled : ndarray of bool
+        Strips in which all points of the formula lie in contact.
     """
 
     bodies: IntArray
     gap: FloatArray
+    before: FloatArray
     base: FloatArray
     depth: FloatArray
     level: FloatArray
     first: FloatArray
     rise: FloatArray
     part: FloatArray
+    settled: BoolArray
 
     @classmethod
     def of(cls, problem: WearProblem, state: WearState, base: FloatArray) -> Edges:
         """Return the strips of a step from a state; `base` is that of the bodies [m]."""
         assert state.separation is not None
         assert state.part is not None
+        assert state.whole_steps is not None
         bodies = problem.body_rows
         depth = of_contacts(state.stacked, bodies)
         separation, part = state.separation.reshape(depth.shape), state.part.reshape(depth.shape)
@@ -114,42 +155,41 @@ class Edges:
         return cls(
             bodies,
             gap,
+            base - state.stacked + separated_bodies(problem, state),
             of_contacts(base, bodies),
             depth,
             depth - separation,
             depth - 0.5 * rise * part**2,
             rise,
             part,
+            state.whole_steps.reshape(depth.shape) >= SETTLED,
         )
 
-    def parts(self, level: FloatArray) -> FloatArray:
+    def parts(self, level: FloatArray, others: Others) -> FloatArray:
         """Return f at a depth l."""
-        part = np.clip(0.5 + (level - self.first) / self.rise, 0.0, 1.0)
+        part = np.clip(0.5 + (level - self.first - others.growth) / self.rise, 0.0, 1.0)
         return np.where(self.part < 1.0, part, 1.0)
 
-    def mean_wear(self, level: FloatArray, others: FloatArray) -> FloatArray:
-        """Return f (l - l_0), the mean wear at a depth l that agrees with the formula [m].
+    def mean_wear(self, level: FloatArray, others: Others) -> FloatArray:
+        """Return f (l - l_0), the mean wear at a depth l that agrees with the formula [m]."""
+        return self.parts(level, others) * (level - self.base - others.wear)
 
-        `others` is the mean wear of the same strips by other contacts, which l_0 leaves out.
-        """
-        return self.parts(level) * (level - self.base - others)
-
-    def linearised(self, level: FloatArray, others: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def linearised(self, level: FloatArray, others: Others) -> tuple[FloatArray, FloatArray]:
         """Return depth without any wear [m] and slope of the mean wear, both about a depth l.
 
         The slope is infinite where the strip is not in contact, and the depth then is l.
         """
-        part, worn = self.parts(level), level - self.base - others
+        part, worn = self.parts(level, others), level - self.base - others.wear
         inside = (part > 0.0) & (part < 1.0)
         slope = np.where(inside, part + np.maximum(worn, 0.0) / self.rise, part)
         apart = slope <= 0.0
         cut = level - np.divide(part * worn, slope, out=np.zeros_like(level), where=~apart)
-        tangent = np.where(part < 1.0, cut - others, self.base)
+        tangent = np.where(part < 1.0, cut - others.wear, self.base)
         apart_at = np.maximum(level, self.depth)
         return np.where(apart, apart_at, tangent), np.where(apart, np.inf, slope)
 
-    def by_others(self, wear: FloatArray) -> FloatArray:
-        """Return the wear of each contact's bodies by other contacts, (contacts, strips) [m].
+    def by_others(self, wear: FloatArray) -> Others:
+        """Return the wear of each contact's bodies by other contacts.
 
         Parameters
         ----------
@@ -157,19 +197,27 @@ class Edges:
             Contributions of the contacts to the wear of their bodies [m].
         """
         if len(self.bodies) == 1:
-            return np.zeros(())
+            return ALONE
         each = wear.reshape(2, len(self.bodies), -1, wear.shape[-1])
-        rows = np.zeros((self.bodies.max() + 1, *each.shape[2:]))
+        rows, found = np.zeros_like(self.before), np.zeros((2, *each.shape[1:]))
         for contact, both in enumerate(self.bodies.tolist()):
             for side, row in enumerate(both):
                 rows[row] += each[side, contact]
-        return of_contacts(rows, self.bodies) - wear.sum(axis=0)
+        for contact, both in enumerate(self.bodies.tolist()):
+            for side, row in enumerate(both):
+                of_others = rows[row] - each[side, contact]
+                found[0, contact] += of_others
+                share = np.divide(
+                    of_others, rows[row], out=np.zeros_like(of_others), where=rows[row] > 0.0
+                )
+                found[1, contact] += share * (self.before[row] + rows[row])
+        return Others(*found.reshape(2, *wear.shape[1:]))
 
-    def growth(self, level: FloatArray, loaded: BoolArray) -> FloatArray:
-        """Return the increase of the mean depth in the step, which ends at a depth l [m]."""
-        part = self.parts(level)
+    def growth(self, level: FloatArray, others: Others, loaded: BoolArray) -> FloatArray:
+        """Return what each contact wears in the step, which ends at a depth l [m]."""
+        part = self.parts(level, others)
         cut = 0.5 * self.rise * (part**2 - self.part**2)
-        grown = np.where(part < 1.0, cut, level - self.depth)
+        grown = np.where(part < 1.0, cut, level - self.depth - others.growth)
         return np.where(loaded, np.maximum(grown, 0.0), 0.0)
 
     def separation(self, level: FloatArray, depth: FloatArray, part: FloatArray) -> FloatArray:

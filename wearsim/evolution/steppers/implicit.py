@@ -20,6 +20,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.edges import (
+    SETTLED,
     resolves_edges,
     separated_bodies,
     starting_edges,
@@ -47,7 +48,10 @@ COVER = np.array([[5.0], [2.0], [6.0]])  # safety factors on the errors of depth
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
-COUNTED = 1.0
+# greatest order where edges are resolved within a strip: beyond the first derivative the wear of
+# strips that the edge has just crossed is not smooth, and pressures would overshoot
+EDGE_ORDER = 3
+EDGES = 3.0
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
 
@@ -103,7 +107,7 @@ class ImplicitStepper(StepDoublingStepper):
         own, order = np.empty_like(depths), np.empty_like(past.order)
         part, aim = (passes / stop) ** PART_EXPONENT, SHARE * self.tolerance
         over, ratio = next_steps(
-            *(past.wear, past.spans, depths, past.order, part, aim, KEEP),
+            *(past.wear, past.spans, depths, past.order, part, aim, KEEP, _most(end)),
             *(_parts_of_bodies(end), own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
@@ -135,7 +139,7 @@ class ImplicitStepper(StepDoublingStepper):
         part = (end.passes / stop) ** PART_EXPONENT
         scale = part / self.tolerance
         over, ratio = next_steps(
-            *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0),
+            *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, _most(end)),
             *(_parts_of_bodies(end), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
@@ -184,9 +188,10 @@ def _estimates(
     stiffness = np.zeros(shape[0])
     if problem.has_spring:
         stiffness = np.broadcast_to(problem.stiffness, problem.shape).flatten()
+    crossed = _crossed(end)
     errors, sizes = carried_errors(
         np.asarray(start.stepping_error),
-        added,
+        added if crossed is None else _with_sum(end, added, crossed),
         contacts.line_load,
         problem.wear_parts(contacts, passes).reshape(2, *shape),
         np.asarray(end.wear_exponents).reshape(shape),
@@ -201,6 +206,9 @@ def _estimates(
     if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
+    if crossed is not None:
+        edges = np.where(crossed, EDGES * added, 0.0)
+        sizes[2] = np.hypot(sizes[2], np.sqrt((edges**2).sum(axis=(0, 2)) / _squares(depths)))
     found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
     depth, volume, profile = found + end.irreducible
@@ -228,13 +236,12 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, exposure)
     wear, energy = _wear_per_pass(here, state.contacts)
-    separation = part = None
+    edges: dict[str, FloatArray | None] = {"separation": None, "part": None, "whole_steps": None}
     if resolves_edges(problem, state.contacts):
-        separation, part = starting_edges(problem, state.contacts)
-    sums = _sums_per_pass(wear if part is not None else None, energy)
+        edges |= starting_edges(problem, state.contacts)
+    sums = _sums_per_pass(wear if edges["part"] is not None else None, energy)
     return state.replaced(
-        separation=separation,
-        part=part,
+        **edges,
         past_wear=_starting(wear, exposure),
         past_sums=_starting(sums, exposure)[..., 0],
         past_feedback=past_feedback,
@@ -267,19 +274,38 @@ def _energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> Fl
     return np.asarray(power / problem.kinematics.pass_rate)
 
 
-def _loaded_parts(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return 1 where a body is loaded and else 0, as `WearState.stacked`; 1 without edges.
+def _most(state: WearState) -> int:
+    """Return the greatest order of steps from a state."""
+    return MAX_ORDER if state.part is None else EDGE_ORDER
 
-    The formulas also continue the separation of strips that are not in contact.
+
+def _with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
+    """Return errors of the depths that a step adds, which agree with those of their sums.
+
+    `_with_volume` keeps the sums.
     """
-    parts = np.ones(state.stacked.shape)
-    if state.separation is None:
-        return parts
-    loaded = problem.values_of(state.contacts, "line_load") > 0.0
-    stations = len(state.cylinder_depth)
-    parts[:stations] = loaded.any(axis=1)
-    parts[stations:] = loaded.any(axis=0)
-    return parts
+    past, parts = Past.of(end), np.where(crossed, 0.0, _parts_of_bodies(end))
+    errors = np.where(crossed, 0.0, errors)
+    sums = past.sums[:, :-1, :, None]
+    ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), past.order.copy()
+    scale = np.ones(len(order))
+    next_steps(sums, past.spans, ones, past.order, scale, 1.0, 1.0, 1, ones, of_sums, order)
+    missing, width = of_sums - errors.sum(axis=-1, keepdims=True), parts.sum(axis=-1, keepdims=True)
+    return errors + parts * np.divide(missing, width, out=np.zeros_like(width), where=width > 0.0)
+
+
+def _crossed(state: WearState) -> BoolArray | None:
+    """Return which strips of the bodies an edge is crossing or has crossed lately."""
+    if state.whole_steps is None or state.part is None:
+        return None
+    lately = (state.part > 0.0) & (state.whole_steps < SETTLED)
+    return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
+
+
+def _squares(depths: FloatArray) -> FloatArray:
+    """Return the sum of squares of the depths of all bodies, (N,), infinite without any [m^2]."""
+    squares = (depths**2).sum(axis=(0, 2))
+    return np.where(squares > 0.0, squares, np.inf)
 
 
 def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
@@ -297,7 +323,7 @@ def _parts_of_bodies(state: WearState) -> FloatArray:
         return np.ones(state.stacked.shape)
     assert state.past_wear is not None
     parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
-    return np.where(state.past_wear[0] > 0.0, np.minimum(COUNTED * parts, 1.0), 0.0)
+    return np.where(state.past_wear[0] > 0.0, parts, 0.0)
 
 
 @dataclass(frozen=True)
@@ -395,7 +421,7 @@ def _step(
     Both have one entry per realisation, as has `order`.
     """
     realisations, start, past = len(passes), state.stacked, Past.of(state)
-    level = start if state.separation is None else start - separated_bodies(state)
+    level = start if state.separation is None else start - separated_bodies(problem, state)
     half_pass = np.where(passes > WHOLE_PASSES, 0.5, 0.0)
     weights = np.empty((2, ROWS, realisations))
     factor, spans = np.empty(realisations), np.empty((ROWS - 1, realisations))
@@ -417,7 +443,7 @@ def _step(
     sums = sums + worn_passes[:, None] * sum_rates
     if parts is not None:
         end = _with_volume(end, parts, sums[:-1, :, 0] - (end.stacked - start).sum(axis=-1))
-        change = end.stacked - separated_bodies(end) - level
+        change = end.stacked - separated_bodies(problem, end) - level
     past_feedback = None
     if feedback is not None:
         new = feedback.reshape(-1, realisations, 1)

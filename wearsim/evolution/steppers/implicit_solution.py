@@ -12,7 +12,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.edges import Edges, of_contacts
+from wearsim.evolution.steppers.edges import SETTLED, Edges, of_contacts
 from wearsim.evolution.steppers.loads import (
     APPROACH_EXPONENT,
     advanced_terms,
@@ -166,7 +166,8 @@ class EndOfStep:
                 others = edges.by_others(wear)
                 without, slopes = edges.linearised(level, others)
                 # the wear over the slope is that of the contact's own part of a strip
-                scaled = edges.by_others(np.where(np.isinf(slopes), 0.0, (1.0 / slopes - 1.0) * wear))
+                part_wear = np.where(np.isinf(slopes), 0.0, (1.0 / slopes - 1.0) * wear)
+                scaled = edges.by_others(part_wear).wear
                 gaps = edges.gap + without - scaled
             opened = np.empty(shape)
             compliance = np.empty((len(active), len(problem.bodies), 2, shape[1]))
@@ -306,22 +307,27 @@ class EndOfStep:
     ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return depths, `Solved.parts`, and fields of the state at the end of the step."""
         problem, start, loaded = self.problem, self.start, solved.line_load > 0.0
-        growth, opening = edges.growth(level, loaded), of_contacts(worn, edges.bodies)
-        ratio = np.divide(growth, opening, out=np.zeros_like(growth), where=opening > 0.0)
-        part = np.where(loaded, edges.parts(level), 0.0)
+        others, own = edges.by_others(wear), wear.sum(axis=0)
+        growth = edges.growth(level, others, loaded)
+        ratio = np.divide(growth, own, out=np.zeros_like(growth), where=own > 0.0)
+        part = np.where(loaded, edges.parts(level, others), 0.0)
         # a strip of a body follows the formula where all of its contacts do
         crossed, depths = np.zeros(worn.shape, np.bool_), np.zeros_like(worn)
         parts = np.zeros_like(worn)
         for c, rows in enumerate(edges.bodies.tolist()):
             places = slice(c * len(self.passes), (c + 1) * len(self.passes))
             for side, row in enumerate(rows):
-                crossed[row] |= edges.part[places] < 1.0
+                crossed[row] |= ~edges.settled[places]
                 depths[row] += ratio[places] * wear[side, places]
                 np.maximum(parts[row], part[places], out=parts[row])
         depths = np.where(crossed, start.stacked + depths, self.base + worn)
         separation = edges.separation(level, of_contacts(depths, edges.bodies), part)
         shape = *problem.shape, problem.grid.strips
+        assert start.whole_steps is not None
+        steps = np.minimum(start.whole_steps.reshape(part.shape) + 1.0, SETTLED)
+        steps = np.where(part < 1.0, 0.0, steps)
         fields = {"separation": separation.reshape(shape), "part": part.reshape(shape)}
+        fields["whole_steps"] = steps.reshape(shape)
         return depths, parts, fields
 
     def _parts(self, contacts: ContactBatchSolution) -> FloatArray:

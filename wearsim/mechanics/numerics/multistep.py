@@ -219,6 +219,7 @@ def next_steps(
     part: FloatArray,
     aim: float,
     keep: float,
+    most: int,
     parts: FloatArray,
     errors: FloatArray,
     next_orders: IntArray,
@@ -235,6 +236,8 @@ def next_steps(
     keep : float
         Part of the length of a step at a lower order that is compared with those at other orders:
         below one, the order is lowered for clearly longer steps only.
+    most : int
+        Greatest order of the next step, at most `MAX_ORDER`.
     parts : ndarray, shape (rows, solutions, columns)
         As of `local_errors`.
     errors : ndarray, shape (rows, solutions, columns)
@@ -258,6 +261,7 @@ def next_steps(
         excess, ratio, best, longest = 0.0, 0.0, 1, 0.0
         if known > 0:
             excess = sizes[min(order, known) - 1, v] / LIMIT
+        known = min(known, most)
         for other in range(max(1, order - 1), min(order + 1, known) + 1):
             size = SAFETY * max(sizes[other - 1, v], 1e-12) ** (-1.0 / (other + 1))
             worth = keep * size if other < order else size
@@ -265,7 +269,7 @@ def next_steps(
                 longest, ratio, best = worth, size, other
         if known == 0:
             best, ratio = order, GROW[0]
-        elif order + 1 > known and order < MAX_ORDER and excess <= 1.0:
+        elif order + 1 > known and order < most and excess <= 1.0:
             best = order + 1  # the first steps have no estimate of the next order
         next_orders[v] = best
         found[0, v], found[1, v] = excess, min(ratio, GROW[best - 1])
@@ -281,7 +285,8 @@ def compile_multistep() -> None:
     extrapolated(weights, differences)
     new_differences(value, value, one, differences, spans)
     errors = np.empty((1, 1, 1))
-    next_steps(differences, spans, value, order, one, 1.0, 1.0, value, errors, order.copy())
+    arguments = differences, spans, value, order, one, 1.0, 1.0, MAX_ORDER
+    next_steps(*arguments, value, errors, order.copy())
 
 
 compile_alongside("solve_slender", compile_multistep)
