@@ -381,6 +381,19 @@ class WearProblem:
         return all(factor is not None for factor in self.wear_factors.values())
 
     @cached_property
+    def cylinder_wear_share(self) -> FloatArray:
+        """Part of the wear of a contact that is the cylinder's, shape (realisations, 1).
+
+        A half where wear is not linear in the dissipation.
+        """
+        if not self.linear_wear:
+            return np.full((self.shape[2], 1), 0.5)
+        factors, shares = self.wear_factors, self.wear_shares
+        cylinder, rollers = (shares[body].sum() * np.asarray(factors[body]) for body in BODIES)
+        every = np.maximum(cylinder + rollers / self.rollers, np.finfo(float).tiny)
+        return np.asarray(cylinder / every).reshape(-1, 1)
+
+    @cached_property
     def wear_shares(self) -> dict[Body, FloatArray]:
         """Passes of each contact over a point of either body per roller pass.
 

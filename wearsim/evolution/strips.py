@@ -243,7 +243,10 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
     }
     past = averaged(np.asarray(state.past_wear), old, new)
     inside = np.flatnonzero(shares(old, new).sum(axis=1) > 0.0)
-    for added, edge in ((slice(0, inside[0]), inside[0]), (slice(inside[-1] + 1, None), inside[-1])):
+    for added, edge in (
+        (slice(0, inside[0]), inside[0]),
+        (slice(inside[-1] + 1, None), inside[-1]),
+    ):
         beyond = gap[..., added] - gap[..., edge : edge + 1]
         arrays["separation"][..., added] = arrays["separation"][..., edge : edge + 1] + beyond
         past[1:, ..., added] = past[1:, ..., edge : edge + 1]

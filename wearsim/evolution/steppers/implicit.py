@@ -20,7 +20,6 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.edges import (
-    SETTLED,
     resolves_edges,
     separated_bodies,
     starting_edges,
@@ -30,6 +29,7 @@ from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloadin
 from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
+from wearsim.mechanics.numerics.edge_strips import SETTLED
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
 from wearsim.mechanics.numerics.multistep import (
@@ -435,7 +435,7 @@ def _step(
         old = past.feedback.reshape(ROWS, -1, realisations, 1)
         feedback = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
         feedback = feedback.reshape(problem.shape)
-    step = EndOfStep(problem, state, level + added, conditions.force, passes, worn_passes)
+    step = EndOfStep(problem, state, level + added, added, conditions.force, passes, worn_passes)
     end, worn, feedback, parts = step.solved(level + guess, feedback)
     rates, change = worn / worn_passes[:, None], added + worn
     energy_rate = _energy_per_pass(problem, end.contacts)
@@ -452,9 +452,7 @@ def _step(
     end = end.replaced(
         passes=state.passes + passes,
         energy=state.energy + sums[-1, :, 0],
-        past_wear=new_differences(
-            rates, change, half_pass, past.wear, spans
-        ),
+        past_wear=new_differences(rates, change, half_pass, past.wear, spans),
         past_sums=new_differences(sum_rates, sums, half_pass, old_sums, spans)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,

@@ -12,7 +12,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.edges import SETTLED, Edges, of_contacts
+from wearsim.evolution.steppers.edges import edges_of_step
 from wearsim.evolution.steppers.loads import (
     APPROACH_EXPONENT,
     advanced_terms,
@@ -22,6 +22,13 @@ from wearsim.evolution.steppers.loads import (
     with_feedback,
 )
 from wearsim.evolution.steppers.single_step import REALISATION, carried_loads
+from wearsim.mechanics.numerics.edge_strips import (
+    EdgeStrips,
+    compare_edges,
+    end_edges,
+    linearise_edges,
+)
+from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
 from wearsim.plugins import SharedWear
 from wearsim.types import BoolArray, FloatArray
@@ -101,8 +108,8 @@ class EndOfStep:
         Problem with every process at its value for the step.
     start : WearState
         State at the start of the step.
-    base : ndarray, shape (stations + rollers, realisations, strips)
-        Depths without the wear at the end [m].
+    base, added : ndarray, shape (stations + rollers, realisations, strips)
+        Depths without the wear at the end, and what they exceed those of the start by [m].
     force : ndarray, shape (realisations,) or (stations, 1, realisations)
         Load before feedback [N].
     passes : ndarray, shape (realisations,)
@@ -114,6 +121,7 @@ class EndOfStep:
     problem: WearProblem
     start: WearState
     base: FloatArray
+    added: FloatArray
     force: FloatArray
     passes: FloatArray
     worn_passes: FloatArray
@@ -150,25 +158,20 @@ class EndOfStep:
             loads = np.maximum(prescribed + feedback, LEAST_GUESS * np.minimum(prescribed, before))
         target = loads
         stations, depths, contacts = problem.shape[0], guess, start.contacts
-        edges = None if start.separation is None else Edges.of(problem, start, self.base)
+        edges = edges_of_step(problem, start, self.base, self.added)
         gap = problem.gap(*separated(self.base, stations))
-        level = np.zeros(()) if edges is None else of_contacts(guess, problem.body_rows)
+        level = guess[problem.body_rows].sum(axis=1).reshape(-1, problem.grid.strips)
         # line loads and wear about which the wear is linearised
         line_load, wear = contacts.line_load, self._parts(contacts)
         shape = line_load.shape
         exponents = np.asarray(start.wear_exponents).reshape(shape)
         active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
         iterations = np.zeros(len(active), dtype=np.int64)
-        gaps, slopes, linear = gap.reshape(shape), np.ones(shape), np.empty(shape)
+        gaps, slopes, linear = gap.reshape(shape).copy(), np.ones(shape), np.empty(shape)
         worn = np.empty_like(self.base)
         for iteration in range(1, MAX_FIXED_POINT + 1):
             if edges is not None:
-                others = edges.by_others(wear)
-                without, slopes = edges.linearised(level, others)
-                # the wear over the slope is that of the contact's own part of a strip
-                part_wear = np.where(np.isinf(slopes), 0.0, (1.0 / slopes - 1.0) * wear)
-                scaled = edges.by_others(part_wear).wear
-                gaps = edges.gap + without - scaled
+                linearise_edges(edges, level, wear, gaps, slopes)
             opened = np.empty(shape)
             compliance = np.empty((len(active), len(problem.bodies), 2, shape[1]))
             constant = linearised_wear(
@@ -202,10 +205,11 @@ class EndOfStep:
                 linear,
             )
             if edges is not None:
-                new_level = gaps + linear - solved.separation - edges.gap
-                level = self._for_active(active, new_level, level)
-                edge_rest = self._rest_of_edges(edges, level, slopes, solved, new)
-                rest = np.maximum(rest, edge_rest)
+                apart, loaded = kernel_input(solved.separation), kernel_input(solved.line_load)
+                of_edges = compare_edges(
+                    edges, active, gaps, slopes, linear, apart, loaded, new, level
+                )
+                rest = np.maximum(rest, of_edges)
             if np.count_nonzero(active) < len(active):  # of realisations that have converged
                 each = exponents.reshape(-1, len(active), shape[1])
                 each[:, ~active] = known.reshape(each.shape)[:, ~active]
@@ -231,7 +235,7 @@ class EndOfStep:
             if not np.count_nonzero(active):
                 parts = None
                 if edges is not None:
-                    depths, parts, edge_state = self._end_of_edges(edges, level, solved, new, worn)
+                    depths, parts, edge_state = self._ended(edges, level, solved, new, worn)
                 cylinder, roller = separated(depths, stations)
                 end = start.replaced(
                     cylinder_depth=cylinder,
@@ -255,80 +259,20 @@ class EndOfStep:
             start.to_arrays(),
         )
 
-    def _for_active(
-        self, active: BoolArray, new: FloatArray, old: FloatArray
-    ) -> FloatArray:
-        """Return new values of the contacts of the active realisations, and old ones of others."""
-        if np.count_nonzero(active) == len(active):
-            return new
-        shape = -1, len(active), new.shape[-1]
-        every = np.where(active[:, None], new.reshape(shape), old.reshape(shape))
-        return every.reshape(new.shape)
-
-    def _greatest(self, values: FloatArray) -> FloatArray:
-        """Return the greatest value of each realisation, (N,), from (contacts, strips)."""
-        if not values.ndim:
-            return values
-        return np.asarray(values.reshape(-1, len(self.passes), values.shape[-1]).max(axis=(0, 2)))
-
-    def _rest_of_edges(
+    def _ended(
         self,
-        edges: Edges,
-        level: FloatArray,
-        slopes: FloatArray,
-        solved: ContactBatchSolution,
-        wear: FloatArray,
-    ) -> FloatArray:
-        """Return the greatest difference of mean wear between formula and linearisation, (N,) [m].
-
-        Parameters
-        ----------
-        level : ndarray, shape (contacts, strips)
-            Depth at the end of the step [m].
-        slopes : ndarray
-            From `Edges.linearised`.
-        solved : ContactBatchSolution
-        wear : ndarray, shape (2, contacts, strips)
-            Wear of the contacts [m].
-        """
-        loaded, apart = solved.line_load > 0.0, np.isinf(slopes)
-        others = edges.by_others(wear)
-        mean, own = edges.mean_wear(level, others), wear.sum(axis=0)
-        rest = np.where(apart, own, np.abs(mean - own))
-        return self._greatest(np.where(loaded, rest, np.maximum(mean, 0.0)))
-
-    def _end_of_edges(
-        self,
-        edges: Edges,
+        edges: EdgeStrips,
         level: FloatArray,
         solved: ContactBatchSolution,
         wear: FloatArray,
         worn: FloatArray,
     ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return depths, `Solved.parts`, and fields of the state at the end of the step."""
-        problem, start, loaded = self.problem, self.start, solved.line_load > 0.0
-        others, own = edges.by_others(wear), wear.sum(axis=0)
-        growth = edges.growth(level, others, loaded)
-        ratio = np.divide(growth, own, out=np.zeros_like(growth), where=own > 0.0)
-        part = np.where(loaded, edges.parts(level, others), 0.0)
-        # a strip of a body follows the formula where all of its contacts do
-        crossed, depths = np.zeros(worn.shape, np.bool_), np.zeros_like(worn)
-        parts = np.zeros_like(worn)
-        for c, rows in enumerate(edges.bodies.tolist()):
-            places = slice(c * len(self.passes), (c + 1) * len(self.passes))
-            for side, row in enumerate(rows):
-                crossed[row] |= ~edges.settled[places]
-                depths[row] += ratio[places] * wear[side, places]
-                np.maximum(parts[row], part[places], out=parts[row])
-        depths = np.where(crossed, start.stacked + depths, self.base + worn)
-        separation = edges.separation(level, of_contacts(depths, edges.bodies), part)
-        shape = *problem.shape, problem.grid.strips
-        assert start.whole_steps is not None
-        steps = np.minimum(start.whole_steps.reshape(part.shape) + 1.0, SETTLED)
-        steps = np.where(part < 1.0, 0.0, steps)
-        fields = {"separation": separation.reshape(shape), "part": part.reshape(shape)}
-        fields["whole_steps"] = steps.reshape(shape)
-        return depths, parts, fields
+        depths, parts = np.empty_like(worn), np.empty_like(worn)
+        fields = np.empty((3, *level.shape))
+        end_edges(edges, level, solved.line_load, wear, worn, depths, parts, fields)
+        separation, part, whole_steps = fields.reshape(3, *self.problem.shape, -1)
+        return depths, parts, dict(separation=separation, part=part, whole_steps=whole_steps)
 
     def _parts(self, contacts: ContactBatchSolution) -> FloatArray:
         """Return the contributions of the contacts to the wear, shape (2, contacts, strips) [m]."""
