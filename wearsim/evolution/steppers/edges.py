@@ -84,7 +84,9 @@ def edges_of_step(
     gap = np.broadcast_to(problem.nominal_gap, state.separation.shape)
     arrays = (gap, state.part, state.separation, state.whole_steps)
     gap, *fields = (kernel_input(array).reshape(-1, strips) for array in arrays)
-    empty = np.empty((2, *gap.shape))
-    edges = EdgeStrips(problem.body_rows, gap, state.stacked, added, base, *fields, *empty)
+    empty, rows = np.empty((2, *gap.shape)), state.stacked
+    edges = EdgeStrips(
+        problem.body_rows, gap, rows, added, base, *fields, *empty, np.empty_like(rows)
+    )
     start_edges(edges)
     return edges

@@ -269,10 +269,11 @@ class EndOfStep:
     ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
         """Return depths, `Solved.parts`, and fields of the state at the end of the step."""
         depths, parts = np.empty_like(worn), np.empty_like(worn)
-        fields = np.empty((3, *level.shape))
-        end_edges(edges, level, solved.line_load, wear, worn, depths, parts, fields)
-        separation, part, whole_steps = fields.reshape(3, *self.problem.shape, -1)
-        return depths, parts, dict(separation=separation, part=part, whole_steps=whole_steps)
+        ended = np.empty((3, *level.shape))
+        end_edges(edges, level, solved.line_load, wear, worn, depths, parts, ended)
+        separation, part, whole_steps = ended.reshape(3, *self.problem.shape, -1)
+        fields = {"separation": separation, "part": part, "whole_steps": whole_steps}
+        return depths, parts, fields
 
     def _parts(self, contacts: ContactBatchSolution) -> FloatArray:
         """Return the contributions of the contacts to the wear, shape (2, contacts, strips) [m]."""

@@ -38,6 +38,8 @@ class EdgeStrips(NamedTuple):
         As in `WearState`.
     first, rise : ndarray, shape (contacts, strips)
         u_0 and r [m], from `start_edges`.
+    greatest : ndarray, shape (bodies, realisations, strips)
+        Greatest f of the contacts of each body, from `start_edges`.
     """
 
     bodies: IntArray
@@ -50,16 +52,23 @@ class EdgeStrips(NamedTuple):
     whole_steps: FloatArray
     first: FloatArray
     rise: FloatArray
+    greatest: FloatArray
 
 
 @kernel
 def start_edges(strips: EdgeStrips) -> None:
-    """Fill u_0 and r of all strips.
+    """Fill u_0, r and greatest f of all strips.
 
     Ahead of an edge, the deformed surfaces of a strip touch at its inner end or not yet.
     """
     contacts, n = strips.part.shape
-    realisations = strips.rows.shape[1]
+    rows, realisations, _ = strips.rows.shape
+    along_cam = strips.bodies[len(strips.bodies) - 1, 0] > 0
+    for b in range(rows):
+        for v in range(realisations):
+            for i in range(n):
+                # the contacts of a roller along a cam meet it one after another
+                strips.greatest[b, v, i] = 1.0 if along_cam else 0.0
     for k in range(contacts):
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
@@ -75,6 +84,8 @@ def start_edges(strips: EdgeStrips) -> None:
             rise = max(rise, FLAT)
             depth = strips.rows[one, v, i] + strips.rows[other, v, i]
             strips.rise[k, i] = rise
+            for b in (one, other):
+                strips.greatest[b, v, i] = max(strips.greatest[b, v, i], part)
             strips.first[k, i] = depth - 0.5 * rise * part * part
 
 
@@ -105,16 +116,31 @@ def sum_of_wear(strips: EdgeStrips, wear: FloatArray, sums: FloatArray) -> None:
 @subroutine
 def by_others(
     strips: EdgeStrips, wear: FloatArray, sums: FloatArray, k: int, i: int
-) -> tuple[float, float]:
-    """Return wear by other contacts at the end of the step, and their wear in the whole step."""
-    worn, grown, realisations = 0.0, 0.0, sums.shape[1]
+) -> tuple[float, float, float]:
+    """Return the wear of a strip by the other contacts of its bodies.
+
+    Where another contact reaches further across the strip, its wear lowers the part ahead of the
+    edge too; the other wear is joint, on the part that this contact has crossed.
+
+    Returns
+    -------
+    ahead, grown, joint : float
+        Wear at the end of the step that lowers the whole strip, the same in the whole step, and
+        joint wear [m].
+    """
+    ahead, grown, joint, realisations = 0.0, 0.0, 0.0, sums.shape[1]
+    part = strips.part[k, i]
     for side in range(2):
         b, v = strips.bodies[k // realisations, side], k % realisations
         of_others = sums[b, v, i] - wear[side, k, i]
         if of_others > 0.0:
-            worn += of_others
-            grown += of_others / sums[b, v, i] * (strips.added[b, v, i] + sums[b, v, i])
-    return worn, grown
+            share = 1.0
+            if part < 1.0:
+                share = max(strips.greatest[b, v, i] - part, 0.0) / (1.0 - part)
+            ahead += share * of_others
+            joint += (1.0 - share) * of_others
+            grown += share * of_others / sums[b, v, i] * (strips.added[b, v, i] + sums[b, v, i])
+    return ahead, grown, joint
 
 
 @kernel
@@ -145,29 +171,33 @@ def linearise_edges(
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
         for i in range(n):
-            of_others, grown = by_others(strips, wear, sums, k, i)
+            ahead, grown, _ = by_others(strips, wear, sums, k, i)
             part = part_at(strips, k, i, level[k, i], grown)
             base = strips.base[one, v, i] + strips.base[other, v, i]
-            worn = level[k, i] - base - of_others
+            worn = level[k, i] - base - ahead
             slope, without = part, base
             if part <= 0.0:
                 depth = strips.rows[one, v, i] + strips.rows[other, v, i]
                 slope, without = np.inf, max(level[k, i], depth)
             elif part < 1.0:
                 slope += max(worn, 0.0) / strips.rise[k, i]
-                without = level[k, i] - part * worn / slope - of_others
+                without = level[k, i] - part * worn / slope - ahead
             gaps[k, i], slopes[k, i] = strips.gap[k, i] + without, slope
             for side in range(2):  # what the scaled wear of a strip opens beyond its mean wear
                 scaled[side, k, i] = 0.0
                 if slope < np.inf:
                     scaled[side, k, i] = (1.0 / slope - 1.0) * wear[side, k, i]
-    if contacts > realisations:
-        sum_of_wear(strips, scaled, sums)
-        for k in range(contacts):
+    if contacts == realisations:
+        return
+    sum_of_wear(strips, scaled, sums)
+    for k in range(contacts):
+        for i in range(n):
             for side in range(2):
                 b, v = strips.bodies[k // realisations, side], k % realisations
-                for i in range(n):
-                    gaps[k, i] -= sums[b, v, i] - scaled[side, k, i]
+                part, share = strips.part[k, i], 1.0
+                if part < 1.0:
+                    share = max(strips.greatest[b, v, i] - part, 0.0) / (1.0 - part)
+                gaps[k, i] -= share * (sums[b, v, i] - scaled[side, k, i])
 
 
 @kernel
@@ -214,16 +244,17 @@ def compare_edges(
         for i in range(n):
             if active[v]:
                 level[k, i] = gaps[k, i] + linear[k, i] - apart[k, i] - strips.gap[k, i]
-            of_others, grown = by_others(strips, wear, sums, k, i)
+            ahead, grown, joint = by_others(strips, wear, sums, k, i)
             part = part_at(strips, k, i, level[k, i], grown)
             base = strips.base[one, v, i] + strips.base[other, v, i]
-            mean, own = part * (level[k, i] - base - of_others), wear[0, k, i] + wear[1, k, i]
+            mean = part * (level[k, i] - base - ahead)
+            own = wear[0, k, i] + wear[1, k, i]
             if not loads[k, i] > 0.0:
-                rest[v] = max(rest[v], mean)
+                rest[v] = max(rest[v], mean - joint)
             elif slopes[k, i] == np.inf:
                 rest[v] = max(rest[v], own)
             else:
-                rest[v] = max(rest[v], abs(mean - own))
+                rest[v] = max(rest[v], abs(mean - own - joint))
     return rest
 
 
@@ -265,7 +296,7 @@ def end_edges(
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
         for i in range(n):
-            _, grown = by_others(strips, wear, sums, k, i)
+            _, grown, joint = by_others(strips, wear, sums, k, i)
             before, part, growth = strips.part[k, i], 0.0, 0.0
             if loads[k, i] > 0.0:
                 part = part_at(strips, k, i, level[k, i], grown)
@@ -274,7 +305,7 @@ def end_edges(
                 if part < 1.0:
                     growth = 0.5 * strips.rise[k, i] * (part * part - before * before)
             own = wear[0, k, i] + wear[1, k, i]
-            ratio = max(growth, 0.0) / own if own > 0.0 else 0.0
+            ratio = max(growth, 0.0) / (own + joint) if own > 0.0 else 0.0
             for side in range(2):
                 b = strips.bodies[k // realisations, side]
                 # a strip of a body follows the formula where all of its contacts do
@@ -304,7 +335,7 @@ def compile_edges() -> None:
     """Compile the kernels of a step by a call for one contact of one strip."""
     strip, rows, wear = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     bodies = np.array([[0, 1]])
-    strips = EdgeStrips(bodies, strip, rows, rows, rows, strip, strip, strip, strip, strip)
+    strips = EdgeStrips(bodies, strip, rows, rows, rows, *(strip,) * 5, rows.copy())
     start_edges(strips)
     linearise_edges(strips, strip, wear, np.ones((1, 1)), np.ones((1, 1)))
     one = np.ones(1, np.bool_)

@@ -65,8 +65,8 @@ class NormalContacts(NamedTuple):
     longitudinal_curvature, loads : ndarray, shape (sets, contacts)
         Relative curvature along rolling [1/m] and loads [N].
     line_load, half_length, separation : ndarray, shape (sets, contacts, strips)
-        Output: q [N/m], whose values on entry are the initial guess, a [m], and the distance between
-        the surfaces in strips without load [m].
+        Output: q [N/m], whose values on entry are the initial guess, a [m], and the distance
+        between the surfaces in strips without load [m].
     approach : ndarray, shape (sets, contacts)
         Output: approach [m], whose values on entry are the initial guess.
     status, iterations : ndarray of int, shape (sets, contacts)
