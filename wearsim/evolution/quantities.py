@@ -145,6 +145,8 @@ class CamStations:
     relocated : callable, optional
         Returns the stations for changes of the normal force at the stations of the unworn cam,
         shape (all stations,) [N], where wear moves the skids.
+    moved_skids : callable, optional
+        Returns the `skids` alone for these changes, which takes a tenth of the time.
     recorded : ndarray, shape (stations of the unworn cam, all stations), optional
         Matrix to values at the stations of the unworn cam, where skids have moved.
     """
@@ -169,6 +171,7 @@ class CamStations:
     panels: Stations | None = None
     skids: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     relocated: Callable[[FloatArray], CamStations] | None = None
+    moved_skids: Callable[[FloatArray], FloatArray] | None = None
     recorded: FloatArray | None = None
 
     @property
@@ -228,7 +231,7 @@ class CamStations:
     def joined(cls, stations: Sequence[CamStations]) -> CamStations:
         """Return the stations of several tests, of which each `matches` the first."""
         first, differing = stations[0], dict[str, Any]()
-        others = {"whole", "panels", "relocated", "recorded"}
+        others = {"whole", "panels", "relocated", "moved_skids", "recorded"}
         names = [item.name for item in fields(first) if item.name not in others]
         for name in names:
             values = [getattr(one, name) for one in stations]

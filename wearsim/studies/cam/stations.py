@@ -46,12 +46,12 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
     found = replace(
         _values(turn, point, stations.weight, segments, within, between),
         panels=stations,
-        skids=np.array([(arc.theta[0], arc.theta[-1]) for arc in turn.arcs]).reshape(-1, 2),
+        skids=_skids(turn),
     )
     if turn.is_worn:
         return found
     if moves(turn, found):
-        found = replace(found, relocated=partial(_relocated, turn))
+        found = _movable(found, turn)
     return found if found.inertia.size else joined(found)
 
 
@@ -62,12 +62,31 @@ def moves(turn: CamTurn, stations: CamStations) -> bool:
     return bool(free and fed_back and (turn.arcs or turn.greatest_demand > FOLLOWED))
 
 
+def _skids(turn: CamTurn) -> FloatArray:
+    """Return the ends of the arcs in which the roller skids, shape (arcs, 2) [rad]."""
+    return np.array([(arc.theta[0], arc.theta[-1]) for arc in turn.arcs]).reshape(-1, 2)
+
+
+def _worn_skids(turn: CamTurn, change: FloatArray) -> FloatArray:
+    """Return the skids for changes of the normal force; see `CamStations.moved_skids`."""
+    return _skids(turn.worn(change))
+
+
+def _movable(stations: CamStations, turn: CamTurn) -> CamStations:
+    """Return stations that are located again as the unworn turn wears."""
+    return replace(
+        stations,
+        relocated=partial(_relocated, turn),
+        moved_skids=partial(_worn_skids, turn),
+    )
+
+
 def _relocated(turn: CamTurn, change: FloatArray) -> CamStations:
     """Return the stations for changes of the normal force; see `CamStations.relocated`."""
     found = cam_stations(turn.worn(change))
     assert found.panels is not None
     matrix, _, _ = moved_stations(found.panels, turn.stations)
-    return replace(found, relocated=partial(_relocated, turn), recorded=matrix)
+    return replace(_movable(found, turn), recorded=matrix)
 
 
 _COMPARED = (

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from wearsim.errors import StepError
+from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
@@ -18,6 +21,7 @@ from wearsim.plugins import BODIES
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import cam_observables, lift_curves
 from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.run.assemble import coarse_stepper
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import Due, due_records, history_row, states_at
@@ -162,12 +166,16 @@ class RunObservations:
         cam, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
     grid : Grid
         Strips at the end.
+    failure : StepError, optional
+        Why the test ended where it became too deep; it then has no curves, and the later rows are
+        nan.
     """
 
     rows: list[Observables]
     scalars: dict[str, float]
     curves: dict[str, FloatArray]
     grid: Grid
+    failure: StepError | None = None
 
 
 def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
@@ -256,14 +264,23 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
     tests = Evolution(problem, state, stepper, stop, steps, schedule.next_record)
     rows = [[row] for row in observables_of(stepper, problem, state, threshold)]
     results: dict[int, RunObservations | Exception] = {}
+    with_courses = scenario.evolution.strip_error
     courses = [Course() for _ in runs]
+    records = len(schedule.all_records(stop, stepper.pass_by_pass))
     for advance in tests:
-        add_step(courses, advance)
+        if with_courses:
+            add_step(courses, advance)
         due = due_records(advance, schedule, stop, stepper.pass_by_pass)
         for part in [due] if runs[0].can_be_batched else [[one] for one in due]:
             tests.fail(_record(stepper, advance, part, threshold, rows))
-        end = advance.end
-        over = np.flatnonzero(end.passes >= stop)
+        end, deep = advance.end, too_deep_tests(advance, scenario)
+        for number, failure in deep.items():
+            missing = [dict.fromkeys(rows[number][0], math.nan)] * (records - len(rows[number]))
+            kept = rows[number] + missing
+            results[number] = RunObservations(kept, {}, {}, advance.problem.grid, failure)
+        tests.end(deep)
+        going = [number not in deep for number in advance.numbers.tolist()]
+        over = np.flatnonzero((end.passes >= stop) & going)
         numbers = advance.numbers[over].tolist()
         scenarios = [runs[number].draws.scenario for number in numbers]
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
@@ -300,7 +317,11 @@ def add_strip_errors(
         estimated.
     """
     stepper = coarse_stepper(runs[0].draws, problem)
-    ended = [number for number, course in enumerate(courses) if course.passes and number in results]
+    ended = [
+        number
+        for number, course in enumerate(courses)
+        if course.passes and number in results and not _is_failed(results[number])
+    ]
     if stepper is None or not ended:
         return {}
     places, steps = np.array(ended), runs[0].draws.scenario.evolution.max_steps
@@ -316,6 +337,32 @@ def add_strip_errors(
             result.scalars["depth_error"] += float(errors[0])
             result.scalars["volume_error"] += float(errors[1])
     return added
+
+
+def _is_failed(result: RunObservations | Exception) -> bool:
+    return not isinstance(result, RunObservations) or result.failure is not None
+
+
+def too_deep_tests(advance: Advance, scenario: Scenario, less: str = "") -> dict[int, StepError]:
+    """Return the failures of tests that a step wears beyond the validity of the models, by number.
+
+    Parameters
+    ----------
+    advance : Advance
+        The step.
+    scenario : Scenario
+        Of any of the tests.
+    less : str
+        As in `too_deep_failure`.
+    """
+    each = zip(
+        advance.numbers.tolist(),
+        greatest_depth(advance.end.depths).tolist(),
+        advance.end.passes.tolist(),
+        strict=True,
+    )
+    failures = {n: too_deep_failure(scenario, depth, passes, less) for n, depth, passes in each}
+    return {number: failure for number, failure in failures.items() if failure}
 
 
 def _record(

@@ -9,6 +9,8 @@ from functools import partial
 
 import numpy as np
 
+from wearsim.errors import StepError
+from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.limits import Crossings, Limit, first_crossings, ratios, take_side_step
 from wearsim.evolution.observables import depth
@@ -24,11 +26,14 @@ from wearsim.studies.ensemble.batch import (
     curves_at_end,
     joined_problem,
     observables_of,
+    too_deep_tests,
 )
+from wearsim.studies.failures import too_deep_failure
 from wearsim.types import FloatArray, IntArray
 
 TOLERANCE = 1e-6  # relative error of a quantity at its limit
 FLAT = 0.05  # log-slope below which the numerical error of a life is searched for
+_LIMITS = "the limits in [limit]"  # which a test shall reach before it is too deep
 _BACK = 0.01  # part of the passes over which the log-slope is taken
 
 
@@ -44,7 +49,8 @@ class LifeRun(RunObservations):
     @property
     def reached(self) -> bool:
         """Whether a limit was reached, and its numerical bounds are known."""
-        return math.isfinite(self.scalars["life"]) and math.isfinite(self.scalars["life_high"])
+        known = ("life", "life_high")
+        return self.failure is None and all(math.isfinite(self.scalars[name]) for name in known)
 
 
 @dataclass
@@ -109,9 +115,11 @@ class _Group:
             chosen = np.array([number])
             self._finish(number, self.problem.at(chosen), self.state.at(chosen), life)
         self.evolution.end(at_once.tolist())
+        with_courses = self.runs[0].draws.scenario.evolution.strip_error
         courses = [Course() for _ in self.tests]
         for advance in self.evolution:
-            add_step(courses, advance)
+            if with_courses:
+                add_step(courses, advance)
             self._take(advance)
         failures = self.evolution.failures
         reached = {k: test.found for k, test in enumerate(self.tests) if test.found is not None}
@@ -143,6 +151,7 @@ class _Group:
         for _, crossings in done:
             for crossing in crossings:
                 self._reached(advance, crossing)
+        self._end_deep(advance)
         over = [number for number in numbers if self._is_over(number)]
         self.evolution.end(over)
         ended = np.flatnonzero(advance.end.passes >= self.stop)
@@ -153,10 +162,21 @@ class _Group:
                 some = advance.problem.at(chosen), advance.end.at(chosen)
                 self._finish(numbers[place], *some, life)
 
+    def _end_deep(self, advance: Advance) -> None:
+        """End tests that become too deep before they reach a limit."""
+        scenario = self.runs[0].draws.scenario
+        deep = too_deep_tests(advance, scenario, _LIMITS)
+        for place, number in enumerate(advance.numbers.tolist()):
+            if number in deep and self.tests[number].found is None:
+                chosen = np.array([place])
+                some = advance.problem.at(chosen), advance.end.at(chosen)
+                self._finish(number, *some, {}, deep[number])
+
     def _reached(self, advance: Advance, crossing: Crossings) -> None:
         """Store the tests that have reached a limit, with the numerical error of their lives."""
         state, problem = crossing.state, crossing.problem
         slope, of_depth = self._slopes(crossing)
+        depths = greatest_depth(state.depths)
         depth_error = state.depth_error / np.maximum(depth(problem, state), 1e-300)
         for place, number in enumerate(advance.numbers[crossing.places].tolist()):
             test, chosen = self.tests[number], np.array([place])
@@ -176,7 +196,9 @@ class _Group:
                 low, high = self._crossing_of(test, 1.0 - error, passes), math.inf
                 test.level = 1.0 + error
             life = {"life": passes, "life_low": low, "life_high": high}
-            self._finish(number, problem.at(chosen), state.at(chosen), life)
+            scenario, deepest = self.runs[number].draws.scenario, float(depths[place])
+            failure = too_deep_failure(scenario, deepest, passes, _LIMITS)
+            self._finish(number, problem.at(chosen), state.at(chosen), life, failure)
 
     def _widen(self, number: int, depth: float, volume: float) -> None:
         """Add the relative errors of depth and volume due to the strips to the bounds of a life."""
@@ -199,6 +221,8 @@ class _Group:
         test = self.tests[number]
         if test.found is None:
             return False
+        if test.found.failure is not None:
+            return True
         passes, relative = test.history[-1]
         scalars = test.found.scalars
         if math.isinf(scalars["life_high"]) and float(relative[test.limit]) >= test.level:
@@ -238,7 +262,12 @@ class _Group:
         return slope, of_depth
 
     def _finish(
-        self, number: int, problem: WearProblem, state: WearState, life: dict[str, float]
+        self,
+        number: int,
+        problem: WearProblem,
+        state: WearState,
+        life: dict[str, float],
+        failure: StepError | None = None,
     ) -> None:
         """Store the result of a test that ends in the given state, of one realisation."""
         test = self.tests[number]
@@ -250,7 +279,7 @@ class _Group:
             "limit_angle": self._angle(test.limit, problem, state),
         }
         (curves,) = curves_at_end(problem, state, [self.runs[number].draws.scenario])
-        test.found = LifeRun(rows, scalars, curves, problem.grid)
+        test.found = LifeRun(rows, scalars, curves, problem.grid, failure)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:
         """Return the angle of a cam at which the limited quantity is greatest [rad]."""

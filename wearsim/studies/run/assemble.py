@@ -238,11 +238,12 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
     Raises
     ------
     CapabilityError
-        If the model does not support the scenario's creepage.
+        If the model does not support the scenario's creepage or its creep factor.
     """
     creepage, materials = scenario.creepage, (scenario.cylinder.material, scenario.roller.material)
-    model = scenario.contact.build(grid, materials)
+    model, factor = scenario.contact.build(grid, materials), scenario.friction.creep_factor
     needs = {
+        "creep_factor": (f"friction.creep_factor = {factor:g}", factor != 1.0),
         "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
         "creepage_variation": ("creepage.differential_slip = true", creepage.differential_slip),
     }
@@ -257,7 +258,7 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
                 f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
                 f" {setting}; choose another contact.model"
             )
-    return model
+    return model if factor == 1.0 else model.with_creep_factor(factor)
 
 
 def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:

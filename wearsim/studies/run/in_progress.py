@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wearsim.errors import Interrupted, ResultsFileError, SolverError, StepError, failure_text
+from wearsim.errors import Interrupted, ResultsFileError, SolverError, failure_text
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
@@ -29,7 +29,7 @@ from wearsim.results import (
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, station_columns
 from wearsim.studies.contact.comparison import REFERENCE, excess
-from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
+from wearsim.studies.failures import explained, failures_explained, too_deep_failure
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, coarse_stepper, start_height
@@ -272,11 +272,10 @@ class RunInProgress:
     def _check_depth(self) -> None:
         """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
         depth = max(float(worn.max()) for worn in self.recorder.state.depths)
-        if text := too_deep(self.scenario, depth):
-            less = f"the limit {self.limit.text}" if self.limit else length_key(self.scenario)
-            remedy = f"lower {less}, or set evolution.allow_deep = true"
-            resuming = "; with the option allow_deep, resume continues" if self.path else ""
-            raise StepError(f"after pass {self._passes:.0f} {text}", remedy=remedy + resuming)
+        less = f"the limit {self.limit.text}" if self.limit else ""
+        resuming = "; with the option allow_deep, resume continues" if self.path else ""
+        if failure := too_deep_failure(self.scenario, depth, self._passes, less, resuming):
+            raise failure
 
     def _verify_model(self, start: float) -> None:
         """Compare an automatically chosen contact model with exact theory, where it is installed.
@@ -293,7 +292,8 @@ class RunInProgress:
         problem = self.present
         batch = present_batch(problem, state)
         tolerance, grid = choice.auto.tolerance, problem.grid
-        if text := excess(REFERENCE, choice, grid, materials, batch, tolerance):
+        factor = self.scenario.friction.creep_factor
+        if text := excess(REFERENCE, problem.model, grid, materials, batch, tolerance, factor):
             self.warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
 
     def warn(self, message: str) -> None:
