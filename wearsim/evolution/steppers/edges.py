@@ -86,7 +86,15 @@ def edges_of_step(
     gap, *fields = (kernel_input(array).reshape(-1, strips) for array in arrays)
     empty, rows = np.empty((2, *gap.shape)), state.stacked
     edges = EdgeStrips(
-        problem.body_rows, gap, rows, added, base, *fields, *empty, np.empty_like(rows)
+        problem.body_rows,
+        gap,
+        kernel_input(state.contacts.approach),
+        rows,
+        added,
+        base,
+        *fields,
+        *empty,
+        np.empty_like(rows),
     )
     start_edges(edges)
     return edges

@@ -16,6 +16,8 @@ from wearsim.mechanics.numerics.multistep import ROWS
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SETTLED = float(ROWS)  # steps after which all points of a formula lie in contact
+ELASTIC = 0.5
+LEAST, FULL, NONE = 0.1, 0.5, 1.0
 FLAT = 1e-15  # least rise of a gap across a strip [m]
 
 
@@ -28,6 +30,8 @@ class EdgeStrips(NamedTuple):
         Rows of the two bodies of each contact.
     gap : ndarray, shape (contacts, strips)
         Gap before wear [m].
+    approach : ndarray, shape (contacts,)
+        Approach of each contact [m].
     rows : ndarray, shape (bodies, realisations, strips)
         Mean depths of the bodies [m].
     added : ndarray, shape (bodies, realisations, strips)
@@ -44,6 +48,7 @@ class EdgeStrips(NamedTuple):
 
     bodies: IntArray
     gap: FloatArray
+    approach: FloatArray
     rows: FloatArray
     added: FloatArray
     base: FloatArray
@@ -71,7 +76,11 @@ def start_edges(strips: EdgeStrips) -> None:
                 strips.greatest[b, v, i] = 1.0 if along_cam else 0.0
     for k in range(contacts):
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
-        v = k % realisations
+        v, least = k % realisations, np.inf
+        for i in range(n):
+            depth = strips.rows[one, v, i] + strips.rows[other, v, i]
+            least = min(least, strips.gap[k, i] + depth)
+        elastic = ELASTIC * (strips.approach[k] - least)
         for i in range(n):
             part, apart = strips.part[k, i], strips.separation[k, i]
             rise = 0.0
@@ -80,7 +89,11 @@ def start_edges(strips: EdgeStrips) -> None:
             elif part <= 0.0:
                 ahead = strips.separation[k, min(i + 1, n - 1)]
                 ahead = max(ahead, strips.separation[k, max(i - 1, 0)])
-                rise = min(ahead - apart, 2.0 * apart)
+                rise = ahead - apart
+                if rise > 0.0:
+                    kept = (NONE - elastic / rise) / (NONE - FULL)
+                    rise *= min(max(kept, LEAST), 1.0)
+                rise = min(rise, 2.0 * apart)
             rise = max(rise, FLAT)
             depth = strips.rows[one, v, i] + strips.rows[other, v, i]
             strips.rise[k, i] = rise
@@ -335,7 +348,7 @@ def compile_edges() -> None:
     """Compile the kernels of a step by a call for one contact of one strip."""
     strip, rows, wear = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     bodies = np.array([[0, 1]])
-    strips = EdgeStrips(bodies, strip, rows, rows, rows, *(strip,) * 5, rows.copy())
+    strips = EdgeStrips(bodies, strip, np.ones(1), rows, rows, rows, *(strip,) * 5, rows.copy())
     start_edges(strips)
     linearise_edges(strips, strip, wear, np.ones((1, 1)), np.ones((1, 1)))
     one = np.ones(1, np.bool_)
