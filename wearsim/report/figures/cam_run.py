@@ -19,7 +19,8 @@ from wearsim.report.parts import (
     name_axes,
     titled_figure,
 )
-from wearsim.report.text import PER_SI, shown
+from wearsim.report.summary import with_error
+from wearsim.report.text import PER_SI
 from wearsim.results import Result
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.types import FloatArray
@@ -67,11 +68,11 @@ def cam_run_figure(result: Result, measured: tuple[Measured, ...] = ()) -> Figur
 
 def _caption(result: Result) -> str:
     final = result.final
-    error, turns = float(np.max(final["lift_error_m"])), float(np.max(final["turns"]))
+    turns, stated = float(np.max(final["turns"])), float(np.max(final["lift_error_error_m"]))
     place = float(np.max(final["depth_angle_rad"])) * DEG
     return (
         f"{turns:,.0f} turns, {caption(result)} at {place:.4g} deg,"
-        f" lift error {shown(error, 'um')} peak to peak"
+        f" lift error {with_error(np.asarray(final['lift_error_m']), stated, 'um')} peak to peak"
     )
 
 

@@ -93,7 +93,7 @@ def _profile(result: Result, measured: Sequence[Measured]) -> Plot:
             hover(plot, [line], ("y", "@y{0.000} mm"), (name, "@shown{0.000} um"))
     add_measured(plot, measured)
     legend(plot)
-    deepest = shown(float(worn[-1].max()), "um")
+    deepest = shown(float(np.max(result.depth[-1])), "um")
     text = f"Height across the track; at the end the {body} is {deepest} deep."
     return Plot(f"Worn profile of the {body}{where}", text, plot)
 
@@ -187,7 +187,7 @@ def _map(result: Result, stations: Stations) -> Plot:
     tips = ("angle", "$x{0.0} deg"), ("y", "$y{0.00} mm"), ("depth", "@image{0.00} um")
     hover(plot, [picture], *tips)
     place = float(np.max(result.final["depth_angle_rad"])) * DEG
-    deepest = shown(float(worn.max()), "um")
+    deepest = shown(float(np.max(result.depth[-1])), "um")
     text = f"At the end the cam is deepest at {place:.4g} deg: {deepest}."
     return Plot("Worn depth over angle and width", text, plot)
 

@@ -11,12 +11,20 @@ import numpy as np
 from wearsim.errors import StepError
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
+from wearsim.evolution.observables import depth_error_by_stations, volume_error_by_stations
+from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
-from wearsim.evolution.strip_errors import Course, add_step, coarse_courses, strip_errors
+from wearsim.evolution.strip_errors import (
+    Course,
+    Observe,
+    add_step,
+    coarse_courses,
+    strip_errors,
+)
 from wearsim.plugins import BODIES
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import cam_observables, lift_curves
@@ -162,8 +170,8 @@ class RunObservations:
     scalars : dict of str to float
         Error estimates, and numbers of steps and contact solutions.
     curves : dict of str to ndarray
-        At the end: "depth_profile", the worn depth of the cylinder or of the deepest station of a
-        cam, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
+        At the end: "depth_profile", the worn depth of the cylinder or of a cam where it is
+        deepest, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
     grid : Grid
         Strips at the end.
     failure : StepError, optional
@@ -232,14 +240,26 @@ def curves_at_end(
     scenarios : sequence of Scenario
         Scenario of each realisation.
     """
-    depths = state.cylinder_depth[:, 0]  # of a cam, the groove at the deepest station is stored
-    deepest = depths.max(axis=-1).argmax(axis=0)
-    found = [{"depth_profile": depths[station, v]} for v, station in enumerate(deepest)]
-    if problem.kinematics.cam is not None:
-        stations = [turn_of(scenario).stations for scenario in scenarios]
-        for curves, curve in zip(found, lift_curves(problem, state, stations), strict=True):
-            curves["lift_error_curve"] = curve
+    depths, cam = state.cylinder_depth[:, 0], problem.kinematics.cam
+    if cam is None:
+        return [{"depth_profile": profile} for profile in depths[0]]
+    angles = cam.greatest(depths.max(axis=-1)).angle.tolist()
+    found = [
+        {"depth_profile": np.maximum(cam.at_angle(depths[:, v], angle), 0.0)}
+        for v, angle in enumerate(angles)
+    ]
+    stations = [turn_of(scenario).stations for scenario in scenarios]
+    for curves, curve in zip(found, lift_curves(problem, state, stations), strict=True):
+        curves["lift_error_curve"] = curve
     return found
+
+
+def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:
+    """Return the scalars of a state of one realisation, by the names of `SCALARS`."""
+    scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
+    scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0])
+    scalars["volume_error"] += float(volume_error_by_stations(problem, state)[0])
+    return scalars
 
 
 def observe(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]:
@@ -285,8 +305,8 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         scenarios = [runs[number].draws.scenario for number in numbers]
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
         for place, number, found in zip(over.tolist(), numbers, curves, strict=True):
-            scalars = {name: float(getattr(end, name)[place]) for name in SCALARS}
-            grid = advance.problem.grid
+            chosen, grid = np.array([place]), advance.problem.grid
+            scalars = scalars_of(advance.problem.at(chosen), end.at(chosen))
             results[number] = RunObservations(rows[number], scalars, found, grid)
     add_strip_errors(runs, problem, courses, results)
     results |= tests.failures
@@ -298,7 +318,8 @@ def add_strip_errors(
     problem: WearProblem,
     courses: Sequence[Course],
     results: Mapping[int, RunObservations | Exception],
-) -> dict[int, FloatArray]:
+    observe: Observe | None = None,
+) -> dict[int, tuple[FloatArray, dict[str, FloatArray]]]:
     """Add the errors due to the strips to those of the results, by the same tests on coarse ones.
 
     Parameters
@@ -309,12 +330,14 @@ def add_strip_errors(
     courses : sequence of Course
         Of each test.
     results : mapping of int to RunObservations or Exception
+    observe : callable, optional
+        Returns the observables that the courses have.
 
     Returns
     -------
-    dict of int to ndarray, shape (3,)
-        Added errors of depth [m], volume [m^3] and profile by number; none where they are not
-        estimated.
+    dict of int to tuple
+        By number the added errors of depth [m], volume [m^3] and profile, shape (3,), and those
+        of the observables by steps and strips at the end; none where they are not estimated.
     """
     stepper = coarse_stepper(runs[0].draws, problem)
     ended = [
@@ -326,14 +349,19 @@ def add_strip_errors(
         return {}
     places, steps = np.array(ended), runs[0].draws.scenario.evolution.max_steps
     needed = np.array([courses[number].passes[-1] for number in ended])
-    added = {}
-    coarse = coarse_courses(problem.at(places), stepper, runs[0].stop, needed, steps)
+    added: dict[int, tuple[FloatArray, dict[str, FloatArray]]] = {}
+    coarse = coarse_courses(problem.at(places), stepper, runs[0].stop, needed, steps, observe)
     for number, other in zip(ended, coarse, strict=True):
         course, result = courses[number], results[number]
         passes, sizes = np.array(course.passes), np.array(course.sizes).T
         errors = strip_errors(other, passes, sizes, course)[:, -1]
         if isinstance(result, RunObservations) and np.isfinite(errors).all():
-            added[number] = errors
+            observed = {
+                name: np.array([item[name] for item in course.observed])
+                for name in (course.observed[0] if course.observed else ())
+            }
+            found = observed_errors(other, np.append(0.0, passes), observed)
+            added[number] = errors, {name: values[-1] for name, values in found.items()}
             result.scalars["depth_error"] += float(errors[0])
             result.scalars["volume_error"] += float(errors[1])
     return added

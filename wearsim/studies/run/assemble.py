@@ -29,13 +29,8 @@ from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import growth_of, strips_of_run
 from wearsim.studies.run.groove import predicted_half_width
-from wearsim.studies.run.inputs import (
-    MAX_NODES,
-    contact_inputs,
-    minimum_nodes,
-    redrawing,
-    with_nodes,
-)
+from wearsim.studies.run.inputs import contact_inputs
+from wearsim.studies.run.nodes import MAX_NODES, minimum_nodes, redrawing, with_nodes
 from wearsim.types import FloatArray, Grid
 from wearsim.units import in_engineers_unit
 
@@ -265,7 +260,7 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
     """Return the problem with quadrature nodes for the inputs that are drawn at every pass.
 
     Unless the scenario gives their number, they are doubled until the initial wear has converged to
-    half the tolerance, or `MAX_NODES` are reached.
+    half the tolerance, as has the known part of its error, or `MAX_NODES` are reached.
     """
     evolution = draws.scenario.evolution
     count, one = evolution.nodes or minimum_nodes(draws.passes), np.ones(1)
@@ -276,7 +271,8 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
         fresh = fresh_state(found)
         full = volume_of(problem, explicit_step(found, fresh, one).depths)
         half = volume_of(problem, explicit_step(*half_quadrature(found, fresh), one).depths)
-        if (np.abs(full - half) <= 0.5 * evolution.tolerance * full).all():
+        error = np.maximum(np.abs(full - half), found.quadrature_error * full)
+        if (error <= 0.5 * evolution.tolerance * full).all():
             return found
         count *= 2
 
