@@ -243,8 +243,8 @@ class ContactBatchSolution:
     def at(self, numbers: IntArray) -> ContactBatchSolution:
         """Return some of the solutions, by number and in that order."""
         apart = None if self.separation is None else self.separation[numbers]
-        columns = (getattr(self, name)[numbers] for name in _OUTPUTS)
-        return ContactBatchSolution(self.y, *columns, separation=apart)
+        columns = {name: getattr(self, name)[numbers] for name in _OUTPUTS}
+        return ContactBatchSolution(self.y, **columns, separation=apart)
 
     def with_others(self, numbers: IntArray, others: ContactBatchSolution) -> ContactBatchSolution:
         """Return these solutions with others at some numbers."""

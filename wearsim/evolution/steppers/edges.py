@@ -36,7 +36,8 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     stations, each, _ = problem.shape
     varies = problem.constant_load is None or len(problem.varying) > 0
     apart = not problem.has_nodes and (stations == 1 or each == 1)
-    return contacts.separation is not None and apart and not varies
+    wanted = problem.resolve_edges and contacts.separation is not None
+    return wanted and apart and not varies
 
 
 def starting_edges(problem: WearProblem, contacts: ContactBatchSolution) -> dict[str, FloatArray]:
@@ -83,8 +84,10 @@ def edges_of_step(
     strips = problem.grid.strips
     gap = np.broadcast_to(problem.nominal_gap, state.separation.shape)
     arrays = (gap, state.part, state.separation, state.whole_steps)
-    gap, *fields = (kernel_input(array).reshape(-1, strips) for array in arrays)
-    empty, rows = np.empty((2, *gap.shape)), state.stacked
+    gap, part, separation, whole_steps = (
+        kernel_input(array).reshape(-1, strips) for array in arrays
+    )
+    rows = state.stacked
     edges = EdgeStrips(
         problem.body_rows,
         gap,
@@ -92,8 +95,11 @@ def edges_of_step(
         rows,
         added,
         base,
-        *fields,
-        *empty,
+        part,
+        separation,
+        whole_steps,
+        np.empty_like(gap),
+        np.empty_like(gap),
         np.empty_like(rows),
     )
     start_edges(edges)

@@ -291,7 +291,8 @@ def _with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatAr
     scale = np.ones(len(order))
     next_steps(sums, past.spans, ones, past.order, scale, 1.0, 1.0, 1, ones, of_sums, order)
     missing, width = of_sums - errors.sum(axis=-1, keepdims=True), parts.sum(axis=-1, keepdims=True)
-    return errors + parts * np.divide(missing, width, out=np.zeros_like(width), where=width > 0.0)
+    shift = np.divide(missing, width, out=np.zeros_like(width), where=width > 0.0)
+    return np.asarray(errors + parts * shift)
 
 
 def _crossed(state: WearState) -> BoolArray | None:
@@ -305,7 +306,7 @@ def _crossed(state: WearState) -> BoolArray | None:
 def _squares(depths: FloatArray) -> FloatArray:
     """Return the sum of squares of the depths of all bodies, (N,), infinite without any [m^2]."""
     squares = (depths**2).sum(axis=(0, 2))
-    return np.where(squares > 0.0, squares, np.inf)
+    return np.asarray(np.where(squares > 0.0, squares, np.inf))
 
 
 def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:

@@ -205,9 +205,10 @@ class EndOfStep:
                 linear,
             )
             if edges is not None:
-                apart, loaded = kernel_input(solved.separation), kernel_input(solved.line_load)
+                assert solved.separation is not None
+                apart, load = kernel_input(solved.separation), kernel_input(solved.line_load)
                 of_edges = compare_edges(
-                    edges, active, gaps, slopes, linear, apart, loaded, new, level
+                    edges, active, gaps, slopes, linear, apart, load, new, level
                 )
                 rest = np.maximum(rest, of_edges)
             if np.count_nonzero(active) < len(active):  # of realisations that have converged

@@ -108,7 +108,7 @@ def part_at(strips: EdgeStrips, k: int, i: int, level: float, grown: float) -> f
     if strips.part[k, i] >= 1.0:
         return 1.0
     part = 0.5 + (level - strips.first[k, i] - grown) / strips.rise[k, i]
-    return min(max(part, 0.0), 1.0)
+    return float(min(max(part, 0.0), 1.0))
 
 
 @subroutine
