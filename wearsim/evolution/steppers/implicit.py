@@ -308,7 +308,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     as the depths, so that Archard's wear law holds to round-off. Passes are counted one by one: the
     formula is applied to the depths half a pass later, ``u + f/2`` with the wear per pass f, whose
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
-    decrease, or contact would be lost, is repeated at first order.
+    decrease is repeated at second order, and at first order if they still decrease; so is one in
+    which contact would be lost. The state returned has the order of its formula.
 
     Raises
     ------
@@ -327,12 +328,14 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         if len(order) > 1 or order[0] == 1:
             raise
         return _step(here, state, passes, conditions, np.ones_like(order))[0]
-    again: IntArray = (decreased & (order > 1)).nonzero()[0]
-    if again.size:
-        conditions = _Conditions(*(column[..., again] for column in vars(conditions).values()))
-        some = here.at(again), state.at(again), passes[again]
-        part, _ = _step(*some, conditions, np.ones_like(again))
-        end = end.with_others(again, part)
+    # strips that leave the contact: their depth can decrease from the third order on
+    for lower in (2, 1):
+        again: IntArray = (decreased & (end.order > lower)).nonzero()[0]
+        if again.size:
+            columns = (column[..., again] for column in vars(conditions).values())
+            some = here.at(again), state.at(again), passes[again], _Conditions(*columns)
+            part, decreased[again] = _step(*some, np.full_like(again, lower))
+            end = end.with_others(again, part)
     return end
 
 
@@ -381,6 +384,7 @@ def _step(
         past_energy=new_energy[:, 0, :, 0],
         past_feedback=past_feedback,
         past_spans=spans,
+        order=order,
     )
     decreased = (base + worn < start).any(axis=(0, 2)) | (energy[0, :, 0] < 0.0)
     return end, decreased
