@@ -330,7 +330,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         return _step(here, state, passes, conditions, np.ones_like(order))[0]
     # strips that leave the contact: their depth can decrease from the third order on
     for lower in (2, 1):
-        again: IntArray = (decreased & (end.order > lower)).nonzero()[0]
+        again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
         if again.size:
             columns = (column[..., again] for column in vars(conditions).values())
             some = here.at(again), state.at(again), passes[again], _Conditions(*columns)
