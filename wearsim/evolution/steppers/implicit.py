@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import NamedTuple
@@ -13,7 +14,13 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.contacts import at_least
 from wearsim.evolution.error_estimates import (
+    COVER as COVER_OF_DOUBLING,
+)
+from wearsim.evolution.error_estimates import (
+    DEPTH_EXPONENT,
+    VOLUME_EXPONENT,
     greatest_depth,
+    volume_of,
     with_pass_errors,
 )
 from wearsim.evolution.problem import WearProblem
@@ -21,7 +28,12 @@ from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
-from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
+from wearsim.evolution.steppers.loads import (
+    abrupt_loads,
+    mean_force,
+    smooth_loads,
+    with_feedback,
+)
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.jit import kernel_input
@@ -37,11 +49,17 @@ from wearsim.mechanics.numerics.multistep import (
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.5  # part of the tolerance that a step may add to the profiles
-COVER = np.array([[5.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
+COVER = 5.0, 2.0, 6.0  # safety factors on the errors of depth, volume, profile
 # of a step at a lower order, compared with other orders: the differences that a step leaves are
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
+# safety factors of step doubling, whose error of the volume is a sum of absolute changes
+DOUBLED = COVER_OF_DOUBLING, math.inf, COVER_OF_DOUBLING
+# the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
+# number, to a least part of itself at the second one
+ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
+LEAST_AIM_OF_ROWS = 0.7  # the same where rows of a log are shorter than a step
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
 
@@ -95,7 +113,8 @@ class ImplicitStepper(StepDoublingStepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        part, aim = (passes / stop) ** PART_EXPONENT, SHARE * self.tolerance
+        left = self._left(problem, state, stop, COVER)
+        part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
             past.wear, past.spans, depths, past.order, part, aim, KEEP, own, order
         )
@@ -107,6 +126,7 @@ class ImplicitStepper(StepDoublingStepper):
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, part, aim, KEEP)
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
+        over = over * left  # it shortens the next step
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
@@ -125,7 +145,10 @@ class ImplicitStepper(StepDoublingStepper):
         half, end = doubled.path
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        part = (end.passes / stop) ** PART_EXPONENT
+        left = self._left(problem, state, stop, DOUBLED)
+        if not problem.varying:  # many rows of a log average out within a step
+            left = np.where(doubled.varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
+        part = (end.passes / stop) ** PART_EXPONENT / left
         scale = part / self.tolerance
         over, ratio = next_steps(
             past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, own, order
@@ -139,10 +162,42 @@ class ImplicitStepper(StepDoublingStepper):
         if unknown.any():
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
+        over = np.where(unknown, over, over * left)
         if self.forced_step is not None:  # steps of a fixed length may be too long for fourth order
             order = np.minimum(order, MAX_ORDER - 1)
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
         return Attempt((half, end.replaced(order=order, **others)), over, ratio)
+
+    def _left(
+        self, problem: WearProblem, state: WearState, stop: float, cover: Sequence[float]
+    ) -> FloatArray:
+        """Return the part of the error of a step that errors before it leave, (realisations,).
+
+        Errors of the volume add up during a test if they have the same sign.
+
+        Parameters
+        ----------
+        problem : WearProblem
+        state : WearState
+            State at the start of the step.
+        stop : float
+            Passes at the end of the test.
+        cover : sequence of float
+            Safety factors that the errors of depth, volume and profile of the state contain.
+        """
+        volumes = volume_of(problem, state.depths).tolist()
+        errors = np.array([state.volume_error, state.profile_error]) - state.irreducible[1:]
+        low, high = ADDED_UP
+        found = []
+        columns = state.passes.tolist(), volumes, *errors.tolist()
+        for passes, volume, of_volume, of_profile in zip(*columns, strict=True):
+            grown, worst = passes / stop, 0.0
+            if volume > 0.0:
+                worst = of_volume / (volume * cover[1]) * grown**VOLUME_EXPONENT
+                worst = max(worst, of_profile / cover[2] * grown**DEPTH_EXPONENT)
+            part = (high - worst / self.tolerance) / (high - low)
+            found.append(min(max(part, LEAST_AIM), 1.0))
+        return np.array(found)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
@@ -193,7 +248,7 @@ def _estimates(
     if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
-    found = COVER * sizes
+    found = np.array(COVER)[:, None] * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
     depth, volume, profile = found + end.irreducible
     return {
@@ -309,7 +364,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     formula is applied to the depths half a pass later, ``u + f/2`` with the wear per pass f, whose
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
     decrease is repeated at second order, and at first order if they still decrease; so is one in
-    which contact would be lost. The state returned has the order of its formula.
+    which contact would be lost. A step in which the load jumps is of first order. The state
+    returned has the order of its formula.
 
     Raises
     ------
@@ -321,6 +377,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = _conditions(here, problem, state, passes)
     order = Past.of(state).order
+    if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
+        order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:
         end, decreased = _step(here, state, passes, conditions, order)
     except StepError:
