@@ -20,7 +20,6 @@ from wearsim.evolution.error_estimates import (
     DEPTH_EXPONENT,
     VOLUME_EXPONENT,
     greatest_depth,
-    volume_of,
     with_pass_errors,
 )
 from wearsim.evolution.problem import WearProblem
@@ -49,13 +48,18 @@ from wearsim.mechanics.numerics.multistep import (
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.5  # part of the tolerance that a step may add to the profiles
-COVER = 5.0, 2.0, 6.0  # safety factors on the errors of depth, volume, profile
+COVER = np.array([[4.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
+# least errors of depth and profile, over that of the volume, all relative and with their factors: a
+# groove of wrong volume has the wrong depth and width, which further wear does not correct
+OF_VOLUME = 0.33, 0.5
 # of a step at a lower order, compared with other orders: the differences that a step leaves are
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
-# safety factors of step doubling, whose error of the volume is a sum of absolute changes
-DOUBLED = COVER_OF_DOUBLING, math.inf, COVER_OF_DOUBLING
+# safety factors of volume and profile, also those of step doubling, whose error of the volume is a
+# sum of absolute changes
+OF_STEPS = COVER[1:, 0].tolist()
+DOUBLED = math.inf, COVER_OF_DOUBLING
 # the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
 # number, to a least part of itself at the second one
 ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
@@ -113,7 +117,7 @@ class ImplicitStepper(StepDoublingStepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        left = self._left(problem, state, stop, COVER)
+        left = self._left(problem, state, stop, OF_STEPS)
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
             past.wear, past.spans, depths, past.order, part, aim, KEEP, own, order
@@ -171,7 +175,7 @@ class ImplicitStepper(StepDoublingStepper):
     def _left(
         self, problem: WearProblem, state: WearState, stop: float, cover: Sequence[float]
     ) -> FloatArray:
-        """Return the part of the error of a step that errors before it leave, (realisations,).
+        """Return the part of its usual error that a step aims at, by the errors before it, (N,).
 
         Errors of the volume add up during a test if they have the same sign.
 
@@ -183,18 +187,19 @@ class ImplicitStepper(StepDoublingStepper):
         stop : float
             Passes at the end of the test.
         cover : sequence of float
-            Safety factors that the errors of depth, volume and profile of the state contain.
+            Safety factors that the errors of volume and profile of the state contain.
         """
-        volumes = volume_of(problem, state.depths).tolist()
-        errors = np.array([state.volume_error, state.profile_error]) - state.irreducible[1:]
+        volumes = _volumes(problem, state.stacked).tolist()
+        _, *fixed = state.irreducible
+        errors = (state.volume_error - fixed[0]).tolist(), (state.profile_error - fixed[1]).tolist()
         low, high = ADDED_UP
         found = []
-        columns = state.passes.tolist(), volumes, *errors.tolist()
+        columns = state.passes.tolist(), volumes, *errors
         for passes, volume, of_volume, of_profile in zip(*columns, strict=True):
             grown, worst = passes / stop, 0.0
             if volume > 0.0:
-                worst = of_volume / (volume * cover[1]) * grown**VOLUME_EXPONENT
-                worst = max(worst, of_profile / cover[2] * grown**DEPTH_EXPONENT)
+                worst = of_volume / (volume * cover[0]) * grown**VOLUME_EXPONENT
+                worst = max(worst, of_profile / cover[1] * grown**DEPTH_EXPONENT)
             part = (high - worst / self.tolerance) / (high - low)
             found.append(min(max(part, LEAST_AIM), 1.0))
         return np.array(found)
@@ -202,6 +207,11 @@ class ImplicitStepper(StepDoublingStepper):
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
         return implicit_step
+
+
+def _volumes(problem: WearProblem, depths: FloatArray) -> FloatArray:
+    """Return the volume of depths of all bodies, as `WearState.stacked`, (realisations,) [m^3]."""
+    return np.asarray((problem.volume_weights[1][:, None] * depths.sum(axis=-1)).sum(axis=0))
 
 
 def _estimates(
@@ -248,8 +258,12 @@ def _estimates(
     if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
-    found = np.array(COVER)[:, None] * sizes
+    found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
+    worn = _volumes(problem, depths)
+    relative = found[1] / np.where(worn > 0.0, worn, np.inf)
+    found[0] = np.maximum(found[0], OF_VOLUME[0] * relative * depths.max(axis=(0, 2)))
+    found[2] = np.maximum(found[2], OF_VOLUME[1] * relative)
     depth, volume, profile = found + end.irreducible
     return {
         "stepping_error": errors,
@@ -387,7 +401,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
             raise
         return _step(here, state, passes, conditions, np.ones_like(order))[0]
     # strips that leave the contact: their depth can decrease from the third order on
-    for lower in (2, 1):
+    for lower in (2, 1) if np.count_nonzero(decreased) else ():
         again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
         if again.size:
             columns = (column[..., again] for column in vars(conditions).values())
