@@ -29,7 +29,7 @@ LOOSER = 10.0  # tolerance of the coarse test over that of the test
 LOOSEST = 0.1  # greatest tolerance of a coarse test
 # safety factors on the differences of depth, volume and profile; those before wear are greater:
 # later, wear reduces errors of the shape of a groove
-COVER, FRESH_COVER = np.array([[0.5], [0.6], [0.5]]), np.array([[1.5], [1.9], [1.5]])
+COVER, FRESH_COVER = np.array([[0.5], [0.6], [0.5]]), np.array([[1.25], [1.9], [1.5]])
 STEPS = 0.15  # part of the error estimate of the coarse steps that is subtracted from it
 LEAST = 0.1  # estimate over the difference, at least
 OF_PROFILE = 0.1  # estimate of depth and volume over that of the profile, both relative, at least
