@@ -5,6 +5,7 @@
 #                      and an hour of one core for the references of stated errors, which are kept in out/references
 # make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
 # make bench-ensembles the same of persistence, ensembles and intervals of lives; a quarter of an hour
+# make validate        published tests compared: out/validation, docs/measurements/validation.json; less than two minutes
 # make docs            the site: docs/_build/html/index.html; three minutes, no network; make linkcheck looks at external links
 # make clean           remove what these targets made, including the environment
 
@@ -13,7 +14,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test test-slow lint bench bench-docs bench-ensembles docs linkcheck clean
+.PHONY: demo test test-slow lint bench bench-docs bench-ensembles validate docs linkcheck clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -58,6 +59,11 @@ bench-ensembles: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.ensembles -o $(MEASURED)/ensembles.json
 	$(BIN)/python -m tests.uq.survival.coverage_study $(MEASURED)/life-coverage.json
 	$(BIN)/python -m tests.uq.survival.small_probabilities $(MEASURED)/life-small.json
+
+validate: $(VENV)/.installed-dev
+	mkdir -p out
+	$(BIN)/wearsim validate -o out/validation --force
+	cp out/validation/validation.json $(MEASURED)
 
 docs: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html

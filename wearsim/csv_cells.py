@@ -66,7 +66,7 @@ def comma_number(text: str) -> float:
 def is_unit(text: str) -> bool:
     """Return whether a cell is empty or holds a unit alone, such as mm or [mm]."""
     try:
-        return not (unit := text.strip("[]() -")) or bool(measure(unit))
+        return not (unit := text.strip("[](){}<> -")) or bool(measure(unit))
     except ValueError:
         return False
 

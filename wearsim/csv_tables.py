@@ -39,6 +39,7 @@ MAX_MISTAKES = 20  # reported of one file
 HEAD_LINES = 100  # the header is one of these
 _HEADER = re.compile(
     r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)"
+    r"|\{(?P<curly>[^{}]*)\}|<(?P<angle>[^<>]*)>"
     r"|(?:\s*/|\s+in\s)\s*(?P<bare>[^\s/()\[\]][^/()\[\]]*))?"
 )
 _PLAIN_NUMBER = {"", "-", "1"}  # spellings of the unit of a plain number
@@ -172,6 +173,32 @@ def column_names(text: str) -> list[str]:
     return [_name_and_unit(cell)[0] for cell in header.cells] if header else []
 
 
+def units_of_columns(text: str, names: Mapping[str, Sequence[str]]) -> dict[str, str | None]:
+    """Return the units of the columns of a CSV file that are there, None for one without.
+
+    Parameters
+    ----------
+    text : str
+        Content of the file.
+    names : mapping of str to sequence of str
+        Other accepted names of each column.
+    """
+    accepted = {name: dict.fromkeys((name, *others), 1.0) for name, others in names.items()}
+    lines = text.removeprefix("\ufeff").splitlines()
+    header, separator = _find_header(lines, accepted)
+    if header is None:
+        return {}
+    rows = list(_rows(lines[header.line : header.line + HEAD_LINES], header.line, separator))
+    below = _unit_line(header, rows)
+    found: dict[str, str | None] = {}
+    for place, cell in enumerate(header.cells):
+        own, unit = _name_and_unit(cell)
+        for name, others in accepted.items():
+            if own in {other.casefold() for other in others}:
+                found[name] = below[place] if below and place < len(below) else unit
+    return found
+
+
 def _mistake(line: int, what: str, got: str | None = None, expected: str | None = None) -> Mistake:
     return Mistake("", f"line {line}", what, got, expected)
 
@@ -200,7 +227,7 @@ def _name_and_unit(cell: str) -> tuple[str, str | None]:
     head = _HEADER.fullmatch(cell)
     if head is None:
         return cell.casefold(), None
-    units = (head[kind] for kind in ("square", "round", "bare"))
+    units = (head[kind] for kind in ("square", "round", "curly", "angle", "bare"))
     return head["name"].casefold(), next((unit for unit in units if unit is not None), None)
 
 
@@ -242,7 +269,7 @@ def _unit_line(header: _Row, sample: list[_Row]) -> list[str] | None:
         return None
     if any(map(_starts_as_number, filter(None, cells))):
         return None
-    return [cell.strip("[]() ") for cell in cells]
+    return [cell.strip("[](){}<> ") for cell in cells]
 
 
 def _find_columns(

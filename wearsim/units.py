@@ -22,6 +22,7 @@ s = [time]; ms = 1/1000 * s; us = 1/1000 * ms; min = 60 * s; h = 60 * min; d = 2
 minute = min; minutes = min; hour = h; hours = h; day = d; days = d
 rad = [angle]; mrad = 1/1000 * rad; urad = 1/1000 * mrad
 turn = 6.283185307179586476925286766559 * rad; turns = turn; rev = turn; deg = 1/360 * turn
+Grad = deg
 rpm = turn / min
 kg = [mass]; g = 1/1000 * kg; mg = 1/1000 * g; ug = 1/1000 * mg
 N = kg * m / s**2; mN = 1/1000 * N; kN = 1000 * N; MN = 1000 * kN

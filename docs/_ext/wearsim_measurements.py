@@ -2,7 +2,8 @@
 
 Pages that contain `{{ ... }}` are templates of jinja2. Their functions are the methods of
 `Measurements`, which reads `docs/measurements/*.json`: topics and hard cases of `wearsim bench`,
-and tables of other commands. Each file has the date, the machine and the command.
+the cases of `wearsim validate`, and tables of other commands. Each file has the date, the machine
+and the command.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from wearsim_bench.figures.topic import bench_figure
 from wearsim_bench.hard_cases.verdict import Verdict
 from wearsim_bench.measure.machine import Machine
 from wearsim_bench.measure.measurement import Effort, Measurement, Topic
+from wearsim_validation.figure import case_figure
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -85,6 +87,42 @@ class Measurements:
                 folder.mkdir(parents=True, exist_ok=True)
                 effort, topic = Effort(**data["effort"]), self._topic(source.stem)
                 save_figure(bench_figure(topic, self._machine(source.stem), effort), path)
+
+    def validated(self, case: str) -> str:
+        """Return title, sources, figure, tables, verdict and reasons of a validated case."""
+        found, figure = self._read("validation")["cases"][case], f"validation-{case}"
+        parts = [
+            f"### {found['title']}",
+            f"{found['source']}. Read: {found['read']}.",
+            f"![{found['title']}](/{FIGURES}/{figure}.svg)",
+        ]
+        for series in found["series"]:
+            title = f"{case}: {series['series']}"
+            parts += [f"**{series['series']}**", self.table("validation", title)]
+        verdict = self.cell("validation", "verdicts", case, "verdict")
+        reasons = "\n".join(f"- {reason}" for reason in found["reasons"])
+        return "\n\n".join([*parts, f"Verdict: **{verdict}**.", reasons])
+
+    def finding(self, case: str, series: str, words: str) -> str:
+        """Return the first finding on a series of a validated case that begins with words."""
+        every = self._read("validation")["cases"][case]["series"]
+        facts = [fact for one in every if one["series"] == series for fact in one["facts"]]
+        found: list[str] = [fact for fact in facts if words in fact]
+        if not found:
+            raise KeyError(f"validation.json: {case}, {series} has no finding with '{words}'")
+        return found[0]
+
+    def draw_validated(self, folder: Path) -> None:
+        """Draw the figures of the validated cases."""
+        source = self.folder / "validation.json"
+        for case, found in self._read("validation")["cases"].items():
+            path = folder / f"validation-{case}.svg"
+            newest = max(
+                source.stat().st_mtime, Path(case_figure.__code__.co_filename).stat().st_mtime
+            )
+            if not path.exists() or path.stat().st_mtime < newest:
+                folder.mkdir(parents=True, exist_ok=True)
+                save_figure(case_figure(found), path)
 
     def _one(self, name: str, group: str, method: str, setting: str) -> Measurement:
         """Return a measurement; of several defaults of a method, that with the fewest strips."""
@@ -165,7 +203,9 @@ def fill_page(app: Sphinx, _name: str, content: list[str]) -> None:
 
 def draw_figures(app: Sphinx) -> None:
     """Draw the figures of the topics."""
-    Measurements().draw(Path(app.srcdir) / FIGURES)
+    measurements, folder = Measurements(), Path(app.srcdir) / FIGURES
+    measurements.draw(folder)
+    measurements.draw_validated(folder)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

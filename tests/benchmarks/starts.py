@@ -57,15 +57,18 @@ def first_output(folder: str, cache: str) -> float:
 
 
 def run_rows(effort: Effort) -> list[Row]:
-    """Time the first run after installation, which compiles, and later runs."""
+    """Time the first run after installation, which compiles, later runs, and their dry run."""
     with TemporaryDirectory() as folder:
         command = run_command(folder)
         cache = str(Path(folder) / "cache")
         first = timed(lambda: call(*command, NUMBA_CACHE_DIR=cache))
         until_output = min(first_output(folder, cache) for _ in range(effort.repetitions))
         later = best(lambda: call(*command, NUMBA_CACHE_DIR=cache), effort.repetitions)
+        checked = [*WEARSIM, "check", str(SCENARIOS / "rig-450min.toml")]
+        check = best(lambda: call(*checked, NUMBA_CACHE_DIR=cache), effort.repetitions)
     return [
         Row("first `wearsim run` after install, compiling", first, "10 s, aim 6 s"),
         Row("later `wearsim run`, to its first output", until_output, "1.0 s"),
         Row("later `wearsim run`, to its end", later, "1.0 s, aim 0.6 s"),
+        Row("later `wearsim check`", check, "0.6 s", "with the contacts of its forecast"),
     ]

@@ -37,16 +37,25 @@ def test_run_is_exported_in_engineering_units(tmp_path: Path) -> None:
         "step_passes",
         "depth [um]",
         "width [mm]",
+        "width_error [mm]",
         "worn_volume [mm^3]",
         "roller_depth [um]",
+        "roller_depth_error [um]",
         "roller_worn_volume [mm^3]",
+        "roller_worn_volume_error [mm^3]",
         "dissipated_energy [J]",
+        "dissipated_energy_error [J]",
         "power [W]",
+        "power_error [W]",
         "normal_force [N]",
+        "normal_force_error [N]",
         "peak_pressure [MPa]",
+        "peak_pressure_error [MPa]",
         "approach [um]",
         "descent [um]",
+        "descent_error [um]",
         "elastic_approach [um]",
+        "elastic_approach_error [um]",
         "longitudinal_creepage",
         "adhesion_fraction",
         "depth_error [um]",
@@ -89,7 +98,7 @@ def test_each_roller_has_a_column(tmp_path: Path) -> None:
     export_csv(result, tmp_path)
     header = _header(tmp_path / "history.csv")
     forces = [f"normal_force roller {r} realisation {n} [N]" for r in (1, 2) for n in (1, 2)]
-    assert [title for title in header if title.startswith("normal_force")] == forces
+    assert [title for title in header if title.startswith("normal_force ")] == forces
     assert "depth realisation 2 [um]" in header
     values = np.loadtxt(tmp_path / "history.csv", delimiter=",", skiprows=1)
     np.testing.assert_allclose(

@@ -19,7 +19,7 @@ from run_examples import some_run
 from tests.results_compared import differences
 from wearsim.errors import ResultsFileError
 from wearsim.results import read_results, write_results
-from wearsim.results.run_schema import AXES, VARIABLES
+from wearsim.results.run_schema import AXES, RUN, VARIABLES
 
 TEXT = st.text(max_size=40)
 PATH = st.text(st.characters(exclude_characters="\0"), min_size=1, max_size=10)
@@ -177,12 +177,12 @@ def test_hdf5_of_another_program_is_refused(tmp_path: Path) -> None:
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 8
+    file.attrs["format_version"] = RUN.version + 1
     del file["depth"]
 
 
 def _older(file: h5py.File) -> None:
-    file.attrs["format_version"] = 6
+    file.attrs["format_version"] = RUN.version - 1
 
 
 def _incomplete(file: h5py.File) -> None:
@@ -208,14 +208,16 @@ def _with_about(text: str) -> Callable[[h5py.File], None]:
         (
             _newer,
             (
-                "has layout 8 of wearsim-run, and this wearsim reads layout 7; update wearsim to"
+                f"has layout {RUN.version + 1} of wearsim-run, and this wearsim reads layout"
+                f" {RUN.version}; update wearsim to"
                 " read it"
             ),
         ),
         (
             _older,
             (
-                "has layout 6 of wearsim-run, and this wearsim reads layout 7; repeat the"
+                f"has layout {RUN.version - 1} of wearsim-run, and this wearsim reads layout"
+                f" {RUN.version}; repeat the"
                 " computation, or read it with the version of wearsim that wrote it"
             ),
         ),

@@ -10,6 +10,7 @@ import pytest
 
 from wearsim.errors import ScenarioError
 from wearsim.scenario import Scenario
+from wearsim.studies.cam.turn import turn_of
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 CYCLOIDAL = (SCENARIOS / "cam-cycloidal.toml").read_text()
@@ -172,3 +173,35 @@ def test_mistake_of_a_cam_is_reported_alone():
         read(text)
     assert len(raised.value.mistakes) == 1
     assert "base_radius" in str(raised.value)
+
+
+def test_number_of_turns_may_be_written_with_an_exponent():
+    assert read(changed(("turns = 1_350_000", "turns = 20e6"))).total_passes == 20_000_000
+    assert read(changed(("turns = 1_350_000", "passes = 2.5e3"))).total_passes == 2500
+    with pytest.raises(ScenarioError, match=r"turns: is not a whole number, got 2.5"):
+        read(changed(("turns = 1_350_000", "turns = 2.5")))
+
+
+def test_cam_that_reaches_the_pivot_of_its_arm_is_refused():
+    def swinging(base: str) -> Scenario:
+        return read(changed(('base_radius = "20 mm"', f'base_radius = "{base}"'), text=SWINGING))
+
+    # the greatest radius is that of the base circle and twice the eccentricity of 5 mm
+    assert turn_of(swinging("79.9 mm")).stations.count > 1
+    for base in ("80.1 mm", "95 mm"):
+        with pytest.raises(ScenarioError, match=r"base_radius: the cam reaches the pivot of the"):
+            turn_of(swinging(base))
+
+
+def test_scatter_of_the_wear_factor_counts_once():
+    scatter = '{distribution = "lognormal", median = 1, factor = 1.3}'
+    k = '{distribution = "lognormal", median = "1.1e-11 1/Pa", factor = 1.5}'
+    old = 'cylinder = { k_over_h = "1.1e-11 1/Pa" }   # of the cam'
+    both = changed((old, f"factor = {scatter}\ncylinder = {{ k_over_h = {k} }}"))
+    with pytest.raises(ScenarioError) as caught:
+        read(both)
+    (mistake,) = caught.value.mistakes
+    assert "wear.cylinder.k_over_h: the scatter of K/H counts twice" in str(mistake)
+    assert "delete factor under [wear]" in str(mistake)
+    for lines in (f"factor = {scatter}\n{old}", f"cylinder = {{ k_over_h = {k} }}"):
+        assert len(read(changed((old, lines))).random) == 1

@@ -229,6 +229,21 @@ class AveragesFriction(UnmodifiedFastsim):
         return super().solve_one(gap, curvature, point, wear_compliance, warm)
 
 
+class IgnoresFactor(Unmodified):
+    """Claims a creep factor and ignores it."""
+
+    def with_creep_factor(self, factor):
+        return self
+
+
+class KeepsFactor(Unmodified):
+    """Applies the creep factor to itself too."""
+
+    def with_creep_factor(self, factor):
+        self._tangential = self._pair.reduced(factor)
+        return self
+
+
 def _without_variation(gap, point, compliance):
     creepage = replace(point.creepage, variation=None)
     return gap, replace(point, creepage=creepage), compliance
@@ -372,6 +387,7 @@ MUTANTS = {
         without_hardening(Unmodified),
         ForgetsHardening,
     ],
+    "creep-factor": [without("creep_factor"), IgnoresFactor, KeepsFactor],
     "pass-loop": [IgnoresLoop, LosesEnergy],
 }
 

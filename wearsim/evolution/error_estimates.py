@@ -237,8 +237,9 @@ def with_pass_errors(
     """Return `end` with the error estimates due to inputs drawn at every pass.
 
     The error of the quadrature is estimated by the difference to a solution with half the nodes
-    per roller and the same steps as `coarse`. The draws of a finite number of passes scatter the
-    volume, and the depth in proportion.
+    per roller and the same steps as `coarse`, plus the part that both halves of the nodes share and
+    that is known before the test. The draws of a finite number of passes scatter the volume, and
+    the depth in proportion.
 
     Parameters
     ----------
@@ -259,10 +260,11 @@ def with_pass_errors(
     volume = volume_of(problem, end.depths)
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
     relative = variance / np.square(np.where(volume > 0.0, volume, np.inf))
-    depth = np.square(greatest_depth(end.depths)) * relative
+    greatest = greatest_depth(end.depths)
+    sizes = np.array([greatest, volume, np.ones_like(volume)])
     return end.replaced(
-        quadrature=state_difference(problem, coarse, half),
-        scatter=np.array([depth, variance, relative]),
+        quadrature=state_difference(problem, coarse, half) + problem.quadrature_error * sizes,
+        scatter=np.array([np.square(greatest) * relative, variance, relative]),
         half_quadrature_solution=half,
     )
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.evolution.contacts import at_least, contact_batch
+from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, mean_along, sum_in_order, width, worn_volume
@@ -17,6 +18,7 @@ from wearsim.evolution.steppers.single_step import (
     present_problem,
     solve_at_record,
 )
+from wearsim.mechanics.cam import Extreme, integral_error
 from wearsim.types import FloatArray
 
 
@@ -59,13 +61,63 @@ def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:
 
 def peak_to_peak(cam: CamStations, errors: FloatArray) -> FloatArray:
     """Return greatest less smallest lift error over the angle, shape (rollers, N) [m]."""
-    between = sum_in_order(cam.between.T[:, :, None, None] * errors[:, None], axis=0)
-    return np.asarray(between.max(axis=0) - between.min(axis=0))
+    return np.asarray(cam.greatest(errors).value + cam.greatest(-errors).value)
+
+
+def greatest(problem: WearProblem, values: FloatArray) -> FloatArray:
+    """Return the greatest of values, stations first, over the angle of a cam."""
+    cam = problem.kinematics.cam
+    return np.asarray(values.max(axis=0) if cam is None else cam.greatest(values).value)
+
+
+def extremes(problem: WearProblem, state: WearState) -> dict[str, Extreme]:
+    """Return extremes over the angle of a cam, with their angles, by name; none of a cylinder.
+
+    They are the "depth", of shape (realisations,) [m], and of shape (rollers, realisations) the
+    "peak_pressure" of the contacts of the state [Pa], and greatest and smallest lift error as
+    "least_wear" and "greatest_wear" [m], the last with its sign changed.
+    """
+    cam = problem.kinematics.cam
+    if cam is None:
+        return {}
+    errors = lift_errors(problem, state)
+    return {
+        "depth": cam.greatest(state.cylinder_depth[:, 0].max(axis=-1)),
+        "peak_pressure": cam.greatest(peak_pressures(problem, state)),
+        "least_wear": cam.greatest(errors),
+        "greatest_wear": cam.greatest(-errors),
+    }
+
+
+def depth_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the error of the greatest depth between the stations of a cam, (realisations,) [m]."""
+    cam = problem.kinematics.cam
+    if cam is None:
+        return np.zeros(len(state.passes))
+    return np.nan_to_num(cam.greatest(state.cylinder_depth[:, 0].max(axis=-1)).error)
+
+
+def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the error of the volume worn off both bodies by a sum over the stations of a cam.
+
+    The relative error is that of the integral of the worn cross-section over the cam's surface,
+    shape (realisations,) [m^3].
+    """
+    cam = problem.kinematics.cam
+    if cam is None or cam.panels is None:
+        return np.zeros(len(state.passes))
+    area = state.cylinder_depth[:, 0].sum(axis=-1)[cam.places]
+    weight = cam.panels.weight[:, None]
+    per_angle = area * cam.along.length[:, 0] / weight
+    total = sum_in_order(weight * per_angle, axis=0)
+    error = integral_error(cam.panels, per_angle)
+    relative = error / np.where(total > 0.0, total, np.inf)
+    return np.asarray(relative * volume_of(problem, state.depths))
 
 
 def depth(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest depth of the cylinder, shape (realisations,) [m]."""
-    return np.asarray(state.cylinder_depth.max(axis=(0, 1, 3)))
+    return greatest(problem, state.cylinder_depth[:, 0].max(axis=-1))
 
 
 def roller_depth(problem: WearProblem, state: WearState) -> FloatArray:
@@ -82,8 +134,7 @@ def volume(problem: WearProblem, state: WearState) -> FloatArray:
 
 def groove_width(problem: WearProblem, state: WearState, threshold: float) -> FloatArray:
     """Return the width of the groove deeper than `threshold` [m], (realisations,) [m]."""
-    worn = state.cylinder_depth[:, 0].max(axis=0)
-    return np.array([width(problem.grid.y, groove, threshold) for groove in worn])
+    return greatest(problem, width(problem.grid.y, state.cylinder_depth[:, 0], threshold))
 
 
 def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
@@ -99,11 +150,16 @@ def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
 
 def clearance(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest worn descent of a roller, shape (realisations,) [m]."""
-    return np.asarray(descents(problem, state.depths).max(axis=(0, 1)))
+    return np.asarray(greatest(problem, descents(problem, state.depths)).max(axis=0))
+
+
+def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest pressure of the contacts of a state at every station, (S, R, N) [Pa]."""
+    return problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
 
 
 def peak_pressure(stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest pressure at the present loads, shape (realisations,) [Pa]."""
     recorded, state, _ = present_contacts(stepper, problem, state)
     values = recorded.values_of(state.contacts, "peak_pressure")
-    return np.asarray(values.reshape(-1, values.shape[-1]).max(axis=0))
+    return np.asarray(greatest(recorded, values).max(axis=0))

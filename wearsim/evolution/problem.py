@@ -78,6 +78,9 @@ class WearProblem:
         Relative change of wear and loads below which an implicit step has converged.
     passes_per_draw : float
         Passes that share one draw of the inputs drawn at every pass.
+    quadrature_error : float
+        Relative error of wear by the quadrature over inputs drawn at every pass, as far as it is
+        known before the test.
     growth : tuple of Growth
         How the strips of each realisation grow with its groove; none where they do not.
     """
@@ -99,6 +102,7 @@ class WearProblem:
     varying: tuple[Varying, ...] = ()
     iteration_tolerance: float = 1e-8
     passes_per_draw: float = 1.0
+    quadrature_error: float = 0.0
     growth: tuple[Growth, ...] = ()
 
     @cached_property

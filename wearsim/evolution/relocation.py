@@ -25,7 +25,7 @@ LOOK = 1e-3  # relative change of the normal force after which skids are located
 # relative change after which stations are placed again: next to a skid the traction of a rolling
 # roller is 2 % below the traction bound
 FALLEN = 0.01
-_SMALL = 0.05  # of the greatest normal force, which smaller ones are compared with
+SMALL = 0.05  # of the greatest normal force, which smaller ones are compared with
 
 
 def located(problem: WearProblem, state: WearState) -> WearProblem:
@@ -57,22 +57,24 @@ def relocated(problem: WearProblem, state: WearState) -> tuple[WearProblem, Wear
     cam = problem.kinematics.cam
     if cam is None or cam.relocated is None or cam.panels is None or not problem.has_spring:
         return problem, state
+    assert cam.moved_skids is not None
     change, last = _changes(problem, state, cam), state.skid_loads
     if last is None:
         last = np.zeros((2, len(change), 1))
-    force = cam.at_unworn(problem.at_stations(_preload(problem))[:, 0])
-    force = np.maximum(np.abs(force), _SMALL * np.abs(force).max())
+    force = cam.at_unworn(problem.at_stations(preload_of(problem))[:, 0])
+    force = np.maximum(np.abs(force), SMALL * np.abs(force).max())
     if (np.abs(change - last[1]) <= LOOK * force).all():
         return problem, state
-    new = cam.relocated(change[:, 0])
     slips = (np.abs(change - last[0]) > FALLEN * force).any()
-    if not slips and not _differ(cam.skids, new.skids):
+    if not slips and not _differ(cam.skids, cam.moved_skids(change[:, 0])):
         return problem, state.replaced(skid_loads=np.stack([last[0], change]))
+    new = cam.relocated(change[:, 0])
     moved = _at_stations(problem, new)
     return moved, _moved(moved, state.replaced(skid_loads=np.stack([change, change])), cam, new)
 
 
-def _preload(problem: WearProblem) -> FloatArray:
+def preload_of(problem: WearProblem) -> FloatArray:
+    """Return the load of each realisation at the start of the test, shape (realisations,) [N]."""
     return np.array([load.force(np.zeros(1))[0] for load in problem.loads])
 
 

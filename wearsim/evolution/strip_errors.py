@@ -11,13 +11,15 @@ they do in a fresh contact.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import Advance, Evolution
+from wearsim.evolution.observables import depth, roller_depth
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
@@ -35,6 +37,9 @@ LEAST = 0.1  # estimate over the difference, at least
 OF_PROFILE = 0.1  # estimate of depth and volume over that of the profile, both relative, at least
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
 COARSE_TOLERANCE = 1e-5  # of the iterations of a step
+
+#: Function that returns observables of a state by name, with the realisations last.
+Observe: TypeAlias = Callable[[WearProblem, WearState], Mapping[str, FloatArray]]
 
 
 @dataclass
@@ -55,6 +60,8 @@ class Course:
         Strips at the end.
     approach : float
         Greatest elastic approach of the contacts at the end [m].
+    observed : list of dict of str to ndarray
+        Observables at the start and after each step, if they are asked for.
     """
 
     passes: list[float] = field(default_factory=list)
@@ -63,11 +70,12 @@ class Course:
     profiles: FloatArray | None = None
     grid: Grid | None = None
     approach: float = 0.0
+    observed: list[dict[str, FloatArray]] = field(default_factory=list)
 
 
 def sizes_of(problem: WearProblem, state: WearState) -> FloatArray:
     """Return greatest depth of cylinder and rollers [m] and volume [m^3], (3, realisations)."""
-    depths = (worn.max(axis=(0, 1, 3)) for worn in state.depths)
+    depths = depth(problem, state), roller_depth(problem, state)
     return np.array([*depths, volume_of(problem, state.depths)])
 
 
@@ -92,8 +100,22 @@ def add_step(courses: Sequence[Course], advance: Advance) -> None:
         course.profiles, course.grid = profiles[:, place], problem.grid
 
 
+def add_observed(
+    courses: Sequence[Course], numbers: Sequence[int], observed: Mapping[str, FloatArray]
+) -> None:
+    """Add the observables of some tests, realisations last, to their courses by number."""
+    for place, number in enumerate(numbers):
+        one = {name: np.asarray(values[..., place]) for name, values in observed.items()}
+        courses[number].observed.append(one)
+
+
 def coarse_courses(
-    problem: WearProblem, stepper: Stepper, stop: float, needed: FloatArray, max_steps: int
+    problem: WearProblem,
+    stepper: Stepper,
+    stop: float,
+    needed: FloatArray,
+    max_steps: int,
+    observe: Observe | None = None,
 ) -> list[Course | None]:
     """Return the courses of tests on strips of twice the width.
 
@@ -108,6 +130,8 @@ def coarse_courses(
     needed : ndarray, shape (realisations,)
         Passes to which the course of each test is needed, at most to their end.
     max_steps : int
+    observe : callable, optional
+        Returns the observables of the courses.
 
     Returns
     -------
@@ -116,9 +140,15 @@ def coarse_courses(
     """
     coarse, courses = coarse_problem(problem), [Course() for _ in needed]
     try:
-        tests = Evolution(coarse, fresh_state(coarse), stepper, stop, max_steps, lambda _: np.inf)
+        state = fresh_state(coarse)
+        tests = Evolution(coarse, state, stepper, stop, max_steps, lambda _: np.inf)
+        if observe is not None:
+            add_observed(courses, range(len(courses)), observe(coarse, state))
         for advance in tests:
             add_step(courses, advance)
+            if observe is not None:
+                numbers = advance.numbers.tolist()
+                add_observed(courses, numbers, observe(advance.problem, advance.end))
             done = advance.end.passes >= needed[advance.numbers]
             if done.any():
                 approaches = elastic_approaches(advance.problem, advance.end).max(axis=(0, 1))
@@ -129,7 +159,10 @@ def coarse_courses(
         if len(needed) == 1:
             return [None]
         each = (np.array([number]) for number in range(len(needed)))
-        parts = (coarse_courses(problem.at(n), stepper, stop, needed[n], max_steps) for n in each)
+        parts = (
+            coarse_courses(problem.at(n), stepper, stop, needed[n], max_steps, observe)
+            for n in each
+        )
         return [course for part in parts for course in part]
     return [None if n in tests.failures else course for n, course in enumerate(courses)]
 

@@ -13,6 +13,7 @@ from pydantic import Field
 from wearsim.csv_tables import read_columns
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.models.motion import ANGLE_NAMES
 from wearsim.plugins import Load, LoadSpec, LoadTerm, Options
 from wearsim.quantities import (
     InputFile,
@@ -145,7 +146,10 @@ def _periodic(file: InputFile, arm: bool) -> Callable[[FloatArray], FloatArray]:
     from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import)
 
     name, unit = ("torque", "N m") if arm else ("force", "N")
-    columns = read_columns(file.text, file.path, {"angle": "rad", name: unit}, rising="angle")
+    aliases = {"angle": ANGLE_NAMES, name: ("drehmoment", "moment") if arm else ("kraft",)}
+    columns = read_columns(
+        file.text, file.path, {"angle": "rad", name: unit}, aliases=aliases, rising="angle"
+    )
     angle, force = columns["angle"], columns[name]
     turn = angle[-1] - angle[0]
     if turn > math.tau * (1.0 + 1e-9) or len(angle) < 4:

@@ -268,6 +268,28 @@ class LiftSpline:
 
 
 FEWEST_ROWS = 8
+#: Other names of the columns of angle and lift.
+ANGLE_NAMES = (
+    *("cam angle", "rotation", "theta", "phi", "winkel", "drehwinkel", "nockenwinkel"),
+    "kurvenwinkel",
+)
+LIFT_NAMES = (
+    *(
+        "rise",
+        "displacement",
+        "follower",
+        "s",
+        "psi",
+        "hub",
+        "erhebung",
+        "stößelhub",
+        "stoesselhub",
+    ),
+    *("rollenhub", "schwenkwinkel", "hebelwinkel"),
+)
+_FLOOR = 6.0  # standard deviations of the noise, below which a jump is not seen
+_BLUNT = 0.05  # part of the greatest slope by which noise may hide a corner
+_WIDEST = math.radians(2.0)  # of the spacing of means of a noisy table
 
 
 def read_lift(text: str, path: str, unit: str) -> tuple[FloatArray, FloatArray]:
@@ -278,7 +300,10 @@ def read_lift(text: str, path: str, unit: str) -> tuple[FloatArray, FloatArray]:
     ScenarioError
         If the file cannot be read or has too few rows.
     """
-    columns = read_columns(text, path, {"angle": "rad", "lift": unit}, rising="angle")
+    names = {"angle": ANGLE_NAMES, "lift": LIFT_NAMES}
+    columns = read_columns(
+        text, path, {"angle": "rad", "lift": unit}, aliases=names, rising="angle"
+    )
     if len(columns["angle"]) < FEWEST_ROWS:
         got = f"{len(columns['angle'])} rows"
         what = "too few rows for a quintic spline"
@@ -286,8 +311,8 @@ def read_lift(text: str, path: str, unit: str) -> tuple[FloatArray, FloatArray]:
     return columns["angle"], columns["lift"]
 
 
-def _isolated(values: FloatArray, size: float) -> IntArray:
-    """Return the places of values that exceed those around them, and a size, several times."""
+def _isolated(values: FloatArray, size: FloatArray) -> IntArray:
+    """Return the places of values that exceed sizes, and those around them several times."""
     values = np.abs(values)
     around = np.full_like(values, np.inf)
     reach = 3  # a corner between two points shows in both
@@ -298,25 +323,63 @@ def _isolated(values: FloatArray, size: float) -> IntArray:
     return found[np.diff(found, prepend=-9) > 1]  # one of two neighbours
 
 
-def kinks(angle: FloatArray, lift: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the angles at which the slope, and the acceleration, of a table jump [rad]."""
+def kinks(angle: FloatArray, lift: FloatArray, noise: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """Return the angles at which the slope, and the acceleration, of a table jump [rad].
+
+    Parameters
+    ----------
+    angle, lift : ndarray, shape (points,)
+    noise : float
+        Standard deviation of the errors of the lift, which hide small jumps of the slope.
+    """
     slope = np.diff(lift) / np.diff(angle)
     middle = 0.5 * (angle[1:] + angle[:-1])
     second = np.diff(slope) / np.diff(middle)
     third = np.diff(second) / np.diff(angle[1:-1])
     jump = np.diff(slope)
-    corners = angle[1:-1][_isolated(jump, 1e-3 * np.abs(slope).max())]
-    steps = middle[1:-1][_isolated(third * np.diff(angle[1:-1]), 0.05 * np.abs(second).max())]
+    # standard deviation of a difference of slopes by that of three points
+    before, after = 1.0 / np.diff(angle)[:-1], 1.0 / np.diff(angle)[1:]
+    scatter = noise * np.sqrt(before**2 + after**2 + (before + after) ** 2)
+    floor = np.maximum(1e-3 * np.abs(slope).max(), _FLOOR * scatter)
+    corners = angle[1:-1][_isolated(jump, floor)]
+    least = np.full(len(third), 0.05 * np.abs(second).max())
+    steps = middle[1:-1][_isolated(third * np.diff(angle[1:-1]), least)]
     return corners, steps
 
 
-def refuse_kinks(path: str, angle: FloatArray, lift: FloatArray) -> None:
-    """Raise a ScenarioError if the slope of a table jumps."""
-    corners, _ = kinks(angle, lift)
+def refuse_kinks(
+    path: str, angle: FloatArray, lift: FloatArray, noise: float = 0.0, name: str = "lift"
+) -> None:
+    """Raise a ScenarioError if the slope of a table jumps.
+
+    Where noise would hide a corner of 5 % of the greatest slope, means of neighbouring points are
+    considered.
+
+    Parameters
+    ----------
+    path : str
+    angle, lift : ndarray, shape (points,)
+    noise : float
+        Standard deviation of the errors of the lift.
+    name : str
+        Name of the quantity, for the message.
+    """
+    if noise > 0.0:
+        step = float(np.median(np.diff(angle)))
+        count = 1
+        while 2 * count * step <= _WIDEST:
+            slope = np.abs(np.diff(lift[::count]) / np.diff(angle[::count])).max()
+            if _FLOOR * noise * math.sqrt(6.0 / count) / (count * step) <= _BLUNT * slope:
+                break
+            count *= 2
+        whole = len(angle) // count * count
+        angle, lift = (each[:whole].reshape(-1, count).mean(axis=1) for each in (angle, lift))
+        noise /= math.sqrt(count)
+    corners, _ = kinks(angle, lift, noise)
     if len(corners):
         got = ", ".join(f"{math.degrees(at):.6g} deg" for at in corners[:3])
-        expected = "a lift without corners, or more points where it turns sharply"
-        what = "the slope of the lift jumps at"
+        expected = f"a {name} without corners, or more points where it turns sharply"
+        what = f"the slope of the {name} jumps at"
         raise ScenarioError(path, [Mistake("", "", what, got, expected)])
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from wearsim.plugins import Body, Options, WearLaw, WearLawSpec
 from wearsim.quantities import (
@@ -16,15 +16,67 @@ from wearsim.quantities import (
     Quantity,
 )
 from wearsim.types import ContactSolution, FloatArray
-from wearsim.units import Kind, QuantityError
+from wearsim.units import WEAR_FACTOR, Kind, QuantityError, shown
+
+SPECIFIC = Quantity(Kind("a specific wear rate", "m^3/(N m)", "1e-5 mm^3/(N m)"), "not negative")
+_OF_A_TEST = "specific_wear_rate", "measured_friction"
+_EITHER = "k_over_h, or specific_wear_rate with measured_friction"
 
 
 class BodyWear(Options):
-    """Wear factor of one body."""
+    """Wear factor of one body.
 
-    k_over_h: NonNegativeWearFactor = Field(
-        description="wear factor K/H, volume per dissipated energy, e.g. '1.1e-11 1/Pa'"
+    A specific wear rate k of a handbook is a volume per load and sliding distance. In the test in
+    which it was measured the work per distance was friction times load: K/H = k/mu.
+    """
+
+    k_over_h: NonNegativeWearFactor | None = Field(
+        None,
+        description="wear factor K/H, volume per dissipated energy, e.g. '1.1e-11 1/Pa'",
+        validate_default=True,
     )
+    specific_wear_rate: Annotated[float, SPECIFIC] | None = Field(
+        None,
+        description="instead: volume per load and sliding distance in a wear test, e.g."
+        " '1e-5 mm^3/(N m)'; needs measured_friction, by which it is divided",
+    )
+    measured_friction: float | None = Field(
+        None, gt=0.0, description="coefficient of friction in the test of specific_wear_rate"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _converted(cls, raw: object) -> object:
+        """Replace a specific wear rate and the friction of its test by the wear factor."""
+        if not isinstance(raw, dict) or not raw.keys() & set(_OF_A_TEST):
+            return raw
+        given = {key: raw[key] for key in ("k_over_h", *_OF_A_TEST) if key in raw}
+        if "k_over_h" in given:
+            raise QuantityError("gives the wear factor twice", " and ".join(given), _EITHER)
+        if len(given) < len(_OF_A_TEST):
+            missing = next(key for key in _OF_A_TEST if key not in given)
+            raise QuantityError(f"{missing} is missing", " and ".join(given), _EITHER)
+        rate, friction = SPECIFIC.parse(raw["specific_wear_rate"]), raw["measured_friction"]
+        known = isinstance(friction, int | float) and not isinstance(friction, bool)
+        if not (known and 0.0 < friction < np.inf):
+            what = "measured_friction is not a coefficient of friction"
+            raise QuantityError(what, shown(friction), "a number above 0")
+        others = {key: value for key, value in raw.items() if key not in given}
+        return {**others, "k_over_h": f"{rate / friction!r} 1/Pa"}
+
+    @field_validator("k_over_h")
+    @classmethod
+    def _is_given(cls, value: float | None) -> float | None:
+        if value is None:
+            raise QuantityError("is missing", None, WEAR_FACTOR.expected("not negative"))
+        return value
+
+    @property
+    def wear_factor(self) -> float:
+        """K/H [1/Pa]."""
+        if self.k_over_h is None:
+            raise ValueError("a wear factor is needed")
+        return self.k_over_h
 
 
 class ArchardOptions(Options):
@@ -44,8 +96,8 @@ class ArchardDissipation(WearLaw):
 
     def __init__(self, options: ArchardOptions) -> None:
         self._wear_factor = {
-            "cylinder": options.factor * options.cylinder.k_over_h,
-            "roller": options.factor * options.roller.k_over_h,
+            "cylinder": options.factor * options.cylinder.wear_factor,
+            "roller": options.factor * options.roller.wear_factor,
         }
 
     def depth_per_pass(

@@ -29,6 +29,8 @@ class Capabilities:
         Friction may be given per strip.
     friction_field : bool
         Friction may be given per point within the contact, fixed to the contact or to a body.
+    creep_factor : bool
+        `with_creep_factor` reduces the initial slope of traction against creepage.
     pass_loop : bool
         `pass_loop` runs the per-pass loop in compiled code.
     fields : bool
@@ -41,6 +43,7 @@ class Capabilities:
     bearing_torque: bool = False
     local_friction: bool = False
     friction_field: bool = False
+    creep_factor: bool = False
     pass_loop: bool = False
     fields: bool = False
 
@@ -226,6 +229,21 @@ class ContactModel(ABC):
             f"{type(self).__name__} does not support friction that varies from point to point;"
             " use contact.model = 'hertz-fastsim'"
         )
+
+    def with_creep_factor(self, factor: float) -> ContactModel:
+        """Return the model with its tangential compliance divided; requires `creep_factor`.
+
+        A third body between the surfaces adds compliance along them. Tractions are those of
+        `factor` times the creepages, since a slip of zero is then reached at creepages 1/`factor`
+        times as large; the normal contact does not change.
+
+        Parameters
+        ----------
+        factor : float
+            Kalker's reduction factor, above 0 and at most 1: initial slope of traction against
+            creepage over that of ideal bodies.
+        """
+        raise CapabilityError(f"{type(self).__name__} does not support a creep factor")
 
     def fields(
         self,

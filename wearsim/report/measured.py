@@ -10,6 +10,7 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError, WearsimError
 from wearsim.report.text import count, shown, sufficient_for
 from wearsim.results import EnsembleResult, Result
+from wearsim.studies.cam.turn import CamTurn
 from wearsim.types import FloatArray
 
 
@@ -25,11 +26,14 @@ class Measured:
         Axial position [m].
     height : ndarray, shape (points,)
         Height above the nominal surface [m]; worn material is negative.
+    angle : float, optional
+        Angle of the cam at which it was measured [rad]; by default where it is deepest.
     """
 
     label: str
     y: FloatArray
     height: FloatArray
+    angle: float | None = None
 
 
 class ComputedProfile(NamedTuple):
@@ -63,11 +67,40 @@ class ComputedProfile(NamedTuple):
 _BAND = 0.025  # probability below the band of an ensemble
 
 
-def computed_profile(result: Result | EnsembleResult) -> ComputedProfile:
-    """Return the profile at the end of a run or an ensemble."""
+def grooves_at(result: Result, angle: float | None = None) -> tuple[FloatArray, float]:
+    """Return the worn depth of a cam at every record, shape (records, strips) [m], and its angle.
+
+    Parameters
+    ----------
+    result : Result
+        Of a cam.
+    angle : float, optional
+        Angle of the cam [rad]; by default that at which it is worn deepest.
+    """
+    depth = np.asarray(result.raw.records["cylinder_depth_profile"])[:, :, 0]
+    if angle is None:
+        place = int(depth[-1].max(axis=1).argmax())
+        return depth[:, place], float(result.raw.static["station_angle"][place])
+    stations, turned = CamTurn(result.scenario).stations, np.array([np.mod(angle, 2.0 * np.pi)])
+    rows = stations.values_at_angles(depth.transpose(1, 0, 2), turned)[0]
+    return np.maximum(rows, 0.0), float(angle)
+
+
+def computed_profile(
+    result: Result | EnsembleResult, angle: float | None = None
+) -> ComputedProfile:
+    """Return the profile at the end of a run or an ensemble.
+
+    Parameters
+    ----------
+    result : Result or EnsembleResult
+    angle : float, optional
+        Angle of a run's cam [rad]; by default, and of ensembles, where it is worn deepest.
+    """
     if isinstance(result, Result):
-        start = result.start_height
-        height = start - np.asarray(result.profiles[-1])
+        start, cam = result.start_height, "station_angle" in result.raw.static
+        worn = grooves_at(result, angle)[0][-1] if cam else np.asarray(result.profiles[-1])
+        height = start - worn
         return ComputedProfile(result.y, height, height, height, start)
     band, start = result.band(), _start_height(result)
     low, high, label = band.low, band.high, ""

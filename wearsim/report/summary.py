@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.errors import PluginError, ScenarioError
+from wearsim.evolution.limits import Limit
 from wearsim.report.text import (
     NINETY_PERCENT,
     NOTHING,
@@ -24,7 +25,7 @@ from wearsim.report.text import (
 )
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.types import FloatArray
-from wearsim.units import engineers_unit, in_engineers_unit, kind_of
+from wearsim.units import LONG, engineers_unit, in_engineers_unit, kind_of
 from wearsim.uq.estimation.moments import is_constant
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 Rows = list[tuple[str, str]]
 CONSTANT = "constant"
+_ROUNDING = 1e-9  # relative error that is not printed
 
 
 def _by_roller(values: Any, unit: str) -> str:
@@ -52,22 +54,28 @@ def width_of(result: Result, width: Any) -> str:
 
 
 def end_state(result: Result) -> Rows:
-    """Return rows on the observables at the end of a run."""
+    """Return rows on the observables at the end of a run, with their estimated errors."""
+    errors = {name: float(np.max(values[-1])) for name, values in result.errors.items()}
+
+    def stated(name: str, unit: str) -> str:
+        return with_error(np.asarray(getattr(result, name)[-1]), errors.get(name), unit)
+
     rows = [("depth", _by_roller(result.depth[-1], "um"))]
     if result.start_height.any():
         below = _by_roller(result.depth_below_nominal[-1], "um")
         rows = [("depth worn since the start", rows[0][1]), ("depth below nominal", below)]
     if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
-        rows.insert(1, ("roller depth", _by_roller(result.roller_depth[-1], "um")))
+        rows.insert(1, ("roller depth", stated("roller_depth", "um")))
+    width = stated("width", "mm") if np.any(result.width[-1]) else width_of(result, 0.0)
     rows += [
-        ("width", width_of(result, result.width[-1])),
-        ("worn volume", _by_roller(result.worn_volume[-1], "mm^3")),
-        ("dissipated energy", _by_roller(result.dissipated_energy[-1], "J")),
-        ("dissipated power", _by_roller(result.power[-1], "W")),
-        ("normal force", _by_roller(result.normal_force[-1], "N")),
-        ("peak pressure", _by_roller(result.peak_pressure[-1], "MPa")),
-        ("worn descent", _by_roller(result.descent[-1], "um")),
-        ("elastic approach", _by_roller(result.elastic_approach[-1], "um")),
+        ("width", width),
+        ("worn volume", stated("worn_volume", "mm^3")),
+        ("dissipated energy", stated("dissipated_energy", "J")),
+        ("dissipated power", stated("power", "W")),
+        ("normal force", stated("normal_force", "N")),
+        ("peak pressure", stated("peak_pressure", "MPa")),
+        ("worn descent", stated("descent", "um")),
+        ("elastic approach", stated("elastic_approach", "um")),
         *_of_cam(result),
     ]
     if result.stepper == "per-pass":
@@ -79,26 +87,46 @@ def end_state(result: Result) -> Rows:
     return [*rows, ("estimated error of depth", f"{shown(error, 'um', 2)}{part}")]
 
 
+def with_error(values: FloatArray, error: float | None, unit: str) -> str:
+    """Return one value per roller with their error, with the digits that it leaves, "262 ± 4 MPa".
+
+    Parameters
+    ----------
+    values : ndarray
+        In SI.
+    error : float, optional
+        In SI; None and values that are not finite are left out.
+    unit : str
+        A key of `PER_SI`.
+    """
+    size = float(np.abs(values).max())
+    if error is None or not math.isfinite(error) or error <= _ROUNDING * size:
+        return _by_roller(values, unit)
+    # the last digit is that below the first digit of the error
+    digits = 2 + math.floor(math.log10(size / error)) if size > 0.0 else 1
+    texts = [in_unit(float(value), unit, min(max(digits, 1), 4)) for value in np.ravel(values)]
+    text = texts[0] if len(set(texts)) == 1 else " / ".join(texts)
+    return f"{text} ± {shown(error, unit, 2)}"
+
+
 def _of_cam(result: Result) -> Rows:
     """Return rows on angles and lift error of a cam; none of a cylinder."""
     final = result.final
     if "turns" not in final:
         return []
-    angles = {name: _by_roller(final[f"{name}_rad"], "deg") for name in _CAM_ANGLES}
+
+    def stated(name: str, unit: str, key: str) -> str:
+        error = final[f"{name}_error_{key}"]
+        return with_error(np.asarray(final[f"{name}_{key}"]), float(np.max(error)), unit)
+
     return [
         ("turns of the cam", f"{float(np.max(final['turns'])):,.0f}"),
-        ("angle of the depth", angles["depth_angle"]),
-        ("angle of the peak pressure", angles["peak_pressure_angle"]),
-        ("lift error, peak to peak", _by_roller(final["lift_error_m"], "um")),
-        ("least wear of the lift", f"at {angles['lift_error_greatest_at']}"),
-        ("greatest wear of the lift", f"at {angles['lift_error_smallest_at']}"),
+        ("angle of the depth", stated("depth_angle", "deg", "rad")),
+        ("angle of the peak pressure", stated("peak_pressure_angle", "deg", "rad")),
+        ("lift error, peak to peak", stated("lift_error", "um", "m")),
+        ("least wear of the lift", f"at {stated('least_wear_angle', 'deg', 'rad')}"),
+        ("greatest wear of the lift", f"at {stated('greatest_wear_angle', 'deg', 'rad')}"),
     ]
-
-
-_CAM_ANGLES = (
-    *("depth_angle", "peak_pressure_angle"),
-    *("lift_error_greatest_at", "lift_error_smallest_at"),
-)
 
 
 def draws(result: Result) -> Rows:
@@ -203,12 +231,39 @@ def standing(result: Result) -> str:
     passes, total = float(result.passes[-1]), float(result.raw.total_passes)
     time = simulated(float(result.time[-1]))
     if result.until:
-        return f"stopped at {result.until}: pass {count(passes)} of {count(total)}, {time}"
+        reached, error = count(passes), passes_error(result)
+        if error is not None and error > _ROUNDING * passes:
+            digits = max(math.floor(math.log10(error)), 0)  # those that the error leaves
+            reached = f"{count(round(passes, -digits))} ± {in_unit(error, '1', 2)}"
+            seconds, rate = np.array(result.time[-1]), result.raw.kinematics["pass_rate"]
+            time = with_error(seconds, error / rate, "min" if seconds < LONG else "h")
+        return f"stopped at {result.until}: pass {reached} of {count(total)}, {time}"
     if result.finished:
         return f"finished: {count(passes)} passes, {time}"
     part = f"{100.0 * passes / total:.1f} %"
     word = "failed after" if result.failure else "unfinished:"
     return f"{word} pass {count(passes)} of {count(total)} ({part}), {time}"
+
+
+def passes_error(result: Result) -> float | None:
+    """Return the error of the passes at which a run has reached its limit; None if not known.
+
+    It is the estimated error of the limited quantity, over its growth per pass in the last step.
+    """
+    if not result.until or len(result.passes) < 2:
+        return None
+    name = Limit.parse(result.until).variable
+    error = result.errors.get(name)
+    if error is None:
+        return None
+    values = np.asarray(getattr(result, name)).reshape(len(result.passes), -1)
+    place = int(values[-1].argmax())
+    growth = abs(float(values[-1, place] - values[-2, place]))
+    step = float(result.passes[-1] - result.passes[-2])
+    greatest = float(np.max(error[-1]))
+    if not (math.isfinite(greatest) and growth > 0.0):
+        return None
+    return min(greatest * step / growth, float(result.passes[-1]))
 
 
 def _last(value: Any) -> int:
@@ -264,6 +319,7 @@ def run_json(result: Result) -> dict[str, Any]:
         "strips": len(result.y),
         "finished": bool(result.finished),
         "until": result.until or None,
+        "passes_error": passes_error(result),
         "failure": result.failure or None,
         "failed_at": result.raw.failed_at or None,
         "steps": _last(result.steps),

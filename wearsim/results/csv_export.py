@@ -39,7 +39,7 @@ _UNITS = {
     "N/m": ("N/mm", 1e3),
     "rad": ("deg", math.radians(1.0)),
 }
-_IN_MM = {"y", "width", "half_length"}  # other lengths are written in um
+_IN_MM = {"y", "width", "width_error", "half_length"}  # other lengths are written in um
 _SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]\d+)?")
 _BLOCK = 16384  # realisations in memory at a time

@@ -16,7 +16,7 @@ from wearsim.results.content import (
     StudyData,
     StudyResult,
 )
-from wearsim.results.run_schema import CAM_RUN, RUN
+from wearsim.results.run_schema import CAM_RUN, ESTIMATED, RUN
 from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray
 
@@ -194,6 +194,26 @@ class Result(StudyResult[RunData]):
         "dissipation", "Dissipated power per axial length of each contact at each record [W/m]."
     )
 
+    @property
+    def errors(self) -> dict[str, FloatArray]:
+        """Estimated numerical errors after each step, by the name of the quantity [SI].
+
+        They are due to steps, strips and the stations of a cam; not a number where they are not
+        estimated. That of the depth applies to either body, and that of the worn volume to both.
+
+        Examples
+        --------
+        >>> result = wearsim.run("rig.toml")
+        >>> bool(result.errors["power"][-1] < 1e-3 * result.power[-1])
+        True
+        """
+        estimated = (name for name in ESTIMATED if name in self.raw.history)
+        return {
+            "depth": self.depth_error,
+            "worn_volume": self.volume_error,
+            **{name: self.values(f"{name}_error") for name in estimated},
+        }
+
     def __repr__(self) -> str:
         passes, total = float(self.passes[-1]), self.raw.total_passes
         done = f"{passes:.12g}" if self.finished else f"{passes:.12g} of {total:.12g}"
@@ -330,6 +350,7 @@ class Result(StudyResult[RunData]):
             "elastic_approach_m": _number(last["elastic_approach"]),
             "depth_error_m": _number(last["depth_error"]),
             "volume_error_m3": _number(last["volume_error"]),
+            **self._final_errors(last),
             "relative_profile_error": _number(last["profile_error"]),
             "relative_depth_error": _number(_relative(last["depth_error"], deepest)),
             "relative_volume_error": _number(
@@ -337,13 +358,29 @@ class Result(StudyResult[RunData]):
             ),
         }
 
+    def _final_errors(self, last: Arrays) -> dict[str, Number]:
+        """Return the estimated errors of the final state, the greatest one over the rollers."""
+        variables = self.raw.schema.variables
+        found: dict[str, Number] = {}
+        for name in ESTIMATED:
+            error = last.get(f"{name}_error")
+            if error is not None:
+                over_rollers = "roller" in variables[name].dims
+                greatest = error.max(axis=0) if over_rollers else error
+                found[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
+        return found
+
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
         """Return the final state of a cam, and depth and lift error per station."""
         if "turns" not in last:
             return {}
         curve = self.raw.records["lift_error_curve"][-1].mean(axis=(1, 2))
-        worst = self.raw.history["peak_pressure"][-1].argmax(axis=0)[None]
-        places = last["peak_pressure_angle"]
+
+        def of_worst(name: str, quantity: str) -> Number:
+            """Return a value of the roller of which a quantity is greatest."""
+            worst = self.raw.history[quantity][-1].argmax(axis=0)[None]
+            return _number(np.take_along_axis(last[name], worst, axis=0))
+
         numbers = self.raw.static["station_segment"].tolist()
         dwells = [k for k, number in enumerate(numbers) if numbers.count(number) == 1]
         dwell = curve[dwells[0] if dwells else 0]  # a dwell has one station
@@ -351,9 +388,9 @@ class Result(StudyResult[RunData]):
             "turns": _number(last["turns"]),
             "depth_angle_rad": _number(last["depth_angle"]),
             "lift_error_m": _number(last["lift_error"].max(axis=0)),
-            "peak_pressure_angle_rad": _number(np.take_along_axis(places, worst, axis=0)),
-            "lift_error_greatest_at_rad": float(self.raw.static["station_angle"][curve.argmax()]),
-            "lift_error_smallest_at_rad": float(self.raw.static["station_angle"][curve.argmin()]),
+            "peak_pressure_angle_rad": of_worst("peak_pressure_angle", "peak_pressure"),
+            "least_wear_angle_rad": of_worst("least_wear_angle", "lift_error"),
+            "greatest_wear_angle_rad": of_worst("greatest_wear_angle", "lift_error"),
             "station_angle_rad": self.raw.static["station_angle"].tolist(),
             "station_depth_m": last["station_depth"].mean(axis=-1).tolist(),
             "station_lift_error_m": curve.tolist(),

@@ -266,6 +266,7 @@ def _state(scout: Scenario, grid: Grid, batch: ContactBatch) -> _State:
                 solutions[k],
                 float(batch.longitudinal_curvature[k]),
                 at_creepage(batch.point(k), solutions[k]),
+                scout.friction.creep_factor,
             )
             for k in np.flatnonzero(loaded).tolist()
         ]

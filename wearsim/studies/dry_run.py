@@ -87,6 +87,7 @@ def dry_run(scenario: Scenario) -> Data:
         },
         "log": _log(scenario, load),
         "friction": scenario.friction.coefficient,
+        "creep_factor": scenario.friction.creep_factor,
         "creepage": _creepage(scenario, random),
         "random": [_random(item, units_of(scenario)) for item in scenario.random],
         "sampling": None,

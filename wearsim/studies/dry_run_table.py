@@ -41,6 +41,7 @@ def plan(data: Data) -> TableRows:
         ("load", _load_text(data["load"])),
         *_log_rows(data["log"]),
         *([("friction", f"{data['friction']:.4g}")] if "friction" in data else []),
+        *([("creep factor", f"{factor:.4g}")] if (factor := data["creep_factor"]) < 1.0 else []),
         *_creepage_rows(data["creepage"]),
         *_random_rows(data),
         ("contact model", f"{data['contact_model']}: {data['contact_model_summary']}"),
@@ -184,6 +185,7 @@ def _test_rows(data: Data) -> TableRows:
         ("strips", strips),
         ("stepper", f"{test['stepper']}, tolerance {test['tolerance']:.1e}"),
         *_forecast_rows(data["forecast"]),
+        *_limit_rows(data),
     ]
 
 
@@ -212,3 +214,25 @@ def _forecast_rows(forecast: Data) -> TableRows:
         f" {_rounded(forecast['file_bytes'] / 1e6)} MB (within a factor of 3)"
     )
     return [("forecast", wear), ("takes about", effort)]
+
+
+_LIMIT_UNITS = {"volume": ("mm^3", 1e-9), "peak_pressure": ("MPa", 1e6), "width": ("mm", 1e-3)}
+
+
+def _limit_rows(data: Data) -> TableRows:
+    """Return a row for each limit of [limit], as forecast."""
+    rows, test = [], data["test"]
+    for item in data["forecast"]["limits"]:
+        unit, size = _LIMIT_UNITS.get(item["quantity"], ("um", 1e-6))
+        ratio = f"{_rounded(item['at_end'] / size)} of {item['limit'] / size:.4g} {unit}"
+        text = f"not reached: about {ratio} at the end"
+        if item["reached_at_passes"] is not None:
+            passes = item["reached_at_passes"]
+            seconds = passes / test["passes"] * test["duration_s"]
+            when = f"{_rounded(seconds / 60.0)} min"
+            length = f"{_rounded(passes)} passes"
+            if data["cam"] is not None:
+                length = f"{_rounded(passes / test['rollers'])} turns"
+            text = f"reached after about {length}, {when}: about {ratio} at the end"
+        rows.append((f"limit of {item['quantity'].replace('_', ' ')}", text))
+    return rows

@@ -7,11 +7,16 @@ fits to measured runs, which they meet within a factor of three.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from wearsim.errors import ContactError
+from wearsim.evolution.limits import Limit
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.relocation import FALLEN, SMALL, preload_of
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
@@ -30,10 +35,14 @@ _STEP = 1.3  # time of an implicit step
 _EXPLICIT = 0.7  # time of an explicit step
 _WHOLE = 0.95  # of the width of a roller
 _CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
+_HALVINGS = 20  # for the passes at which a limit is reached
 _BISECTIONS = 5  # for the pass of a failure
 _OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn contacts
 _PASS = 0.06  # time of a pass in compiled code, over that of a solve
 _STABLE = 0.03  # wear of the longest stable step, over the line load through pi E*
+_STEPS_OF_RESTART = 2.0  # of the stepper, where skids of a cam's roller have moved
+_SOLVES_OF_RESTART = 6.0
+_STATIONS = 0.08  # to choose the stations again [s]
 _START = 1.0  # of the process: imports and kernels read from the disk [s]
 _SYSTEM = 4.0  # bytes of a coefficient between two strips, few of which are in contact
 _MEMORY = 210e6  # of a process with its kernels [bytes]
@@ -63,7 +72,7 @@ class Effort:
 
 def forecast_data(
     draws: Draws, problem: WearProblem, stepper: str
-) -> tuple[dict[str, float | None], list[str]]:
+) -> tuple[dict[str, Any], list[str]]:
     """Return the forecast of a run in SI units, and warnings.
 
     Parameters
@@ -90,7 +99,8 @@ def forecast_data(
     if scenario.contact.width is not None:
         _check_strips(forecast, _CERTAIN * passes)
     effort = effort_of(scenario, forecast, stepper)
-    data: dict[str, float | None] = {
+    data: dict[str, Any] = {
+        "limits": _limits(scenario, forecast, wear),
         "depth_m": wear["depth"],
         "roller_depth_m": wear["roller_depth"],
         "width_m": wear["width"],
@@ -105,6 +115,27 @@ def forecast_data(
         "file_bytes": effort.file_size,
     }
     return data, list(_warnings(scenario, forecast, wear, effort))
+
+
+def _limits(
+    scenario: Scenario, forecast: WearForecast, wear: Mapping[str, float]
+) -> list[dict[str, Any]]:
+    """Return the limits of [limit] with the values at the end, and when they are reached."""
+    total, found = float(scenario.total_passes), []
+    for key, value in scenario.limit.given.items():
+        reached = None
+        if forecast.at(1.0)[key] >= value:
+            reached = 0.0
+        elif wear[key] >= value:
+            low, high = 0.0, 1.0  # parts of the test
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + high)
+                worn = forecast.at(middle * total)[key] >= value
+                low, high = (low, middle) if worn else (middle, high)
+            reached = high * total
+        item = {"quantity": key, "unit": Limit(key.replace("_", " "), value, key).unit}
+        found.append({**item, "limit": value, "at_end": wear[key], "reached_at_passes": reached})
+    return found
 
 
 def _check_strips(forecast: WearForecast, passes: float) -> None:
@@ -162,6 +193,23 @@ def _warnings(
         yield f"forecast of the time: about {effort.seconds / 60.0:.2g} min; {less} takes less"
 
 
+def restarts_of(problem: WearProblem, depth: float) -> float:
+    """Return how often the stepper restarts because skids of a cam's roller have moved.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    depth : float
+        Worn depth of both bodies at the end [m].
+    """
+    cam = problem.kinematics.cam
+    if cam is None or cam.relocated is None:
+        return 0.0
+    force = np.abs(problem.at_stations(preload_of(problem)).ravel())
+    force = np.maximum(force, SMALL * force.max())
+    return float((cam.stiffness.ravel() * depth / force).max()) / FALLEN
+
+
 def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effort:
     """Return what a run takes.
 
@@ -187,7 +235,8 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
         steps = passes / scenario.evolution.step
     if stepper == "per-pass":
         steps = passes
-    steps = max(min(steps, passes), 1.0)
+    restarts = restarts_of(problem, wear["clearance"])
+    steps = max(min(steps + _STEPS_OF_RESTART * restarts, passes), 1.0)
     groove, solve = forecast.seconds_of_groove, forecast.seconds
     each = _STAGES if stepper == "stabilised" else 1.0
     if stepper == "stabilised":
@@ -210,7 +259,7 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     return Effort(
         steps=math.ceil(steps),
         solves=math.ceil(steps * each) * problem.contacts_each,
-        seconds=_START + steps * per_step,
+        seconds=_START + steps * per_step + restarts * (_STATIONS + _SOLVES_OF_RESTART * groove),
         memory=_MEMORY + 5.0 * size + _SYSTEM * system,
         file_size=size,
     )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from wearsim.errors import SolverError
+from wearsim.errors import SolverError, StepError
 from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.scenario import Scenario
 from wearsim.studies.plausibility import greatest_load
@@ -58,6 +58,29 @@ def too_deep(scenario: Scenario, depth: float) -> str:
         f"the worn depth of {depth * 1e3:.4g} mm exceeds a tenth of roller.radius ="
         f" {radius * 1e3:.6g} mm, up to which the contact models hold"
     )
+
+
+def too_deep_failure(
+    scenario: Scenario, depth: float, passes: float, less: str = "", also: str = ""
+) -> StepError | None:
+    """Return the failure of a test that is worn beyond the validity of the models, if it is.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    depth : float
+        Greatest worn depth of either body [m].
+    passes : float
+        Passes done.
+    less : str
+        What to lower, by default the length of the test.
+    also : str
+        A further remedy.
+    """
+    if text := too_deep(scenario, depth):
+        remedy = f"lower {less or length_key(scenario)}, or set evolution.allow_deep = true{also}"
+        return StepError(f"after pass {passes:.0f} {text}", remedy=remedy)
+    return None
 
 
 def length_key(scenario: Scenario) -> str:

@@ -374,6 +374,40 @@ def _run_single_solves(fixture: ContactFixture, loop: PassLoop) -> None:
         loop.line_load[g], loop.approach[g] = solution.line_load, solution.approach
 
 
+_SLIPS = {
+    "almost no slip": Creepage(1e-7, 2e-7),
+    "partial slip": Creepage(4e-4, 1e-4),
+    "all creepages": Creepage(3e-4, 4e-4, 0.3),
+    "gross sliding": Creepage(2e-2, -1e-2),
+}
+
+
+@CAPABILITIES.specified_in(_CAPABILITIES)
+def creep_factor(fixture: ContactFixture) -> None:
+    """With a creep factor k tractions are those of k times the creepages, at 1/k their power."""
+    if _is_refused(fixture, "creep_factor", lambda: fixture.model.with_creep_factor(0.5)):
+        return
+    factor, curvature = 0.4, fixture.case.curvature
+    before = fixture.solve()
+    model = fixture.model.with_creep_factor(factor)
+    for case, creepage in _SLIPS.items():
+        slower = Creepage(
+            factor * creepage.longitudinal, factor * creepage.lateral, factor * creepage.spin
+        )
+        ideal = fixture.solve(fixture.point(slower))
+        found = model.solve_one(fixture.gap, curvature, fixture.point(creepage))
+        force = float(np.hypot(ideal.force_x, ideal.force_y))
+        scales = {"force_x": force, "force_y": force, "spin_moment": force * fixture.case.width}
+        how = f"{case}: with a creep factor of {factor}, the"
+        for name in ("line_load", "approach", *scales):
+            scale = scales.get(name, 0.0)
+            agree(f"{how} {name}", getattr(found, name), getattr(ideal, name), 1e-6, scale)
+        for name in ("power", "dissipation"):
+            agree(f"{how} {name}", factor * getattr(found, name), getattr(ideal, name), 1e-6)
+    after = fixture.solve()
+    require(before.power == after.power, "with_creep_factor changes the model that it is called on")
+
+
 @CAPABILITIES.specified_in("wearsim.plugins.PassLoop")
 def pass_loop(fixture: ContactFixture) -> None:
     """The compiled loop over passes gives the same state as single solves."""

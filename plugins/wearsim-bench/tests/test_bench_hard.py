@@ -12,7 +12,7 @@ from wearsim.results import Result
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.run.run import run
 from wearsim_bench.figures.hard_cases import hard_markdown
-from wearsim_bench.hard_cases import measures
+from wearsim_bench.hard_cases import evaluation, measures
 from wearsim_bench.hard_cases.cases import (
     RobustnessCase,
     crown_radius_of,
@@ -23,6 +23,7 @@ from wearsim_bench.hard_cases.cases import (
 from wearsim_bench.hard_cases.evaluation import evaluate
 from wearsim_bench.hard_cases.runs import Plan, is_symmetric, mirror_image
 from wearsim_bench.hard_cases.topic import hard
+from wearsim_bench.hard_cases.truths import rigid_depth
 from wearsim_bench.hard_cases.verdict import CRITERIA, Criterion, Verdict
 from wearsim_bench.measure.measurement import Effort
 
@@ -215,6 +216,28 @@ def test_criterion_describes_its_failure(criterion, failure):
     assert criterion.holds == (not failure)
 
 
+def test_depth_of_rigid_bodies_is_that_of_the_closed_forms():
+    rig = RobustnessCase("rig", {})
+    crown, area = 0.5, 1.1e-11 * 0.1 * 1e-3 * 300.0 * 1_350_000
+    free = rigid_depth(rig.scenario(1_350_000, {}))
+    assert free == pytest.approx((0.75 * area / (2.0 * crown) ** 0.5) ** (2.0 / 3.0), rel=1e-9)
+    ended = rigid_depth(rig.scenario(1_350_000, {"roller.width": "10 mm"}))
+    assert area == pytest.approx(0.01 * ended - 0.005**3 / (3.0 * crown), rel=1e-9)
+    spring = {"load": {"kind": "spring", "normal_force": "300 N", "stiffness": "690 N/mm"}}
+    depth, stiffness = rigid_depth(rig.scenario(1_350_000, spring)), 6.9e5
+    unloaded = (stiffness * depth / 300.0) ** 0.5
+    passes = (300.0 / stiffness) ** 0.5 * np.arctanh(unloaded) - depth**0.5
+    passes *= 4.0 * (2.0 * crown) ** 0.5 / (area / 300.0 / 1_350_000 * stiffness)
+    assert passes == pytest.approx(1_350_000, rel=1e-6)
+
+
+def test_wrong_depth_of_a_known_case_is_detected(monkeypatch):
+    (known,) = (case for case in hard_cases(PASSES) if case.name == "load step x3")
+    assert evaluate(known, PLAN).criterion("truth").holds
+    monkeypatch.setattr(evaluation, "rigid_depth", lambda scenario: 1.01 * rigid_depth(scenario))
+    assert any("truth" in text for text in evaluate(known, PLAN).failures)
+
+
 def test_names_of_cases_are_unique():
     names = [case.name for case in hard_cases(PASSES)]
     assert len(set(names)) == len(names)
@@ -232,7 +255,10 @@ def test_verdicts_in_json_and_markdown(monkeypatch):
     assert [item["case"] for item in kept] == [verdict.case for verdict in verdicts]
     assert tuple(map(Verdict.from_json, kept)) == verdicts
     checks = {check["name"] for check in kept[0]["checks"]}
-    assert checks == set(CRITERIA) - {"tolerance"}  # not part of the quick evaluation
+    assert checks == set(CRITERIA) - {
+        "tolerance",
+        "truth",
+    }  # not of this case in the quick evaluation
     text = hard_markdown(verdicts)
     assert text.startswith(f"{len(verdicts)} of {len(verdicts)} pass.")
     assert all(f"| {verdict.case} |" in text for verdict in verdicts)

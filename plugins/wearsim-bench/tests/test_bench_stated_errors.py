@@ -1,6 +1,7 @@
 """Topic `stated-errors`: random tests in strata, references on disk, statistics."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +10,12 @@ import wearsim
 from wearsim.errors import ResultsFileError
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
+from wearsim.plugins import BODIES
 from wearsim.types import Grid
 from wearsim_bench.figures.stated_errors import stated_errors_figure
 from wearsim_bench.measure.measurement import Effort, Measurement
 from wearsim_bench.stated_errors import references
+from wearsim_bench.stated_errors.observed import OBSERVED, observed_of
 from wearsim_bench.stated_errors.random_tests import RandomTest
 from wearsim_bench.stated_errors.references import (
     EACH_PASS,
@@ -41,6 +44,7 @@ from wearsim_bench.stated_errors.study import (
 from wearsim_bench.stated_errors.topic import requirements, stated_errors
 from wearsim_bench.stepping.runs import PreparedTest
 
+OF_CAMS = {name for name in OBSERVED if name == "lift_error" or name.endswith("angle")}
 QUICK = Effort(quick=True, repetitions=1)
 SMALL = {"operation.passes": 300, "evolution.tolerance": 1e-2, "contact.strips": 31}
 TEST = RandomTest("small", "rig-450min", SMALL)
@@ -165,7 +169,9 @@ def test_true_and_stated_errors_are_measured(tmp_path):
     assert row.failed == ""
     assert set(row.errors) == {
         prefix + name for prefix in ("", STATED, STEPS, STRIPS) for name in QUANTITIES
-    }
+    } | {prefix + name for prefix in ("", STATED) for name in OBSERVED if name not in OF_CAMS}
+    assert 0.0 < row.errors["peak_pressure"] < 0.2
+    assert row.errors["normal_force"] < 1e-9
     assert 0.0 < row.errors["depth"] < 2e-2
     for name in ("depth", "volume"):  # relative to nearly the same values, so that errors add up
         parts = row.errors[STEPS + name], row.errors[STRIPS + name]
@@ -175,6 +181,20 @@ def test_true_and_stated_errors_are_measured(tmp_path):
     assert len(list(tmp_path.iterdir())) == 2  # the reference, and that on the strips of the run
     lost = {**SMALL, "creepage": {"drive": "free", "bearing_torque": "100 N m"}}
     assert measured(RandomTest("lost", "rig-450min", lost), None).failed.startswith(CLEAR)
+
+
+def test_observables_of_a_reference_are_those_of_the_test_on_its_profiles():
+    result = wearsim.run(TEST.scenario(outputs__records=2))
+    raw, y = result.raw, result.y
+    reference = references.Reference(
+        *("", 0.0, y, *(raw.records[f"{body}_depth_profile"][-1] for body in BODIES)),
+        *(float(result.passes[-1]), 0.0, 0.0, np.zeros(3), np.zeros(3)),
+    )
+    reference = replace(reference, cylinder_depth=reference.cylinder_depth[:, None])
+    reference = replace(reference, roller_depth=reference.roller_depth[None])
+    for name, value in observed_of(TEST, reference).items():
+        own = np.ravel(raw.history[name][-1])
+        assert value == pytest.approx(own, rel=1e-3, abs=1e-12), name
 
 
 def test_requirements_state_what_is_met():
@@ -215,7 +235,7 @@ def test_study_lists_statistics_and_worst_tests(tmp_path):
         found = coverage(topic.of("tests"), row.method)
         assert row.counts["covered"] == found.covered
         title = f"not covered, {row.method}"
-        done = [item for item in topic.of("tests") if not item.failed]
+        done = [item for item in topic.of("tests") if row.method in item.errors]
         assert len(topic.of(title)) == len(done) - found.covered
         for item in topic.of(title):
             assert f"- {item.method}: " in topic.conclusions[title]

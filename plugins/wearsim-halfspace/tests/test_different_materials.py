@@ -156,3 +156,21 @@ def test_note_on_neglected_coupling_is_left_out_where_it_is_included():
     assert shipped_scenario("rig-450min", bronze).notes == ()
     [note] = shipped_scenario("rig-450min", bronze | {"contact.coupling": False}).notes
     assert "neglected" in note
+
+
+def test_creep_factor_changes_no_sliding_contact_of_different_materials():
+    materials, slip = (STEEL, BRONZE), Creepage(0.1)
+    point = OperatingPoint(300.0, 1.0, slip, 0.3)
+    model = Halfspace(HalfspaceOptions(mx=24), GRID, materials)
+    ideal = model.solve_one(20.0 * GRID.y**2, 90.0, point)
+    film = model.with_creep_factor(0.5).solve_one(20.0 * GRID.y**2, 90.0, point)
+    # the power extrapolated from coarser elements is that of the tolerance there
+    assert film.power == pytest.approx(ideal.power, rel=1e-4)
+    np.testing.assert_allclose(
+        film.line_load, ideal.line_load, rtol=0.0, atol=3e-4 * ideal.line_load.max()
+    )
+    partly = model.with_creep_factor(0.5).solve_one(
+        20.0 * GRID.y**2, 90.0, OperatingPoint(300.0, 1.0, Creepage(2e-3), 0.3)
+    )
+    whole = model.solve_one(20.0 * GRID.y**2, 90.0, OperatingPoint(300.0, 1.0, Creepage(2e-3), 0.3))
+    assert 0.0 < -partly.force_x < -0.9 * whole.force_x

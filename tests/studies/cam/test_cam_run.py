@@ -169,8 +169,35 @@ def test_lift_error_is_the_descent_over_the_cosine(eccentric):
     assert curve == pytest.approx(-depth / np.cos(alpha), rel=1e-3)
     assert final["lift_error_m"] == pytest.approx(np.ptp(curve), rel=2e-2)
     assert final["station_depth_m"] == pytest.approx(depth)
-    assert abs(math.sin(final["depth_angle_rad"])) == pytest.approx(1.0, abs=1e-3)
+    theta = np.linspace(0.0, math.pi, 1801)
+    point = turn_of(cam("eccentric")).at_angles(theta)
+    wear = point.normal_force ** (2.0 / 3.0) / np.cos(point.kinematics.pressure_angle)
+    least, most = final["least_wear_angle_rad"], final["greatest_wear_angle_rad"]
+    assert math.cos(most) == pytest.approx(math.cos(theta[wear.argmax()]), abs=5e-3)
+    assert math.cos(least) == pytest.approx(1.0, abs=1e-3)
     assert final["station_lift_error_from_dwell_m"] == pytest.approx(curve - curve[0])  # no dwell
+
+
+def test_greatest_depth_lies_between_the_stations(eccentric):
+    turn = turn_of(cam("eccentric"))
+    theta = np.linspace(0.0, math.pi, 1801)
+    place = theta[turn.at_angles(theta).normal_force.argmax()]  # the depth grows with the load
+    error = float(eccentric.values("depth_angle_error_by_stations")[-1])
+    assert abs(eccentric.final["depth_angle_rad"] - place) < error + math.radians(0.2)
+    assert eccentric.depth[-1] > eccentric.values("station_depth")[-1].max() * 1.0002
+
+
+@pytest.mark.parametrize("stations", [5, 7, 9])
+def test_few_stations_have_errors_within_the_stated_ones(stations):
+    changes = {"wear__roller__k_over_h": "0 1/Pa", **SHORT}
+    few, many = (wearsim.run(prescribed(cam__stations=n, **changes)) for n in (stations, 25))
+    for name in ("depth", "lift_error"):
+        error = abs(float(few.values(name)[-1] - many.values(name)[-1]))
+        stated = few.values(f"{name}_error_by_stations")[-1]
+        assert error <= stated + 5e-4 * many.values(name)[-1]
+    assert few.depth_error[-1] >= few.values("depth_error_by_stations")[-1]
+    assert any("cam.stations decrease it" in text for text in few.warnings)
+    assert not any("cam.stations" in text for text in many.warnings)
 
 
 def test_interrupted_run_of_a_cam_resumes_bit_for_bit(tmp_path):
@@ -203,7 +230,7 @@ def test_results_of_a_cam_are_exported_and_drawn(tmp_path, eccentric):
     fresh, worn = columns[1:3], columns[3:5]
     assert np.hypot(fresh[0] - 5.0, fresh[1]) == pytest.approx(25.0, abs=1e-6)
     lost = 25.0 - np.hypot(worn[0] - 5.0, worn[1])
-    assert lost.max() == pytest.approx(1e3 * eccentric.depth[-1], rel=1e-3)
+    assert lost.max() == pytest.approx(1e3 * eccentric.depth[-1], rel=2e-5)
     assert lost.min() == pytest.approx(1e3 * eccentric.values("station_depth")[-1].min(), rel=1e-3)
     panels = {axes.get_title(loc="left"): axes for axes in cam_run_figure(eccentric).axes}
     assert {"Worn depth of the cam", "Worn cam", "Lift error against the unworn cam"} <= set(panels)

@@ -12,6 +12,7 @@ from wearsim.evolution import relocation
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.state import fresh_state
 from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.effort import restarts_of
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 
@@ -51,6 +52,9 @@ def test_ends_of_skids_follow_the_load_and_keep_volume_and_energy(moves):
     test = scenario()
     result = wearsim.run(test)
     assert len(moves) >= 4
+    problem, _, _ = assemble_problem(draw(test))
+    both_bodies = result.depth[-1] + result.roller_depth[-1].max()
+    assert 1.0 / 3.0 < restarts_of(problem, both_bodies) / len(moves) < 3.0
     for old, new, before, after in moves:
         lengths = [one.along.length.ravel()[:, None] for one in (old, new)]
         volumes = [

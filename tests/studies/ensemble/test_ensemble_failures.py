@@ -24,6 +24,29 @@ def test_failed_realisations_are_stored_with_errors(tmp_path):
     assert result.estimate("depth").count == result.count
 
 
+def test_realisation_that_becomes_too_deep_fails_and_keeps_its_observables(tmp_path):
+    deep = {"passes": 17_000, "contact__width": "130 mm", "outputs__records": 4}
+    factor = {"distribution": "lognormal", "median": "1.2e-7 1/Pa", "factor": 1.5}
+    scenario = small(wear__cylinder__k_over_h=factor, **deep)
+    ended = ensemble(scenario, 6, tmp_path / "ended.h5", **SERIAL)
+    allowed = scenario.changed({"evolution.allow_deep": True})
+    whole = ensemble(allowed, 6, tmp_path / "whole.h5", **SERIAL)
+    assert whole.count == 6
+    beyond = whole.at_end("depth") > 0.1 * scenario.roller.radius
+    assert sorted(ended.errors) == np.flatnonzero(beyond).tolist()
+    assert 0 < ended.failed < 6
+    for number, text in ended.errors.items():
+        assert "exceeds a tenth of roller.radius = 20 mm" in text
+        assert "lower operation.passes, or set evolution.allow_deep = true" in text
+        kept = ended.raw.rows("depth", number, number + 1)[0]
+        done = int(text.removeprefix("after pass ").split()[0])
+        known = ended.record_passes <= done
+        assert known.sum() > 1
+        np.testing.assert_array_equal(np.isfinite(kept), known)
+        np.testing.assert_array_equal(kept[known], whole.values("depth")[number][known])
+    np.testing.assert_array_equal(ended.values("depth"), whole.values("depth")[~beyond])
+
+
 def test_only_failed_realisations_run_again(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 

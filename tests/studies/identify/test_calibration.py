@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.studies.identify.grooves import NOISE, PASSES, K, groove, grown, rig
+from wearsim.errors import ScenarioError
 from wearsim.studies.identify.analysis import Identified, identified, kernel_of
 from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.measurements import Measurement
@@ -60,18 +61,21 @@ def test_intervals_hold_the_truth_with_correlated_noise(length: float):
         assert row.depth is not None
         held += holds(row), row.depth[1] < DEPTH < row.depth[2]
     assert_95_percent(held[0])
-    if length < 1e-3:
-        assert_95_percent(held[1])
-    else:  # few correlation lengths on shoulders and bottom: the interval of the depth is too small
-        assert held[1] >= 0.82 * SETS
+    assert_95_percent(held[1])
 
 
 @pytest.mark.slow
 def test_intervals_hold_the_truth_without_shoulders():
-    rng = np.random.default_rng(31)
-    found = [found_in(*groove(rng, K, rng.uniform(-0.2e-3, 0.2e-3), 7.5e-3)) for _ in range(SETS)]
+    rng, found, refused = np.random.default_rng(31), [], []
+    for _ in range(SETS):
+        try:
+            found.append(found_in(*groove(rng, K, rng.uniform(-0.2e-3, 0.2e-3), 7.5e-3)))
+        except ScenarioError as error:  # an edge of the groove that noise hides: nothing is stated
+            refused.append(str(error))
     assert all(row.depth is None for row in found)
-    assert_95_percent(sum(map(holds, found)))
+    assert all("may be wider than the trace" in text for text in refused)
+    assert len(refused) <= 0.02 * SETS
+    assert_95_percent(sum(map(holds, found)), len(found))
 
 
 @pytest.mark.slow

@@ -65,7 +65,7 @@ body = "disc"
     message = str(caught.value)
     for part in (
         "[test 1] depht_std: is unknown",
-        "[test 1] profile or depth: exactly one",
+        "[test 1] profile, depth or lift: exactly one",
         "[test 2] depth: ",
         "[test 2] depth_std: is needed with depth",
         "[test 3] std.friction.coefficient: has no measured value in set",

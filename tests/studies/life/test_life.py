@@ -64,6 +64,30 @@ def exact(tmp_path_factory: pytest.TempPathFactory) -> LifeResult:
     return lives(tmp_path_factory.mktemp("life") / "exact.h5", target=4000)
 
 
+@pytest.mark.parametrize(
+    ("limit", "allowed", "count"), [(1.5, False, 4), (3, False, 0), (3, True, 4)]
+)
+def test_test_that_becomes_too_deep_before_its_limit_fails(
+    limit: float, allowed: bool, count: int, tmp_path: Path
+) -> None:
+    factor = {"distribution": "lognormal", "median": "1.2e-7 1/Pa", "factor": 1.5}
+    scenario = design(
+        passes=10_000,
+        wear__cylinder__k_over_h=factor,
+        contact__width="130 mm",
+        limit__depth=f"{limit} mm",
+        evolution__allow_deep=allowed,
+    )
+    found = lives(tmp_path / "deep.h5", scenario, 4)
+    assert found.count == count
+    for number, text in found.errors.items():
+        assert "exceeds a tenth of roller.radius = 20 mm" in text
+        assert "lower the limits in [limit], or set evolution.allow_deep" in text
+        start, end = found.raw.rows("depth", number, number + 1)[0].tolist()
+        assert start == 0.0
+        assert 2e-3 < end < 3e-3
+
+
 def test_life_of_a_mean_design_is_that_of_the_closed_form(tmp_path: Path) -> None:
     scenario = design(load__normal_force="300 N", friction__coefficient=0.1)
     found = lives(tmp_path / "mean.h5", scenario, 400)
@@ -360,7 +384,9 @@ def test_rare_end_of_life_agrees_with_the_exact_factor(tmp_path: Path, exact: Li
 
 
 def test_stopped_rare_events_continue_bit_for_bit(tmp_path: Path) -> None:
-    scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"})
+    factor = {**LOGNORMAL, "median": "1e-20 1/Pa"}
+    quick = {"evolution__tolerance": 5e-2, "evolution__strip_error": False}
+    scenario = design(wear__roller__k_over_h=factor, **quick)
     whole = lives(tmp_path / "whole.h5", scenario, 20, target=250, rare=200)
     path, calls = tmp_path / "stopped.h5", []
 

@@ -7,7 +7,7 @@ from tests.studies.random_examples import CREEPAGE, FRICTION, end_of, scenario_o
 from wearsim.errors import ScenarioError
 from wearsim.evolution.quantities import ContactInputs
 from wearsim.studies.run.draws import draw
-from wearsim.studies.run.inputs import redrawing
+from wearsim.studies.run.nodes import redrawing
 
 PER_TURN = {**FRICTION, "persistence": "per-turn"}
 

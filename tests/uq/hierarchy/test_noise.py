@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wearsim.uq.hierarchy.noise import Noise, fit_noise
+from wearsim.uq.hierarchy.noise import Noise, fit_noise, noise_models
 
 NOISE = Noise(1e-6, 0.2e-3, 0.3e-6)
 
@@ -47,3 +47,47 @@ def test_fit_finds_length_and_both_parts():
 def test_too_few_points_are_refused():
     with pytest.raises(ValueError, match="8 points"):
         fit_noise(np.linspace(0.0, 1.0, 7), np.zeros(7))
+
+
+def means_and_stds(log: np.ndarray, mean: np.ndarray, std: np.ndarray) -> np.ndarray:
+    """Return mean and standard deviation of mixtures over the first axis, shape (2, sets)."""
+    weight = np.exp(log - log.max(axis=0))
+    weight /= weight.sum(axis=0)
+    whole = (weight * mean).sum(axis=0)
+    return np.array([whole, np.sqrt((weight * (std**2 + (mean - whole) ** 2)).sum(axis=0))])
+
+
+@pytest.mark.parametrize("length", [0.3e-3, 1.5e-3])
+def test_integral_over_the_noise_equals_that_of_a_fine_grid(length: float):
+    rng, noise, sets = np.random.default_rng(4), Noise(1e-6, length, 0.1e-6), 12
+    y = np.arange(-12e-3, 12e-3, 0.12e-3)
+    count = len(y)
+    heights = noise.sample(y, rng.standard_normal((2, count, sets)))
+    # the unknown that matters is the height of a step in both edges of a groove
+    forms = np.column_stack([np.abs(y) < 7e-3, np.ones(count), y / 12e-3]).astype(float)
+    freedom, rows = count - forms.shape[1], []
+    for decades in np.linspace(-4.4, np.log10(12e-3), 36):
+        for white in np.linspace(0.0, 1.0, 40)[:-1] ** 2:
+            unit = Noise(float(np.sqrt(1.0 - white)), 10.0**decades, float(np.sqrt(white)))
+            root = np.linalg.cholesky(covariance(y, unit))
+            z = np.linalg.solve(root, np.column_stack([heights, forms]))
+            inverse = np.linalg.inv(z[:, sets:].T @ z[:, sets:])
+            found = inverse @ z[:, sets:].T @ z[:, :sets]
+            squares = ((z[:, :sets] - z[:, sets:] @ found) ** 2).sum(axis=0)
+            log = np.log(10.0**decades * np.sqrt(max(white, 1e-4))) - np.log(np.diag(root)).sum()
+            log += 0.5 * np.linalg.slogdet(inverse)[1] - 0.5 * freedom * np.log(squares)
+            rows.append([log, found[0], np.sqrt(inverse[0, 0] * squares / freedom)])
+    mean, std = means_and_stds(*np.array(rows).transpose(1, 0, 2))
+    got = []
+    for height in heights.T:
+        models = noise_models(y, height, forms)
+        z = models.whitened(np.column_stack([height, forms])).transpose(1, 0, 2)
+        inverse = np.linalg.inv(z[:, :, 1:].transpose(0, 2, 1) @ z[:, :, 1:])
+        found = np.einsum("mfg,mjg,mj->mf", inverse, z[:, :, 1:], z[:, :, 0])
+        squares = ((z[:, :, 0] - np.einsum("mjf,mf->mj", z[:, :, 1:], found)) ** 2).sum(axis=1)
+        log = models.log_weight - models.exponent * np.log(squares)
+        deviation = np.sqrt(inverse[:, 0, 0] * squares / freedom)
+        got.append(means_and_stds(*(v[:, None] for v in (log, found[:, 0], deviation)))[:, 0])
+    means, stds = np.array(got).T
+    assert means == pytest.approx(mean, abs=0.1 * std.min())
+    assert stds == pytest.approx(std, rel=0.05)

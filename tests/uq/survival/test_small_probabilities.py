@@ -26,6 +26,11 @@ from wearsim.uq.survival.effective import effective_number
 MOST_FALSE = STUDIES - 372  # studies of 400 whose stated interval does not hold the probability
 
 
+def least_held(stated: int) -> float:
+    """Return the least number of stated intervals that hold the truth, for a coverage of 95 %."""
+    return 0.95 * stated - 2.0 * math.sqrt(0.95 * 0.05 * stated)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("count", SIZES)
 @pytest.mark.parametrize("factor", FRICTION)
@@ -34,6 +39,13 @@ def test_stated_probabilities_hold_the_truth(form: str, factor: float, count: in
     for probability in PROBABILITIES:
         cell = by_realisations(form, factor, count, probability)
         assert cell.false <= MOST_FALSE, (probability, cell)
+        assert cell.stated < 30 or cell.held >= least_held(cell.stated), (probability, cell)
+
+
+def test_the_few_studies_that_state_a_probability_hold_the_truth() -> None:
+    cell = by_realisations("linear", 1.2, 40, 1e-2)
+    assert cell.stated > 30
+    assert cell.held >= least_held(cell.stated)
 
 
 @pytest.mark.slow

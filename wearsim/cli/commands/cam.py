@@ -117,7 +117,19 @@ def _data(study: CamStudy) -> dict[str, Any]:
     """Return the study in SI units."""
     from wearsim.studies.cam.checks import harmonic_depth
 
-    motion = study.turn.cam.motion
+    motion, measured = study.turn.cam.motion, study.turn.cam.measured
+    smoothing = {}
+    if measured is not None:
+        unit = measured.unit
+        smoothing["smoothing"] = {
+            "file": measured.file,
+            "quantity": measured.quantity,
+            f"noise_{unit}": measured.noise,
+            "scatter_of_acceleration_per_rad2": measured.scatter,
+            "error_of_acceleration_per_rad2": measured.error,
+            "angle_rad": measured.angle,
+            f"residual_{unit}": measured.residual,
+        }
     return {
         "title": study.turn.scenario.title,
         "perimeter_m": study.perimeter,
@@ -139,6 +151,7 @@ def _data(study: CamStudy) -> dict[str, Any]:
             {"start_rad": skid.start, "stop_rad": skid.stop, "energy_J": skid.energy}
             for skid in study.skids
         ],
+        **smoothing,
         "stations": _columns(study),
         "warnings": study.warnings,
     }
@@ -146,6 +159,8 @@ def _data(study: CamStudy) -> dict[str, Any]:
 
 def _summary(study: CamStudy) -> list[tuple[str, str]]:
     """Return the numbers of the turn in engineering units."""
+    import numpy as np
+
     from wearsim.report.text import NOTHING, shown
     from wearsim.studies.cam.checks import harmonic_depth
 
@@ -171,6 +186,13 @@ def _summary(study: CamStudy) -> list[tuple[str, str]]:
         rows.append(("skids of the roller", text))
     if study.weight is not None:
         rows.append(("stations", f"{len(study.weight)} of a run"))
+    if measured := turn.cam.measured:
+        away, unit = np.abs(measured.residual), "um" if measured.unit == "m" else "mrad"
+        rms = shown(float(np.sqrt((away**2).mean())), unit, 3)
+        most, noise = shown(float(away.max()), unit, 3), shown(measured.noise, unit, 3)
+        place = shown(float(measured.angle[away.argmax()]), "deg")
+        words = f"rms {rms}, at most {most} at {place}; noise {noise}"
+        rows.append((f"residuals of the {measured.quantity}", words))
     return rows
 
 

@@ -45,8 +45,8 @@ Tests = Annotated[
     typer.Option(
         "--tests",
         metavar="TESTS.toml",
-        help="Tests as [[test]] tables: profile or depth with depth_std; before, at, group, set,"
-        " std, body, shoulders, curvature, columns, units.",
+        help="Tests as [[test]] tables: profile, depth with depth_std, or lift of a cam; angle of a"
+        " cam, before, at, group, set, std, body, shoulders, curvature, runout, columns, units.",
         show_default=False,
     ),
 ]

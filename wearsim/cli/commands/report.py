@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wearsim.cli.commands.results import Level, MeasuredFiles, measured_profiles
+from wearsim.cli.commands.results import Angle, Level, MeasuredFiles, measured_profiles
 from wearsim.cli.shared import (
     At,
     Columns,
@@ -44,6 +44,7 @@ def report(
     files: Files,
     output: Page = None,
     measured: MeasuredFiles = None,
+    angle: Angle = None,
     level: Level = False,
     columns: Columns = None,
     units: Units = None,
@@ -65,6 +66,6 @@ def report(
     results = [open_results(file) for file in files]
     check_new_file(path, force)
     choice = profile_choice(columns, units, row, mean_rows, at)
-    profiles = measured_profiles(measured or [], choice, results, level)
+    profiles = measured_profiles(measured or [], choice, results, level, angle)
     save_report(results, path, profiles)
     note(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")

@@ -19,6 +19,7 @@ from wearsim.cli.shared import (
     Row,
     Units,
     check_figure,
+    checking,
     note,
     profile_choice,
     write_json,
@@ -50,6 +51,16 @@ MeasuredFiles = Annotated[
         show_default=False,
     ),
 ]
+Angle = Annotated[
+    str | None,
+    typer.Option(
+        "--angle",
+        metavar="ANGLE",
+        help="Angle of the cam at which --measured was measured: '112 deg'; default: where the cam"
+        " is worn deepest.",
+        show_default=False,
+    ),
+]
 Level = Annotated[
     bool,
     typer.Option(
@@ -64,6 +75,7 @@ def plot(
     file: ResultsFile,
     figure: Figure = None,
     measured: MeasuredFiles = None,
+    angle: Angle = None,
     level: Level = False,
     columns: Columns = None,
     units: Units = None,
@@ -90,21 +102,32 @@ def plot(
             f"requires wear tests; {file} holds {result.raw.schema.holds}", param_hint="--measured"
         )
     choice = profile_choice(columns, units, row, mean_rows, at)
-    draw(result, path, measured_profiles(measured or [], choice, [result], level))
+    draw(result, path, measured_profiles(measured or [], choice, [result], level, angle))
     note(f"figure: {path}")
 
 
 def measured_profiles(
-    files: Sequence[Path], choice: ProfileChoice, results: Sequence[object], level: bool
+    files: Sequence[Path],
+    choice: ProfileChoice,
+    results: Sequence[object],
+    level: bool,
+    angle: str | None = None,
 ) -> list[Measured]:
     """Return the profiles of measured files, levelled against the first result if required.
 
     How signs were read and the residuals go to stderr.
     """
     if not files:
-        if level:
-            raise typer.BadParameter("needs a measured profile, --measured", param_hint="--level")
+        for name, given in (("--level", level), ("--angle", angle)):
+            if given:
+                raise typer.BadParameter("needs a measured profile, --measured", param_hint=name)
         return []
+    at = None
+    if angle is not None:
+        from wearsim.quantities import quantity
+
+        with checking("--angle"):
+            at = quantity(angle, "rad")
     from wearsim.errors import ScenarioError
     from wearsim.profiles import load_profile, sign_note
     from wearsim.report.measured import Measured, computed_profile, levelled, residual_text, rms
@@ -116,16 +139,20 @@ def measured_profiles(
     each = zip(files, read, strict=True)
     write_notes(filter(None, [sign_note(one, choice, str(file)) for file, one in each]))
     each = zip(files, read, strict=True)
-    profiles = [Measured(file.stem, one.y, one.height) for file, one in each]
+    profiles = [Measured(file.stem, one.y, one.height, at) for file, one in each]
     tests = (
         one
         for one in results
         if isinstance(one, Result | EnsembleResult) and not isinstance(one, LifeResult)
     )
     test = next(tests, None)
+    if at is not None and not (isinstance(test, Result) and test.scenario.cam is not None):
+        raise typer.BadParameter(
+            "is for the run of a cam; ensembles hold the deepest groove", param_hint="--angle"
+        )
     if test is None:
         return profiles
-    computed = computed_profile(test)
+    computed = computed_profile(test, at)
     for place, profile in enumerate(profiles):
         try:
             corrected = levelled(profile, computed)

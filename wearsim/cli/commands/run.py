@@ -85,12 +85,14 @@ def run(
 
 def report(result: Result, json: bool) -> None:
     """Write the summary of a run to stdout."""
+    from wearsim.report.limits import limit_rows, limits_json
     from wearsim.report.summary import draws, effort, end_state, run_json, run_line, standing
 
     if json:
-        write_json(run_json(result))
+        write_json({**run_json(result), "limits": limits_json(result)})
         return
-    rows = [("test", standing(result)), *draws(result), *end_state(result), *effort(result)]
+    state = [*end_state(result), *limit_rows(result)]
+    rows = [("test", standing(result)), *draws(result), *state, *effort(result)]
     write_table(result.title, [*rows, ("results file", str(result.path))])
     typer.echo(run_line(result))
 

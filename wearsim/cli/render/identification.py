@@ -78,7 +78,7 @@ def _line(test: Mapping[str, Any]) -> tuple[str, ...]:
         test["levelled_on"],
         NOTHING if measured is None else with_range(test["depth_m"], measured[0], measured[1], 1e6),
         with_range(test["model_depth_m"], depth[0], depth[1], 1e6),
-        with_range(test["area_m2"], area[0], area[1], 1e6),
+        NOTHING if area is None else with_range(test["area_m2"], area[0], area[1], 1e6),
         with_range(k["value"], k["low"], k["high"], 1e12),
         residuals,
     )

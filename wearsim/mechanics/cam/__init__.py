@@ -1,5 +1,6 @@
 """Cams: motion of the follower, kinematics of the roller on the cam, stations along the angle."""
 
+from wearsim.mechanics.cam.extremes import Extreme, greatest, integral_error
 from wearsim.mechanics.cam.follower import Follower, RollerKinematics
 from wearsim.mechanics.cam.motion import Motion, Panel, Segment, motion_mistakes
 from wearsim.mechanics.cam.shapes import (
@@ -16,6 +17,7 @@ from wearsim.mechanics.cam.surface import surface_points
 
 __all__ = [
     "Arc",
+    "Extreme",
     "Follower",
     "Line",
     "Motion",
@@ -28,6 +30,8 @@ __all__ = [
     "choose_stations",
     "eccentric_cam",
     "extreme",
+    "greatest",
+    "integral_error",
     "motion_mistakes",
     "moved_stations",
     "shape_motion",

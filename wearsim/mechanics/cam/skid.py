@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -67,10 +68,16 @@ class SkidArc:
 
     def slip_at(self, theta: FloatArray) -> FloatArray:
         """Return the slip at angles of the arc [rad]."""
+        return np.asarray(self._spline(np.clip(theta, self.theta[0], self.theta[-1])))
+
+    @cached_property
+    def _spline(self) -> Callable[[FloatArray], FloatArray]:
         from scipy.interpolate import CubicHermiteSpline  # noqa: PLC0415  (slow to import)
 
-        spline = CubicHermiteSpline(self.theta, self.slip, self.slip_per_rad)
-        return np.asarray(spline(np.clip(theta, self.theta[0], self.theta[-1])))
+        spline: Callable[[FloatArray], FloatArray] = CubicHermiteSpline(
+            self.theta, self.slip, self.slip_per_rad
+        )
+        return spline
 
 
 def skid_arcs(
@@ -131,21 +138,21 @@ class _Trace:
     """Slip along a part of a panel, on points of which every second one is a middle."""
 
     def __init__(self, theta: FloatArray, values: Rolling) -> None:
-        self.theta, self.values = theta, values
-        self.demand = values.demand()
+        # Python floats, which are faster than arrays one at a time
+        self.theta, self.demand = theta.tolist(), values.demand().tolist()
+        self.spin, self.spin_per_rad, self.drag, self.reach = (a.tolist() for a in values)
 
     def _rate(self, place: int, sign: float, slip: float) -> float:
-        values = self.values
-        turning = math.copysign(1.0, float(values.spin[place]) - slip)
-        drag = turning * float(values.drag[place])
-        return float(values.spin_per_rad[place]) + drag - sign * float(values.reach[place])
+        drag = math.copysign(1.0, self.spin[place] - slip) * self.drag[place]
+        return float(self.spin_per_rad[place] + drag - sign * self.reach[place])
 
     def follow(self, slip: float) -> tuple[float, list[tuple[FloatArray, ...]]]:
         """Return the slip at the end, from that at the start, and the arcs between."""
         arcs: list[list[tuple[float, float, float]]] = []
         inside = slip != 0.0
+        spin, rise, drag, reach = self.spin, self.spin_per_rad, self.drag, self.reach
         for place in range(0, len(self.theta) - 1, 2):
-            low, high = self.theta[place : place + 3 : 2].tolist()
+            low, high = self.theta[place], self.theta[place + 2]
             if slip == 0.0:
                 if abs(self.demand[place + 2]) <= 1.0:
                     inside = False
@@ -156,24 +163,28 @@ class _Trace:
                     near, far = abs(self.demand[place]), abs(self.demand[place + 2])
                     start = low + (1.0 - near) / (far - near) * (high - low)
                 rate = self._rate(place + 2, sign, 0.0)
-                last = 0.5 * rate * (high - start) if start > low else rate * (high - start)
-                arcs.append([(start, 0.0, 0.0 if start > low else rate), (high, last, rate)])
-                slip, inside = last, True
+                slip = 0.5 * rate * (high - start) if start > low else rate * (high - start)
+                arcs.append([(start, 0.0, 0.0 if start > low else rate), (high, slip, rate)])
+                inside = True
                 continue
             sign = math.copysign(1.0, slip)
-            rates = [self._rate(place + k, sign, slip) for k in range(3)]
+            first, middle, last = (
+                # as of _rate, without calls: this takes most of the time of a turn
+                (rise[k] + (drag[k] if spin[k] >= slip else -drag[k]) - sign * reach[k])
+                for k in (place, place + 1, place + 2)
+            )
             if not inside or not arcs:
-                arcs.append([(low, slip, rates[0])])
+                arcs.append([(low, slip, first)])
                 inside = True
-            after = slip + (high - low) / 6.0 * (rates[0] + 4.0 * rates[1] + rates[2])
+            after = slip + (high - low) / 6.0 * (first + 4.0 * middle + last)
             if after * sign > 0.0:
                 slip = after
-                arcs[-1].append((high, slip, rates[2]))
+                arcs[-1].append((high, slip, last))
                 continue
             # the roller catches up within the interval
             part = slip / (slip - after)
             stop = low + part * (high - low)
-            arcs[-1].append((stop, 0.0, rates[0] + part * (rates[2] - rates[0])))
+            arcs[-1].append((stop, 0.0, first + part * (last - first)))
             slip, inside = 0.0, False
             if abs(self.demand[place]) > 1.0 >= abs(self.demand[place + 2]):
                 # rolling begins somewhere in the rest of the interval

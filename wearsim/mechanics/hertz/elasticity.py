@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wearsim.types import Material
 
@@ -21,12 +21,28 @@ class ElasticPair:
         E* [Pa], 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; equals G/(1 - nu).
     dundurs : float
         Dundurs' second constant beta, a measure of the coupling of pressure and traction.
+    creep_factor : float
+        Kalker's reduction factor, by which both moduli have been multiplied.
     """
 
     shear_modulus: float
     poisson_ratio: float
     contact_modulus: float
     dundurs: float
+    creep_factor: float = 1.0
+
+    def reduced(self, creep_factor: float) -> ElasticPair:
+        """Return the constants of a tangential problem with a third body between the bodies.
+
+        Their compliance along the surface is divided by the factor, so that the initial slope of
+        traction against creepage is multiplied by it (Kalker 1990, DOI 10.1007/978-94-015-7889-9).
+        """
+        return replace(
+            self,
+            shear_modulus=creep_factor * self.shear_modulus,
+            contact_modulus=creep_factor * self.contact_modulus,
+            creep_factor=creep_factor * self.creep_factor,
+        )
 
 
 def combine(first: Material, second: Material) -> ElasticPair:

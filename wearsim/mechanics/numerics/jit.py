@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -14,7 +15,6 @@ from functools import cache, update_wrapper
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryFile
-from threading import RLock
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -32,7 +32,7 @@ _SUBROUTINES: list[Callable[..., Any]] = []  # those that numba has not been giv
 _REPORTS: list[Callable[[str], None]] = []
 _ALONGSIDE: dict[str, list[Callable[[], None]]] = {}  # by the name of a kernel
 _STARTED: list[Any] = []  # processes that compile kernels
-_LOCK = RLock()
+_LOCK = threading.RLock()
 
 
 class Kernel:
@@ -98,7 +98,9 @@ def _compiled(function: Callable[..., Any]) -> Any:
 @cache
 def _prepared_numba() -> Any:
     """Import numba, let compiled functions call kernels, and report compilations."""
-    import numba  # noqa: PLC0415
+    with _without_scipy_linalg():
+        import numba  # noqa: PLC0415
+        import numba.np.arraymath  # noqa: PLC0415
     from numba.core import event  # noqa: PLC0415
     from numba.extending import typeof_impl  # noqa: PLC0415
 
@@ -171,6 +173,24 @@ def _register_subroutines() -> None:
 
     while _SUBROUTINES:
         register_jitable(**_OPTIONS)(_SUBROUTINES.pop())
+
+
+@contextmanager
+def _without_scipy_linalg() -> Iterator[None]:
+    """Let numba find no scipy.linalg in the context, which takes a tenth of a second to import.
+
+    numba asks whether it exists for a faster numpy.convolve, and imports it again where a function
+    calls BLAS. In the threads of a pool another one may be importing scipy, which would then fail.
+    """
+    name, main = "scipy.linalg", threading.main_thread()
+    hidden = name not in sys.modules and threading.current_thread() is main
+    if hidden:
+        sys.modules[name] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        if hidden:
+            del sys.modules[name]
 
 
 @contextmanager

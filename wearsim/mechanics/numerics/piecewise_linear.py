@@ -8,6 +8,8 @@ import numpy as np
 
 from wearsim.types import FloatArray
 
+_KNOWN = 16  # times whose integrals are kept
+
 
 class PiecewiseLinear:
     """Function of time that is linear between its samples, defined from the first to the last.
@@ -27,13 +29,19 @@ class PiecewiseLinear:
         squares = steps * (first**2 + first * last + last**2) / 3.0
         self._area = np.concatenate([[0.0], np.cumsum(areas)])
         self._square = np.concatenate([[0.0], np.cumsum(squares)])
+        self._known: dict[float, tuple[float, float]] = {}
 
     def at(self, time: FloatArray) -> FloatArray:
         """Return the value at each `time` [s], shape as `time`."""
         return np.interp(time, self.time, self.value)
 
     def _integrals(self, time: float) -> tuple[float, float]:
-        """Return the integrals of the value and of its square from the first sample to `time`."""
+        """Return the integrals of the value and of its square from the first sample to `time`.
+
+        Those of the last times are kept: the solutions of a step ask for the same ones.
+        """
+        if (known := self._known.get(time)) is not None:
+            return known
         # Python floats, which are faster than arrays for the few values of a step
         k = min(max(int(self.time.searchsorted(time)) - 1, 0), len(self.time) - 2)
         start, stop = float(self.time[k]), float(self.time[k + 1])
@@ -42,7 +50,10 @@ class PiecewiseLinear:
         here, duration = first + (last - first) * part, time - start
         square = duration * (first * first + first * here + here * here) / 3.0
         area = float(self._area[k]) + 0.5 * duration * (first + here)
-        return area, float(self._square[k]) + square
+        if len(self._known) >= _KNOWN:
+            self._known = {}
+        found = self._known[time] = area, float(self._square[k]) + square
+        return found
 
     def mean(self, start: float, stop: float) -> float:
         """Return the exact mean between two times [s]."""

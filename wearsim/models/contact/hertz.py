@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from copy import copy
+from typing import Any, Self
 
 import numpy as np
 from pydantic import Field
@@ -73,7 +74,11 @@ class HertzModel(SingleContactModel):
     """
 
     capabilities = Capabilities(
-        creepage_variation=True, bearing_torque=True, local_friction=True, fields=True
+        creepage_variation=True,
+        bearing_torque=True,
+        local_friction=True,
+        creep_factor=True,
+        fields=True,
     )
 
     def __init__(
@@ -86,7 +91,14 @@ class HertzModel(SingleContactModel):
         self.theory = theory
         self._grid = grid
         self._pair: ElasticPair = combine(*materials)
+        self._tangential = self._pair
         self.patch = patch
+
+    def with_creep_factor(self, factor: float) -> Self:
+        """Return the model with its tangential compliance divided by a factor."""
+        model = copy(self)
+        model._tangential = self._pair.reduced(factor)
+        return model
 
     def solve_contact(
         self,
@@ -108,7 +120,7 @@ class HertzModel(SingleContactModel):
         if not np.isfinite(point.friction).all():  # a closed form would return zero traction
             raise power_not_finite(point, gap=gap)
         strips = self._theory_strips(gap, longitudinal_curvature, point)
-        return complete(self.theory, strips, self._pair, point)
+        return complete(self.theory, strips, self._tangential, point)
 
     def fields(
         self,
@@ -122,7 +134,7 @@ class HertzModel(SingleContactModel):
         strips = self._theory_strips(gap, longitudinal_curvature, point)
         return self.theory.fields(
             strips,
-            self._pair,
+            self._tangential,
             local_slip(strips, point, solution.longitudinal_creepage),
             self._friction(strips, point),
             point.rolling_speed,

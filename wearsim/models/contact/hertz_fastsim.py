@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Self
 
 import numpy as np
 from pydantic import Field
@@ -95,6 +96,7 @@ class HertzFastsim(HertzModel):
         bearing_torque=True,
         local_friction=True,
         friction_field=True,
+        creep_factor=True,
         fields=True,
     )
     theory: FastsimTheory
@@ -116,6 +118,12 @@ class HertzFastsim(HertzModel):
         )
         super().__init__(theory, grid, materials, options.patch)
         self._compiled = theory.compiled(self._pair)
+
+    def with_creep_factor(self, factor: float) -> Self:
+        """Return the model with Kalker's flexibilities divided by a factor."""
+        model = super().with_creep_factor(factor)
+        model._compiled = model.theory.compiled(model._tangential)
+        return model
 
     def solve_one(
         self,
@@ -201,7 +209,7 @@ class HertzFastsim(HertzModel):
         gap, point = batch.gap[number], batch.point(number)
         try:
             strips = self._strips(gap, float(batch.longitudinal_curvature[number]), point)
-            self.theory.flexibilities(strips, self._pair)
+            self.theory.flexibilities(strips, self._tangential)
             error = power_not_finite(point, gap=gap)
         except ContactError as caught:
             error = caught

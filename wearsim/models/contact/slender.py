@@ -73,6 +73,7 @@ class Slender(StripModel):
         creepage_variation=True,
         bearing_torque=True,
         local_friction=True,
+        creep_factor=True,
         pass_loop=True,
         fields=True,
     )
@@ -122,9 +123,11 @@ class Slender(StripModel):
             )
         if free:
             batch = with_balanced_creepage(
-                batch, line_load, half_length, self._grid, self._pair, warm
+                batch, line_load, half_length, self._grid, self._tangential, warm
             )
-        dissipation, sums = strip_tractions(line_load, half_length, batch, self._grid, self._pair)
+        dissipation, sums = strip_tractions(
+            line_load, half_length, batch, self._grid, self._tangential
+        )
         finite = np.isfinite(sums)
         if np.count_nonzero(finite) < finite.size:
             number = int(np.argmin(finite.all(axis=0)))
@@ -196,7 +199,7 @@ class Slender(StripModel):
             loop.longitudinal_curvature,
             self._table,
             self._bend,
-            strip_elasticity(modulus, self._pair.shear_modulus),
+            strip_elasticity(self._tangential.contact_modulus, self._tangential.shear_modulus),
         )
         status, done, full_solves = pass_loop.run_passes(
             loop.order,

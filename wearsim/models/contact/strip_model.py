@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from copy import copy
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -61,7 +62,14 @@ class StripModel(ContactModel):
         self.theory = theory
         self._grid = grid
         self._pair: ElasticPair = combine(*materials)
+        self._tangential = self._pair
         self._table = influence_table(grid.strips)
+
+    def with_creep_factor(self, factor: float) -> Self:
+        """Return the model with its tangential compliance divided by a factor."""
+        model = copy(self)
+        model._tangential = self._pair.reduced(factor)
+        return model
 
     def fields(
         self,
@@ -81,7 +89,7 @@ class StripModel(ContactModel):
         )
         return self.theory.fields(
             strips,
-            self._pair,
+            self._tangential,
             local_slip(strips, point, solution.longitudinal_creepage),
             friction_per_strip(strips, point),
             point.rolling_speed,
@@ -99,7 +107,7 @@ class StripModel(ContactModel):
     ) -> ContactSolution:
         """Solve the tangential problem of a solved normal contact."""
         strips = self._strips(line_load, half_length, longitudinal_curvature, approach, iterations)
-        return complete(self.theory, strips, self._pair, point)
+        return complete(self.theory, strips, self._tangential, point)
 
     def _strips(
         self,
@@ -243,6 +251,7 @@ class SemiHertzian(StripModel, SingleContactModel):
         creepage_variation=True,
         bearing_torque=True,
         local_friction=True,
+        creep_factor=True,
         fields=True,
     )
 

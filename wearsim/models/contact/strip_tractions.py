@@ -93,7 +93,8 @@ def with_balanced_creepage(
         # of the order of the creepage of saturation
         batch.friction.reshape(len(batch), -1).max(axis=1)
         * half_length.max(axis=1)
-        * batch.longitudinal_curvature,
+        * batch.longitudinal_curvature
+        / pair.creep_factor,
     )
     others = np.flatnonzero(~converged)
     if others.size:
@@ -141,6 +142,7 @@ def _bracketed_creepage(
     # a creepage of gross sliding, many times that of saturation
     friction = batch.friction.reshape(len(batch), -1).max(axis=1)
     saturation = friction * half_length.max(axis=1) * batch.longitudinal_curvature
+    saturation /= pair.creep_factor
     reach = 100.0 * (saturation + np.abs(batch.lateral)) + np.abs(batch.longitudinal)
     if batch.variation is not None:
         reach = reach + np.abs(batch.variation).max(axis=1)

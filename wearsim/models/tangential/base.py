@@ -173,6 +173,7 @@ def _balanced_creepage(
     # a creepage of gross sliding: above the variation and many times that of saturation
     variation = local_slip(strips, point, 0.0).longitudinal
     saturation = float(friction.max() * strips.half_length.max()) * strips.longitudinal_curvature
+    saturation /= pair.creep_factor
     reach = float(np.abs(variation).max()) + 100.0 * (saturation + abs(point.creepage.lateral))
     low, high = excess(-reach), excess(reach)
     if low >= 0.0 or high <= 0.0:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,6 +11,7 @@ from matplotlib.figure import Figure
 from wearsim.mechanics.cam import Motion, Stations, surface_points
 from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, RED, name_axes, titled_figure
 from wearsim.report.text import PER_SI
+from wearsim.scenario.tables.cam_points import MeasuredPoints
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
 from wearsim.studies.cam.turn import CamTurn
@@ -29,7 +32,7 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
     -------
     Figure
         Five panels: the cam with its roller, the motion, pressure angle and curvature, speeds, and
-        normal force with peak pressure.
+        normal force with peak pressure; a sixth has the residuals of a smoothed table.
     """
     turn = study.turn
     samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
@@ -42,11 +45,14 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
     def broken(one: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
         return between_flanks(one, fine), between_flanks(other, fine)
 
-    with titled_figure(12.0, 8.6, title) as figure:
-        panels = figure.subplot_mosaic(
-            [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]],
-            width_ratios=[1.0, 1.25],
-        )
+    rows: list[Any] = [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]]
+    measured = turn.cam.measured
+    if measured is not None:
+        rows.append(["residuals", "residuals"])
+    with titled_figure(12.0, 8.6 + 2.2 * (len(rows) - 3), title) as figure:
+        panels = figure.subplot_mosaic(rows, width_ratios=[1.0, 1.25])
+        if measured is not None:
+            draw_residuals(panels["residuals"], turn.cam.motion, measured)
         draw_shape(panels["shape"], turn, fine)
         axes = panels["motion"]
         axes.plot(angle, found.lift * scale, color=BLUE, label=f"{lift} [{unit}]")
@@ -82,6 +88,17 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
             for name in ("speed", "load"):
                 panels[name].axvspan(skid.start * DEG, skid.stop * DEG, color=RED, alpha=0.12, lw=0)
     return figure
+
+
+def draw_residuals(axes: Axes, motion: Motion, measured: MeasuredPoints) -> None:
+    """Draw the residuals of a table about its smoothing spline, along the angle."""
+    unit = "um" if measured.unit == "m" else "mrad"
+    scale = PER_SI[unit]
+    axes.axhspan(*(scale * measured.noise * np.array([-2.0, 2.0])), color=GREY, alpha=0.15, lw=0)
+    axes.plot(measured.angle * DEG, measured.residual * scale, ".", color=BLUE, ms=3.0)
+    title = f"Residuals of the {measured.quantity}, and twice its noise (shaded)"
+    name_axes(axes, title, "angle [deg]", f"measured less spline [{unit}]")
+    name_segments(axes, motion, names=False)
 
 
 def _second(axes: Axes, angle: FloatArray, values: FloatArray, label: str) -> Axes:

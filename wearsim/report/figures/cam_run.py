@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from wearsim.mechanics.cam import Stations, surface_points
 from wearsim.report.figures.cam import between_flanks, name_segments
 from wearsim.report.figures.run import Colours, caption, draw_depth
-from wearsim.report.measured import Measured
+from wearsim.report.measured import Measured, grooves_at
 from wearsim.report.parts import (
     BLUE,
     GREY,
@@ -19,7 +19,8 @@ from wearsim.report.parts import (
     name_axes,
     titled_figure,
 )
-from wearsim.report.text import PER_SI, shown
+from wearsim.report.summary import with_error
+from wearsim.report.text import PER_SI
 from wearsim.results import Result
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.types import FloatArray
@@ -36,7 +37,7 @@ def cam_run_figure(result: Result, measured: tuple[Measured, ...] = ()) -> Figur
     ----------
     result : Result
     measured : tuple of Measured
-        Profiles drawn over the deepest groove.
+        Profiles drawn over the groove at their angle, by default the deepest.
 
     Returns
     -------
@@ -58,7 +59,7 @@ def cam_run_figure(result: Result, measured: tuple[Measured, ...] = ()) -> Figur
         _draw_lift(panels["lift"], turn, stations, result, colours)
         draw_depth(panels["depth"], result)
         panels["depth"].legend(loc="lower right", fontsize=7.0, handlelength=1.0)
-        _draw_groove(panels["groove"], result, depth, colours)
+        _draw_groove(panels["groove"], result, measured[0].angle if measured else None, colours)
         draw_measured(panels["groove"], measured)
         _draw_roller(panels["roller"], result, colours)
         colours.draw_bar(figure, [panels["roller"]])
@@ -67,11 +68,11 @@ def cam_run_figure(result: Result, measured: tuple[Measured, ...] = ()) -> Figur
 
 def _caption(result: Result) -> str:
     final = result.final
-    error, turns = float(np.max(final["lift_error_m"])), float(np.max(final["turns"]))
+    turns, stated = float(np.max(final["turns"])), float(np.max(final["lift_error_error_m"]))
     place = float(np.max(final["depth_angle_rad"])) * DEG
     return (
         f"{turns:,.0f} turns, {caption(result)} at {place:.4g} deg,"
-        f" lift error {shown(error, 'um')} peak to peak"
+        f" lift error {with_error(np.asarray(final['lift_error_m']), stated, 'um')} peak to peak"
     )
 
 
@@ -140,12 +141,11 @@ def _draw_lift(
     name_segments(axes, turn.cam.motion, names=False)
 
 
-def _draw_groove(axes: Axes, result: Result, depth: FloatArray, colours: Colours) -> None:
-    place = int(depth.max(axis=1).argmax())
-    profiles = np.asarray(result.raw.records["cylinder_depth_profile"])[:, place, 0]
-    angle = float(result.raw.static["station_angle"][place]) * DEG
+def _draw_groove(axes: Axes, result: Result, angle: float | None, colours: Colours) -> None:
+    profiles, at = grooves_at(result, angle)
     _draw_profiles(axes, result.y, profiles, colours)
-    name_axes(axes, f"Deepest groove, at {angle:.4g} deg", "y [mm]", "height [um]")
+    which = "Deepest groove, at" if angle is None else "Groove at"
+    name_axes(axes, f"{which} {at * DEG:.4g} deg", "y [mm]", "height [um]")
 
 
 def _draw_roller(axes: Axes, result: Result, colours: Colours) -> None:

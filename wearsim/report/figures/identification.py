@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, RED, name_axes, titled_figure
+from wearsim.report.text import PER_SI
 from wearsim.results import IdentificationResult
 from wearsim.studies.identify.planning import SCATTERS, PlannedDesign
 from wearsim.types import FloatArray
@@ -52,7 +53,9 @@ def _draw_trace(upper: Axes, lower: Axes, result: IdentificationResult, place: i
     names = ("y", "height", "fitted", "low", "high", "unworn")
     rows = [result.values(f"trace_{name}")[place] for name in names]
     y, height, fitted, low, high, unworn = (row[np.isfinite(rows[0])] for row in rows)
-    across, test = 1e3 * y, result.tests[place]
+    test = result.tests[place]
+    lift = test.get("quantity") == "lift"
+    across = PER_SI["deg" if lift else "mm"] * y
     upper.plot(across, 1e6 * height, ".", ms=2.0, color=GREY, label="measured")
     upper.plot(
         across[unworn > 0.5],
@@ -68,11 +71,11 @@ def _draw_trace(upper: Axes, lower: Axes, result: IdentificationResult, place: i
     upper.plot(across, 1e6 * fitted, color=BLUE, lw=1.0, label="best profile")
     k = test["k_over_h_per_Pa"]
     title = f"{test['file'].rpartition('/')[2]}: K/H {1e12 * k['value']:.3g}e-12 1/Pa"
-    name_axes(upper, title, "", "height [um]")
+    name_axes(upper, title, "", "change of the lift [um]" if lift else "height [um]")
     lower.plot(across, 1e6 * (height - fitted), color=GREY, lw=0.6)
     noise = 1e6 * (test["noise_m"] or 0.0)
     lower.axhspan(-2.0 * noise, 2.0 * noise, color=GREEN, alpha=0.15, lw=0)
-    name_axes(lower, "", "y [mm]", "residual [um]")
+    name_axes(lower, "", "angle [deg]" if lift else "y [mm]", "residual [um]")
 
 
 def draw_factors(axes: Axes, result: IdentificationResult) -> None:

@@ -11,10 +11,10 @@ import tomlkit
 from bokeh.models.ranges import Range1d
 
 from wearsim.report.page.part import SAME_NUMBERS, Part, command_of, files_of, tables_of
-from wearsim.report.page.plots import COLOURS, MM, UM, Plot, axes, columns, hover, legend
+from wearsim.report.page.plots import COLOURS, UM, Plot, axes, columns, hover, legend
 from wearsim.report.parts import BLUE, GREY, ORANGE, evenly_spaced
 from wearsim.report.summary import with_range
-from wearsim.report.text import in_unit, shown
+from wearsim.report.text import PER_SI, in_unit, shown
 from wearsim.results.identification import IdentificationResult
 
 MOST_TRACES, MOST_POINTS = 12, 1200
@@ -75,7 +75,7 @@ def _repetition(result: IdentificationResult) -> dict[str, Any]:
         names = (_name(test["file"]) for test in result.tests)
         return {"files": files, "command": command_of(result, "identify", *names), "remark": remark}
     profiles = dict.fromkeys(
-        test[key] for test in raw.measured for key in ("profile", "before") if key in test
+        test[key] for test in raw.measured for key in ("profile", "lift", "before") if key in test
     )
     tests, remark = f"{Path(raw.scenario_file).stem}-tests.toml", SAME_NUMBERS
     if profiles:
@@ -170,18 +170,23 @@ def _traces(result: IdentificationResult) -> list[Plot]:
         every = known[evenly_spaced(len(known), MOST_POINTS)]
         y, *heights = (row[every] for row in rows)
         each = dict(zip(names[1:], (UM * height for height in heights), strict=True))
-        data = columns(y=y * MM, **each)
-        plot = axes("y [mm]", "height [um]")
+        lift = test.get("quantity") == "lift"
+        across = ("angle", "deg") if lift else ("y", "mm")
+        data = columns(y=y * PER_SI[across[1]], **each)
+        plot = axes(
+            f"{across[0]} [{across[1]}]", "change of the lift [um]" if lift else "height [um]"
+        )
         plot.varea("y", "low", "high", source=data, color=ORANGE, alpha=0.4)
         style = {"size": 3, "color": GREY, "legend_label": "measured"}
         plot.scatter("y", "height", source=data, **style)
         style = {"color": BLUE, "width": 2, "legend_label": "best profile, with 95 % band"}
         line = plot.line("y", "fitted", source=data, **style)
         tips = ("measured", "@height{0.00} um"), ("model", "@fitted{0.00} um")
-        hover(plot, [line], ("y", "@y{0.000} mm"), *tips)
+        hover(plot, [line], (across[0], f"@y{{0.000}} {across[1]}"), *tips)
         legend(plot)
         text = _depth("Model's depth", test["model_depth_interval_m"])
         if test["depth_interval_m"] is not None:
             text = f"{_depth('Measured depth', test['depth_interval_m'])}. {text}"
-        plots.append(Plot(f"Groove {_name(test['file'])}", f"{text}.", plot))
+        what = "Lift" if lift else "Groove"
+        plots.append(Plot(f"{what} {_name(test['file'])}", f"{text}.", plot))
     return plots

@@ -9,6 +9,7 @@ import numpy as np
 
 from wearsim.errors import PluginError, WearsimError
 from wearsim.report import summary
+from wearsim.report.limits import limit_rows
 from wearsim.report.measured import Measured
 from wearsim.report.page.part import (
     NO_STEPPING_ERROR,
@@ -115,6 +116,7 @@ def _of_run(result: Result, measured: Sequence[Measured]) -> Part:
         value += f" ± {shown(float(np.max(result.depth_error[-1])), 'um', 2)}"
         error = NOT_MODEL
     answer[0] = (answer[0][0], value)
+    answer[1:1] = limit_rows(result)
     body, length = "cylinder", f"{count(raw.total_passes)} roller passes"
     if "station_angle" in raw.static:
         turns = raw.total_passes / raw.kinematics["physical_rollers"]

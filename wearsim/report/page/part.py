@@ -81,8 +81,9 @@ def tables_of(
     """Return the tables of a part: the study, its inputs, measured profiles, and its origin."""
     residuals = []
     if measured and isinstance(result, Result | EnsembleResult):
-        computed = computed_profile(result)
-        residuals = [(one.label, residual_text(one, computed)) for one in measured]
+        residuals = [
+            (one.label, residual_text(one, computed_profile(result, one.angle))) for one in measured
+        ]
     origin = summary.sources(result.raw)
     return [first, ("Random inputs", inputs), ("Measured profiles", residuals), ("Origin", origin)]
 

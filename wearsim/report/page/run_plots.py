@@ -12,7 +12,7 @@ from bokeh.models.ranges import Range1d
 from bokeh.palettes import Viridis256
 
 from wearsim.mechanics.cam import Stations
-from wearsim.report.measured import Measured
+from wearsim.report.measured import Measured, grooves_at
 from wearsim.report.page.plots import (
     COLOURS,
     DEG,
@@ -71,14 +71,15 @@ def _profile(result: Result, measured: Sequence[Measured]) -> Plot:
     """Return the worn profile at the record of the slider, of a cam where it is deepest."""
     records, y = records_of(result), result.y * MM
     worn = np.asarray(result.raw.records["cylinder_depth_profile"])[:, :, 0]
-    place = int(worn[-1].max(axis=1).argmax())
-    body, where = "cylinder", ""
+    body, where, groove = "cylinder", "", worn[:, 0]
     if "station_angle" in result.raw.static:
-        angle = float(result.raw.static["station_angle"][place]) * DEG
-        body, where = "cam", f" at {angle:.4g} deg, where it is deepest"
-    extent = worn_range(result.y, worn[-1, place])
+        given = measured[0].angle if measured else None
+        groove, angle = grooves_at(result, given)
+        body, where = "cam", f" at {angle * DEG:.4g} deg"
+        where += ", where it is deepest" if given is None else ""
+    extent = worn_range(result.y, groove[-1])
     plot = axes("y [mm]", "height above nominal [um]", x_range=extent)
-    height = (result.start_height - worn[:, place]) * UM
+    height = (result.start_height - groove) * UM
     source = _by_record("profile", height, records, y=y)
     line = plot.line("y", "shown", source=source, color=BLUE, width=2, legend_label=body)
     hover(plot, [line], ("y", "@y{0.000} mm"), ("height", "@shown{0.000} um"))
@@ -92,7 +93,7 @@ def _profile(result: Result, measured: Sequence[Measured]) -> Plot:
             hover(plot, [line], ("y", "@y{0.000} mm"), (name, "@shown{0.000} um"))
     add_measured(plot, measured)
     legend(plot)
-    deepest = shown(float(worn[-1].max()), "um")
+    deepest = shown(float(np.max(result.depth[-1])), "um")
     text = f"Height across the track; at the end the {body} is {deepest} deep."
     return Plot(f"Worn profile of the {body}{where}", text, plot)
 
@@ -186,7 +187,7 @@ def _map(result: Result, stations: Stations) -> Plot:
     tips = ("angle", "$x{0.0} deg"), ("y", "$y{0.00} mm"), ("depth", "@image{0.00} um")
     hover(plot, [picture], *tips)
     place = float(np.max(result.final["depth_angle_rad"])) * DEG
-    deepest = shown(float(worn.max()), "um")
+    deepest = shown(float(np.max(result.depth[-1])), "um")
     text = f"At the end the cam is deepest at {place:.4g} deg: {deepest}."
     return Plot("Worn depth over angle and width", text, plot)
 

@@ -149,7 +149,7 @@ class EnsembleData(StudyData):
     variables : mapping of str to ndarray
         Variables of `wearsim.results.ensemble.schema`, and the drawn values by dotted key; those
         of a file are read on access. Rows of pending realisations are undefined, those of failed
-        ones are nan.
+        ones are nan, apart from observables of tests up to the depth at which they end.
     status : ndarray
         PENDING, DONE or FAILED of every realisation, shape (requested,).
     errors : dict of int to str

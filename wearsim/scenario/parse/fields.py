@@ -188,6 +188,8 @@ OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
 OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
 #: roles of the distributions that need a marginal distribution
 WITH_MARGINAL = ("field", "process")
+#: last parts of keys in these tables whose values cannot be random
+_FIXED = ("creep_factor", "specific_wear_rate", "measured_friction")
 RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
 
 
@@ -209,7 +211,8 @@ class RandomInputTable(Options):
 def can_be_random(name: str) -> bool:
     """Return whether the value at a dotted key can be random."""
     tables = {"load", "friction", "creepage", "wear"}
-    return name.split(".", maxsplit=1)[0] in tables or name == "roller.offset"
+    of_table = name.split(".", maxsplit=1)[0] in tables and name.rsplit(".", 1)[-1] not in _FIXED
+    return of_table or name == "roller.offset"
 
 
 def amount(value: float, quantity: Quantity | None) -> str:

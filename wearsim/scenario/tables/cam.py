@@ -14,6 +14,7 @@ from wearsim.quantities import InputFile, Length, PositiveLength, Quantity
 from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.tables.bodies import Cylinder, MaterialField, Roller
 from wearsim.scenario.tables.cam_motion import SHAPES, read_motion
+from wearsim.scenario.tables.cam_points import MeasuredPoints
 from wearsim.units import COMPRESSIBILITY, INERTIA, MASS, VISCOSITY, shown
 
 _WAYS = ("motion", "lift", "profile", "shape")
@@ -35,6 +36,18 @@ class CamTable(Options):
         description="CSV file of the cam's surface over a turn: columns 'angle [deg]' and 'radius"
         " [mm]', or 'x [mm]' and 'y [mm]'; the point at an angle passes the roller as the cam has"
         " turned by about that angle.",
+    )
+    columns: tuple[str, str] | None = Field(
+        default=None,
+        description="Names of the columns of angle and lift, angle and radius, or x and y.",
+    )
+    units: tuple[str, str] | None = Field(
+        default=None, description="Units of these columns where the header has none."
+    )
+    lift_tolerance: str | None = Field(
+        default=None,
+        description='Standard deviation of the noise of lift or profile, "2 um", or an angle of an'
+        " arm; estimated by default. 0 follows every point.",
     )
     shape: Literal["eccentric", "tangent", "three-arc"] | None = Field(
         default=None, description="Cam of circular arcs and straight lines."
@@ -127,6 +140,8 @@ class Cam:
         Clearance in the groove [m].
     stations : int, optional
         Stations on each part of a moving segment, chosen by the tolerance if None.
+    measured : MeasuredPoints, optional
+        Noise of the table from which the motion was smoothed.
     """
 
     base_radius: float
@@ -136,6 +151,7 @@ class Cam:
     groove: bool = False
     clearance: float = 0.0
     stations: int | None = None
+    measured: MeasuredPoints | None = None
 
     @property
     def lift_unit(self) -> str:
@@ -189,7 +205,11 @@ def read_cam(
     built = _read_follower(mistakes, table, follower, roller)
     if built is None:
         return None
-    motion = read_motion(mistakes, table, given[0], built)
+    if given[0] not in {"lift", "profile"}:
+        for key in ("columns", "units", "lift_tolerance"):
+            if getattr(table, key) is not None:
+                mistakes.add("cam", key, "has no meaning without lift or profile")
+    motion, measured = read_motion(mistakes, table, given[0], built)
     if motion is None:
         return None
     cam = Cam(
@@ -200,6 +220,7 @@ def read_cam(
         follower.contact == "groove",
         follower.clearance or 0.0,
         stations,
+        measured,
     )
     return Cylinder(table.base_radius, table.material), cam
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field, PlainValidator
+from pydantic import BeforeValidator, Field, PlainValidator
 
 from wearsim.plugins import Options
 from wearsim.quantities import (
@@ -35,6 +35,14 @@ class TopTable(Options):
     seed: int = Field(default=1, ge=0, le=2**63 - 1, description="Seed of all random draws.")
 
 
+def _whole(value: object) -> object:
+    """Return a float without a fraction as an int: 20e6 is a whole number."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+WholeNumber: TypeAlias = Annotated[int, BeforeValidator(_whole)]
+
+
 class OperationTable(Options):
     """Speed, duration and number of rollers of the test."""
 
@@ -42,12 +50,12 @@ class OperationTable(Options):
     duration: PositiveDuration | None = Field(
         default=None, description="Simulated time; a run needs it or the number of passes."
     )
-    passes: int | None = Field(
+    passes: WholeNumber | None = Field(
         default=None,
         gt=0,
         description="Number of roller passes of the whole test, all rollers together.",
     )
-    turns: int | None = Field(
+    turns: WholeNumber | None = Field(
         default=None, gt=0, description="Number of turns of a cam; passes are turns times rollers."
     )
     rollers: int = Field(default=1, ge=1, description="Number of rollers on the cylinder.")
@@ -57,6 +65,13 @@ class FrictionTable(Options):
     """Friction between roller and cylinder."""
 
     coefficient: float = Field(gt=0.0, description="Coefficient of friction.")
+    creep_factor: float = Field(
+        default=1.0,
+        gt=0.0,
+        le=1.0,
+        description="Kalker's reduction factor, below 1 for a third body between the surfaces:"
+        " initial slope of traction against creepage over that of ideal bodies.",
+    )
 
 
 def _refuse(value: object) -> None:
@@ -163,7 +178,7 @@ class OutputsTable(Options):
     spacing: Literal["even", "log"] = Field(
         default="even", description="Spacing of the records over the passes."
     )
-    every_passes: int | None = Field(
+    every_passes: WholeNumber | None = Field(
         default=None, gt=0, description="Number of passes between records."
     )
     every: PositiveDuration | None = Field(

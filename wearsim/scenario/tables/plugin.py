@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -175,6 +176,11 @@ class WearChoice:
         return self.spec.factory(self.options)
 
 
+#: a volume or an area per force: mm^3/(N m), mm^2/N, also with kN or MN
+_PER_LOAD = re.compile(
+    r"m(?:\^|\*\*)?[23²³]\s*/\s*\(?\s*[kM]?N(?![A-Za-z])|m[23²³^*]*\s*/\s*\(?[kM]?Nm\b"
+)
+
 #: model of the table's own keys, key with the name of the plugin, kind of plugin
 PLUGIN_TABLES: dict[str, tuple[type[Options], str, type[Spec]]] = {
     "contact": (ContactTable, "model", ContactModelSpec),
@@ -249,7 +255,30 @@ def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | Non
     """Return the wear law, or None after adding the mistakes of the table [wear]."""
     own, spec, rest = _choose(mistakes, "wear", raw)
     options = validate(mistakes, spec.options, rest, "wear", WearTable) if spec else None
+    mistakes.notes += _rate_notes(rest)
+    if {"wear.factor", "wear.cylinder.k_over_h"} <= mistakes.random.keys():
+        what = "is random, and so is wear.cylinder.k_over_h: the scatter of K/H counts twice"
+        remedy = (
+            "one of them: delete factor under [wear], or [wear.factor], if the distribution of"
+            " k_over_h holds the scatter between specimens, as that of identify --posterior does"
+        )
+        mistakes.add("wear", "factor", what, None, remedy)
     return WearChoice(own.law, options) if own and options is not None else None
+
+
+def _rate_notes(raw: Mapping[str, object]) -> list[str]:
+    """Return a note for each wear factor in a unit of specific wear rates, such as mm^3/(N m)."""
+    notes = []
+    for body, table in raw.items():
+        value = table.get("k_over_h") if isinstance(table, dict) else None
+        texts = value.values() if isinstance(value, dict) else [value]
+        if any(isinstance(text, str) and _PER_LOAD.search(text) for text in texts):
+            notes.append(
+                f"wear.{body}.k_over_h is in a unit of specific wear rates, and is a volume per"
+                " dissipated energy; a volume per load and sliding distance is"
+                f" wear.{body}.specific_wear_rate, which is divided by measured_friction"
+            )
+    return notes
 
 
 def read_load(mistakes: Mistakes, raw: Mapping[str, object]) -> LoadChoice | None:

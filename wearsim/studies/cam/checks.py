@@ -12,6 +12,8 @@ from wearsim.studies.cam.turn import SHARP, STEEP, CamTurn
 
 FEWEST_SWEEPS = 10.0  # of the contact around the roller in a life, below which it wears unevenly
 
+_NEAR = 2.0  # ratio of the noise of a table to lift_tolerance
+
 HARMONIC_DEPTH = 50e-6  # m, worn depth at which the harmonic limit is given without a depth limit
 
 
@@ -89,6 +91,7 @@ def cam_warnings(
             f"cam: the radius of the pitch curve falls to {1e3 / sharp:.4g} mm at"
             f" {turn.place(theta)}, less than twice the roller's {1e3 * radius:.6g} mm"
         )
+    found += noise_warnings(turn)
     found += [
         f"roller: it skids from {math.degrees(skid.start):.4g} to {math.degrees(skid.stop):.4g} deg"
         f" and dissipates {skid.energy:.4g} J per turn"
@@ -98,5 +101,37 @@ def cam_warnings(
         found.append(
             f"roller: the contact moves around it only {sweeps:.3g} times in a life; it may wear"
             " unevenly, while even wear is assumed"
+        )
+    return found
+
+
+def _two_digits(value: float) -> str:
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def noise_warnings(turn: CamTurn) -> list[str]:
+    """Return warnings of the noise of a measured lift or surface, and of what it does to loads."""
+    measured, cam = turn.cam.measured, turn.cam
+    if measured is None:
+        return []
+    unit = "mrad" if cam.follower.swings else "mm"
+    noise = f"{1e6 * measured.noise:.2g} {'u' + measured.unit}"
+    effort = cam.inertia * turn.speed**2 / cam.follower.lever if turn.load else 0.0
+
+    def effect(acceleration: float) -> str:
+        force = f" and the force by {_two_digits(effort * acceleration)} N" if effort > 0.0 else ""
+        return f"{_two_digits(1e3 * acceleration)} {unit}/rad^2{force}"
+
+    text = (
+        f"cam: the points of {measured.file} scatter by {noise} about the smoothing spline; a curve"
+        f" through all of them would change the acceleration by {effect(measured.scatter)}, noise"
+        f" still changes that of the spline by {effect(measured.error)} (root mean squares; the"
+        f" greatest acceleration is {1e3 * measured.peak:.3g} {unit}/rad^2)"
+    )
+    found, stated = [text], measured.tolerance
+    if stated is not None and not _NEAR**-1 < measured.noise / stated < _NEAR:
+        found.append(
+            f"cam: lift_tolerance is {1e6 * stated:.2g} u{measured.unit}, and the points of"
+            f" {measured.file} scatter by {noise}: is one of them in other units?"
         )
     return found

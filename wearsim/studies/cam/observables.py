@@ -1,4 +1,4 @@
-"""Observables of a worn cam: depth and its angle, lift error, angle of the peak pressure."""
+"""Observables of a worn cam: extremes over the angle and their angles, curve of lift error."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wearsim.evolution.observables import lift_errors, peak_to_peak
+from wearsim.evolution.observables import (
+    extremes,
+    lift_errors,
+    peak_to_peak,
+    volume_error_by_stations,
+)
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.mechanics.cam import Stations
@@ -20,15 +25,19 @@ def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]
     cam = problem.kinematics.cam
     if cam is None:
         return {}
-    angle = cam.angle.ravel()
-    depth = state.cylinder_depth[:, 0].max(axis=-1)
-    pressure = problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
+    found = extremes(problem, state)
+    least, greatest = found["least_wear"], found["greatest_wear"]
     return {
         "turns": state.passes / problem.kinematics.physical_rollers,
-        "station_depth": at_every_station(problem, depth),
-        "depth_angle": angle[depth.argmax(axis=0)],
-        "peak_pressure_angle": angle[pressure.argmax(axis=0)],
-        "lift_error": peak_to_peak(cam, lift_errors(problem, state)),
+        "station_depth": at_every_station(problem, state.cylinder_depth[:, 0].max(axis=-1)),
+        "peak_pressure": found["peak_pressure"].value,
+        "lift_error": least.value + greatest.value,
+        **{f"{name}_angle": extreme.angle for name, extreme in found.items()},
+        "depth_error_by_stations": found["depth"].error,
+        "volume_error_by_stations": volume_error_by_stations(problem, state),
+        "peak_pressure_error_by_stations": found["peak_pressure"].error,
+        "lift_error_error_by_stations": least.error + greatest.error,
+        **{f"{n}_angle_error_by_stations": item.angle_error for n, item in found.items()},
     }
 
 
@@ -47,11 +56,10 @@ def cam_observables(
     cam = problem.kinematics.cam
     if cam is None:
         return {}
-    pressure, errors = row["peak_pressure"], np.abs(lift_errors(problem, state))
-    first = pressure.argmax(axis=0)[None]
+    first = row["peak_pressure"].argmax(axis=0)[None]
     return {
         "lift_error": row["lift_error"].max(axis=0),
-        "lift_error_angle": cam.angle.ravel()[errors.max(axis=1).argmax(axis=0)],
+        "lift_error_angle": cam.greatest(np.abs(lift_errors(problem, state)).max(axis=1)).angle,
         "depth_angle": row["depth_angle"],
         "peak_pressure_angle": np.take_along_axis(row["peak_pressure_angle"], first, axis=0)[0],
     }

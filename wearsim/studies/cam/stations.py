@@ -20,7 +20,6 @@ from wearsim.types import FloatArray
 
 FEWEST_HARMONICS = 3
 FOLLOWED = 0.8  # demand of friction on the unworn cam from which skids are followed through a run
-_BETWEEN = 49  # points of a panel between its stations, for the lift error
 
 
 def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
@@ -35,23 +34,22 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
     if theta is not None:
         weight = np.full(len(theta), math.tau / len(theta))
         segments = np.asarray(turn.cam.motion.segment_at(theta), dtype=np.float64)
-        return _values(turn, turn.at_angles(theta), weight, segments, None, np.eye(len(theta)))
+        return _values(turn, turn.at_angles(theta), weight, segments, None)
     stations = turn.stations
     middles = np.array([0.5 * (panel.start + panel.stop) for panel in stations.panels])
     point = turn.at_stations(stations)
-    between = stations.values_at(np.eye(stations.count), _BETWEEN)[1]
     numbers = np.array([float(panel.segment) for panel in stations.panels])
     segments = numbers[stations.panel]
     within = middles[stations.panel]
     found = replace(
-        _values(turn, point, stations.weight, segments, within, between),
+        _values(turn, point, stations.weight, segments, within),
         panels=stations,
-        skids=np.array([(arc.theta[0], arc.theta[-1]) for arc in turn.arcs]).reshape(-1, 2),
+        skids=_skids(turn),
     )
     if turn.is_worn:
         return found
     if moves(turn, found):
-        found = replace(found, relocated=partial(_relocated, turn))
+        found = _movable(found, turn)
     return found if found.inertia.size else joined(found)
 
 
@@ -62,12 +60,31 @@ def moves(turn: CamTurn, stations: CamStations) -> bool:
     return bool(free and fed_back and (turn.arcs or turn.greatest_demand > FOLLOWED))
 
 
+def _skids(turn: CamTurn) -> FloatArray:
+    """Return the ends of the arcs in which the roller skids, shape (arcs, 2) [rad]."""
+    return np.array([(arc.theta[0], arc.theta[-1]) for arc in turn.arcs]).reshape(-1, 2)
+
+
+def _worn_skids(turn: CamTurn, change: FloatArray) -> FloatArray:
+    """Return the skids for changes of the normal force; see `CamStations.moved_skids`."""
+    return _skids(turn.worn(change))
+
+
+def _movable(stations: CamStations, turn: CamTurn) -> CamStations:
+    """Return stations that are located again as the unworn turn wears."""
+    return replace(
+        stations,
+        relocated=partial(_relocated, turn),
+        moved_skids=partial(_worn_skids, turn),
+    )
+
+
 def _relocated(turn: CamTurn, change: FloatArray) -> CamStations:
     """Return the stations for changes of the normal force; see `CamStations.relocated`."""
     found = cam_stations(turn.worn(change))
     assert found.panels is not None
     matrix, _, _ = moved_stations(found.panels, turn.stations)
-    return replace(found, relocated=partial(_relocated, turn), recorded=matrix)
+    return replace(_movable(found, turn), recorded=matrix)
 
 
 _COMPARED = (
@@ -93,9 +110,7 @@ def joined(stations: CamStations) -> CamStations:
     for name in ("length", "time_share"):
         total = np.bincount(places, weights=getattr(stations, name).ravel())
         arrays[name] = total[:, None, None]
-    between = np.zeros((len(stations.between), len(first)))
-    np.add.at(between.T, places, stations.between.T)
-    return replace(stations, **arrays, between=between, places=places, whole=stations)
+    return replace(stations, **arrays, places=places, whole=stations)
 
 
 _PLACES = ("angle", "segment", "pressure_angle")
@@ -107,7 +122,6 @@ def _values(
     weight: FloatArray,
     segments: FloatArray,
     within: FloatArray | None,
-    between: FloatArray,
 ) -> CamStations:
     """Return the values at points with weights [rad]; `within` as in `CamTurn.slip`."""
     found, count, roller = point.kinematics, len(point.angle), turn.scenario.roller
@@ -140,7 +154,7 @@ def _values(
     inertia = np.zeros((0, 0))
     if turn.load is not None and turn.load.feedback == "inertia":
         inertia = _inertia(turn, point, weight)
-    return CamStations(**arrays, between=between, inertia=inertia, places=np.arange(count))
+    return CamStations(**arrays, inertia=inertia, places=np.arange(count))
 
 
 def harmonics_of(turn: CamTurn, stations: int) -> int:

@@ -18,6 +18,7 @@ from wearsim.mechanics.cam import (
     choose_stations,
     extreme,
     skid_arcs,
+    surface_points,
 )
 from wearsim.models.loads import FollowerLoad
 from wearsim.scenario import Scenario
@@ -284,7 +285,8 @@ class CamTurn:
         """Return the torque of the bearing, against the roller's rotation [N m]."""
         creepage = self.scenario.creepage
         arm = 0.5 * creepage.bearing_friction * (creepage.bearing_diameter or 0.0)
-        return np.asarray((creepage.bearing_torque or 0.0) + arm * self.carried(point))
+        friction = arm * self.carried(point) if arm else np.zeros(len(point.angle))
+        return np.asarray((creepage.bearing_torque or 0.0) + friction)
 
     def torque(self, point: Point) -> FloatArray:
         """Return the torque that the traction gives the rolling roller [N m]."""
@@ -297,6 +299,12 @@ class CamTurn:
         """Stations of a run, by the tolerance of the scenario."""
         tolerance = PART_OF_TOLERANCE * self.scenario.evolution.tolerance
         return choose_stations(self.parts, self._represented, tolerance, self.cam.stations)
+
+    @property
+    def varies(self) -> bool:
+        """Whether a run has more than one station."""
+        single = self.parts[0].dwell or self.cam.stations == 1
+        return len(self.parts) > 1 or not single
 
     def _represented(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return what the stations must represent: depth in full slip, N ds, traction and slip."""
@@ -366,6 +374,7 @@ class CamTurn:
             expected = f"more than {1e3 * radius:.6g} mm, by a greater base_radius,"
             expected += " a smaller roller or a gentler motion"
             mistakes.append(Mistake("cam", "base_radius", what, got, expected))
+        mistakes += self._reach_mistakes()
         least, theta = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
         if -least <= 0.0 and not self.cam.groove:
             got = f"{-least:.4g} N at {self.place(theta)}"
@@ -378,6 +387,25 @@ class CamTurn:
             raise ScenarioError(self.scenario.file, mistakes)
         self.arcs  # noqa: B018  (raises where the roller rolls nowhere)
         return self
+
+    def _reach_mistakes(self) -> list[Mistake]:
+        """Return a mistake if the cam of a swinging arm reaches its pivot."""
+        follower = self.cam.follower
+        if not follower.swings or self.cam.groove:
+            return []
+
+        def radius(panel: Panel, theta: FloatArray) -> FloatArray:
+            point = self.at(panel, theta)
+            x, y = surface_points(follower, point.kinematics, point.angle)[1]
+            return np.asarray(np.hypot(x, y))
+
+        greatest, theta = extreme(self.panels, radius)
+        if greatest < follower.centre_distance:
+            return []
+        got = f"{1e3 * greatest:.6g} mm at {self.place(theta)}"
+        what = "the cam reaches the pivot of the arm: its greatest radius is"
+        expected = f"less than {1e3 * follower.centre_distance:.6g} mm, follower.centre_distance"
+        return [Mistake("cam", "base_radius", what, got, expected)]
 
     def _undercut(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the curvature of the pitch curve times the roller's radius, 1 at a cusp."""

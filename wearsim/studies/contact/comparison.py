@@ -11,7 +11,6 @@ import numpy as np
 from wearsim.contact_batch import ContactBatch
 from wearsim.errors import ContactError, PluginError, WearsimError
 from wearsim.plugins import ContactModel, ContactModelSpec, Options, registry
-from wearsim.scenario.tables.plugin import ContactChoice
 from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
 
 REFERENCE = "halfspace"  # the exact theory
@@ -120,6 +119,7 @@ def solve_reference(
     longitudinal_curvature: float,
     point: OperatingPoint,
     resolutions: tuple[float, ...] = RESOLUTIONS,
+    creep_factor: float = 1.0,
 ) -> ContactReference:
     """Solve a contact with a reference model, and estimate the reference's own errors.
 
@@ -137,6 +137,8 @@ def solve_reference(
         The contact, as for `ContactModel.solve_one`.
     resolutions : tuple of float
         Numbers of elements along rolling, over the usual number, the greatest first.
+    creep_factor : float
+        As in `ContactModel.with_creep_factor`.
 
     Returns
     -------
@@ -161,6 +163,8 @@ def solve_reference(
     def solve(options: Options, on: Grid) -> FloatArray:
         heights = gap if on is grid else np.interp(on.y, grid.y, gap)
         model = spec.factory(options, on, materials)
+        if creep_factor != 1.0:
+            model = model.with_creep_factor(creep_factor)
         return _values(model.solve_one(heights, longitudinal_curvature, _on(point, grid, on)))
 
     if spec.reference and "mx" in spec.options.model_fields:
@@ -199,11 +203,12 @@ def at_creepage(point: OperatingPoint, solution: ContactSolution) -> OperatingPo
 
 def excess(
     name: str,
-    choice: ContactChoice,
+    model: ContactModel,
     grid: Grid,
     materials: tuple[Material, Material],
     batch: ContactBatch,
     tolerance: float,
+    creep_factor: float = 1.0,
 ) -> str:
     """Return how far the error of a model exceeds a tolerance in the most loaded contact.
 
@@ -211,14 +216,16 @@ def excess(
     ----------
     name : str
         The reference model.
-    choice : ContactChoice
-        The model with its options.
+    model : ContactModel
+        The model.
     grid, materials
         Strips and bodies.
     batch : ContactBatch
         The contacts.
     tolerance : float
         Of P_l(y), L2 over the strips.
+    creep_factor : float
+        Of the model.
 
     Returns
     -------
@@ -229,9 +236,9 @@ def excess(
     number = int(np.argmax(batch.normal_force))
     gap, curvature = batch.gap[number], float(batch.longitudinal_curvature[number])
     try:
-        solution = choice.build(grid, materials).solve_one(gap, curvature, batch.point(number))
+        solution = model.solve_one(gap, curvature, batch.point(number))
         point = at_creepage(batch.point(number), solution)
-        reference = solve_reference(name, grid, materials, gap, curvature, point, FEW)
+        reference = solve_reference(name, grid, materials, gap, curvature, point, FEW, creep_factor)
     except WearsimError:
         return ""
     error, own = reference.errors_of(solution).dissipation, reference.own.dissipation

@@ -130,7 +130,10 @@ def terms_of(scaled: FloatArray) -> FloatArray:
 
 
 def indicators_of(
-    solution: ContactSolution, longitudinal_curvature: float, point: OperatingPoint
+    solution: ContactSolution,
+    longitudinal_curvature: float,
+    point: OperatingPoint,
+    creep_factor: float = 1.0,
 ) -> FloatArray:
     """Return the indicators of a contact.
 
@@ -142,6 +145,8 @@ def indicators_of(
         Relative curvature along rolling [1/m].
     point : OperatingPoint
         Its operating point, with uniform friction and creepage.
+    creep_factor : float
+        That of the model; tractions are those of ideal bodies at as many times the creepages.
 
     Returns
     -------
@@ -155,7 +160,7 @@ def indicators_of(
     creepage, friction = point.creepage, float(np.mean(point.friction))
     spin = creepage.spin * np.sqrt(length * half_width)
     size = float(np.sqrt(creepage.longitudinal**2 + creepage.lateral**2 + spin**2)) or 1e-300
-    full = max(friction, 1e-300) * length * longitudinal_curvature
+    full = max(friction, 1e-300) * length * longitudinal_curvature / creep_factor
     lateral = creepage.lateral * (np.sign(spin) or np.sign(creepage.lateral))
     parabola = np.maximum(1.0 - ((y - middle) / half_width) ** 2, 0.0)
     parabola *= load.sum() / parabola.sum()

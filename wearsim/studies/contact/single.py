@@ -229,7 +229,15 @@ def _reference(
         _, gap, curvature, point = _contact(scenario, wider)
         prescribed = at_creepage(point, solution)
         try:
-            return solve_reference(against, wider, materials, gap, curvature, prescribed)
+            return solve_reference(
+                against,
+                wider,
+                materials,
+                gap,
+                curvature,
+                prescribed,
+                creep_factor=scenario.friction.creep_factor,
+            )
         except ContactError as error:
             failure = failure or error
     assert failure is not None

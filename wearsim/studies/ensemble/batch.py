@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from wearsim.errors import StepError
+from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
+from wearsim.evolution.observables import depth_error_by_stations, volume_error_by_stations
+from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
-from wearsim.evolution.strip_errors import Course, add_step, coarse_courses, strip_errors
+from wearsim.evolution.strip_errors import (
+    Course,
+    Observe,
+    add_step,
+    coarse_courses,
+    strip_errors,
+)
 from wearsim.plugins import BODIES
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import cam_observables, lift_curves
 from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.run.assemble import coarse_stepper
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import Due, due_records, history_row, states_at
@@ -158,16 +170,20 @@ class RunObservations:
     scalars : dict of str to float
         Error estimates, and numbers of steps and contact solutions.
     curves : dict of str to ndarray
-        At the end: "depth_profile", the worn depth of the cylinder or of the deepest station of a
-        cam, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
+        At the end: "depth_profile", the worn depth of the cylinder or of a cam where it is
+        deepest, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
     grid : Grid
         Strips at the end.
+    failure : StepError, optional
+        Why the test ended where it became too deep; it then has no curves, and the later rows are
+        nan.
     """
 
     rows: list[Observables]
     scalars: dict[str, float]
     curves: dict[str, FloatArray]
     grid: Grid
+    failure: StepError | None = None
 
 
 def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
@@ -224,14 +240,26 @@ def curves_at_end(
     scenarios : sequence of Scenario
         Scenario of each realisation.
     """
-    depths = state.cylinder_depth[:, 0]  # of a cam, the groove at the deepest station is stored
-    deepest = depths.max(axis=-1).argmax(axis=0)
-    found = [{"depth_profile": depths[station, v]} for v, station in enumerate(deepest)]
-    if problem.kinematics.cam is not None:
-        stations = [turn_of(scenario).stations for scenario in scenarios]
-        for curves, curve in zip(found, lift_curves(problem, state, stations), strict=True):
-            curves["lift_error_curve"] = curve
+    depths, cam = state.cylinder_depth[:, 0], problem.kinematics.cam
+    if cam is None:
+        return [{"depth_profile": profile} for profile in depths[0]]
+    angles = cam.greatest(depths.max(axis=-1)).angle.tolist()
+    found = [
+        {"depth_profile": np.maximum(cam.at_angle(depths[:, v], angle), 0.0)}
+        for v, angle in enumerate(angles)
+    ]
+    stations = [turn_of(scenario).stations for scenario in scenarios]
+    for curves, curve in zip(found, lift_curves(problem, state, stations), strict=True):
+        curves["lift_error_curve"] = curve
     return found
+
+
+def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:
+    """Return the scalars of a state of one realisation, by the names of `SCALARS`."""
+    scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
+    scalars["depth_error"] += float(depth_error_by_stations(problem, state)[0])
+    scalars["volume_error"] += float(volume_error_by_stations(problem, state)[0])
+    return scalars
 
 
 def observe(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]:
@@ -256,20 +284,29 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
     tests = Evolution(problem, state, stepper, stop, steps, schedule.next_record)
     rows = [[row] for row in observables_of(stepper, problem, state, threshold)]
     results: dict[int, RunObservations | Exception] = {}
+    with_courses = scenario.evolution.strip_error
     courses = [Course() for _ in runs]
+    records = len(schedule.all_records(stop, stepper.pass_by_pass))
     for advance in tests:
-        add_step(courses, advance)
+        if with_courses:
+            add_step(courses, advance)
         due = due_records(advance, schedule, stop, stepper.pass_by_pass)
         for part in [due] if runs[0].can_be_batched else [[one] for one in due]:
             tests.fail(_record(stepper, advance, part, threshold, rows))
-        end = advance.end
-        over = np.flatnonzero(end.passes >= stop)
+        end, deep = advance.end, too_deep_tests(advance, scenario)
+        for number, failure in deep.items():
+            missing = [dict.fromkeys(rows[number][0], math.nan)] * (records - len(rows[number]))
+            kept = rows[number] + missing
+            results[number] = RunObservations(kept, {}, {}, advance.problem.grid, failure)
+        tests.end(deep)
+        going = [number not in deep for number in advance.numbers.tolist()]
+        over = np.flatnonzero((end.passes >= stop) & going)
         numbers = advance.numbers[over].tolist()
         scenarios = [runs[number].draws.scenario for number in numbers]
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
         for place, number, found in zip(over.tolist(), numbers, curves, strict=True):
-            scalars = {name: float(getattr(end, name)[place]) for name in SCALARS}
-            grid = advance.problem.grid
+            chosen, grid = np.array([place]), advance.problem.grid
+            scalars = scalars_of(advance.problem.at(chosen), end.at(chosen))
             results[number] = RunObservations(rows[number], scalars, found, grid)
     add_strip_errors(runs, problem, courses, results)
     results |= tests.failures
@@ -281,7 +318,8 @@ def add_strip_errors(
     problem: WearProblem,
     courses: Sequence[Course],
     results: Mapping[int, RunObservations | Exception],
-) -> dict[int, FloatArray]:
+    observe: Observe | None = None,
+) -> dict[int, tuple[FloatArray, dict[str, FloatArray]]]:
     """Add the errors due to the strips to those of the results, by the same tests on coarse ones.
 
     Parameters
@@ -292,30 +330,67 @@ def add_strip_errors(
     courses : sequence of Course
         Of each test.
     results : mapping of int to RunObservations or Exception
+    observe : callable, optional
+        Returns the observables that the courses have.
 
     Returns
     -------
-    dict of int to ndarray, shape (3,)
-        Added errors of depth [m], volume [m^3] and profile by number; none where they are not
-        estimated.
+    dict of int to tuple
+        By number the added errors of depth [m], volume [m^3] and profile, shape (3,), and those
+        of the observables by steps and strips at the end; none where they are not estimated.
     """
     stepper = coarse_stepper(runs[0].draws, problem)
-    ended = [number for number, course in enumerate(courses) if course.passes and number in results]
+    ended = [
+        number
+        for number, course in enumerate(courses)
+        if course.passes and number in results and not _is_failed(results[number])
+    ]
     if stepper is None or not ended:
         return {}
     places, steps = np.array(ended), runs[0].draws.scenario.evolution.max_steps
     needed = np.array([courses[number].passes[-1] for number in ended])
-    added = {}
-    coarse = coarse_courses(problem.at(places), stepper, runs[0].stop, needed, steps)
+    added: dict[int, tuple[FloatArray, dict[str, FloatArray]]] = {}
+    coarse = coarse_courses(problem.at(places), stepper, runs[0].stop, needed, steps, observe)
     for number, other in zip(ended, coarse, strict=True):
         course, result = courses[number], results[number]
         passes, sizes = np.array(course.passes), np.array(course.sizes).T
         errors = strip_errors(other, passes, sizes, course)[:, -1]
         if isinstance(result, RunObservations) and np.isfinite(errors).all():
-            added[number] = errors
+            observed = {
+                name: np.array([item[name] for item in course.observed])
+                for name in (course.observed[0] if course.observed else ())
+            }
+            found = observed_errors(other, np.append(0.0, passes), observed)
+            added[number] = errors, {name: values[-1] for name, values in found.items()}
             result.scalars["depth_error"] += float(errors[0])
             result.scalars["volume_error"] += float(errors[1])
     return added
+
+
+def _is_failed(result: RunObservations | Exception) -> bool:
+    return not isinstance(result, RunObservations) or result.failure is not None
+
+
+def too_deep_tests(advance: Advance, scenario: Scenario, less: str = "") -> dict[int, StepError]:
+    """Return the failures of tests that a step wears beyond the validity of the models, by number.
+
+    Parameters
+    ----------
+    advance : Advance
+        The step.
+    scenario : Scenario
+        Of any of the tests.
+    less : str
+        As in `too_deep_failure`.
+    """
+    each = zip(
+        advance.numbers.tolist(),
+        greatest_depth(advance.end.depths).tolist(),
+        advance.end.passes.tolist(),
+        strict=True,
+    )
+    failures = {n: too_deep_failure(scenario, depth, passes, less) for n, depth, passes in each}
+    return {number: failure for number, failure in failures.items() if failure}
 
 
 def _record(

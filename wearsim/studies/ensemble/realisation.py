@@ -294,6 +294,10 @@ class RealisationRunner:
         if isinstance(observations, Exception):
             return Outcome(number=run.number, values=drawn, error=failure_text(observations))
         rows, scalars = observations.rows, dict(observations.scalars)
+        courses = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        if observations.failure is not None:
+            error = failure_text(observations.failure)
+            return Outcome(number=run.number, values={**drawn, **courses}, error=error)
         unusable = [
             f"{name} is not finite at record {number}"
             for number, row in enumerate(rows)
@@ -309,6 +313,5 @@ class RealisationRunner:
         if not same_strips(observations.grid, self.grid):
             profile = curves["depth_profile"]
             curves["depth_profile"] = averaged(profile, observations.grid, self.grid)
-        courses = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         values = {**drawn, **courses, **scalars, **curves}
         return Outcome(number=run.number, values=values)

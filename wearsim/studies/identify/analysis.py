@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.studies.cam.observables import CURVE_ANGLES
+from wearsim.studies.identify.cam_wear import size_of
 from wearsim.studies.identify.checks import (
     check_covered,
     check_width,
@@ -16,6 +18,7 @@ from wearsim.studies.identify.checks import (
     other_form,
     profiles_of_depth,
 )
+from wearsim.studies.identify.lifts import LiftLikelihood
 from wearsim.studies.identify.likelihood import (
     DrawLikelihood,
     TraceLikelihood,
@@ -29,6 +32,7 @@ from wearsim.uq.hierarchy.kernels import Kernel
 from wearsim.uq.hierarchy.noise import Noise, fit_noise
 
 _FIRST_NOISE = Noise(1e-6, 0.2e-3, 0.1e-6)  # of a trace without shoulders, before its own is fitted
+_NOISE_OF_LIFT = Noise(1e-6, 0.05, 1e-6)  # before that of the residuals is fitted; lengths in rad
 _BAND = 100  # draws of the band of fitted profiles
 _SUSPECT = 1.6
 _CONFOUNDED = Mistake(
@@ -94,7 +98,8 @@ class Identified:
         Measured depth: value, and ends of the 95 % interval [m]; None without shoulders, and where
         the surface was not flat before wear.
     model_depth, area, energy : tuple of float
-        Depth [m], worn area [m^2] and energy [J] of the model: value and 95 % interval.
+        Depth, or peak to peak of a change of the lift [m], worn area [m^2] and energy [J] of the
+        model: value and 95 % interval; no area of a lift.
     fit : Fit, optional
         None for a measured depth.
     passes : float
@@ -107,7 +112,7 @@ class Identified:
     kernel: Kernel
     depth: tuple[float, float, float] | None
     model_depth: tuple[float, float, float]
-    area: tuple[float, float, float]
+    area: tuple[float, float, float] | None
     energy: tuple[float, float, float]
     fit: Fit | None
     passes: float
@@ -159,10 +164,24 @@ def identified(
         assert item.depth is not None
         assert item.depth_std is not None
         depth = _around(item.depth, item.depth_std)
-        found = depth_likelihood(item.depth, item.depth_std, grown, item.body)
+        found = depth_likelihood(item.depth, item.depth_std, grown, item.surface)
+    elif item.lift is not None:
+        model: TraceLikelihood = LiftLikelihood(
+            trace.y,
+            trace.height,
+            _NOISE_OF_LIFT,
+            replace(grown, start=np.zeros(len(CURVE_ANGLES)), y=CURVE_ANGLES),
+            item.surface,
+            lateral=False,
+            start=False,
+            curvature=item.runout,
+        )
+        model = _with_noise(model)
+        found = model.integrated()
+        fit = _fit(model, found, trace)
     else:
         if trace.noise is not None and trace.depth is not None:
-            rows = profiles_of_depth(grown, item.body, trace.depth)
+            rows = profiles_of_depth(grown, item.surface, trace.depth)
             suspects = check_width(trace, grown.y, rows)
             trace = _levelled_again(trace, item, crown_radius, extents_of(grown.y, rows))
             if trace.difference or not grown.start.any():
@@ -174,7 +193,7 @@ def identified(
             trace.height,
             trace.noise or _FIRST_NOISE,
             grown,
-            item.body,
+            item.surface,
             start=item.body == "cylinder" and not trace.difference,
             curvature=item.curvature,
             least=trace.spread,
@@ -186,9 +205,9 @@ def identified(
         fit = _fit(model, found, trace)
     kernel = kernel_of(found, item.name)
     step = grown.y[1] - grown.y[0]
-    sizes = grown.depth[item.body]
-    model_depth = _interval(sizes.max(axis=2), grown, found)
-    area = _interval(sizes.sum(axis=2) * step, grown, found)
+    sizes = grown.depth[item.surface]
+    model_depth = _interval(size_of(item.surface, sizes), grown, found)
+    area = None if item.lift else _interval(sizes.sum(axis=2) * step, grown, found)
     energy = _interval(grown.energy, grown, found)
     if fit is not None and fit.trace.noise is not None:
         suspects += [*other_depth(depth, model_depth)] if depth is not None else []
@@ -283,8 +302,9 @@ def exponent(rows: Sequence[Identified]) -> tuple[float, float, float] | None:
     Parameters
     ----------
     rows : sequence of Identified
-        Traces of one test at different passes.
+        Traces of one test; those of the same place as the first are used.
     """
+    rows = [row for row in rows if row.item.surface == rows[0].item.surface]
     if len(rows) < 2:
         return None
     x = np.log([row.passes for row in rows])

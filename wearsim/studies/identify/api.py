@@ -17,7 +17,9 @@ from wearsim.results import IdentificationResult, check_output, write_results
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.identify.analysis import Identified, identified
+from wearsim.studies.identify.cam_wear import Wanted, size_of
 from wearsim.studies.identify.inputs import with_known
+from wearsim.studies.identify.lifts import read_change
 from wearsim.studies.identify.measurements import (
     Measurement,
     key_of,
@@ -26,7 +28,7 @@ from wearsim.studies.identify.measurements import (
     tables_of,
 )
 from wearsim.studies.identify.pooling import FEW_DRAWS, content, specimens_of
-from wearsim.studies.identify.traces import Trace, read_trace
+from wearsim.studies.identify.traces import Trace, read_trace, smoothed
 from wearsim.studies.identify.trajectories import Grower, Trajectories, check_law
 from wearsim.studies.progress import shown_progress
 from wearsim.units import QuantityError, shown
@@ -126,7 +128,7 @@ def identify(
     shared = _checked_share(share)
     width = quantity(shoulders, "m") if isinstance(shoulders, str) else shoulders
     items = _measurements(tests, before, choice, width, curvature)
-    files = [path for item in items for path in (item.profile, item.before) if path is not None]
+    files = [path for item in items for path in item.files]
     if output is not None:
         check_output(Path(output), force, [*scenario.paths, *files])
     study = _Study(scenario, items, draws, shared)
@@ -213,10 +215,16 @@ class _Study:
             what = "wear of the roller is measured, and its K/H is that of the scenario"
             expected = "share = cylinder, roller (--share k=cylinder,roller)"
             raise item.refused(Mistake("", "body", what, None, expected))
+        _check_place(self.scenario, item)
         scenario = with_known(self.scenario, item)
         require_run(scenario)
         passes = _passes(scenario, item)
         crown = scenario.roller.crown_radius
+        if item.lift is not None:
+            assert scenario.cam is not None
+            trace = read_change(item, scenario.cam.follower)
+            size = float(size_of(item.surface, smoothed(trace.height)))
+            return _Ready(item, scenario, trace, passes, (0.5 * size, 1.2 * size))
         if item.profile is None:
             assert item.depth is not None
             return _Ready(item, scenario, None, passes, (item.depth, item.depth))
@@ -264,10 +272,17 @@ class _Study:
         self, group: Sequence[_Ready], draws: int | None, report: Callable[[int, int], None]
     ) -> tuple[list[Identified], Trajectories]:
         """Return the wear factors of tests with the same inputs, and their trajectories."""
-        low = min(ready.depths[0] for ready in group)
-        high = max(ready.depths[1] for ready in group)
-        grower = Grower(group[0].scenario, draws, self.shared, report)
-        trajectories = grower.grow((low, high), [ready.passes for ready in group])
+        angles = {
+            ready.item.surface: ready.item.angle for ready in group if ready.item.angle is not None
+        }
+        grower = Grower(group[0].scenario, draws, self.shared, report, angles)
+        if self.scenario.cam is None:
+            low = min(ready.depths[0] for ready in group)
+            high = max(ready.depths[1] for ready in group)
+            trajectories = grower.grow((low, high), [ready.passes for ready in group])
+        else:
+            wanted = [Wanted(one.item.surface, one.passes, *one.depths) for one in group]
+            trajectories = grower.grow_on_cam(wanted)
         return [self._identified(ready, trajectories) for ready in group], trajectories
 
     def _identified(self, ready: _Ready, trajectories: Trajectories) -> Identified:
@@ -307,13 +322,31 @@ def _passes(scenario: Scenario, item: Measurement) -> float:
     try:
         if text.endswith("passes"):
             found = float(text.removesuffix("passes"))
+        elif text.endswith("turns") and scenario.cam is not None:
+            found = float(text.removesuffix("turns")) * scenario.operation.rollers
         else:
             found = quantity(text, "s") * scenario.pass_rate
     except ValueError as error:
         what = error.what if isinstance(error, QuantityError) else "is no number of passes"
-        expected = 'a time such as "100 min", or "2e5 passes"'
+        expected = 'a time such as "100 min", or "2e5 passes", of a cam also "1e5 turns"'
         raise item.refused(Mistake("", "at", what, shown(item.at), expected)) from error
     if not 0.0 < found <= scenario.total_passes * (1.0 + 1e-9):
         what, expected = "is not within the test", f"up to {scenario.total_time / 60.0:.6g} min"
         raise item.refused(Mistake("", "at", what, item.at, expected))
     return found
+
+
+def _check_place(scenario: Scenario, item: Measurement) -> None:
+    """Refuse a groove of a cam without its angle, and an angle or a lift of a cylinder."""
+    if scenario.cam is None:
+        for key, value in (("angle", item.angle), ("lift", item.lift)):
+            if value is not None:
+                what, expected = "is for a cam, and the scenario has a cylinder", f"no {key}"
+                raise item.refused(Mistake("", key, what, None, expected))
+    elif item.lift is None and item.angle is None and item.body == "cylinder":
+        what = "is needed for a groove of a cam: where the trace crosses it"
+        expected = 'angle = "112 deg" with profile, in a tests file (--tests)'
+        raise item.refused(Mistake("", "angle", what, None, expected))
+    elif item.angle is not None and item.body == "roller":
+        what = "has no meaning for a groove of the roller"
+        raise item.refused(Mistake("", "angle", what, None, "no angle"))

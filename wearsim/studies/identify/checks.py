@@ -115,11 +115,12 @@ def other_depth(
 ) -> list[str]:
     """Return a warning if the model's depth is not the measured one.
 
-    The model's depth follows from the whole trace. Where the model is right it is the more precise
-    one, and the variance of the difference is the difference of the variances.
+    Of two estimates of the same depth the more precise one, usually the model's from the whole
+    trace, is taken as efficient: the variance of the difference is then that of the variances
+    (Hausman, Econometrica 46 (1978), DOI 10.2307/1913827).
     """
-    std, own = ((ends[2] - ends[1]) / 3.92 for ends in (measured, model))
-    scale = np.sqrt(max(std**2 - own**2, _LEAST_PART * std**2))
+    less, more = sorted(((ends[2] - ends[1]) / 3.92) ** 2 for ends in (measured, model))
+    scale = np.sqrt(max(more - less, _LEAST_PART * more))
     if abs(measured[0] - model[0]) < _OTHER_DEPTH * scale:
         return []
     what = (

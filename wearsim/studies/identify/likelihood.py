@@ -85,6 +85,16 @@ class TraceLikelihood:
         """Orthonormal whitened forms, shape (points, forms)."""
         return np.linalg.qr(self.noise.whitened(self.y, self.forms))[0]
 
+    def records(self, draw: IntArray, ln_k: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return the number of the record below each ln K, and the part of the way to the next."""
+        known = self.grown.ln_k[draw]
+        last = known.shape[1] - 1
+        record = np.clip((known <= ln_k[:, None]).sum(axis=1) - 1, 0, max(last - 1, 0))
+        columns = np.arange(len(draw))
+        low = known[columns, record]
+        high = known[columns, np.minimum(record + 1, last)]
+        return record, np.clip((ln_k - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+
     def worn(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:
         """Return worn depth less start height, shape (points, columns) [m].
 
@@ -97,17 +107,11 @@ class TraceLikelihood:
         ln_k, shift : ndarray, shape (columns,)
         """
         grown = self.grown
-        known = grown.ln_k[draw]
-        last = known.shape[1] - 1
-        record = np.clip((known <= ln_k[:, None]).sum(axis=1) - 1, 0, max(last - 1, 0))
-        columns = np.arange(len(draw))
-        low = known[columns, record]
-        high = known[columns, np.minimum(record + 1, last)]
-        part = np.clip((ln_k - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
-        total = np.zeros((len(self.y), len(draw)))
+        record, part = self.records(draw, ln_k)
+        total, last = np.zeros((len(self.y), len(draw))), grown.ln_k.shape[1] - 1
         for step, weight in ((0, 1.0 - part), (1, part)):
             place = np.minimum(record + step, last)
-            stretch = np.exp((ln_k - known[columns, place]) / 3.0)
+            stretch = np.exp((ln_k - grown.ln_k[draw, place]) / 3.0)
             centre = self._centroid[draw, place]
             position = (self.y[:, None] - shift - centre) / stretch + centre
             depth = self.grown.depth[self.body][draw, place]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,10 +27,11 @@ SHORT = {
 }
 _ROWS = ("row", "mean_rows", "row_at")
 _KEYS = (
-    *("profile", "depth", "depth_std", "before", "at", "group", "set", "std", "body", "shoulders"),
-    *("curvature", "columns", "units", *_ROWS),
+    *("profile", "depth", "depth_std", "lift", "before", "angle", "at", "group", "set", "std"),
+    *("body", "shoulders", "curvature", "runout", "columns", "units", *_ROWS),
 )
 _EXAMPLE = '[[test]] tables with profile = "t1.csv", or depth = "48 um" and depth_std = "1 um"'
+_SIZES = ("profile", "depth", "lift")
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,12 @@ class Measurement:
         Distance from the middle of the groove beyond which the surface is unworn [m].
     curvature : bool
         Whether the trace has an unknown curvature, as of a bow of the instrument's guide.
+    angle : float, optional
+        Angle of the cam at which the groove was measured [rad].
+    lift : Path, optional
+        File of the lift of the worn cam, instead of a profile; `before` is that of the unworn cam.
+    runout : bool
+        Whether the lifts differ by an unknown run-out too, since the cam was mounted again.
     file, place : str
         Tests file and "test 2", for messages; empty without such a file.
     """
@@ -77,8 +85,24 @@ class Measurement:
     body: str = "cylinder"
     shoulders: float | None = None
     curvature: bool = False
+    angle: float | None = None
+    lift: Path | None = None
+    runout: bool = False
     file: str = ""
     place: str = ""
+
+    @property
+    def files(self) -> list[Path]:
+        """Files of the measurement."""
+        return [path for path in (self.profile, self.lift, self.before) if path is not None]
+
+    @property
+    def surface(self) -> str:
+        """Name of what was measured: a body, a body at an angle of the cam, or the lift."""
+        if self.lift is not None:
+            return "lift"
+        at = "" if self.angle is None else f" at {math.degrees(self.angle):.9g} deg"
+        return f"{self.body}{at}"
 
     def refused(self, *mistakes: Mistake) -> ScenarioError:
         """Return the error of mistakes in the test, which names the tests file and the test."""
@@ -183,7 +207,7 @@ def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
     list of dict
         Values as TOML and JSON can hold them.
     """
-    files = {path for item in items for path in (item.profile, item.before) if path is not None}
+    files = {path for item in items for path in item.files}
     unique = len({path.name for path in files}) == len(files)
 
     def name(path: Path | None) -> str | None:
@@ -197,9 +221,11 @@ def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
         choice = item.choice
         table: dict[str, Any] = {
             "profile": name(item.profile),
+            "lift": name(item.lift),
             "before": name(item.before),
             "depth": length(None if item.profile else item.depth),
             "depth_std": length(None if item.profile else item.depth_std),
+            "angle": None if item.angle is None else f"{float(item.angle)!r} rad",
             "at": item.at,
             "group": item.group,
             "set": dict(item.values) or None,
@@ -207,6 +233,7 @@ def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
             "body": item.body if item.body != "cylinder" else None,
             "shoulders": length(item.shoulders),
             "curvature": item.curvature or None,
+            "runout": item.runout or None,
             "columns": choice.columns,
             "units": choice.units,
             "row": choice.row,
@@ -225,15 +252,18 @@ def _read_test(
     def wrong(key: str, what: str, got: object, expected: str) -> None:
         mistakes.append(Mistake(place, key, what, None if got is None else shown(got), expected))
 
-    def length(key: str) -> float | None:
+    def amount(key: str, unit: str, expected: str) -> float | None:
         if key not in table:
             return None
         try:
-            value = quantity(table[key], "m")
+            return quantity(table[key], unit)
         except QuantityError as error:
-            wrong(key, error.what, table[key], "a length such as '48 um'")
+            wrong(key, error.what, table[key], expected)
             return None
-        if value <= 0.0:
+
+    def length(key: str) -> float | None:
+        value = amount(key, "m", "a length such as '48 um'")
+        if value is not None and value <= 0.0:
             wrong(key, "must be above 0", table[key], "a length such as '48 um'")
         return value
 
@@ -251,14 +281,23 @@ def _read_test(
         if not isinstance(table.get(key, {}), dict):
             wrong(key, "is not a table", table[key], 'a table such as {load = "310 N"}')
             return Measurement(place)
-    if ("profile" in table) == ("depth" in table):
-        wrong("profile or depth", "exactly one of them is needed", None, _EXAMPLE)
+    if sum(key in table for key in _SIZES) != 1:
+        wrong("profile, depth or lift", "exactly one of them is needed", None, _EXAMPLE)
+    if "lift" in table:
+        if "before" not in table:
+            wrong("before", "is needed with lift", None, "the lift of the unworn cam")
+        refused = ("angle", "body", "shoulders", "curvature", *_ROWS)
+        for key in [key for key in refused if key in table]:
+            wrong(key, "has no meaning with lift", table[key], "")
+    elif "runout" in table:
+        wrong("runout", "is of a lift", None, "runout with lift only")
     if "depth" in table and "depth_std" not in table:
         wrong("depth_std", "is needed with depth", None, "its standard deviation, such as '1 um'")
     if table.get("body", "cylinder") not in {"cylinder", "roller"}:
         wrong("body", "is unknown", table["body"], '"cylinder" or "roller"')
-    if not isinstance(table.get("curvature", False), bool):
-        wrong("curvature", "is not true or false", table["curvature"], "true or false")
+    for key in ("curvature", "runout"):
+        if not isinstance(table.get(key, False), bool):
+            wrong(key, "is not true or false", table[key], "true or false")
     values, errors = _flat(table.get("set", {})), _flat(table.get("std", {}))
     for key, value in values.items():
         if "." not in key and key not in SHORT:
@@ -269,9 +308,9 @@ def _read_test(
             hint = nearest(key, values) or nearest(key, SHORT)
             expected = "a key of set" if hint else f"{key} in set"
             wrong(f"std.{key}", f"has no measured value in set{hint}", value, expected)
-    names = {key: text(key) for key in ("profile", "before", "at", "group")}
-    profile, before = (
-        file.parent / name if (name := names[k]) else None for k in ("profile", "before")
+    names = {key: text(key) for key in ("profile", "lift", "before", "at", "group")}
+    profile, lift, before = (
+        file.parent / name if (name := names[k]) else None for k in ("profile", "lift", "before")
     )
     choice = ProfileChoice()
     try:
@@ -285,7 +324,7 @@ def _read_test(
     except (TypeError, ValueError) as error:
         wrong("columns, units or rows", str(error), None, 'columns = ["y", "-z"], for instance')
     return Measurement(
-        names["profile"] or place,
+        _name(names["profile"] or names["lift"] or place, table),
         profile,
         before,
         choice,
@@ -298,9 +337,17 @@ def _read_test(
         str(table.get("body", "cylinder")),
         length("shoulders"),
         table.get("curvature") is True,
+        amount("angle", "rad", "an angle such as '112 deg'"),
+        lift,
+        table.get("runout") is True,
         str(file),
         place,
     )
+
+
+def _name(name: str, table: Mapping[str, Any]) -> str:
+    """Return the name of a test, with the angle of a cam."""
+    return f"{name} ({table['angle']})" if isinstance(table.get("angle"), str) else name
 
 
 def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, object]:

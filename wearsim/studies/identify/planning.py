@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wearsim.errors import CapabilityError
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.realisation import closed_form_depths
@@ -97,6 +98,11 @@ def plan_tests(
     scenario = as_scenario(scenario)
     require_run(scenario)
     check_law(scenario)
+    if scenario.cam is not None:
+        raise CapabilityError(
+            f"{scenario.file}: holds a cam; tests are planned for a cylinder, whose groove is the"
+            " same all around"
+        )
     scenario = with_chosen_model(scenario, test=True)
     if not tests or min(tests) < 2:
         raise ValueError("scatter needs 2 tests or more")

@@ -49,7 +49,8 @@ def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
     """Return the specimens of measured grooves.
 
     Grooves of a group are of one specimen. A groove at more passes than the one before it in the
-    group is of the same test, and shares all inputs with it; otherwise it begins another test.
+    group, or at the same passes and another angle of a cam, is of the same test, and shares all
+    inputs with it; otherwise it begins another test.
 
     Parameters
     ----------
@@ -67,7 +68,9 @@ def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
     for name, members in groups.items():
         tests: list[list[Identified]] = []
         for row in members:
-            continues = tests and row.passes > tests[-1][-1].passes
+            before = [(one.passes, one.item.surface) for one in tests[-1]] if tests else []
+            later = bool(before) and row.passes >= before[-1][0]
+            continues = later and (row.passes, row.item.surface) not in before
             same = continues and _same_inputs(row, tests[-1][-1])
             if same:
                 tests[-1].append(row)
@@ -190,14 +193,16 @@ def _test(row: Identified, specimen: Specimen) -> dict[str, Any]:
         "file": row.item.name,
         "specimen": specimen.name,
         "body": row.item.body,
+        "angle_rad": row.item.angle,
+        "quantity": "lift" if row.item.lift else "groove",
         "levelled_on": "a measured depth" if fit is None else fit.trace.levelled,
         "passes": row.passes,
         "depth_m": None if row.depth is None else row.depth[0],
         "depth_interval_m": None if row.depth is None else list(row.depth[1:]),
         "model_depth_m": row.model_depth[0],
         "model_depth_interval_m": list(row.model_depth[1:]),
-        "area_m2": row.area[0],
-        "area_interval_m2": list(row.area[1:]),
+        "area_m2": None if row.area is None else row.area[0],
+        "area_interval_m2": None if row.area is None else list(row.area[1:]),
         "k_over_h_per_Pa": _three(alone),
         "energy_J": dict(zip(names, row.energy, strict=True)),
         "share_of_inputs": row.kernel.variance_of_inputs / row.kernel.variance,

@@ -328,19 +328,17 @@ def measured_depth(
     line = np.vander((y - trace.middle) / np.ptp(y), 3 if curvature else 2, True)
     forms = np.hstack([inside, line])
     models = noise_models(y, height, forms, trace.spread)
-    depth, variance, score = np.empty((3, len(models.length)))
-    for place in range(len(depth)):
-        columns = np.column_stack([height, forms])
-        white = models.noise(place).whitened(y, columns)
-        inverse = np.linalg.inv(white[:, 1:].T @ white[:, 1:])
-        found = inverse @ white[:, 1:].T @ white[:, 0]
-        squares = float(((white[:, 0] - white[:, 1:] @ found) ** 2).sum())
-        score[place] = models.log_weight[place] - models.exponent[place] * np.log(squares)
-        vertex = float(np.clip(-0.5 * found[1] / found[2], -1.0, 1.0))
-        slope = np.zeros(len(found))
-        slope[:3] = 1.0, vertex, vertex**2
-        depth[place] = -slope @ found
-        variance[place] = slope @ inverse @ slope * squares / (2.0 * models.exponent[place])
+    white = models.whitened(np.column_stack([height, forms])).transpose(1, 0, 2)
+    z, lines = white[:, :, :1], white[:, :, 1:]
+    inverse = np.linalg.inv(lines.transpose(0, 2, 1) @ lines)
+    found = (inverse @ lines.transpose(0, 2, 1) @ z)[..., 0]
+    squares = ((z[..., 0] - np.einsum("mjf,mf->mj", lines, found)) ** 2).sum(axis=1)
+    score = models.log_weight - models.exponent * np.log(squares)
+    vertex = np.clip(-0.5 * found[:, 1] / found[:, 2], -1.0, 1.0)
+    slope = np.zeros_like(found)
+    slope[:, :3] = np.column_stack([np.ones_like(vertex), vertex, vertex**2])
+    depth = -(slope * found).sum(axis=1)
+    variance = np.einsum("mf,mfg,mg->m", slope, inverse, slope) * squares / (2.0 * models.exponent)
     weight = np.exp(score - score.max())
     weight /= weight.sum()
     mean = float(weight @ depth)

@@ -15,12 +15,14 @@ import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError, SolverError
 from wearsim.evolution.integrate import Evolution, bisect_failures
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, joined_problem
 from wearsim.studies.ensemble.realisation import closed_form_depths
+from wearsim.studies.identify.cam_wear import LIFT, CamView, Wanted, falls_of_lift, size_of
 from wearsim.studies.run.assemble import assemble_problem, prepared_model, start_height
 from wearsim.studies.run.draws import Drawer, Draws
 from wearsim.studies.run.grid import Extent, extent_of, lattice, strips_of_run
@@ -36,6 +38,9 @@ BELOW, ABOVE = 0.75, 1.35  # depths that are covered, over the least and the gre
 TOLERANCE = 1e-2  # of each of many tests, whose scatter is far greater
 _FEW = 8  # draws
 _MOST_LOST = 0.05  # fraction of the draws whose tests may fail
+_PILOTS = 6  # tests that search for the wear factor of a cam
+_NEAR = 1.3  # ratio of sizes at which the search ends
+_ROOM = 1.5  # by which the depth on a cam may differ between draws from that expected
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,8 @@ class Grown:
     ln_k : ndarray, shape (draws, records)
         Logarithm of K/H of the cylinder [1/Pa].
     depth : mapping of str to ndarray, shape (draws, records, strips)
-        Worn depth of "cylinder" and "roller" [m].
+        Worn depth of "cylinder" and "roller", of a cam at each measured angle [m]; "lift" has the
+        fall of the lift, at `CURVE_ANGLES` instead of strips.
     energy : ndarray, shape (draws, records)
         Dissipated energy of all rollers [J].
     """
@@ -139,19 +145,18 @@ def check_law(scenario: Scenario) -> None:
     Raises
     ------
     CapabilityError, ScenarioError
-        If the scenario is of a cam, if the wear law has none, or if it is zero.
+        If the wear law has none, or if it is zero or has a random factor.
     """
-    if scenario.cam is not None:
-        raise CapabilityError(
-            f"{scenario.file}: holds a cam; identification needs a test of a cylinder, whose groove"
-            " is the same all around"
-        )
     if scenario.wear is None or scenario.wear.law != "archard-dissipation":
         law = "none" if scenario.wear is None else f"'{scenario.wear.law}'"
         raise CapabilityError(
             f"{scenario.file}: identification needs the wear factor K/H of"
             f" wear.law = 'archard-dissipation', and the wear law is {law}"
         )
+    if any(item.name == "wear.factor" for item in scenario.random):
+        what = "is random, and so is what is identified: the scatter of K/H between specimens"
+        remedy = "no such line: delete factor under [wear], or the table [wear.factor]"
+        raise ScenarioError(scenario.file, [Mistake("wear", "factor", what, None, remedy)])
     if factors(scenario)[0] <= 0.0:
         what = "must be above 0: it is where the search begins"
         mistake = Mistake(
@@ -164,7 +169,7 @@ def factors(scenario: Scenario) -> tuple[float, float]:
     """Return the wear factors of cylinder and roller [1/Pa]."""
     assert scenario.wear is not None
     options: Any = scenario.wear.options
-    return float(options.cylinder.k_over_h), float(options.roller.k_over_h)
+    return float(options.cylinder.wear_factor), float(options.roller.wear_factor)
 
 
 def with_factors(scenario: Scenario, cylinder: float, roller: float) -> Scenario:
@@ -192,6 +197,8 @@ class Grower:
         Whether the wear factors of both bodies have a common unknown factor.
     on_progress : callable, optional
         Called with the numbers of completed and of all wear tests.
+    angles : mapping of str to float, optional
+        Surfaces of a cam by name, and their angles [rad].
     """
 
     def __init__(
@@ -200,6 +207,7 @@ class Grower:
         draws: int | None = None,
         shared: bool = False,
         on_progress: Callable[[int, int], None] | None = None,
+        angles: Mapping[str, float] | None = None,
     ) -> None:
         check_law(scenario)
         dropped = {CYLINDER, ROLLER} if shared else {CYLINDER}
@@ -212,6 +220,7 @@ class Grower:
         self.draws: list[Draws] = [self.drawer.draw(number) for number in range(self.count)]
         self._report = on_progress or (lambda done, total: None)
         self._grid: Grid | None = None
+        self._angles = angles or {}
 
     def values(self) -> dict[str, FloatArray]:
         """Return the drawn values by key, shape (draws,); means over rollers and time."""
@@ -242,11 +251,54 @@ class Grower:
         """
         times = sorted(set(passes))
         low, high = BELOW * depths[0], ABOVE * depths[1]
-        start = self._factor_for(high)
-        span = (high / low) ** 1.5
+        span = (high / low) ** 1.5 * (times[-1] / times[0] if self.reasons else 1.0)
+        return self._grown_at(times, self._factor_for(high), span)
+
+    def grow_on_cam(self, wanted: Sequence[Wanted]) -> Trajectories:
+        """Run the wear tests of a cam; see `grow`.
+
+        Parameters
+        ----------
+        wanted : sequence of Wanted
+            Sizes of the measured grooves and changes of the lift.
+        """
+        times = sorted({one.passes for one in wanted})
+        k, sizes = self._pilot(wanted, times[-1])
+        # with one test for each K/H, a groove that was measured earlier needs a greater one
+        part = np.array([one.passes / times[-1] if self.reasons else 1.0 for one in wanted])
+        low, high = np.array([(one.low, one.high) for one in wanted]).T / sizes
+        low, high = (k * each**1.5 / part for each in (BELOW / _ROOM * low, ABOVE * _ROOM * high))
+        cylinder, roller = factors(self.scenario)
+        columns = self.drawer.columns(0, self.count)
+        share = {ROLLER: np.full(self.count, roller)} if self.shared else {}
+        known = {**columns, CYLINDER: np.full(self.count, cylinder), **share}
+        expected = closed_form_depths(self.scenario, known, self.count)
+        usual = expected / expected[0] if expected[0] > 0.0 else np.full(self.count, np.nan)
+        usual = np.where(np.isfinite(usual) & (usual > 0.0), usual, 1.0)
+        start = high.max() * np.clip(usual, 0.1, 10.0) ** -1.5
+        return self._grown_at(times, start, float(high.max() / low.min()))
+
+    def _pilot(self, wanted: Sequence[Wanted], passes: float) -> tuple[float, FloatArray]:
+        """Return a wear factor near that of the first draw, and the sizes that it wears [m]."""
+        k = factors(self.scenario)[0]
+        high = np.array([one.high for one in wanted])
+        for number in range(_PILOTS):
+            profiles = self._run([(0, k)], [passes], pilot=True)[1][0][0][0]
+            sizes = np.array([float(size_of(one.surface, profiles[one.surface])) for one in wanted])
+            if not (sizes > 0.0).all():
+                where = wanted[int(sizes.argmin())].surface
+                what = "the model does not wear there"
+                raise ScenarioError(self.scenario.file, [Mistake("", where, what)])
+            ratio = float((high / sizes).max())
+            if 1.0 / _NEAR < ratio < _NEAR or number == _PILOTS - 1:
+                break
+            k *= float(np.clip(ratio, 0.01, 100.0)) ** 1.5
+        return k, sizes
+
+    def _grown_at(self, times: Sequence[float], start: FloatArray, span: float) -> Trajectories:
+        """Return the wear up to a factor for each draw, and down to the part 1/span of it."""
         count = int(np.ceil(np.log(span) / np.log(RATIO))) + 1
         if self.reasons:
-            span *= times[-1] / times[0]
             count = int(np.ceil(np.log(span) / np.log(RATIO_OF_TESTS))) + 1
             scale = span ** (np.arange(count) / (count - 1) - 1.0)
             tests = [(d, start[d] * s) for d in range(self.count) for s in scale]
@@ -265,7 +317,13 @@ class Grower:
             flat = [one for state in states for one in state]
             ln_tau = np.log(start[kept])[:, None] + np.log(records)
             grown = self._grown(ln_tau, flat, ln_tau.shape)
-            by_passes = {one: replace(grown, ln_k=ln_tau - np.log(one)) for one in times}
+            # the energy is that of the passes of a record, and grows as they do
+            by_passes = {
+                one: replace(
+                    grown, ln_k=ln_tau - np.log(one), energy=grown.energy * (one / records)
+                )
+                for one in times
+            }
         values = {key: column[kept] for key, column in self.values().items()}
         return Trajectories(values, self.reasons, by_passes, self.count - len(kept))
 
@@ -285,19 +343,17 @@ class Grower:
         self, ln_k: FloatArray, states: Sequence[tuple[Any, ...]], shape: tuple[int, ...]
     ) -> Grown:
         assert self._grid is not None
-        columns = [np.array(column) for column in zip(*states, strict=True)]
-        cylinder, roller, energy = (c.reshape(*shape, *c.shape[1:]) for c in columns)
-        return Grown(
-            self._grid.y,
-            start_height(self.scenario, self._grid),
-            ln_k,
-            {"cylinder": cylinder, "roller": roller},
-            energy,
-        )
+        profiles, energies = zip(*states, strict=True)
+        depth = {
+            name: np.array([one[name] for one in profiles]).reshape(*shape, -1)
+            for name in profiles[0]
+        }
+        start = start_height(self.scenario, self._grid)
+        return Grown(self._grid.y, start, ln_k, depth, np.array(energies).reshape(shape))
 
     def _run(
-        self, tests: Sequence[tuple[int, float]], passes: Sequence[float]
-    ) -> tuple[list[int], list[list[tuple[FloatArray, FloatArray, float]]]]:
+        self, tests: Sequence[tuple[int, float]], passes: Sequence[float], pilot: bool = False
+    ) -> tuple[list[int], list[list[tuple[dict[str, FloatArray], float]]]]:
         """Run tests, given by draw and wear factor.
 
         Returns the draws without a failed test, and profiles and energy at the passes for each of
@@ -331,18 +387,21 @@ class Grower:
             return model if strips is grid else prepared_model(scenario, strips)
 
         schedule = ListedPasses(0.0, 1.0, 1.0, tuple(passes))
-        runs, results = [], {}
+        runs, results, views = [], {}, {}
         for number, draws in enumerate(ready):
             problem, stepper, _ = assemble_problem(draws, grid, models)
             runs.append(RealisationRun(number, {}, draws, problem, stepper))
+            if draws.scenario.cam is not None:
+                views[number] = CamView.of(draws.scenario, self._angles)
         failures: dict[int, Exception] = {}
         done = 0
         for group in batch_groups(runs):
-            found, failed = _step(group, schedule, grid)
+            found, failed = _step(group, schedule, grid, views)
             results.update(found)
             failures.update(failed)
             done += len(group)
-            self._report(done, len(runs))
+            if not pilot:
+                self._report(done, len(runs))
         lost = {tests[number][0] for number in failures}
         if len(lost) > _MOST_LOST * self.count:
             raise SolverError(
@@ -364,9 +423,12 @@ def _covering(grids: Sequence[Grid], extents: Sequence[Extent]) -> Grid:
 
 
 def _step(
-    group: Sequence[RealisationRun], schedule: ListedPasses, grid: Grid
+    group: Sequence[RealisationRun],
+    schedule: ListedPasses,
+    grid: Grid,
+    views: Mapping[int, CamView],
 ) -> tuple[dict[int, list[Any]], dict[int, Exception]]:
-    """Step through a group of tests; return their states at the records, and errors.
+    """Step through a group of tests; return their profiles and energies at the records, and errors.
 
     The profiles are on the strips of `grid`.
     """
@@ -388,22 +450,40 @@ def _step(
                 if not part:
                     continue
                 present, states = states_at(stepper, advance, part)
-                profiles = [
-                    depths
-                    if same_strips(present.grid, grid)
-                    else averaged(depths, present.grid, grid)
-                    for depths in states.depths
-                ]
-                for row, (_, place, _) in enumerate(part):
-                    number = runs[int(advance.numbers[place])].number
-                    results[number].append(
-                        (
-                            profiles[0][:, 0, row].mean(axis=0),
-                            profiles[1][0, :, row].mean(axis=0),
-                            float(states.energy[row]),
-                        )
-                    )
+                numbers = [runs[int(advance.numbers[place])].number for _, place, _ in part]
+                profiles = _profiles(present, states, grid, [views.get(one) for one in numbers])
+                for row, number in enumerate(numbers):
+                    results[number].append((profiles[row], float(states.energy[row])))
         failures.update({runs[place].number: error for place, error in tests.failures.items()})
 
     _, failed = bisect_failures(work, np.arange(len(group)))
     return results, failures | {group[place].number: error for place, error in failed.items()}
+
+
+def _profiles(
+    problem: WearProblem, state: WearState, grid: Grid, views: Sequence[CamView | None]
+) -> list[dict[str, FloatArray]]:
+    """Return the worn profiles of each test of a state by the name of their surface."""
+    same = same_strips(problem.grid, grid)
+    cylinder, roller = (
+        depths if same else averaged(depths, problem.grid, grid) for depths in state.depths
+    )
+    cam = problem.kinematics.cam
+    if cam is None:
+        return [
+            {
+                "cylinder": cylinder[:, 0, row].mean(axis=0),
+                "roller": roller[0, :, row].mean(axis=0),
+            }
+            for row in range(len(views))
+        ]
+    depth, falls = cam.at_unworn(cylinder[:, 0]), falls_of_lift(problem, state)
+    return [
+        {
+            **view.grooves(depth[:, row]),
+            "roller": roller[0, :, row].mean(axis=0),
+            LIFT: view.along @ falls[:, row],
+        }
+        for row, view in enumerate(views)
+        if view is not None
+    ]

@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
+from wearsim.errors import StepError
+from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.limits import Crossings, Limit, first_crossings, ratios, take_side_step
-from wearsim.evolution.observables import depth
+from wearsim.evolution.observables import (
+    depth,
+    extremes,
+    lift_errors,
+    peak_pressures,
+    volume_error_by_stations,
+)
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
-from wearsim.evolution.strip_errors import Course, add_step
+from wearsim.evolution.strip_errors import Course, add_observed, add_step
 from wearsim.studies.ensemble.batch import (
-    SCALARS,
     Observables,
     RealisationRun,
     RunObservations,
@@ -24,11 +31,15 @@ from wearsim.studies.ensemble.batch import (
     curves_at_end,
     joined_problem,
     observables_of,
+    scalars_of,
+    too_deep_tests,
 )
+from wearsim.studies.failures import too_deep_failure
 from wearsim.types import FloatArray, IntArray
 
 TOLERANCE = 1e-6  # relative error of a quantity at its limit
 FLAT = 0.05  # log-slope below which the numerical error of a life is searched for
+_LIMITS = "the limits in [limit]"  # which a test shall reach before it is too deep
 _BACK = 0.01  # part of the passes over which the log-slope is taken
 
 
@@ -44,7 +55,8 @@ class LifeRun(RunObservations):
     @property
     def reached(self) -> bool:
         """Whether a limit was reached, and its numerical bounds are known."""
-        return math.isfinite(self.scalars["life"]) and math.isfinite(self.scalars["life_high"])
+        known = ("life", "life_high")
+        return self.failure is None and all(math.isfinite(self.scalars[name]) for name in known)
 
 
 @dataclass
@@ -52,15 +64,15 @@ class _Test:
     """A test in progress.
 
     It has its quantities over their limits after each step, its result, the number of its limit,
-    the level of that quantity, over the limit, up to which it is followed, and the log-slopes of
-    the limited quantity and of the depth.
+    the level of that quantity, over the limit, up to which it is followed, and the log-slope of
+    the limited quantity.
     """
 
     history: list[tuple[float, FloatArray]] = field(default_factory=list)
     found: LifeRun | None = None
     limit: int = -1
     level: float = 1.0
-    slopes: tuple[float, float] = (1.0, 1.0)
+    slope: float = 1.0
 
 
 def observe_lives(
@@ -109,22 +121,43 @@ class _Group:
             chosen = np.array([number])
             self._finish(number, self.problem.at(chosen), self.state.at(chosen), life)
         self.evolution.end(at_once.tolist())
+        with_courses = self.runs[0].draws.scenario.evolution.strip_error
         courses = [Course() for _ in self.tests]
+        add_observed(courses, range(len(courses)), self._by_limit(start))
         for advance in self.evolution:
-            add_step(courses, advance)
-            self._take(advance)
+            relative = self._ratios(advance.problem, advance.end)
+            if with_courses:
+                add_step(courses, advance)
+                add_observed(courses, advance.numbers.tolist(), self._by_limit(relative))
+            self._take(advance, relative)
         failures = self.evolution.failures
         reached = {k: test.found for k, test in enumerate(self.tests) if test.found is not None}
-        added = add_strip_errors(self.runs, self.problem, courses, reached)
-        for number, errors in added.items():
+
+        def observe(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
+            return self._by_limit(self._ratios(problem, state))
+
+        added = add_strip_errors(self.runs, self.problem, courses, reached, observe)
+        for number, (errors, observed) in added.items():
             cylinder, roller, volume = courses[number].sizes[-1].tolist()
-            self._widen(number, errors[0] / max(cylinder, roller), errors[1] / volume)
+            observed["depth"] = errors[0] / max(cylinder, roller)
+            observed["volume"] = errors[1] / volume
+            self._widen(number, observed)
         return [failures.get(k) or test.found or _missing() for k, test in enumerate(self.tests)]
 
-    def _take(self, advance: Advance) -> None:
-        """Locate the limits that are reached in a step, and end the tests that need no more."""
+    def _by_limit(self, relative: FloatArray) -> dict[str, FloatArray]:
+        """Return quantities over their limits, (limits, tests), by the name of the quantity."""
+        return {limit.quantity: values for limit, values in zip(self.limits, relative, strict=True)}
+
+    def _take(self, advance: Advance, relative: FloatArray) -> None:
+        """Locate the limits that are reached in a step, and end the tests that need no more.
+
+        Parameters
+        ----------
+        advance : Advance
+        relative : ndarray, shape (limits, tests)
+            Quantities over their limits at the end of the step.
+        """
         numbers = advance.numbers.tolist()
-        relative = self._ratios(advance.problem, advance.end)
         for place, number in enumerate(numbers):
             passes = float(advance.end.passes[place])
             self.tests[number].history.append((passes, relative[:, place]))
@@ -143,6 +176,7 @@ class _Group:
         for _, crossings in done:
             for crossing in crossings:
                 self._reached(advance, crossing)
+        self._end_deep(advance)
         over = [number for number in numbers if self._is_over(number)]
         self.evolution.end(over)
         ended = np.flatnonzero(advance.end.passes >= self.stop)
@@ -153,22 +187,38 @@ class _Group:
                 some = advance.problem.at(chosen), advance.end.at(chosen)
                 self._finish(numbers[place], *some, life)
 
+    def _end_deep(self, advance: Advance) -> None:
+        """End tests that become too deep before they reach a limit."""
+        scenario = self.runs[0].draws.scenario
+        deep = too_deep_tests(advance, scenario, _LIMITS)
+        for place, number in enumerate(advance.numbers.tolist()):
+            if number in deep and self.tests[number].found is None:
+                chosen = np.array([place])
+                some = advance.problem.at(chosen), advance.end.at(chosen)
+                self._finish(number, *some, {}, deep[number])
+
     def _reached(self, advance: Advance, crossing: Crossings) -> None:
         """Store the tests that have reached a limit, with the numerical error of their lives."""
         state, problem = crossing.state, crossing.problem
         slope, of_depth = self._slopes(crossing)
-        depth_error = state.depth_error / np.maximum(depth(problem, state), 1e-300)
+        depths = greatest_depth(state.depths)
+        by_stations = self._errors_by_stations(problem, state)
+        error_of_depth = state.depth_error + by_stations["depth"]
+        error_of_volume = state.volume_error + volume_error_by_stations(problem, state)
+        depth_error = error_of_depth / np.maximum(depth(problem, state), 1e-300)
         for place, number in enumerate(advance.numbers[crossing.places].tolist()):
             test, chosen = self.tests[number], np.array([place])
             test.limit = int(crossing.limit[place])
             limit, passes = self.limits[test.limit], float(state.passes[place])
             if limit.unit == "m" and limit.quantity != "width":
-                error = float(state.depth_error[place]) / limit.value
+                error = float(error_of_depth[place]) / limit.value
             elif limit.quantity == "volume":
-                error = float(state.volume_error[place]) / limit.value
+                error = float(error_of_volume[place]) / limit.value
             else:  # by way of the passes that correspond to the error of the depth
                 error = float(depth_error[place] * abs(slope[place]) / max(of_depth[place], FLAT))
-            test.slopes = float(slope[place]), float(of_depth[place])
+            if limit.quantity in {"lift error", "peak pressure"}:
+                error += float(by_stations[limit.quantity][place]) / limit.value
+            test.slope = float(slope[place])
             if slope[place] >= FLAT:
                 part = error / float(slope[place])
                 low, high = passes * max(1.0 - part, 0.0), passes * (1.0 + part)
@@ -176,18 +226,32 @@ class _Group:
                 low, high = self._crossing_of(test, 1.0 - error, passes), math.inf
                 test.level = 1.0 + error
             life = {"life": passes, "life_low": low, "life_high": high}
-            self._finish(number, problem.at(chosen), state.at(chosen), life)
+            scenario, deepest = self.runs[number].draws.scenario, float(depths[place])
+            failure = too_deep_failure(scenario, deepest, passes, _LIMITS)
+            self._finish(number, problem.at(chosen), state.at(chosen), life, failure)
 
-    def _widen(self, number: int, depth: float, volume: float) -> None:
-        """Add the relative errors of depth and volume due to the strips to the bounds of a life."""
+    def _errors_by_stations(self, problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
+        """Return the errors due to the stations of a cam by quantity, (tests,) [SI]."""
+        found = extremes(problem, state)
+        if not found:
+            none = np.zeros(len(state.passes))
+            return {"depth": none, "lift error": none, "peak pressure": none}
+        lift = found["least_wear"].error + found["greatest_wear"].error
+        errors = {
+            "depth": found["depth"].error,
+            "lift error": lift.max(axis=0),
+            "peak pressure": found["peak_pressure"].error.max(axis=0),
+        }
+        return {name: np.nan_to_num(values) for name, values in errors.items()}
+
+    def _widen(self, number: int, errors: Mapping[str, FloatArray]) -> None:
+        """Add errors of quantities over their limits, by quantity, to the bounds of a life."""
         test = self.tests[number]
         if test.found is None or test.limit < 0:
             return
-        scalars, limit, (slope, of_depth) = test.found.scalars, self.limits[test.limit], test.slopes
-        error = volume if limit.quantity == "volume" else depth
-        if limit.quantity == "width" or limit.unit not in {"m", "m^3"}:
-            error = depth * abs(slope) / max(of_depth, FLAT)
-        added = scalars["life"] * error / max(slope, FLAT)
+        scalars = test.found.scalars
+        error = float(errors[self.limits[test.limit].quantity])
+        added = scalars["life"] * error / max(test.slope, FLAT)
         scalars["life_low"] = max(scalars["life_low"] - added, 0.0)
         scalars["life_high"] += added
 
@@ -199,6 +263,8 @@ class _Group:
         test = self.tests[number]
         if test.found is None:
             return False
+        if test.found.failure is not None:
+            return True
         passes, relative = test.history[-1]
         scalars = test.found.scalars
         if math.isinf(scalars["life_high"]) and float(relative[test.limit]) >= test.level:
@@ -238,19 +304,24 @@ class _Group:
         return slope, of_depth
 
     def _finish(
-        self, number: int, problem: WearProblem, state: WearState, life: dict[str, float]
+        self,
+        number: int,
+        problem: WearProblem,
+        state: WearState,
+        life: dict[str, float],
+        failure: StepError | None = None,
     ) -> None:
         """Store the result of a test that ends in the given state, of one realisation."""
         test = self.tests[number]
         rows = [self.first_rows[number], *self._observed(problem, state)]
-        scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
-        scalars |= {
+        scalars = {
+            **scalars_of(problem, state),
             **life,
             "first_limit": float(test.limit),
             "limit_angle": self._angle(test.limit, problem, state),
         }
         (curves,) = curves_at_end(problem, state, [self.runs[number].draws.scenario])
-        test.found = LifeRun(rows, scalars, curves, problem.grid)
+        test.found = LifeRun(rows, scalars, curves, problem.grid, failure)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:
         """Return the angle of a cam at which the limited quantity is greatest [rad]."""
@@ -258,15 +329,12 @@ class _Group:
         if cam is None or limit < 0:
             return math.nan
         if self.limits[limit].quantity == "peak pressure":
-            values = problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
-            place = int(values.max(axis=(1, 2)).argmax())
+            values = peak_pressures(problem, state).max(axis=1)
         elif self.limits[limit].quantity == "lift error":
-            from wearsim.evolution.observables import lift_errors  # noqa: PLC0415
-
-            place = int(np.abs(lift_errors(problem, state)).max(axis=(1, 2)).argmax())
+            values = np.abs(lift_errors(problem, state)).max(axis=1)
         else:
-            place = int(state.cylinder_depth[:, 0].max(axis=(1, 2)).argmax())
-        return float(cam.angle.ravel()[place])
+            values = state.cylinder_depth[:, 0].max(axis=-1)
+        return float(cam.greatest(values).angle[0])
 
     def _ratios(self, problem: WearProblem, state: WearState) -> FloatArray:
         return ratios(self.limits, self.stepper, problem, state)

@@ -181,7 +181,8 @@ class LifeRunner(RealisationRunner):
         last = runner.scenario.total_passes >= self.longest
         for group in batch_groups(runs):
             for run, found in zip(group, observe_lives(group, limits), strict=True):
-                if isinstance(found, LifeRun) and not (found.reached or last):
+                ended = isinstance(found, Exception) or found.reached or found.failure is not None
+                if not (ended or last):
                     left.append(run.number)
                 else:
                     outcomes[run.number] = self._life_outcome(runner, run, found)
@@ -209,7 +210,7 @@ class LifeRunner(RealisationRunner):
         self, runner: LevelRunner, run: RealisationRun, found: LifeRun | Exception
     ) -> Outcome:
         """Return the outcome of a realisation, with its life at the drawn wear factor."""
-        if isinstance(found, Exception):
+        if isinstance(found, Exception) or found.failure is not None:
             return self.outcome(run, found)
         scalars, scale, score_mean = dict(found.scalars), 1.0, 0.0
         if self.factor is not None:

@@ -29,13 +29,8 @@ from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import growth_of, strips_of_run
 from wearsim.studies.run.groove import predicted_half_width
-from wearsim.studies.run.inputs import (
-    MAX_NODES,
-    contact_inputs,
-    minimum_nodes,
-    redrawing,
-    with_nodes,
-)
+from wearsim.studies.run.inputs import contact_inputs
+from wearsim.studies.run.nodes import MAX_NODES, minimum_nodes, redrawing, with_nodes
 from wearsim.types import FloatArray, Grid
 from wearsim.units import in_engineers_unit
 
@@ -238,11 +233,12 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
     Raises
     ------
     CapabilityError
-        If the model does not support the scenario's creepage.
+        If the model does not support the scenario's creepage or its creep factor.
     """
     creepage, materials = scenario.creepage, (scenario.cylinder.material, scenario.roller.material)
-    model = scenario.contact.build(grid, materials)
+    model, factor = scenario.contact.build(grid, materials), scenario.friction.creep_factor
     needs = {
+        "creep_factor": (f"friction.creep_factor = {factor:g}", factor != 1.0),
         "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
         "creepage_variation": ("creepage.differential_slip = true", creepage.differential_slip),
     }
@@ -257,14 +253,14 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
                 f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
                 f" {setting}; choose another contact.model"
             )
-    return model
+    return model if factor == 1.0 else model.with_creep_factor(factor)
 
 
 def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
     """Return the problem with quadrature nodes for the inputs that are drawn at every pass.
 
     Unless the scenario gives their number, they are doubled until the initial wear has converged to
-    half the tolerance, or `MAX_NODES` are reached.
+    half the tolerance, as has the known part of its error, or `MAX_NODES` are reached.
     """
     evolution = draws.scenario.evolution
     count, one = evolution.nodes or minimum_nodes(draws.passes), np.ones(1)
@@ -275,7 +271,8 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
         fresh = fresh_state(found)
         full = volume_of(problem, explicit_step(found, fresh, one).depths)
         half = volume_of(problem, explicit_step(*half_quadrature(found, fresh), one).depths)
-        if (np.abs(full - half) <= 0.5 * evolution.tolerance * full).all():
+        error = np.maximum(np.abs(full - half), found.quadrature_error * full)
+        if (error <= 0.5 * evolution.tolerance * full).all():
             return found
         count *= 2
 

@@ -238,7 +238,7 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
         if choice.strips or not inside or least < STRIPS_AT_START:
             return roller_grid(scenario, choice.strips or strips_of_roller(scenario, least, load))
     width = choice.width if choice.width is not None else 2.0 * half
-    many = scenario.cam is not None and turn_of(scenario).stations.count > 1
+    many = scenario.cam is not None and turn_of(scenario).varies
     resolved = 0.0
     if many:
         resolved = predicted_half_width(draws, load, full_slip=False)
@@ -347,7 +347,7 @@ def growth_of(
     coarse = partial(coarse_grid, scenario)
     if choice.width is not None or ends_roller(scenario, *grid.edges):
         return (Growth(model, surfaces, coarse, 0),)
-    many = scenario.cam is not None and turn_of(scenario).stations.count > 1
+    many = scenario.cam is not None and turn_of(scenario).varies
     most = choice.strips or (STRIPS_OF_MANY_CONTACTS if many else STRIPS_BEFORE_JOINING)
     last, margin = None, 0.0
     if draws.varying or draws.passes or not load.constant:

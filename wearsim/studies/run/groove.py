@@ -83,7 +83,7 @@ def predicted_half_width(draws: Draws, load: float, full_slip: bool = True) -> f
     differs = creepage.drive == "free" or creepage.differential_slip
     if scenario.cam is not None:
         turn, differs = turn_of(scenario), creepage.differential_slip
-        saturation = friction * patch.a * turn.curvatures[1]
+        saturation = friction * patch.a * turn.curvatures[1] / scenario.friction.creep_factor
         creep = saturation * turn.greatest_demand if turn.free else 0.0
         longitudinal = max(longitudinal, creep, turn.greatest_skid)
     yaw, tilt = (
@@ -95,6 +95,7 @@ def predicted_half_width(draws: Draws, load: float, full_slip: bool = True) -> f
     slipping = 1.0
     if not full_slip:
         saturated = friction * patch.a * (1.0 / roller.radius + 1.0 / scenario.cylinder.radius)
+        saturated /= scenario.friction.creep_factor
         ratio = min(float(np.hypot(longitudinal, yaw)) / saturated, 1.0)
         slipping = ratio * (2.0 - ratio)
     start = 0.0 if profile is None else float(np.ptp(profile.height))

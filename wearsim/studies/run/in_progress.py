@@ -9,11 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from wearsim.errors import Interrupted, ResultsFileError, SolverError, StepError, failure_text
+from wearsim.errors import Interrupted, ResultsFileError, SolverError, failure_text
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
-from wearsim.evolution.observables import present_batch
+from wearsim.evolution.observables import (
+    depth_error_by_stations,
+    present_batch,
+    volume_error_by_stations,
+)
+from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
@@ -26,10 +31,11 @@ from wearsim.results import (
     Storage,
     write_results,
 )
+from wearsim.results.run_schema import ESTIMATED
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, station_columns
 from wearsim.studies.contact.comparison import REFERENCE, excess
-from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
+from wearsim.studies.failures import explained, failures_explained, too_deep_failure
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, coarse_stepper, start_height
@@ -44,9 +50,10 @@ from wearsim.studies.run.recorder import (
     Started,
     Stepped,
     Warned,
+    history_row,
 )
 from wearsim.studies.run.schedule import RecordSchedule
-from wearsim.types import Grid
+from wearsim.types import FloatArray, Grid
 
 Watcher = Callable[[Event], None]
 
@@ -182,7 +189,12 @@ class RunInProgress:
             column("worn_volume")[:, 0] + rollers,
         ]
         last, most = passes[-1:], self.scenario.evolution.max_steps
-        (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most)
+
+        def observe(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
+            row = history_row(stepper, problem, state, None, self.recorder.threshold)
+            return {name: row[name] for name in ESTIMATED if name in row}
+
+        (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most, observe)
         if coarse is None:
             self.warn(
                 "error by strips: not estimated, as the test fails on strips of twice the width"
@@ -191,6 +203,7 @@ class RunInProgress:
         profiles = [record[f"{body}_depth_profile"][:, 0] for body in ("cylinder", "roller")]
         end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
         self.recorder.strip_errors = strip_errors(coarse, passes, np.array(sizes), end)
+        self.recorder.observed_errors = observed_errors(coarse, passes, self.recorder.observed)
 
     def _check_errors(self) -> None:
         """Warn if estimated errors exceed the tolerance."""
@@ -199,16 +212,22 @@ class RunInProgress:
         sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
         errors = state.depth_error, state.volume_error
         by_strips = np.nan_to_num(self.recorder.errors_by_strips[:, -1:])
+        by_stations = [
+            of(problem, state) for of in (depth_error_by_stations, volume_error_by_stations)
+        ]
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [
-                errors[kind] + by_strips[kind],
+                errors[kind] + by_strips[kind] + by_stations[kind],
                 state.quadrature[kind],
                 SIGMAS * np.sqrt(state.scatter[kind]),
                 by_strips[kind],
+                by_stations[kind],
             ]
             size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
-            relative, quadrature, scatter, strips = (float((part / size).max()) for part in parts)
+            relative, quadrature, scatter, strips, stations = (
+                float((part / size).max()) for part in parts
+            )
             if relative <= tolerance:
                 continue
             remedy = "a lower evolution.tolerance or evolution.step decreases it"
@@ -220,6 +239,8 @@ class RunInProgress:
             elif strips > 0.5 * relative:
                 strips_here = self.scenario.contact.strips or self.present.grid.strips
                 remedy = f"more contact.strips than {strips_here} decrease it"
+            elif stations > 0.5 * relative:
+                remedy = "more cam.stations decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
         for remedy, found in beyond.items():
             names, errors_text = map(" and ".join, zip(*found, strict=True))
@@ -272,11 +293,10 @@ class RunInProgress:
     def _check_depth(self) -> None:
         """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
         depth = max(float(worn.max()) for worn in self.recorder.state.depths)
-        if text := too_deep(self.scenario, depth):
-            less = f"the limit {self.limit.text}" if self.limit else length_key(self.scenario)
-            remedy = f"lower {less}, or set evolution.allow_deep = true"
-            resuming = "; with the option allow_deep, resume continues" if self.path else ""
-            raise StepError(f"after pass {self._passes:.0f} {text}", remedy=remedy + resuming)
+        less = f"the limit {self.limit.text}" if self.limit else ""
+        resuming = "; with the option allow_deep, resume continues" if self.path else ""
+        if failure := too_deep_failure(self.scenario, depth, self._passes, less, resuming):
+            raise failure
 
     def _verify_model(self, start: float) -> None:
         """Compare an automatically chosen contact model with exact theory, where it is installed.
@@ -293,7 +313,8 @@ class RunInProgress:
         problem = self.present
         batch = present_batch(problem, state)
         tolerance, grid = choice.auto.tolerance, problem.grid
-        if text := excess(REFERENCE, choice, grid, materials, batch, tolerance):
+        factor = self.scenario.friction.creep_factor
+        if text := excess(REFERENCE, problem.model, grid, materials, batch, tolerance, factor):
             self.warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
 
     def warn(self, message: str) -> None:

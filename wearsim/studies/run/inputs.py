@@ -1,15 +1,12 @@
-"""Inputs of contacts: those of a scenario, drawn values, and draws at every pass."""
+"""Inputs of contacts: those of a scenario, and drawn values."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import ContactInputs, Redraw
 from wearsim.models.loads import FollowerLoad
 from wearsim.plugins import Load
 from wearsim.quantities import InputFile
@@ -17,8 +14,6 @@ from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.cam.turn import turn_of
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.sampler import GaussianCopula, Sampler
-from wearsim.uq.sampling.sobol import Stream
 
 LOAD, FRICTION, LONGITUDINAL = "load.normal_force", "friction.coefficient", "creepage.longitudinal"
 YAW, TILT, OFFSET = "creepage.yaw", "creepage.tilt", "roller.offset"
@@ -132,135 +127,3 @@ def _load_mistake(scenario: Scenario, what: str, got: str, expected: str) -> Sce
     key, file = load_file(scenario) or ("kind", scenario.load.kind)
     mistake = Mistake("load", key, f"{file}: {what}", got, expected)
     return ScenarioError(scenario.file, [mistake])
-
-
-MAX_NODES = 128
-REFERENCE_POINTS = 2**15  # Sobol points of the exact means
-LEAST_WEIGHT = 0.1  # of an equal weight; a negative weight would add material
-
-
-def _with_values(
-    inputs: ContactInputs, items: Sequence[RandomInput], uniforms: Mapping[str, FloatArray]
-) -> ContactInputs:
-    """Return inputs with drawn values, the same for every roller; loads are added to the load."""
-    values: dict[str, FloatArray] = {}
-    for item in items:
-        drawn = item.values(uniforms[item.name])
-        rollers = len(inputs.friction) // len(drawn)
-        values |= zip(item.keys, np.tile(drawn, (rollers, 1)).T[..., None], strict=True)
-    columns = contact_values(items, values)
-    if "normal_force_offset" in columns:
-        columns["normal_force_offset"] = inputs.normal_force_offset + columns["normal_force_offset"]
-    return inputs.with_values(columns)
-
-
-def _copula(scenario: Scenario, items: Sequence[RandomInput]) -> GaussianCopula:
-    dimensions = {item.name: item.dimension for item in items}
-    rows = [row for row in scenario.sampling.correlation if row[0] in dimensions]
-    return GaussianCopula(rows, dimensions)
-
-
-def redrawing(scenario: Scenario, items: Sequence[RandomInput]) -> Redraw:
-    """Return a function that draws the inputs of single passes by the number of the pass."""
-    streams = {item: Stream(scenario.seed, item.name, "pass") for item in items}
-    copula, realisation = _copula(scenario, items), scenario.sampling.realisation
-
-    def redraw(inputs: ContactInputs, first: int) -> ContactInputs:
-        count = len(inputs.friction)
-        uniforms = {}
-        for item, stream in streams.items():
-            rollers = scenario.operation.rollers if item.persistence == "per-turn" else 1
-            draws = (first + np.arange(count)) // rollers
-            rows = stream.rows(int(draws[0]), int(np.ptp(draws)) + 1, item.dimension, realisation)
-            uniforms[item.name] = rows[draws - draws[0]]
-        return _with_values(inputs, items, copula.correlate(uniforms))
-
-    return redraw
-
-
-def minimum_nodes(items: Sequence[RandomInput]) -> int:
-    """Return the minimum number of nodes of a roller: 8 in one dimension, 64 in several."""
-    return 8 if sum(item.dimension for item in items) == 1 else 64
-
-
-def with_nodes(
-    problem: WearProblem, scenario: Scenario, items: Sequence[RandomInput], count: int
-) -> WearProblem:
-    """Return the problem with `count` contacts for each roller, a quadrature over its passes.
-
-    The nodes are scrambled Sobol points. Their weights are the nearest to equal ones that integrate
-    the wear in full slip, and its moments in the tilt, exactly. The quadrature error is then that
-    of the difference between the wear and these functions.
-
-    Parameters
-    ----------
-    problem : WearProblem
-        With one contact for each roller.
-    scenario : Scenario
-        Scenario with seed and correlations.
-    items : sequence of RandomInput
-        Inputs that are drawn at every pass.
-    count : int
-        Nodes of each roller, a multiple of 4.
-    """
-    names = [(item.name, item.dimension) for item in items]
-    per_turn = any(item.persistence == "per-turn" for item in items)
-    sampler, copula = Sampler(scenario.seed, names, "sobol"), _copula(scenario, items)
-    rollers = np.arange(problem.rollers, dtype=np.int64)
-
-    def inputs_of(points: int) -> ContactInputs:
-        uniforms = copula.correlate(sampler.uniforms(0, points))
-        return _with_values(problem.inputs.at(np.repeat(rollers, points)), items, uniforms)
-
-    (load,) = problem.loads
-    force = float(load.force(np.zeros(1))[0]) or float(problem.greatest_load[0])  # 0 in a pause
-    inputs, reference = inputs_of(count), inputs_of(REFERENCE_POINTS)
-    weights = []
-    for number in range(problem.rollers):
-        values, exact = (
-            _wear_functions(some, force, slice(number * points, (number + 1) * points))
-            for some, points in ((inputs, count), (reference, REFERENCE_POINTS))
-        )
-        # both halves of the points are quadratures too
-        halves = values[:, : count // 2], values[:, count // 2 :]
-        weights += [0.5 * _calibrated(half, exact.mean(axis=1)) for half in halves]
-    return replace(
-        problem,
-        inputs=inputs,
-        roller=np.repeat(rollers, count),
-        weight=np.concatenate(weights),
-        passes_per_draw=float(max(per_turn * scenario.operation.rollers, 1)),
-    )
-
-
-def _wear_functions(inputs: ContactInputs, force: float, part: slice) -> FloatArray:
-    """Return functions of the inputs that approximate wear, shape (functions, draws)."""
-    load = np.maximum(force + inputs.normal_force_offset[part, 0], 0.0)
-    slip = np.hypot(inputs.longitudinal[part, 0], inputs.yaw[part, 0])
-    wear, tilt = load * inputs.friction[part, 0] * slip, inputs.tilt[part, 0]
-    one = np.ones_like(tilt)
-    return np.array([one, wear, wear * tilt, wear * tilt**2, tilt, tilt**2, wear * tilt**3])
-
-
-def _calibrated(values: FloatArray, means: FloatArray) -> FloatArray:
-    """Return the positive weights nearest to equal ones that integrate functions exactly.
-
-    Parameters
-    ----------
-    values : ndarray, shape (functions, nodes)
-        Functions at the nodes, in the order of their importance; the last ones are left out if a
-        weight would be too small.
-    means : ndarray, shape (functions,)
-        Exact means.
-    """
-    nodes = values.shape[1]
-    equal = np.full(nodes, 1.0 / nodes)
-    scale = np.abs(values).max(axis=1)
-    used = np.flatnonzero(scale > 0.0)[: max(nodes // 4, 2)]
-    for count in range(len(used), 1, -1):
-        rows = values[used[:count]] / scale[used[:count], None]
-        missing = means[used[:count]] / scale[used[:count]] - rows @ equal
-        found: FloatArray = equal + rows.T @ (np.linalg.pinv(rows @ rows.T, 1e-10) @ missing)
-        if found.min() > LEAST_WEIGHT / nodes:
-            return found
-    return equal

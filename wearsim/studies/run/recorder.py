@@ -20,7 +20,7 @@ from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem
 from wearsim.evolution.strips import averaged, same_strips
-from wearsim.results.run_schema import ALL_VARIABLES
+from wearsim.results.run_schema import ALL_VARIABLES, ESTIMATED
 from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
 from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import FloatArray, Grid
@@ -72,6 +72,11 @@ class Finished:
     wall_seconds: float
 
 
+#: means and sums over a turn of a cam
+_OF_TURN = {
+    *("roller_depth", "roller_worn_volume", "dissipated_energy", "power", "normal_force"),
+    *("descent", "elastic_approach"),
+}
 ERRORS = "depth_error", "volume_error", "profile_error"
 Event: TypeAlias = Started | Stepped | Warned | Checkpointed | Finished
 Variables = dict[str, FloatArray]
@@ -222,13 +227,17 @@ class Recorder:
         self.stepper = stepper
         self.schedule = schedule
         self.threshold = threshold
+        self._multiplicity = problem.kinematics.multiplicity
         sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
+        sums |= {f"{name}_error" for name in ESTIMATED}
         steps = {name: column for name, column in (history or {}).items() if name not in sums}
         self._history = _rows(steps) or [
             _single(history_row(stepper, problem, state, None, threshold))
         ]
         #: errors of the finished test due to its strips, see `strip_errors.strip_errors`
         self.strip_errors: FloatArray | None = None
+        #: errors of observables of the finished test, see `observed_errors`
+        self.observed_errors: Mapping[str, FloatArray] = {}
         rows = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
         self._records = [(problem.grid, row) for row in rows]
         self._kept = len(self._history), len(self._records), state, problem.grid
@@ -299,14 +308,40 @@ class Recorder:
     def history(self) -> dict[str, FloatArray]:
         """The history as arrays, first axis step.
 
-        Errors are sums of those due to steps and, where they are known, due to strips.
+        Errors are sums of those due to steps, to the stations of a cam and, where they are known,
+        to strips.
         """
         columns = _columns(self._history)
         for name, part in zip(ERRORS, self.errors_by_strips, strict=True):
             by_steps = columns[f"{name}_by_steps"]
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
             columns[name] = by_steps + np.nan_to_num(part)[:, None]
+            columns[name] = columns[name] + columns.get(f"{name}_by_stations", 0.0)
+        of_turn = self._error_of_turn(columns)
+        for name in self.observed:
+            unknown = np.full_like(columns[name], np.nan)
+            by_stations = np.nan_to_num(columns.get(f"{name}_error_by_stations", 0.0))
+            if name in _OF_TURN:
+                by_stations = np.abs(columns[name]) * of_turn.reshape(
+                    -1, *(1,) * (columns[name].ndim - 1)
+                )
+            error = self.observed_errors.get(name, unknown) + by_stations
+            columns[f"{name}_error"] = np.minimum(error, np.pi) if name.endswith("angle") else error
         return columns
+
+    def _error_of_turn(self, columns: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the relative error of sums over the stations of a cam, that of its volume."""
+        error = columns.get("volume_error_by_stations")
+        if error is None:
+            return np.zeros(len(self._history))
+        rollers = columns["roller_worn_volume"][..., 0] @ self._multiplicity
+        total = columns["worn_volume"][:, 0] + rollers
+        return np.asarray(error[:, 0] / np.where(total > 0.0, total, np.inf))
+
+    @property
+    def observed(self) -> dict[str, FloatArray]:
+        """The observables that have an estimated error besides depth and volume."""
+        return {name: self.column(name) for name in ESTIMATED if name in self._history[0]}
 
     def column(self, name: str) -> FloatArray:
         """Return a variable of the history except errors, first axis step."""

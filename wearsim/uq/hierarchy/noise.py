@@ -15,11 +15,9 @@ import numpy as np
 
 from wearsim.types import FloatArray
 
-_WHITE = np.array([0.0, 0.01, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 0.99])
-_LENGTHS = 14
-_ROUNDS = 2  # the grid, and a finer one
-_MODELS = (8, 5)  # lengths and white parts over which a likelihood is integrated
-_NEGLIGIBLE = 6.0  # below the greatest log likelihood
+_GRIDS = (14, 12), (9, 7)  # correlation lengths and ratios of white noise, and of the finer grid
+_RATIOS = 3e-3, 100.0  # of white noise to steps of the process; the last one times the points
+_COVERED, _NEGLIGIBLE = 7.0, 6.0  # below the greatest log density: of the finer grid, and of models
 MOST_POINTS = 700  # of a trace; others are left out or averaged
 
 
@@ -111,34 +109,6 @@ class Noise:
         return np.asarray(self.sigma * found + self.white * normal[1])
 
 
-def _filtered(
-    y: FloatArray, columns: FloatArray, power: FloatArray, length: FloatArray, white: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return whitened columns and the log determinants of several noise models.
-
-    Parameters
-    ----------
-    y : ndarray, shape (points,)
-    columns : ndarray, shape (points, 1 or models, columns)
-    power, length, white : ndarray, shape (models,)
-        Variance of the process, its length, variance of the white noise.
-    """
-    decay = np.exp(-np.diff(y, append=y[-1])[:, None] / length)
-    found = np.empty((len(y), len(power), columns.shape[2]))
-    mean, variance = np.zeros_like(found[0]), power.copy()
-    log_determinant = np.zeros(len(power))
-    for j, factor in enumerate(decay):
-        total = variance + white
-        error = columns[j] - mean
-        found[j] = error * (1.0 / np.sqrt(total))[:, None]
-        gain = variance / total
-        mean += gain[:, None] * error
-        mean *= factor[:, None]
-        log_determinant += np.log(total)
-        variance = factor**2 * variance * (1.0 - gain) + power * (1.0 - factor**2)
-    return found, log_determinant
-
-
 @dataclass(frozen=True)
 class NoiseModels:
     """Noise models of a trace with unit variance, and what they give to its likelihood.
@@ -169,14 +139,15 @@ class NoiseModels:
     log_weight: FloatArray
     exponent: FloatArray
 
-    def noise(self, place: int) -> Noise:
-        """Return one of the models, with unit variance."""
-        return unit_noise(self.length[place], self.white[place])
+    def whitened(self, columns: FloatArray) -> FloatArray:
+        """Return columns whose noise is independent, shape (points, models, columns).
 
-
-def unit_noise(length: float, white: float) -> Noise:
-    """Return noise of unit variance, of which a share is white."""
-    return Noise(float(np.sqrt(1.0 - white)), float(length), float(np.sqrt(white)))
+        Parameters
+        ----------
+        columns : ndarray, shape (points, columns)
+            Heights [m], or anything that adds to them.
+        """
+        return _whitened(columns, self.decay, self.gain, self.scale)
 
 
 def noise_models(
@@ -198,78 +169,91 @@ def noise_models(
     least : float
         Least standard deviation of the noise, known from elsewhere [m].
     """
-    columns = np.column_stack([residual, forms])[:, None, :]
-    lengths, whites = _first_grid(y), _WHITE
-    for count in (0, 1):
-        length, white = (grid.ravel() for grid in np.meshgrid(lengths, whites))
-        score, variance = _restricted(y, columns, length, white)
-        if count == 0:
-            lengths, whites = _finer(lengths, whites, score, 6.0, _MODELS)
+    found, variance, score = _likely(y, residual, forms)
     kept = score > score.max() - _NEGLIGIBLE
-    length, white, variance = length[kept], white[kept], variance[kept]
-    noises = [unit_noise(*pair) for pair in zip(length, white, strict=True)]
-    filters = zip(*(noise.filter(y) for noise in noises), strict=True)
-    decay, gain, scale = (np.stack(parts, axis=1) for parts in filters)
-    lines, log_weight = np.empty((forms.shape[1], *decay.shape)), np.empty(len(length))
+    arrays = found.decay, found.gain, found.scale, found.lines
+    decay, gain, scale, lines = (np.ascontiguousarray(values[..., kept]) for values in arrays)
     freedom = len(y) - forms.shape[1]
-    for place, noise in enumerate(noises):
-        whitened, triangle = np.linalg.qr(noise.whitened(y, forms))
-        lines[:, :, place] = whitened.T
-        log_weight[place] = -np.log(np.abs(np.diag(triangle))).sum()
-    # the grid is one of the logarithm of the length
-    log_weight += np.log(scale).sum(axis=0) + np.log(length)
     # a variance that is greater by a factor divides the logarithm of the likelihood by it
-    known = np.maximum(1.0, least**2 / variance)
+    known = np.maximum(1.0, least**2 / variance[kept])
     exponent = 0.5 * freedom / known
-    log_weight += (exponent - 0.5 * freedom) * np.log(freedom * variance)
+    log_weight = found.log_weight[kept]
+    log_weight += (exponent - 0.5 * freedom) * np.log(freedom * variance[kept])
+    length, white = found.length[kept], found.white[kept]
     return NoiseModels(length, white, decay, gain, scale, lines, log_weight, exponent)
 
 
-def _first_grid(y: FloatArray) -> FloatArray:
-    """Return correlation lengths from less than the spacing to half of the longest part."""
+def _likely(
+    y: FloatArray, residual: FloatArray, forms: FloatArray
+) -> tuple[NoiseModels, FloatArray, FloatArray]:
+    """Return a grid of noise models, the variance of each, and the logarithm of its weight.
+
+    One axis is the logarithm of the correlation length, the other that of the variance of the white
+    noise over that of a step of the process from point to point. Short distances show both parts of
+    this ratio, whereas the white share is hardly independent of a correlation length that is long.
+    """
     spacing = float(np.median(np.diff(y)))
     parts = np.split(y, np.flatnonzero(np.diff(y) > 20.0 * spacing) + 1)
     span = max(float(np.ptp(part)) for part in parts)
-    return np.geomspace(0.3 * spacing, max(0.5 * span, spacing), _LENGTHS)
+    ends = (0.3 * spacing, max(0.5 * span, spacing)), (_RATIOS[0], _RATIOS[1] * span / spacing)
+    freedom = len(y) - forms.shape[1]
+    for sizes in _GRIDS:
+        axes = [np.geomspace(*pair, size) for pair, size in zip(ends, sizes, strict=True)]
+        length, ratio = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
+        white = ratio / (ratio + length / spacing)
+        filters = _filters(y, length, white)
+        whitened = _whitened(np.column_stack([residual, forms]), *filters)
+        lines, triangle = np.linalg.qr(whitened[:, :, 1:].transpose(1, 0, 2))
+        z = whitened[:, :, 0].T
+        along = np.einsum("mjf,mj->mf", lines, z)
+        variance = ((z**2).sum(axis=1) - (along**2).sum(axis=1)) / freedom
+        if variance.max() <= 0.0:
+            raise ValueError("the unworn surface is a straight line without any noise")
+        log_weight = np.log(filters[2]).sum(axis=0)
+        log_weight -= np.log(np.abs(np.diagonal(triangle, axis1=1, axis2=2))).sum(axis=1)
+        # density of a uniform length and white share on this grid
+        log_weight += np.log(length * white * (1.0 - white))
+        score = log_weight - 0.5 * freedom * np.log(variance)
+        likely = (score > score.max() - _COVERED).reshape(sizes)
+        places = (np.flatnonzero(likely.any(axis=other)) for other in (1, 0))
+        ends = tuple(  # type: ignore[assignment]
+            (axis[max(place[0] - 1, 0)], axis[min(place[-1] + 1, len(axis) - 1)])
+            for axis, place in zip(axes, places, strict=True)
+        )
+    exponent = np.full(len(length), 0.5 * freedom)
+    models = NoiseModels(length, white, *filters, lines.transpose(2, 1, 0), log_weight, exponent)
+    return models, variance, score
 
 
-def _restricted(
-    y: FloatArray, columns: FloatArray, length: FloatArray, white: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the restricted log likelihood of noise models, and the variance of each.
-
-    Parameters
-    ----------
-    y : ndarray, shape (points,)
-    columns : ndarray, shape (points, 1, 1 + forms)
-        Heights, and forms of unknown size.
-    length, white : ndarray, shape (models,)
-    """
-    whitened, log_determinant = _filtered(y, columns, 1.0 - white, length, white)
-    z, lines = whitened[:, :, 0], whitened[:, :, 1:]
-    normal = np.einsum("jpa,jpb->pab", lines, lines)
-    right = np.einsum("jpa,jp->pa", lines, z)
-    explained = np.einsum("pa,pa->p", right, np.linalg.solve(normal, right[..., None])[..., 0])
-    squares = np.einsum("jp,jp->p", z, z) - explained
-    if squares.max() <= 0.0:
-        raise ValueError("the unworn surface is a straight line without any noise")
-    freedom = len(y) - lines.shape[2]
-    variance = squares / freedom
-    score = -0.5 * (freedom * np.log(variance) + log_determinant + np.linalg.slogdet(normal)[1])
-    return score, variance
+def _filters(
+    y: FloatArray, length: FloatArray, white: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return decay, gain and scale of noise models with unit variance, see `NoiseModels`."""
+    decay = np.exp(-np.diff(y, append=y[-1])[:, None] / length)
+    gain, scale = np.empty_like(decay), np.empty_like(decay)
+    power = 1.0 - white
+    kept, fresh, variance = decay**2, power * (1.0 - decay**2), power
+    for j in range(len(y)):
+        total = variance + white
+        gain[j] = variance / total
+        scale[j] = 1.0 / np.sqrt(total)
+        variance = kept[j] * variance * (1.0 - gain[j]) + fresh[j]
+    return decay, gain, scale
 
 
-def _finer(
-    lengths: FloatArray, whites: FloatArray, score: FloatArray, below: float, sizes: tuple[int, int]
-) -> tuple[FloatArray, FloatArray]:
-    """Return a grid over the parameters whose log likelihood is less than `below` from the best."""
-    length, white = (grid.ravel() for grid in np.meshgrid(lengths, whites))
-    likely = score > score.max() - below
-    step = lengths[1] / lengths[0]
-    low, high = length[likely].min() / step**0.5, length[likely].max() * step**0.5
-    less = whites[whites < white[likely].min()].max(initial=0.0)
-    more = whites[whites > white[likely].max()].min(initial=0.99)
-    return np.geomspace(low, min(high, lengths[-1]), sizes[0]), np.linspace(less, more, sizes[1])
+def _whitened(
+    columns: FloatArray, decay: FloatArray, gain: FloatArray, scale: FloatArray
+) -> FloatArray:
+    """Return columns whitened by several models, shape (points, models, columns)."""
+    found = np.empty((*decay.shape, columns.shape[1]))
+    mean = np.zeros(found.shape[1:])
+    corrected = (decay * gain)[:, :, None]
+    for j, column in enumerate(columns):
+        error = np.subtract(column, mean, out=found[j])
+        mean *= decay[j][:, None]
+        mean += corrected[j] * error
+    found *= scale[:, :, None]
+    return found
 
 
 def fit_noise(y: FloatArray, height: FloatArray) -> Noise:
@@ -296,20 +280,16 @@ def fit_noise(y: FloatArray, height: FloatArray) -> Noise:
     count = len(y)
     if count < 8:
         raise ValueError(f"noise needs 8 points of the unworn surface or more, got {count}")
-    scaled = (y - y.mean()) / np.ptp(y)
-    columns = np.column_stack([height - height.mean(), np.ones(count), scaled])[:, None, :]
-    lengths, whites = _first_grid(y), _WHITE
-    for round_ in range(_ROUNDS):
-        length, white = (grid.ravel() for grid in np.meshgrid(lengths, whites))
-        score, variance = _restricted(y, columns, length, white)
-        if round_ < _ROUNDS - 1:
-            # the next grid covers the parameters that are not much less likely
-            lengths, whites = _finer(lengths, whites, score, 4.0, (_LENGTHS, len(_WHITE)))
-    weight = np.exp(score - score.max())
-    weight /= weight.sum()
-    power = variance * np.maximum(1.0 - white, 1e-6)
+    line = np.column_stack([np.ones(count), (y - y.mean()) / np.ptp(y)])
+    models, variance, score = _likely(y, height - height.mean(), line)
     # a groove as wide as many correlation lengths depends on the product of power and length,
     # whose most likely value is too small on average, and whose mean is too great
-    mean_power = float(np.exp(weight @ np.log(power)))
-    mean_length = float(np.exp(weight @ np.log(length)))
-    return Noise(mean_power**0.5, mean_length, float(weight @ (variance * white)) ** 0.5)
+    score -= np.log(models.length)
+    weight = np.exp(score - score.max())
+    weight /= weight.sum()
+    power = variance * (1.0 - models.white)
+    return Noise(
+        float(np.exp(weight @ np.log(power))) ** 0.5,
+        float(np.exp(weight @ np.log(models.length))),
+        float(weight @ (variance * models.white)) ** 0.5,
+    )

@@ -140,15 +140,7 @@ def word(random: bool, upper: float, negligible: float) -> Word:
 class Power:
     """Rates of the verdicts of tests like given ones, by simulated sets of tests.
 
-    Parameters
-    ----------
-    kernels : sequence of Kernel
-        Likelihood of each test; of more tests they are repeated in this order.
-    negligible : float
-        Scatter of ln K below which it is negligible.
-    seed : int
-    sets : int
-        Number of simulated sets of tests.
+    The parameters are those of `Design`; the number of tests is given to the methods.
     """
 
     def __init__(

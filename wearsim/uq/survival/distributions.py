@@ -17,7 +17,13 @@ import numpy as np
 
 from wearsim.types import BoolArray, FloatArray
 from wearsim.uq.estimation.intervals import Interval, bisect, t_quantile
-from wearsim.uq.survival.effective import effective_number, fits_of, predicted_number
+from wearsim.uq.survival.effective import (
+    Fits,
+    caution,
+    effective_number,
+    fits_of,
+    predicted_number,
+)
 from wearsim.uq.survival.scores import ScoreFunction
 
 _HALVINGS = 50
@@ -204,10 +210,12 @@ class FactorMixture(LifeDistribution):
         """Return the standard error of the mean probability, and its degrees of freedom.
 
         The error is at least the one predicted by fits of ln kappa, since a sample rarely contains
-        the realisations that cause most of the scatter of a small probability.
+        the realisations that cause most of the scatter of a small probability, and with a spread
+        that is the greater the smaller the probability, see `caution`.
         """
         error, degrees = super().error(life, each)
-        mean, predicted = float(each.mean()), self._predicted(life, cautious=False)
+        mean = float(each.mean())
+        predicted = self._predicted(life, caution(mean))
         if predicted == 0.0:  # a probability below the least number
             return math.inf, 1.0
         error = max(error, min(mean, 1.0 - mean) / math.sqrt(predicted))
@@ -225,15 +233,15 @@ class FactorMixture(LifeDistribution):
             return 0.0
         each = self.failed(np.array([life]))[:, 0]
         number = effective_number(self.count, float(each.mean()), float(each.var(ddof=1)))
-        return min(number, self._predicted(life, cautious=True))
+        return min(number, self._predicted(life, 1.0))
 
-    def _predicted(self, life: float, cautious: bool) -> float:
+    def _predicted(self, life: float, widened: float) -> float:
         """Return the effective number by the fits of ln kappa."""
         from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
         shares = float((self.kappa == 0.0).mean()), float(self._is_finite.mean())
         return predicted_number(
-            self._fits[cautious],
+            self._fits.values(widened),
             lambda log: np.asarray(ndtr(-self.needed_score(log, life))),
             shares,
             self.count,
@@ -256,10 +264,9 @@ class FactorMixture(LifeDistribution):
         return np.asarray(self.score(np.exp(log_kappa) / life) / self.spread)
 
     @cached_property
-    def _fits(self) -> tuple[list[FloatArray], list[FloatArray]]:
-        """Fits of ln kappa, and cautious ones."""
-        log, _ = self.log_kappa
-        return fits_of(log), fits_of(log, cautious=True)
+    def _fits(self) -> Fits:
+        """Fits of ln kappa."""
+        return fits_of(self.log_kappa[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from wearsim.types import FloatArray
 
 LEAST_NUMBER = 20.0  # effective number below which no probability is stated
 _CONFIDENCE = 0.9  # of the upper limit of the spread, by which a probability is refused
+_WIDENED = 0.1, 0.01  # probabilities from which and to which the spread is widened for intervals
 _FEWEST = 8  # finite values for a fit with a quadratic term
 _SCORES = np.linspace(-9.0, 9.0, 721)
 _DENSITY = np.exp(-0.5 * _SCORES**2) / np.exp(-0.5 * _SCORES**2).sum()
@@ -41,28 +43,47 @@ def effective_number(count: int, mean: float, variance: float) -> float:
     return math.inf if variance <= 0.0 else count * least**2 / variance
 
 
-def fits_of(log: FloatArray, cautious: bool = False) -> list[FloatArray]:
-    """Return fits of a sample as polynomials of a normal score, at equidistant scores.
+class Fits(NamedTuple):
+    """Fits of a sample as polynomials of a normal score.
+
+    Parameters
+    ----------
+    centre : float
+        Mean of the sample.
+    shapes : list of ndarray
+        Differences from it at equidistant scores.
+    widening : float
+        Upper 90 % limit of the spread of normal values over its estimate.
+    """
+
+    centre: float
+    shapes: list[FloatArray]
+    widening: float
+
+    def values(self, caution: float) -> list[FloatArray]:
+        """Return the values of each fit at equidistant scores.
+
+        Parameters
+        ----------
+        caution : float
+            0 for the estimated spread, 1 for its upper limit.
+        """
+        return [self.centre + self.widening**caution * shape for shape in self.shapes]
+
+
+def fits_of(log: FloatArray) -> Fits:
+    """Return fits of a sample: by mean and standard deviation, from 8 values on also by a parabola.
 
     Parameters
     ----------
     log : ndarray, shape (n,)
         Finite values of ln kappa.
-    cautious : bool
-        Whether the spread is the upper 90 % limit of that of normal values, instead of its
-        estimate.
-
-    Returns
-    -------
-    list of ndarray
-        A line by mean and standard deviation, and from 8 values on a parabola by least squares to
-        the ordered values.
     """
     from scipy.special import gammaincinv, ndtri  # noqa: PLC0415  (slow to load)
 
     count = len(log)
     if count < 2:
-        return [np.full_like(_SCORES, log.mean() if count else 0.0)]
+        return Fits(float(log.mean()) if count else 0.0, [np.zeros_like(_SCORES)], 1.0)
     centre, found = float(log.mean()), [log.std(ddof=1) * _SCORES]
     if count >= _FEWEST:
         ordered, scores = np.sort(log) - centre, ndtri((np.arange(count) + 0.625) / (count + 0.25))
@@ -70,8 +91,18 @@ def fits_of(log: FloatArray, cautious: bool = False) -> list[FloatArray]:
     degrees = count - 1
     # of the chi-squared distribution of the variance
     lower = 2.0 * float(gammaincinv(0.5 * degrees, 1.0 - _CONFIDENCE)) / degrees
-    widening = 1.0 / math.sqrt(lower) if cautious else 1.0
-    return [centre + widening * one for one in found]
+    return Fits(centre, found, 1.0 / math.sqrt(lower))
+
+
+def caution(probability: float) -> float:
+    """Return how far the spread of the fits is widened towards its limit for an interval.
+
+    A small probability is stated where the spread of the sample is small, also by chance; that of a
+    probability in the bulk of the sample is shown by the sample itself.
+    """
+    least = min(probability, 1.0 - probability)
+    bulk, small = _WIDENED
+    return float(np.interp(math.log(max(least, 1e-300)), np.log([small, bulk]), [1.0, 0.0]))
 
 
 def predicted_number(
@@ -85,7 +116,7 @@ def predicted_number(
     Parameters
     ----------
     fits : sequence of ndarray
-        See `fits_of`.
+        See `Fits.values`.
     probability : callable
         Probability of failure for values of ln kappa.
     shares : (float, float)

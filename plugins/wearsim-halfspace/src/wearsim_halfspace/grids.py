@@ -54,6 +54,8 @@ class Problem:
         Of the elements along rolling: 1 as in CONTACT, or 2 by positions within elements.
     difference : float
         K of different bodies, see `Elements`. The opening of the gap by traction is part of `gap`.
+    creep_factor : float
+        See `Elements`.
     """
 
     dx: float
@@ -70,12 +72,13 @@ class Problem:
     y: FloatArray
     order: int = 2
     difference: float = 0.0
+    creep_factor: float = 1.0
 
     @cached_property
     def elements(self) -> Elements:
         """Influence coefficients."""
         rows, columns = self.gap.shape
-        constants = self.shear_modulus, self.poisson_ratio, self.difference
+        constants = self.shear_modulus, self.poisson_ratio, self.difference, self.creep_factor
         return Elements(rows, columns, self.dx, self.dy, *constants)
 
     @property
@@ -108,6 +111,7 @@ class Problem:
             halved(self.y, rows),
             self.order,
             self.difference,
+            self.creep_factor,
         )
 
 

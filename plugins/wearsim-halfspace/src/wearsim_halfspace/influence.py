@@ -152,6 +152,8 @@ class Elements:
         Of both bodies combined: 1/G = (1/G_1 + 1/G_2)/2, nu/G = (nu_1/G_1 + nu_2/G_2)/2.
     difference : float
         K = G/4 ((1 - 2 nu_1)/G_1 - (1 - 2 nu_2)/G_2), zero for quasi-identical bodies.
+    creep_factor : float
+        Kalker's reduction factor: tangential displacements by traction are divided by it.
 
     Attributes
     ----------
@@ -168,10 +170,11 @@ class Elements:
         shear_modulus: float,
         poisson_ratio: float,
         difference: float = 0.0,
+        creep_factor: float = 1.0,
     ) -> None:
         self.rows, self.columns, self.dx, self.dy = rows, columns, dx, dy
         self._scale, self._poisson_ratio = 1.0 / (np.pi * shear_modulus), poisson_ratio
-        self._difference = self._scale * difference
+        self._difference, self._creep_factor = self._scale * difference, creep_factor
         # for distances from 0 to one element more than there are columns
         self._integrals = self._scale * _integrals(columns + 1, rows, dx, dy)
         normal = (1.0 - poisson_ratio) * (self._integrals[0] + self._integrals[1])
@@ -235,8 +238,8 @@ class Elements:
 
     def _displacements(self, mixed: FloatArray | None = None) -> FloatArray:
         """Return displacements by traction, kernels xx, yy and xy (Cerruti) [m/Pa]."""
-        along, across, middle = self._integrals
-        mixed = middle if mixed is None else mixed
+        along, across, middle = self._integrals / self._creep_factor
+        mixed = middle if mixed is None else mixed / self._creep_factor
         every = (1.0 - self._poisson_ratio) * (along + across)
         found = _mirrored(np.stack([every + self._poisson_ratio * along,
                                     every + self._poisson_ratio * across,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Annotated, Literal, NamedTuple
 
@@ -92,6 +93,7 @@ class Halfspace(ws.SingleContactModel):
         creepage_variation=True,
         local_friction=True,
         friction_field=True,
+        creep_factor=True,
         fields=True,
     )
 
@@ -105,6 +107,13 @@ class Halfspace(ws.SingleContactModel):
         self._difference = difference(materials) if options.coupling else 0.0
         #: contact modulus E* of both bodies [Pa]
         self.contact_modulus = self.shear_modulus / (1.0 - self.poisson_ratio)
+        self._creep_factor = 1.0
+
+    def with_creep_factor(self, factor: float) -> Halfspace:
+        """Return the model with tangential displacements by traction divided by a factor."""
+        model = copy(self)
+        model._creep_factor = factor
+        return model
 
     def solve_contact(
         self,
@@ -208,6 +217,7 @@ class Halfspace(ws.SingleContactModel):
                 y=self.grid.y[strips],
                 order=self.options.order,
                 difference=self._difference,
+                creep_factor=self._creep_factor,
             )
             normal = solve_normal(
                 problem.elements,

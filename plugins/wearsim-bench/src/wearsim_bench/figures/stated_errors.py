@@ -25,7 +25,8 @@ def stated_errors_figure(topic: Topic, under: str) -> Figure:
     """
     rows = [row for row in topic.of(TESTS) if not row.failed]
     tolerances = sorted({row.counts["tolerance"] for row in rows}, reverse=True)
-    values = [max(v, _LOWEST) for row in rows for v in row.errors.values()] or [_LOWEST, 1.0]
+    shown = [prefix + name for name in QUANTITIES for prefix in ("", STATED)]
+    values = [max(row.errors[name], _LOWEST) for row in rows for name in shown] or [_LOWEST, 1.0]
     low, high = 100.0 * min(values) / 2.0, 100.0 * max(values) * 2.0
     with figure_style():
         figure = Figure(figsize=_SIZE, layout="constrained")

@@ -54,6 +54,9 @@ class RobustnessCase:
         Whether the outcome is expected of the default contact model only.
     steps : int
         Factor on the number of fixed steps, for inputs that vary in time.
+    true_within : float
+        Greatest relative difference from the depth that rigid bodies in full slip have; 0 if
+        that is not known.
     """
 
     name: str
@@ -65,6 +68,7 @@ class RobustnessCase:
     rough: bool = False
     of_default_model: bool = False
     steps: int = 1
+    true_within: float = 0.0
 
     def passes(self, usual: int) -> int:
         """Return the roller passes of the case, by default `usual`."""
@@ -98,6 +102,7 @@ def hard_cases(passes: int) -> tuple[RobustnessCase, ...]:
         *_shapes(),
         *_profiles(),
         *_loads(duration),
+        *_known(passes, duration),
         *_rubbing(),
         *_wear(),
         *_bodies(),
@@ -181,6 +186,39 @@ def _loads(duration: float) -> list[RobustnessCase]:
             # to 1 mN; a limit on the steps of models that cannot reach it
             {**spring("69 kN/mm"), "operation.passes": 600_000, "evolution.max_steps": 2000},
             steps=16,
+        ),
+    ]
+
+
+def _known(passes: int, duration: float) -> list[RobustnessCase]:
+    """Return cases whose depth is known, with the wear of a long test in any number of passes."""
+    wear = {"wear.cylinder.k_over_h": f"{1.1e-11 * LONG / passes!r} 1/Pa"}
+    recorded = {"kind": "recorded", "file": "log.csv"}
+    # the spring holds the roller off the cylinder until the load exceeds its force
+    rising = log_of_load(duration, (0.4, 0.5), (300.0, 0.0, 400.0), last=0.4)
+    return [
+        RobustnessCase(
+            "roller lifts off and returns",
+            {**wear, "load": {**recorded, "stiffness": "1000 N/mm"}},
+            {"log.csv": rising},
+            steps=4,
+            of_default_model=True,
+            true_within=0.01,
+        ),
+        RobustnessCase(
+            "load step x3",
+            {**wear, "load": recorded},
+            {"log.csv": log_of_load(duration, (1.0 / 3.0,), (150.0, 450.0))},
+            steps=2,
+            of_default_model=True,
+            true_within=0.005,
+        ),
+        RobustnessCase(
+            "groove reaches the ends of the roller",
+            {**wear, "roller.width": "10 mm"},
+            strips=60,
+            of_default_model=True,
+            true_within=0.005,
         ),
     ]
 
@@ -280,13 +318,16 @@ def _refused(duration: float) -> list[RobustnessCase]:
     recorded = {"kind": "recorded", "file": "log.csv"}
     below_zero = log_of_load(duration, (0.4, 0.6), (300.0, -10.0, 300.0))
     slow = {"gain": "1 N/W", "time_constant": "20 min"}
+    falling = log_of_load(duration, (0.4, 0.6), (300.0, 20.0, 300.0))
+    sprung = {"kind": "recorded", "file": "falling.csv", "stiffness": "15000 N/mm"}
     white = {
         "distribution": "white",
         "marginal": {"distribution": "maxent", "support": [0, "inf"], "mean": 0.1, "std": 0.05},
     }
 
     def case(name: str, changes: dict[str, object], *words: str) -> RobustnessCase:
-        return RobustnessCase(name, changes, {"log.csv": below_zero}, words)
+        files = {"log.csv": below_zero, "falling.csv": falling}
+        return RobustnessCase(name, changes, files, words)
 
     return [
         case("1 strip", {"contact.strips": 1}, "[contact] strips", "3"),
@@ -298,6 +339,12 @@ def _refused(duration: float) -> list[RobustnessCase]:
             "contact is lost",
             "pass",
             "recorded load",
+        ),
+        case(
+            "spring that lifts the roller off under load",
+            {"load": sprung},
+            "contact is lost",
+            "spring has run out of travel",
         ),
         case(
             "tilt that moves the contact off the strips",

@@ -10,6 +10,7 @@ from wearsim.scenario import Scenario
 from wearsim_bench.hard_cases import measures
 from wearsim_bench.hard_cases.cases import RobustnessCase
 from wearsim_bench.hard_cases.runs import Plan, is_symmetric
+from wearsim_bench.hard_cases.truths import rigid_depth
 from wearsim_bench.hard_cases.verdict import Criterion, Verdict
 
 ROUND_OFF = 1e-9  # for sums over some hundred strips and steps
@@ -53,6 +54,7 @@ def _evaluate_run(case: RobustnessCase, plan: Plan) -> Verdict:
     first, runs = adaptive[0], [*adaptive, *fixed, *refined]
     criteria = [
         *_balances(scenario, runs, fixed),
+        *_truth(case, scenario, first),
         *_shape(case, scenario, first, (refined or fixed)[-1]),
         *_convergence(case, adaptive, fixed, refined),
         Criterion("mirror", measures.asymmetry(fixed[0], plan.mirrored(case)), ROUND_OFF),
@@ -81,6 +83,12 @@ def _balances(scenario: Scenario, runs: list[Result], fixed: list[Result]) -> It
     if not scenario.creepage.differential_slip and not scenario.random:
         yield Criterion("work", max(measures.work_balance(r, scenario) for r in runs), ROUND_OFF)
     yield Criterion("load", max(measures.load_balance(item) for item in runs), ROUND_OFF)
+
+
+def _truth(case: RobustnessCase, scenario: Scenario, first: Result) -> Iterator[Criterion]:
+    if case.true_within:
+        error = abs(float(first.depth[-1]) / rigid_depth(scenario) - 1.0)
+        yield Criterion("truth", error, case.true_within)
 
 
 def _shape(

@@ -27,7 +27,9 @@ def profile(height: Callable[[FloatArray], FloatArray], finer: int = 1) -> str:
     return _csv("y [mm], height [um]", y, height(y))
 
 
-def log_of_load(duration: float, parts: tuple[float, ...], levels: tuple[float, ...]) -> str:
+def log_of_load(
+    duration: float, parts: tuple[float, ...], levels: tuple[float, ...], last: float = _RAMP
+) -> str:
     """Return the CSV of a stepwise constant load.
 
     Parameters
@@ -38,10 +40,13 @@ def log_of_load(duration: float, parts: tuple[float, ...], levels: tuple[float, 
         Start of each level except the first, as a fraction of the test.
     levels : tuple of float
         Loads [N].
+    last : float
+        Duration of the last change of the load, relative to the test.
     """
     time, load = [0.0], [levels[0]]
-    for part, before, after in zip(parts, levels[:-1], levels[1:], strict=True):
-        time += [part * duration, (part + _RAMP) * duration]
+    ramps = [*(_RAMP for _ in parts[1:]), last]
+    for part, ramp, before, after in zip(parts, ramps, levels[:-1], levels[1:], strict=True):
+        time += [part * duration, (part + ramp) * duration]
         load += [before, after]
     return _csv("time [s], load [N]", np.array([*time, duration]), np.array([*load, levels[-1]]))
 

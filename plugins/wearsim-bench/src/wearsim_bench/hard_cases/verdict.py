@@ -16,6 +16,7 @@ CRITERIA: Mapping[str, str] = {
     "load": "sum of q dy minus the load",
     "oscillation": "second difference of q on the finest strips, relative to its peak",
     "drift": "centre of a symmetric groove, relative to its width",
+    "truth": "greatest depth minus that of rigid bodies in full slip, where it is known",
     "tolerance": "change of depth and volume with a tenth of the tolerance",
     "steps": "change of the profile from halving fixed steps",
     "strips": "change of the profile from doubling strips",

@@ -18,6 +18,7 @@ from wearsim.studies.run.run import run
 from wearsim.types import FloatArray, Grid
 from wearsim_bench.contact.worn_profiles import failure_reason
 from wearsim_bench.measure.measurement import Measurement
+from wearsim_bench.stated_errors.observed import errors_of, observed_of
 from wearsim_bench.stated_errors.random_tests import RandomTest
 from wearsim_bench.stated_errors.references import Worn, on_strips, reference_of, stacked
 
@@ -57,6 +58,7 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
     try:
         reference = reference_of(test, folder)
         same, grew = _without_stepping_error(test, result, folder)
+        observed = errors_of(result, observed_of(test, reference))
     except Exception as error:
         return _failed(row, LACKS, error)
     own = worn_of_result(result)
@@ -65,6 +67,8 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
         **{STATED + name: value for name, value in stated(result).items()},
         **_named(STEPS, own.changes_from(same)),
         **_named(STRIPS, same.changes_from(reference)),
+        **{name: true for name, (true, _) in observed.items()},
+        **{STATED + name: estimate for name, (_, estimate) in observed.items()},
     }
     counts: dict[str, float] = {
         "tolerance": test.tolerance,
@@ -114,14 +118,15 @@ def timed_run(test: RandomTest, **others: object) -> tuple[Result, float]:
 
 
 def worn_of_result(result: Result) -> Worn:
-    """Return the depths at the end of a run."""
+    """Return the depths at the end of a run, of a cam at its stations as in a reference."""
     raw = result.raw
     last = {name: values[-1] for name, values in {**raw.history, **raw.records}.items()}
     rollers = raw.static["multiplicity"] @ last["roller_worn_volume"]
+    depth = last["station_depth" if "station_depth" in last else "depth"].max()
     return Worn(
         np.asarray(result.y),
         stacked(last["cylinder_depth_profile"], last["roller_depth_profile"]),
-        float(max(last["depth"].max(), last["roller_depth"].max())),
+        float(max(depth, last["roller_depth"].max())),
         float(np.ravel(last["worn_volume"] + rollers)[0]),
     )
 
@@ -194,13 +199,13 @@ class Coverage:
 
 
 def coverage(rows: Sequence[Measurement], quantity: str) -> Coverage:
-    """Return the statistics of a quantity over tests that have not failed."""
-    done = [row for row in rows if not row.failed]
+    """Return the statistics of a quantity over tests that have it and have not failed."""
+    done = [row for row in rows if not row.failed and quantity in row.errors]
     return Coverage(
         [row.errors[quantity] for row in done],
         [row.errors[STATED + quantity] for row in done],
         [row.counts["tolerance"] for row in done],
-        [row.errors[STEPS + quantity] for row in done],
+        [row.errors.get(STEPS + quantity, 0.0) for row in done],
     )
 
 
@@ -211,5 +216,5 @@ def worst(rows: Sequence[Measurement], quantity: str, count: int) -> list[Measur
         true, own = row.errors[quantity], row.errors[STATED + quantity]
         return float("inf") if true < SMALL else own / true
 
-    done = [row for row in rows if not row.failed]
+    done = [row for row in rows if not row.failed and quantity in row.errors]
     return [row for row in sorted(done, key=ratio)[:count] if ratio(row) < 1.0]

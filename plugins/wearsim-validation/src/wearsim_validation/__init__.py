@@ -1,0 +1,1 @@
+"""Comparison of wearsim with published tests and simulations."""

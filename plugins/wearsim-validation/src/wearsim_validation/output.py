@@ -1,0 +1,156 @@
+"""Tables, JSON and figures of the outcomes."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wearsim.cli.shared import console, note, plain
+from wearsim_validation.case import VERDICTS
+
+if TYPE_CHECKING:
+    from wearsim_validation.comparison import Comparison, Outcome
+
+_WIDE = 150  # width of tables written to a file or a pipe
+
+
+def rows_of(one: Comparison) -> tuple[list[str], list[list[str]]]:
+    """Return heads and rows of the table of a comparison, as text."""
+    unit = "" if one.unit == "1" else f" [{one.unit}]"
+    x_unit = "" if one.x_unit == "1" else f" [{one.x_unit}]"
+    heads = [f"{one.series.x}{x_unit}", f"published{unit}"]
+    columns = [_texts(one.x), _texts(one.published)]
+    for name, values in one.columns.items():
+        heads += [name, "difference"]
+        relative = values / one.published - 1.0
+        columns += [
+            _texts(values),
+            [f"{100.0 * part:+.1f} %" if np.isfinite(part) else "" for part in relative],
+        ]
+    if one.spread is not None:
+        heads.append("range of what is not published")
+        columns.append([f"{low:.3g} to {high:.3g}" for low, high in one.spread.T])
+    for name, fitted in one.fits.items():
+        heads.append(name)
+        columns.append(["" if value is None else f"{value:.2g}" for value in fitted])
+    return heads, [list(row) for row in zip(*columns, strict=True)]
+
+
+def _texts(values: Any) -> list[str]:
+    return ["" if not np.isfinite(value) else f"{value:.4g}" for value in values]
+
+
+def verdict_line(outcome: Outcome) -> str:
+    """Return the verdict of a case in words."""
+    text = f"verdict: {VERDICTS[outcome.verdict]}"
+    return text if outcome.expected else f"{text}; recorded: {VERDICTS[outcome.case.file.verdict]}"
+
+
+def show(outcome: Outcome) -> None:
+    """Write a case to stdout: its tables, the verdict and the reasons."""
+    from rich import box
+    from rich.table import Table
+
+    screen, file = console(), outcome.case.file
+    if not screen.is_terminal:
+        screen.width = _WIDE
+    screen.print(f"\n{outcome.case.name}: {file.title}\n{file.source}\nread: {file.read}")
+    for one in outcome.comparisons:
+        table = Table(title=one.series.name, title_justify="left", box=box.SIMPLE_HEAD)
+        heads, rows = rows_of(one)
+        for head in heads:
+            table.add_column(head, justify="right", overflow="fold")
+        for row in rows:
+            table.add_row(*row)
+        screen.print(table)
+        for fact in one.facts:
+            screen.print(f"  {fact}")
+        screen.print(f"  {VERDICTS[one.verdict]}")
+    screen.print(verdict_line(outcome))
+    for reason in file.reasons:
+        screen.print(f"  {reason}")
+    for text in outcome.notes:
+        note(f"note: {text}")
+
+
+def show_summary(outcomes: Sequence[Outcome]) -> None:
+    """Write one line for each case to stdout."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title="Validation", title_justify="left", box=box.SIMPLE_HEAD)
+    for head in ("case", "verdict", "published"):
+        table.add_column(head, overflow="fold")
+    for outcome in outcomes:
+        table.add_row(outcome.case.name, VERDICTS[outcome.verdict], outcome.case.file.title)
+    screen = console()
+    if not screen.is_terminal:
+        screen.width = _WIDE
+    screen.print(table)
+
+
+def as_json(outcomes: Sequence[Outcome], command: str) -> dict[str, Any]:
+    """Return all outcomes as JSON types, with tables as text for the documentation."""
+    tables: dict[str, Any] = {
+        "verdicts": {
+            "columns": ["case", "published", "verdict"],
+            "rows": [
+                [one.case.name, one.case.file.title, VERDICTS[one.verdict]] for one in outcomes
+            ],
+        }
+    }
+    for outcome in outcomes:
+        for one in outcome.comparisons:
+            heads, rows = rows_of(one)
+            notes = [f"- {fact}" for fact in (*one.facts, VERDICTS[one.verdict])]
+            tables[f"{outcome.case.name}: {one.series.name}"] = {
+                "columns": heads,
+                "rows": rows,
+                "notes": ["\n".join(notes)],
+            }
+    found: dict[str, Any] = plain(
+        {
+            "machine": _machine(),
+            "command": command,
+            "tables": tables,
+            "cases": {outcome.case.name: outcome.as_json() for outcome in outcomes},
+        }
+    )
+    return found
+
+
+def _machine() -> dict[str, Any]:
+    """Return the machine in the form of `wearsim bench`; no times are stated."""
+    from wearsim.studies.execution.factory import available_processors
+
+    return {
+        "processor": platform.processor() or platform.machine(),
+        "cores": available_processors(),
+        "python": platform.python_version(),
+        "libraries": {name: version(name) for name in ("wearsim", "numba", "numpy", "scipy")},
+        "yardstick": None,
+        "date": date.today().isoformat(),
+    }
+
+
+def write_files(outcomes: Sequence[Outcome], data: dict[str, Any], folder: Path) -> list[Path]:
+    """Write validation.json and a figure for each case; return the files."""
+    import json
+
+    from wearsim.report.parts import save_figure, save_text
+    from wearsim_validation.figure import case_figure
+
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False)
+    files = [folder / "validation.json"]
+    save_text(text + "\n", files[0])
+    for outcome in outcomes:
+        files.append(folder / f"{outcome.case.name}.png")
+        save_figure(case_figure(data["cases"][outcome.case.name]), files[-1])
+    return files

@@ -1,0 +1,89 @@
+"""Estimated errors of power, pressure, width and other observables, against finer tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wearsim
+from wearsim.evolution.observed_errors import COVER, observed_errors
+from wearsim.evolution.strip_errors import Course
+
+RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
+SPRING: dict[str, object] = {
+    "operation.duration": "60 min",
+    "operation.rollers": 1,
+    "load.kind": "spring",
+    "load.stiffness": "2000 N/mm",
+    "creepage.longitudinal": 2e-4,
+    "wear.cylinder.k_over_h": "2e-10 1/Pa",
+    "wear.roller.k_over_h": "1e-10 1/Pa",
+}
+
+
+def run(changes: dict[str, object]) -> wearsim.Result:
+    return wearsim.run(wearsim.load_scenario(RIG, overrides=changes))
+
+
+@pytest.fixture(scope="module")
+def spring() -> wearsim.Result:
+    return run(SPRING)
+
+
+def test_stated_errors_cover_those_against_a_finer_test(spring: wearsim.Result) -> None:
+    strips: dict[str, object] = {
+        "contact.strips": 4 * len(spring.y),
+        "contact.width": f"{float(len(spring.y) * (spring.y[1] - spring.y[0]))!r} m",
+        "evolution.tolerance": 1e-5,
+        "evolution.strip_error": False,
+    }
+    true = run({**SPRING, **strips})
+    for name, errors in spring.errors.items():
+        if name in {"depth", "worn_volume"}:
+            continue
+        error = abs(float(spring.values(name)[-1] - true.values(name)[-1]))
+        size = abs(float(true.values(name)[-1]))
+        assert error <= errors[-1] + 1e-6 * size, name
+        assert errors[-1] < 0.5 * size, name
+        assert np.isnan(true.errors[name]).all()  # without the coarse test they are not known
+
+
+def test_errors_are_in_final_state_and_summary(spring: wearsim.Result) -> None:
+    final = spring.final
+    assert final["peak_pressure_error_Pa"] == spring.errors["peak_pressure"][-1]
+    assert final["normal_force_error_N"] == spring.errors["normal_force"][-1] > 0.0
+    assert set(spring.errors) >= {"depth", "worn_volume", "width", "power", "descent"}
+
+
+def test_error_is_the_greatest_of_the_last_differences() -> None:
+    passes = np.array([0.0, 10.0, 20.0, 40.0, 80.0])
+    pressure = np.array([3.0, 2.0, 2.0, 2.0, 2.0])
+    other = pressure * np.array([1.0, 1.1, 1.0, 1.0, 1.0])
+    course = Course(passes[1:].tolist(), observed=[{"peak_pressure": v} for v in other])
+    found = observed_errors(course, passes, {"peak_pressure": pressure})["peak_pressure"]
+    np.testing.assert_allclose(found[[0, 1]], [0.0, COVER * 0.2], atol=1e-12)
+    np.testing.assert_allclose(found[3:], 0.0, atol=1e-12)  # it is no longer recent
+
+
+def test_power_laws_are_compared_without_error_of_interpolation() -> None:
+    passes = np.geomspace(1.0, 1e6, 40)
+    steps = np.geomspace(2.0, 1e6, 13)
+    course = Course(steps.tolist(), observed=[{"descent": np.asarray(n**0.6)} for n in (0, *steps)])
+    observed = {"descent": np.append(0.0, passes) ** 0.6}
+    found = observed_errors(course, np.append(0.0, passes), observed)["descent"]
+    assert (found[2:] <= 2e-2 * observed["descent"][2:]).all()
+    assert found[-1] <= 1e-6 * observed["descent"][-1]
+
+
+def test_angles_differ_by_less_than_half_a_turn() -> None:
+    course = Course([1.0], observed=[{"depth_angle": np.asarray(6.2)}] * 2)
+    found = observed_errors(course, np.array([0.0, 1.0]), {"depth_angle": np.array([0.1, 0.1])})
+    assert found["depth_angle"][-1] == pytest.approx(COVER * (0.1 + 2.0 * np.pi - 6.2))
+
+
+def test_unknown_errors_are_not_a_number() -> None:
+    found = observed_errors(None, np.array([0.0, 1.0]), {"power": np.ones((2, 3))})
+    assert np.isnan(found["power"]).all()
+    assert found["power"].shape == (2, 3)

@@ -1,0 +1,89 @@
+"""Greatest value between the stations of a cam, its angle, and the errors of interpolation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.cam import Panel, Stations, greatest, integral_error
+
+HALVES = Panel(0, 0.0, 2.5, dwell=False), Panel(1, 2.5, 2.0 * math.pi, dwell=False)
+
+
+def stations(number: int) -> Stations:
+    return Stations(HALVES, (number, number))
+
+
+def bump(theta: np.ndarray, place: float, width: float) -> np.ndarray:
+    return 1.0 + np.exp(-(((theta - place) / width) ** 2))
+
+
+@pytest.mark.parametrize("place", [0.7, 1.3, 3.9, 5.4])
+@pytest.mark.parametrize("number", [5, 6, 7, 9, 13, 16])
+def test_stated_errors_cover_those_of_the_interpolation(number, place):
+    angles = stations(number).angle
+    width = 1.2
+    found = greatest(stations(number), bump(angles, place, width))
+    error = abs(float(found.value) - 2.0)
+    assert error <= found.error <= max(60.0 * error, 0.2)
+    assert abs(found.angle - place) <= found.angle_error + 1e-4
+
+
+def test_greatest_value_is_exact_with_many_stations():
+    places = np.array([0.4, 1.1, 2.9, 5.2])
+    values = bump(stations(25).angle[:, None], places, 0.8)
+    found = greatest(stations(25), values)
+    np.testing.assert_allclose(found.value, 2.0, rtol=2e-5)
+    np.testing.assert_allclose(found.angle, places, atol=1e-3)
+    assert (found.error < 1e-3).all()
+
+
+def test_values_do_not_depend_on_others():
+    values = bump(stations(9).angle[:, None], np.linspace(0.3, 5.0, 7), 0.9)
+    together = greatest(stations(9), values)
+    for number in range(7):
+        alone = greatest(stations(9), values[:, [number]])
+        for one, other in zip(alone, together, strict=True):
+            assert one[0] == other[number]
+
+
+def test_first_of_equal_values_is_returned():
+    whole = Stations((Panel(0, 0.0, 2.0 * math.pi, dwell=False),), (13,))
+    found = greatest(whole, np.sin(whole.angle) ** 2)
+    assert found.angle == pytest.approx(0.5 * math.pi, abs=1e-3)
+    assert found.angle_error < 0.1  # equal values are no error
+
+
+def test_angle_is_unknown_where_another_maximum_is_as_great_within_the_error():
+    angles = stations(7).angle
+    values = bump(angles, 1.0, 0.5) + bump(angles, 5.0, 0.5) * (1.0 + 1e-6)
+    found = greatest(stations(7), values)
+    assert found.angle_error > 2.0 * math.pi - 4.1
+
+
+def test_dwell_has_no_error_and_a_rise_with_one_station_is_unknown():
+    panels = Panel(0, 0.0, 3.0, dwell=True), Panel(1, 3.0, 2.0 * math.pi, dwell=False)
+    flat = greatest(Stations(panels, (1, 5)), np.ones(6))
+    assert (flat.value, flat.error) == (1.0, 0.0)
+    unknown = greatest(Stations(panels, (1, 1)), np.array([1.0, 3.0]))
+    assert unknown.error == 3.0
+
+
+def test_angle_of_a_dwell_is_uncertain_where_the_rise_beside_it_may_be_greater():
+    panels = Panel(0, 0.0, 3.0, dwell=True), Panel(1, 3.0, 2.0 * math.pi, dwell=False)
+    rise = np.array([2.0, 1.9, 1.2, 1.1])
+    found = greatest(Stations(panels, (1, 4)), np.append(2.0, rise))
+    assert found.angle_error > 1.0
+
+
+@pytest.mark.parametrize("place", [0.7, 3.9])
+@pytest.mark.parametrize("number", [3, 4, 5, 7, 9, 13])
+def test_stated_error_of_an_integral_covers_the_true_one(number, place):
+    exact = stations(60)
+    integral = exact.weight @ bump(exact.angle, place, 1.2)
+    few = stations(number)
+    values = bump(few.angle, place, 1.2)
+    error = abs(few.weight @ values - integral)
+    assert error <= integral_error(few, values) <= max(300.0 * error, 2.0)

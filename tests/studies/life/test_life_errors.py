@@ -1,0 +1,50 @@
+"""Numerical bounds of lives by limits of peak pressure, width and clearance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wearsim.results.ensemble.life import LifeResult
+from wearsim.scenario import parse_scenario
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.life.api import life
+
+LOG = "time [s],load [N]\n0,200\n27000,2000\n"
+
+
+def lives(limit: dict[str, str], factor: str, **changes: object) -> LifeResult:
+    """Return two lives of the rig under a load that rises."""
+    base = shipped_scenario("rig-450min")
+    given: dict[str, object] = {
+        "load": {"kind": "recorded", "file": "load.csv"},
+        "operation.rollers": 1,
+        "friction.coefficient": {"distribution": "lognormal", "median": 0.1, "factor": 1.3},
+        "wear.cylinder.k_over_h": factor,
+        "limit": limit,
+        **{key.replace("__", "."): value for key, value in changes.items()},
+    }
+    scenario = parse_scenario(base.text, "rig.toml", lambda file: LOG, given)
+    return life(scenario, 2, None, scheduler="serial")
+
+
+@pytest.mark.parametrize(
+    ("limit", "factor"),
+    [
+        ({"peak_pressure": "900 MPa"}, "1e-12 1/Pa"),
+        pytest.param({"width": "9 mm"}, "1e-11 1/Pa", marks=pytest.mark.slow),
+        pytest.param({"clearance": "10 um"}, "1e-11 1/Pa", marks=pytest.mark.slow),
+    ],
+    ids=["peak pressure", "width", "clearance"],
+)
+def test_bounds_of_a_life_include_that_on_fine_strips(limit: dict[str, str], factor: str) -> None:
+    found = lives(limit, factor)
+    fine = lives(limit, factor, contact__strips=401, evolution__tolerance=1e-5)
+    low, high = found.values("life_low"), found.values("life_high")
+    true = fine.values("life")
+    assert np.isfinite(high).all()
+    assert (low <= true).all()
+    assert (true <= high).all()
+    assert ((high - low) / true < 0.2).all()
+    # finer strips and steps have narrower bounds
+    assert (fine.values("life_high") - fine.values("life_low") < high - low).all()

@@ -1,0 +1,170 @@
+"""Reading of a lift by angle, of a follower or a swinging arm, as a motion over a turn."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wearsim.csv_tables import read_columns, units_of_columns
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.mechanics.cam import Follower, Motion
+from wearsim.mechanics.cam.smoothing import estimated_noise, scatter_through_points
+from wearsim.models.motion import (
+    ANGLE_NAMES,
+    FEWEST_ROWS,
+    LIFT_NAMES,
+    LiftSpline,
+    kinks,
+    refuse_kinks,
+)
+from wearsim.quantities import Quantity
+from wearsim.scenario.tables.cam_points import (
+    CHOICE,
+    MeasuredPoints,
+    has_dimension,
+    motion_of,
+    peak,
+    refuse_few,
+    smoothed_points,
+)
+from wearsim.types import FloatArray
+from wearsim.units import ANGLE, LENGTH, QuantityError
+
+if TYPE_CHECKING:
+    from wearsim.scenario.tables.cam import CamTable
+
+_CLOSED = 6.0  # standard deviations by which both ends of a turn may differ
+
+
+def motion_of_lift(
+    notes: list[str], table: CamTable, follower: Follower
+) -> tuple[Motion, MeasuredPoints | None]:
+    """Return the motion of a table of the lift, and its noise if it was smoothed.
+
+    Parameters
+    ----------
+    notes : list of str
+        Gets a note of jumps of the acceleration.
+    table : CamTable
+        With `lift`.
+    follower : Follower
+
+    Raises
+    ------
+    ScenarioError, QuantityError
+        If the file or the tolerance cannot be used.
+    """
+    assert table.lift is not None
+    tolerance, path = _tolerance(table.lift_tolerance, follower), table.lift.path
+    read = read_lift_table(table.lift.text, path, table.columns, table.units, follower)
+    angle, lift = one_turn(path, *read)
+    return motion_of_table(notes, path, angle, lift, "rad" if follower.swings else "m", tolerance)
+
+
+def _tolerance(text: str | None, follower: Follower) -> float | None:
+    """Return the stated noise of a lift [m], of an arm [rad]."""
+    if text is None:
+        return None
+    if follower.swings:
+        try:
+            return Quantity(ANGLE, "not negative").parse(text)
+        except QuantityError as error:
+            if error.what != "wrong dimension":
+                raise
+        return float(Quantity(LENGTH, "not negative").parse(text)) / follower.arm_length
+    return Quantity(LENGTH, "not negative").parse(text)
+
+
+def read_lift_table(
+    text: str,
+    path: str,
+    names: tuple[str, str] | None,
+    units: tuple[str, str] | None,
+    follower: Follower,
+) -> tuple[FloatArray, FloatArray]:
+    """Return angles [rad] and lifts of a file, in metres or, of an arm, in radians.
+
+    Lengths of an arm are arcs of its roller's path.
+
+    Parameters
+    ----------
+    text, path : str
+        Content of the file, and its name for messages.
+    names, units : tuple of str, optional
+        Names of the columns, and their units where the file has none.
+    follower : Follower
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes of the file.
+    """
+    angle, lift = names or ("angle", "lift")
+    aliases = {} if names else {angle: ANGLE_NAMES, lift: LIFT_NAMES}
+    given = dict(zip((angle, lift), units or (), strict=False))
+    heads = units_of_columns(text, {lift: aliases.get(lift, ())})
+    length = not follower.swings or has_dimension(given.get(lift) or heads.get(lift), "m")
+    columns = read_columns(
+        text,
+        path,
+        {angle: "rad", lift: "m" if length else "rad"},
+        aliases=aliases,
+        units=given,
+        rising=angle,
+        either_way=True,
+        choice=CHOICE.format("LIFT"),
+    )
+    found = columns[lift] / follower.arm_length if follower.swings and length else columns[lift]
+    refuse_few(path, len(found), FEWEST_ROWS, "rows for a quintic spline")
+    return columns[angle], found
+
+
+def one_turn(path: str, angle: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a table from its first angle to the same one after a turn [rad]."""
+    turn = float(angle[-1] - angle[0])
+    if abs(turn - math.tau) > 1e-9:
+        step = float(np.diff(angle).max())
+        if not 0.0 < math.tau - turn < 1.5 * step + 1e-6:
+            got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
+            what = "the angles do not span a turn"
+            raise ScenarioError(path, [Mistake("", "", what, got, "0 to 360 deg")])
+        return np.append(angle, angle[0] + math.tau), np.append(values, values[0])
+    noise = estimated_noise(angle[:-1], values[:-1])
+    allowed = max(1e-9 * float(np.ptp(values)), _CLOSED * math.sqrt(2.0) * noise)
+    if abs(values[-1] - values[0]) > allowed:
+        got = f"{values[0]:.6g} and {values[-1]:.6g}"
+        what = "the lift does not close: its first and last value differ"
+        raise ScenarioError(path, [Mistake("", "", what, got, "equal values at 0 and 360 deg")])
+    return angle, values
+
+
+def motion_of_table(
+    notes: list[str],
+    path: str,
+    angle: FloatArray,
+    lift: FloatArray,
+    unit: str,
+    tolerance: float | None,
+) -> tuple[Motion, MeasuredPoints | None]:
+    """Return the motion of a lift over a closed turn, whose first and last angle are the same."""
+    turned = angle - angle[0]
+    curve = smoothed_points(turned[:-1], lift[:-1], tolerance)
+    closed_lift = np.append(lift[:-1], lift[0])
+    around = np.concatenate([angle, angle[1:5] + math.tau])
+    closed = np.concatenate([closed_lift, closed_lift[1:5]])
+    refuse_kinks(path, around, closed, curve.noise if curve else 0.0)
+    if curve is not None:
+        light = replace(curve, factor=np.empty((0, 0)))
+        motion = motion_of("lift", light, curve.dwells)
+        scatter = scatter_through_points(turned[:-1], curve.noise)
+        points = turned[:-1], curve.residual
+        own = curve.noise, tolerance, *points, scatter, curve.second_error, peak(curve)
+        return motion, MeasuredPoints(path, "lift", unit, *own)
+    steps = np.unique(np.round(np.degrees(kinks(around, closed)[1]) % 360.0, 6))
+    if len(steps):
+        at = ", ".join(f"{place:.6g} deg" for place in steps[:5])
+        notes.append(f"{path}: the acceleration of the follower jumps at about {at}")
+    return motion_of("lift", LiftSpline(turned, closed_lift, closed=True), ()), None

@@ -1,0 +1,92 @@
+"""Worn profiles of a cam at angles, and changes of its lift, from the states of wear tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.evolution.observables import lift_errors
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState
+from wearsim.scenario import Scenario
+from wearsim.studies.cam.observables import CURVE_ANGLES
+from wearsim.studies.cam.turn import turn_of
+from wearsim.types import FloatArray
+
+LIFT = "lift"
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Size of a groove, or of a change of the lift, that wear tests must cover.
+
+    Parameters
+    ----------
+    surface : str
+        "roller", "lift", or a name of the cam's surface at an angle.
+    passes : float
+        At which it was measured.
+    low, high : float
+        Least and greatest depth, or peak to peak of the lift [m].
+    """
+
+    surface: str
+    passes: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class CamView:
+    """Interpolation between the stations of one test's cam.
+
+    Parameters
+    ----------
+    angles : mapping of str to float
+        Angle of the cam of each surface [rad].
+    at_angles : ndarray, shape (angles, stations)
+    along : ndarray, shape (curve angles, stations)
+        At `CURVE_ANGLES`.
+    """
+
+    angles: Mapping[str, float]
+    at_angles: FloatArray
+    along: FloatArray
+
+    @classmethod
+    def of(cls, scenario: Scenario, angles: Mapping[str, float]) -> CamView:
+        """Return the interpolation for the stations of a scenario's run."""
+        stations = turn_of(scenario).stations
+        eye = np.eye(stations.count)
+        turned = np.mod(list(angles.values()), 2.0 * np.pi)
+        rows = [stations.values_at_angles(eye, np.array([one]))[0] for one in turned]
+        at_angles = np.array(rows).reshape(len(rows), stations.count)
+        return cls(angles, at_angles, stations.values_at_angles(eye, CURVE_ANGLES))
+
+    def grooves(self, depth: FloatArray) -> dict[str, FloatArray]:
+        """Return the worn profile of each surface from those at all stations [m].
+
+        Parameters
+        ----------
+        depth : ndarray, shape (stations, strips)
+        """
+        found = np.maximum(self.at_angles @ depth, 0.0)
+        return dict(zip(self.angles, found, strict=True))
+
+
+def falls_of_lift(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return how far the lift has fallen by wear, shape (stations of the unworn cam, tests) [m].
+
+    It is the mean over the rollers.
+    """
+    cam = problem.kinematics.cam
+    assert cam is not None
+    return -cam.at_unworn(lift_errors(problem, state).mean(axis=1))
+
+
+def size_of(surface: str, profiles: FloatArray) -> FloatArray:
+    """Return the depth of grooves, or the peak to peak of changes of the lift, last axis."""
+    greatest = profiles.max(axis=-1)
+    return np.asarray(greatest - profiles.min(axis=-1) if surface == LIFT else greatest)
