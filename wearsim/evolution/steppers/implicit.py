@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import NamedTuple
@@ -13,6 +14,11 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.contacts import at_least
 from wearsim.evolution.error_estimates import (
+    COVER as COVER_OF_DOUBLING,
+)
+from wearsim.evolution.error_estimates import (
+    DEPTH_EXPONENT,
+    VOLUME_EXPONENT,
     greatest_depth,
     with_pass_errors,
 )
@@ -26,7 +32,12 @@ from wearsim.evolution.steppers.edges import (
 )
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
-from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
+from wearsim.evolution.steppers.loads import (
+    abrupt_loads,
+    mean_force,
+    smooth_loads,
+    with_feedback,
+)
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.edge_strips import SETTLED
@@ -43,7 +54,10 @@ from wearsim.mechanics.numerics.multistep import (
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.5  # part of the tolerance that a step may add to the profiles
-COVER = np.array([[5.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
+COVER = np.array([[4.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
+# least errors of depth and profile, over that of the volume, all relative and with their factors: a
+# groove of wrong volume has the wrong depth and width, which further wear does not correct
+OF_VOLUME = 0.33, 0.5
 # of a step at a lower order, compared with other orders: the differences that a step leaves are
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
@@ -52,6 +66,14 @@ PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power o
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
 EDGES = 3.0
+# safety factors of volume and profile, also those of step doubling, whose error of the volume is a
+# sum of absolute changes
+OF_STEPS = COVER[1:, 0].tolist()
+DOUBLED = math.inf, COVER_OF_DOUBLING
+# the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
+# number, to a least part of itself at the second one
+ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
+LEAST_AIM_OF_ROWS = 0.7  # the same where rows of a log are shorter than a step
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
 
@@ -105,7 +127,8 @@ class ImplicitStepper(StepDoublingStepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        part, aim = (passes / stop) ** PART_EXPONENT, SHARE * self.tolerance
+        left = self._left(problem, state, stop, OF_STEPS)
+        part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, part, aim, KEEP, _most(end)),
             *(_parts_of_bodies(end), own, order),
@@ -118,6 +141,7 @@ class ImplicitStepper(StepDoublingStepper):
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, part, aim, KEEP)
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
+        over = over * left  # it shortens the next step
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
@@ -136,7 +160,10 @@ class ImplicitStepper(StepDoublingStepper):
         half, end = doubled.path
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        part = (end.passes / stop) ** PART_EXPONENT
+        left = self._left(problem, state, stop, DOUBLED)
+        if not problem.varying:  # many rows of a log average out within a step
+            left = np.where(doubled.varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
+        part = (end.passes / stop) ** PART_EXPONENT / left
         scale = part / self.tolerance
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, _most(end)),
@@ -151,14 +178,52 @@ class ImplicitStepper(StepDoublingStepper):
         if unknown.any():
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
+        over = np.where(unknown, over, over * left)
         if self.forced_step is not None:  # steps of a fixed length may be too long for fourth order
             order = np.minimum(order, MAX_ORDER - 1)
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
         return Attempt((half, end.replaced(order=order, **others)), over, ratio)
 
+    def _left(
+        self, problem: WearProblem, state: WearState, stop: float, cover: Sequence[float]
+    ) -> FloatArray:
+        """Return the part of its usual error that a step aims at, by the errors before it, (N,).
+
+        Errors of the volume add up during a test if they have the same sign.
+
+        Parameters
+        ----------
+        problem : WearProblem
+        state : WearState
+            State at the start of the step.
+        stop : float
+            Passes at the end of the test.
+        cover : sequence of float
+            Safety factors that the errors of volume and profile of the state contain.
+        """
+        volumes = _volumes(problem, state.stacked).tolist()
+        _, *fixed = state.irreducible
+        errors = (state.volume_error - fixed[0]).tolist(), (state.profile_error - fixed[1]).tolist()
+        low, high = ADDED_UP
+        found = []
+        columns = state.passes.tolist(), volumes, *errors
+        for passes, volume, of_volume, of_profile in zip(*columns, strict=True):
+            grown, worst = passes / stop, 0.0
+            if volume > 0.0:
+                worst = of_volume / (volume * cover[0]) * grown**VOLUME_EXPONENT
+                worst = max(worst, of_profile / cover[1] * grown**DEPTH_EXPONENT)
+            part = (high - worst / self.tolerance) / (high - low)
+            found.append(min(max(part, LEAST_AIM), 1.0))
+        return np.array(found)
+
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
         return implicit_step
+
+
+def _volumes(problem: WearProblem, depths: FloatArray) -> FloatArray:
+    """Return the volume of depths of all bodies, as `WearState.stacked`, (realisations,) [m^3]."""
+    return np.asarray((problem.volume_weights[1][:, None] * depths.sum(axis=-1)).sum(axis=0))
 
 
 def _estimates(
@@ -211,6 +276,10 @@ def _estimates(
         sizes[2] = np.hypot(sizes[2], np.sqrt((edges**2).sum(axis=(0, 2)) / _squares(depths)))
     found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
+    worn = _volumes(problem, depths)
+    relative = found[1] / np.where(worn > 0.0, worn, np.inf)
+    found[0] = np.maximum(found[0], OF_VOLUME[0] * relative * depths.max(axis=(0, 2)))
+    found[2] = np.maximum(found[2], OF_VOLUME[1] * relative)
     depth, volume, profile = found + end.irreducible
     return {
         "stepping_error": errors,
@@ -382,7 +451,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     as the depths, so that Archard's wear law holds to round-off. Passes are counted one by one: the
     formula is applied to the depths half a pass later, ``u + f/2`` with the wear per pass f, whose
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
-    decrease, or contact would be lost, is repeated at first order.
+    decrease is repeated at second order, and at first order if they still decrease; so is one in
+    which contact would be lost. A step in which the load jumps is of first order. The state
+    returned has the order of its formula.
 
     Raises
     ------
@@ -394,6 +465,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = _conditions(here, problem, state, passes)
     order = Past.of(state).order
+    if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
+        order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:
         end, decreased = _step(here, state, passes, conditions, order)
     except StepError:
@@ -401,12 +474,14 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         if len(order) > 1 or order[0] == 1:
             raise
         return _step(here, state, passes, conditions, np.ones_like(order))[0]
-    again: IntArray = (decreased & (order > 1)).nonzero()[0]
-    if again.size:
-        conditions = _Conditions(*(column[..., again] for column in vars(conditions).values()))
-        some = here.at(again), state.at(again), passes[again]
-        part, _ = _step(*some, conditions, np.ones_like(again))
-        end = end.with_others(again, part)
+    # strips that leave the contact: their depth can decrease from the third order on
+    for lower in (2, 1) if np.count_nonzero(decreased) else ():
+        again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
+        if again.size:
+            columns = (column[..., again] for column in vars(conditions).values())
+            some = here.at(again), state.at(again), passes[again], _Conditions(*columns)
+            part, decreased[again] = _step(*some, np.full_like(again, lower))
+            end = end.with_others(again, part)
     return end
 
 
@@ -457,6 +532,7 @@ def _step(
         past_sums=new_differences(sum_rates, sums, half_pass, old_sums, spans)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
+        order=order,
     )
     decreased = (end.stacked < start).any(axis=(0, 2)) | (sums[-1, :, 0] < 0.0)
     return end, decreased
