@@ -5,6 +5,7 @@ import pytest
 
 import wearsim
 from tests.evolution.test_strip_errors import RIG
+from wearsim.errors import Interrupted
 
 RESOLVED = {"evolution.resolve_edges": True}
 SHORT = {**RESOLVED, "operation.duration": "20 min", "evolution.strip_error": False}
@@ -56,7 +57,7 @@ def test_error_by_steps_is_covered(case: str) -> None:
     fine = {"contact.strips": len(result.y), "evolution.tolerance": 1e-5}
     width = f"{float(len(result.y) * (result.y[1] - result.y[0]))!r} m"
     true = run({**SHORT, **CASES[case], **fine, "contact.width": width})
-    assert result.depth_error[-1] < 2e-3 * result.depth[-1]
+    assert result.depth_error[-1] < 5e-3 * result.depth[-1]
     assert abs(result.depth[-1] - true.depth[-1]) <= result.depth_error[-1]
     assert abs(result.worn_volume[-1] - true.worn_volume[-1]) <= result.volume_error[-1]
 
@@ -78,8 +79,8 @@ def test_groove_on_strips_that_grow_keeps_its_volume() -> None:
 def test_resumed_test_is_equal_to_the_bit(tmp_path) -> None:
     file = tmp_path / "part.h5"
     steps = iter(range(1000))
-    stopped = run(SHORT, output=file, stop_requested=lambda: next(steps) > 12)
-    assert not stopped.finished
+    with pytest.raises(Interrupted):
+        run(SHORT, output=file, stop_requested=lambda: next(steps) > 12)
     resumed, whole = wearsim.resume(file), run(SHORT)
     assert np.array_equal(resumed.depth, whole.depth)
     assert np.array_equal(resumed.profiles[-1], whole.profiles[-1])

@@ -22,10 +22,11 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, separated
 from wearsim.mechanics.numerics.edge_strips import SETTLED, EdgeStrips, start_edges
 from wearsim.mechanics.numerics.jit import kernel_input
-from wearsim.types import FloatArray
+from wearsim.mechanics.numerics.multistep import next_steps
+from wearsim.types import BoolArray, FloatArray
 
 
 def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool:
@@ -104,3 +105,69 @@ def edges_of_step(
     )
     start_edges(edges)
     return edges
+
+
+def crossed_strips(state: WearState) -> BoolArray | None:
+    """Return which strips of the bodies an edge is crossing or has crossed lately."""
+    if state.whole_steps is None or state.part is None:
+        return None
+    lately = (state.part > 0.0) & (state.whole_steps < SETTLED)
+    return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
+
+
+def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
+    """Return errors of the depths that a step adds, which agree with those of their sums.
+
+    `with_volume` keeps the sums.
+    """
+    past, spans, orders = end.past_sums, end.past_spans, end.order
+    assert past is not None
+    assert spans is not None
+    assert orders is not None
+    parts = np.where(crossed, 0.0, parts_of_bodies(end))
+    errors = np.where(crossed, 0.0, errors)
+    sums = past[:, :-1, :, None]
+    ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
+    scale = np.ones(len(orders))
+    next_steps(sums, spans, ones, orders, scale, 1.0, 1.0, 1, ones, of_sums, order)
+    missing, width = of_sums - errors.sum(axis=-1, keepdims=True), parts.sum(axis=-1, keepdims=True)
+    shift = np.divide(missing, width, out=np.zeros_like(width), where=width > 0.0)
+    return np.asarray(errors + parts * shift)
+
+
+def squares(depths: FloatArray) -> FloatArray:
+    """Return the sum of the squares of all depths, (N,), infinite where it is 0 [m^2]."""
+    squares = (depths**2).sum(axis=(0, 2))
+    return np.asarray(np.where(squares > 0.0, squares, np.inf))
+
+
+def parts_of_bodies(state: WearState) -> FloatArray:
+    """Return the part of each strip's error that counts, as `WearState.stacked`.
+
+    The formulas also continue the separation of strips that are not in contact.
+    """
+    if state.part is None:
+        return np.ones(state.stacked.shape)
+    assert state.past_wear is not None
+    parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
+    return np.where(state.past_wear[0] > 0.0, parts, 0.0)
+
+
+def with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearState:
+    """Return the end of a step with the volume that the formula gives.
+
+    The depths of strips partly in contact follow from their shape, which keeps no volume. What is
+    missing is added evenly where the bodies are in contact, which changes no pressure.
+
+    Parameters
+    ----------
+    end : WearState
+    parts : ndarray
+        Part of each strip that is in contact, as `WearState.stacked`.
+    missing : ndarray, shape (stations + rollers, realisations)
+        Sum over the strips of the depths to be added [m].
+    """
+    width = parts.sum(axis=-1)
+    added = np.divide(missing, width, out=np.zeros_like(missing), where=width > 0.0)
+    cylinder, roller = separated(end.stacked + added[..., None] * parts, len(end.cylinder_depth))
+    return end.replaced(cylinder_depth=cylinder, roller_depth=roller)

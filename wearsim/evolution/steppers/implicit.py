@@ -23,13 +23,9 @@ from wearsim.evolution.error_estimates import (
     with_pass_errors,
 )
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, separated
+from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step
-from wearsim.evolution.steppers.edges import (
-    resolves_edges,
-    separated_bodies,
-    starting_edges,
-)
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
 from wearsim.evolution.steppers.loads import (
@@ -40,7 +36,6 @@ from wearsim.evolution.steppers.loads import (
 )
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
-from wearsim.mechanics.numerics.edge_strips import SETTLED
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
 from wearsim.mechanics.numerics.multistep import (
@@ -65,10 +60,12 @@ PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power o
 # greatest order where edges are resolved within a strip: beyond the first derivative the wear of
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
-EDGES = 3.0
+# safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
+EDGES, OF_EDGES = 3.0, 5.0
 # safety factors of volume and profile, also those of step doubling, whose error of the volume is a
 # sum of absolute changes
 OF_STEPS = COVER[1:, 0].tolist()
+OF_STEPS_WITH_EDGES = [OF_EDGES * OF_STEPS[0], OF_STEPS[1]]
 DOUBLED = math.inf, COVER_OF_DOUBLING
 # the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
 # number, to a least part of itself at the second one
@@ -127,11 +124,12 @@ class ImplicitStepper(StepDoublingStepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        left = self._left(problem, state, stop, OF_STEPS)
+        factors = OF_STEPS if state.part is None else OF_STEPS_WITH_EDGES
+        left = self._left(problem, state, stop, factors)
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, part, aim, KEEP, _most(end)),
-            *(_parts_of_bodies(end), own, order),
+            *(edges.parts_of_bodies(end), own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
         if step.min() <= WHOLE_PASSES:
@@ -167,7 +165,7 @@ class ImplicitStepper(StepDoublingStepper):
         scale = part / self.tolerance
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, _most(end)),
-            *(_parts_of_bodies(end), own, order),
+            *(edges.parts_of_bodies(end), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
@@ -253,10 +251,10 @@ def _estimates(
     stiffness = np.zeros(shape[0])
     if problem.has_spring:
         stiffness = np.broadcast_to(problem.stiffness, problem.shape).flatten()
-    crossed = _crossed(end)
+    crossed = edges.crossed_strips(end)
     errors, sizes = carried_errors(
         np.asarray(start.stepping_error),
-        added if crossed is None else _with_sum(end, added, crossed),
+        added if crossed is None else edges.with_sum(end, added, crossed),
         contacts.line_load,
         problem.wear_parts(contacts, passes).reshape(2, *shape),
         np.asarray(end.wear_exponents).reshape(shape),
@@ -272,8 +270,11 @@ def _estimates(
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
     if crossed is not None:
-        edges = np.where(crossed, EDGES * added, 0.0)
-        sizes[2] = np.hypot(sizes[2], np.sqrt((edges**2).sum(axis=(0, 2)) / _squares(depths)))
+        at_edges = np.where(crossed, EDGES * added, 0.0)
+        sizes[2] = np.hypot(
+            sizes[2], np.sqrt((at_edges**2).sum(axis=(0, 2)) / edges.squares(depths))
+        )
+        sizes[:2] *= OF_EDGES
     found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
     worn = _volumes(problem, depths)
@@ -305,12 +306,12 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, exposure)
     wear, energy = _wear_per_pass(here, state.contacts)
-    edges: dict[str, FloatArray | None] = {"separation": None, "part": None, "whole_steps": None}
-    if resolves_edges(problem, state.contacts):
-        edges |= starting_edges(problem, state.contacts)
-    sums = _sums_per_pass(wear if edges["part"] is not None else None, energy)
+    of_edges: dict[str, FloatArray | None] = {"separation": None, "part": None, "whole_steps": None}
+    if edges.resolves_edges(problem, state.contacts):
+        of_edges |= edges.starting_edges(problem, state.contacts)
+    sums = _sums_per_pass(wear if of_edges["part"] is not None else None, energy)
     return state.replaced(
-        **edges,
+        **of_edges,
         past_wear=_starting(wear, exposure),
         past_sums=_starting(sums, exposure)[..., 0],
         past_feedback=past_feedback,
@@ -348,52 +349,10 @@ def _most(state: WearState) -> int:
     return MAX_ORDER if state.part is None else EDGE_ORDER
 
 
-def _with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
-    """Return errors of the depths that a step adds, which agree with those of their sums.
-
-    `_with_volume` keeps the sums.
-    """
-    past, parts = Past.of(end), np.where(crossed, 0.0, _parts_of_bodies(end))
-    errors = np.where(crossed, 0.0, errors)
-    sums = past.sums[:, :-1, :, None]
-    ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), past.order.copy()
-    scale = np.ones(len(order))
-    next_steps(sums, past.spans, ones, past.order, scale, 1.0, 1.0, 1, ones, of_sums, order)
-    missing, width = of_sums - errors.sum(axis=-1, keepdims=True), parts.sum(axis=-1, keepdims=True)
-    shift = np.divide(missing, width, out=np.zeros_like(width), where=width > 0.0)
-    return np.asarray(errors + parts * shift)
-
-
-def _crossed(state: WearState) -> BoolArray | None:
-    """Return which strips of the bodies an edge is crossing or has crossed lately."""
-    if state.whole_steps is None or state.part is None:
-        return None
-    lately = (state.part > 0.0) & (state.whole_steps < SETTLED)
-    return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
-
-
-def _squares(depths: FloatArray) -> FloatArray:
-    """Return the sum of squares of the depths of all bodies, (N,), infinite without any [m^2]."""
-    squares = (depths**2).sum(axis=(0, 2))
-    return np.asarray(np.where(squares > 0.0, squares, np.inf))
-
-
 def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
     """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
     sums = energy[None] if wear is None else np.concatenate([wear.sum(axis=-1), energy[None]])
     return np.asarray(sums[..., None])
-
-
-def _parts_of_bodies(state: WearState) -> FloatArray:
-    """Return the part of each strip's error that counts, as `WearState.stacked`.
-
-    The formulas also continue the separation of strips that are not in contact.
-    """
-    if state.part is None:
-        return np.ones(state.stacked.shape)
-    assert state.past_wear is not None
-    parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
-    return np.where(state.past_wear[0] > 0.0, parts, 0.0)
 
 
 @dataclass(frozen=True)
@@ -497,7 +456,7 @@ def _step(
     Both have one entry per realisation, as has `order`.
     """
     realisations, start, past = len(passes), state.stacked, Past.of(state)
-    level = start if state.separation is None else start - separated_bodies(problem, state)
+    level = start if state.separation is None else start - edges.separated_bodies(problem, state)
     half_pass = np.where(passes > WHOLE_PASSES, 0.5, 0.0)
     weights = np.empty((2, ROWS, realisations))
     factor, spans = np.empty(realisations), np.empty((ROWS - 1, realisations))
@@ -518,8 +477,8 @@ def _step(
     sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
     sums = sums + worn_passes[:, None] * sum_rates
     if parts is not None:
-        end = _with_volume(end, parts, sums[:-1, :, 0] - (end.stacked - start).sum(axis=-1))
-        change = end.stacked - separated_bodies(problem, end) - level
+        end = edges.with_volume(end, parts, sums[:-1, :, 0] - (end.stacked - start).sum(axis=-1))
+        change = end.stacked - edges.separated_bodies(problem, end) - level
     past_feedback = None
     if feedback is not None:
         new = feedback.reshape(-1, realisations, 1)
@@ -536,23 +495,3 @@ def _step(
     )
     decreased = (end.stacked < start).any(axis=(0, 2)) | (sums[-1, :, 0] < 0.0)
     return end, decreased
-
-
-def _with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearState:
-    """Return the end of a step with the volume that the formula gives.
-
-    The depths of strips partly in contact follow from their shape, which keeps no volume. What is
-    missing is added evenly where the bodies are in contact, which changes no pressure.
-
-    Parameters
-    ----------
-    end : WearState
-    parts : ndarray
-        Part of each strip that is in contact, as `WearState.stacked`.
-    missing : ndarray, shape (stations + rollers, realisations)
-        Sum over the strips of the depths to be added [m].
-    """
-    width = parts.sum(axis=-1)
-    added = np.divide(missing, width, out=np.zeros_like(missing), where=width > 0.0)
-    cylinder, roller = separated(end.stacked + added[..., None] * parts, len(end.cylinder_depth))
-    return end.replaced(cylinder_depth=cylinder, roller_depth=roller)
