@@ -1,7 +1,8 @@
 # make demo            run the 450-minute wear test: summary, results and figure in out/
 # make test            lint, types, import contracts and the quick tests: 5 minutes on 2 cores
 # make test-slow       the other tests: kills of the writers, hard cases, installs, Dask: 13 minutes
-# make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; six minutes
+# make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; ten minutes,
+#                      and an hour of one core for the references of stated errors, which are kept in out/references
 # make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
 # make bench-ensembles the same of persistence, ensembles and intervals of lives; a quarter of an hour
 # make validate        published tests compared: out/validation, docs/measurements/validation.json; less than two minutes
@@ -40,7 +41,7 @@ MEASURED := docs/measurements
 bench-docs: $(VENV)/.installed-dev
 	mkdir -p out
 	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
-	$(BIN)/wearsim bench stated-errors --tests 200 --seed 3 --references out/references -j $$(nproc) -o out/bench --force \
+	$(BIN)/wearsim bench stated-errors --tests 400 --seed 2026 --references out/references -j $$(nproc) -o out/bench --force \
 		&& cp out/bench/stated-errors.json $(MEASURED)
 	-$(BIN)/wearsim bench --hard -o out/bench --force
 	cp out/bench/hard.json $(MEASURED)

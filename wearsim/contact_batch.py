@@ -199,6 +199,9 @@ class ContactBatchSolution:
         As in `ContactSolution`.
     iterations : ndarray of int, shape (contacts,)
         As in `ContactSolution`.
+    separation : ndarray, shape (contacts, strips), optional
+        Distance between the deformed surfaces in strips without load, 0 in the others [m]. With a
+        model that returns it, implicit steps resolve the edge of a contact within a strip.
     """
 
     y: FloatArray
@@ -214,6 +217,7 @@ class ContactBatchSolution:
     power: FloatArray
     longitudinal_creepage: FloatArray
     iterations: IntArray
+    separation: FloatArray | None = None
 
     @classmethod
     def of(cls, solutions: Sequence[ContactSolution]) -> ContactBatchSolution:
@@ -238,27 +242,34 @@ class ContactBatchSolution:
 
     def at(self, numbers: IntArray) -> ContactBatchSolution:
         """Return some of the solutions, by number and in that order."""
-        return ContactBatchSolution(self.y, *(getattr(self, name)[numbers] for name in _OUTPUTS))
+        apart = None if self.separation is None else self.separation[numbers]
+        columns = {name: getattr(self, name)[numbers] for name in _OUTPUTS}
+        return ContactBatchSolution(self.y, **columns, separation=apart)
 
     def with_others(self, numbers: IntArray, others: ContactBatchSolution) -> ContactBatchSolution:
         """Return these solutions with others at some numbers."""
-        columns = [getattr(self, name).copy() for name in _OUTPUTS]
-        for column, name in zip(columns, _OUTPUTS, strict=True):
+        both = self.separation is not None and others.separation is not None
+        names = (*_OUTPUTS, "separation") if both else _OUTPUTS
+        columns = {name: getattr(self, name).copy() for name in names}
+        for name, column in columns.items():
             column[numbers] = getattr(others, name)
-        return ContactBatchSolution(self.y, *columns)
+        return ContactBatchSolution(self.y, **columns)
 
     def joined_with(self, *others: ContactBatchSolution, rows: int) -> ContactBatchSolution:
         """Return these solutions joined with others row by row, all divided into equal `rows`."""
-        joined = []
-        for name in _OUTPUTS:
+        every = all(part.separation is not None for part in (self, *others))
+        joined = {}
+        for name in (*_OUTPUTS, "separation") if every else _OUTPUTS:
             columns = [getattr(part, name) for part in (self, *others)]
             parts = [column.reshape(rows, -1, *column.shape[1:]) for column in columns]
             whole = np.concatenate(parts, axis=1)
-            joined.append(whole.reshape(-1, *whole.shape[2:]))
-        return ContactBatchSolution(self.y, *joined)
+            joined[name] = whole.reshape(-1, *whole.shape[2:])
+        return ContactBatchSolution(self.y, **joined)
 
 
-_OUTPUTS = tuple(item.name for item in fields(ContactBatchSolution) if item.name != "y")
+_OUTPUTS = tuple(
+    item.name for item in fields(ContactBatchSolution) if item.name not in {"y", "separation"}
+)
 
 
 NO_BODY = -1

@@ -206,7 +206,8 @@ class SolverError(WearsimError):
         What to do about it; a study that knows the scenario may name another.
     cause : str
         "edge" (the contact reaches the edge of its strips), "too fine" (strips that are too narrow
-        for the length of the contact), "skid" (friction cannot transmit the torque) or empty.
+        for the length of the contact), "skid" (friction cannot transmit the torque), "lost" (a load
+        falls to zero) or empty.
 
     Examples
     --------

@@ -103,6 +103,91 @@ def test_no_depth_and_no_energy_decreases(changes):
     assert_monotonic(path_of(problem, stepper, stop))
 
 
+# partial slip of three rollers whose contacts overlap; strips leave a contact as others enter
+OVERLAPPING = {
+    "operation__rollers": 3,
+    "roller__radius": "43 mm",
+    "roller__crown_radius": "44.94 mm",
+    "cylinder__radius": "34.72 mm",
+    "load__normal_force": "96.46 N",
+    "friction__coefficient": 0.07688,
+    "roller__offset": ["-0.2005 mm", "-0.5011 mm", "0.07609 mm"],
+    "creepage__longitudinal": 1.099e-4,
+    "wear__cylinder__k_over_h": "1.096e-12 1/Pa",
+    "wear__roller__k_over_h": "5.699e-14 1/Pa",
+    "operation__passes": 2_500_000,
+    "evolution__tolerance": 1e-4,
+}
+
+
+def test_step_in_which_a_strip_leaves_its_contact_is_of_second_order():
+    problem, stepper, stop = built(**OVERLAPPING)
+    lowered = 0
+    for start, end in itertools.pairwise(path_of(problem, stepper, stop)):
+        if start.past_spans is None or start.order[0] < 3:
+            continue
+        length = end.passes - start.passes
+        one = implicit_step(problem, start, length)
+        if one.order[0] == start.order[0]:
+            continue
+        lowered += 1
+        assert one.order[0] == 2
+        first = implicit_step(problem, start.replaced(order=np.array([1])), length)
+        several = start
+        for _ in range(8):
+            several = implicit_step(problem, several.replaced(order=np.array([2])), length / 8)
+        errors = [np.linalg.norm(other.stacked - several.stacked) for other in (one, first)]
+        assert errors[0] < 0.5 * errors[1]
+    assert lowered
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "changes",
+    [
+        OVERLAPPING,
+        {  # partial slip in a groove that many strips enter one by one
+            "operation__rollers": 1,
+            "roller__radius": "13.05 mm",
+            "roller__crown_radius": "26.55 mm",
+            "cylinder__radius": "39.17 mm",
+            "load__normal_force": "62.68 N",
+            "friction__coefficient": 0.1329,
+            "creepage__longitudinal": 3.654e-5,
+            "wear__cylinder__k_over_h": "7.76e-12 1/Pa",
+            "operation__passes": 614_600_000,
+            "evolution__tolerance": 1e-4,
+        },
+    ],
+    ids=["strips leave contacts", "strips enter"],
+)
+def test_errors_of_all_steps_are_at_most_twice_the_tolerance(changes):
+    state, _ = stepped(*built(**changes))
+    problem, stepper, stop = built(**{**changes, "evolution__tolerance": 1e-6})
+    exact, _ = stepped(problem, stepper, stop)
+    difference = state.stacked - exact.stacked
+    assert np.linalg.norm(difference) < 2e-4 * np.linalg.norm(exact.stacked)
+    volumes = [volume_of(problem, one.depths)[0] for one in (state, exact)]
+    assert volumes[0] == pytest.approx(volumes[1], rel=2e-4)
+    assert state.depth_error < 2e-3 * exact.stacked.max()  # known without a wide margin
+
+
+def test_step_in_which_a_logged_load_jumps_is_of_first_order(tmp_path):
+    path = tmp_path / "log.csv"
+    rows = ["0, 300", "59.9, 300", "60, 150", "90, 150", "120, 250"]
+    path.write_text("\n".join(["time [s], load [N]", *rows]))
+    changes = {"contact__strips": 41, "load": {"kind": "recorded", "file": str(path)}}
+    problem, _, stop = built(operation__duration="2 min", **changes)
+    rate = stop / 120.0  # passes per second
+    state = ImplicitStepper(1.0).started(problem, fresh_state(problem))
+    orders = []
+    for until in (40.0, 50.0, 55.0, 65.0, 75.0, 85.0, 90.0, 95.0, 105.0):  # s
+        length = np.array([until * rate]) - state.passes
+        state = implicit_step(problem, state.replaced(order=np.array([2])), length)
+        orders.append(int(state.order[0]))
+    assert orders == [2, 2, 2, 1, 2, 2, 2, 2, 2]
+
+
 def test_a_smooth_test_is_stepped_at_third_and_fourth_order():
     problem, stepper, stop = built(operation__passes=45_000, evolution__tolerance=1e-4)
     orders = [int(state.order[0]) for state in path_of(problem, stepper, stop)[2::2]]

@@ -83,6 +83,8 @@ class WearProblem:
         known before the test.
     growth : tuple of Growth
         How the strips of each realisation grow with its groove; none where they do not.
+    resolve_edges : bool
+        Whether implicit steps resolve the edges of contacts within a strip where they can.
     """
 
     grid: Grid
@@ -104,6 +106,7 @@ class WearProblem:
     passes_per_draw: float = 1.0
     quadrature_error: float = 0.0
     growth: tuple[Growth, ...] = ()
+    resolve_edges: bool = False
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -383,6 +386,19 @@ class WearProblem:
     def linear_wear(self) -> bool:
         """Whether wear is linear in the dissipation."""
         return all(factor is not None for factor in self.wear_factors.values())
+
+    @cached_property
+    def cylinder_wear_share(self) -> FloatArray:
+        """Part of the wear of a contact that is the cylinder's, shape (realisations, 1).
+
+        A half where wear is not linear in the dissipation.
+        """
+        if not self.linear_wear:
+            return np.full((self.shape[2], 1), 0.5)
+        factors, shares = self.wear_factors, self.wear_shares
+        cylinder, rollers = (shares[body].sum() * np.asarray(factors[body]) for body in BODIES)
+        every = np.maximum(cylinder + rollers / self.rollers, np.finfo(float).tiny)
+        return np.asarray(cylinder / every).reshape(-1, 1)
 
     @cached_property
     def wear_shares(self) -> dict[Body, FloatArray]:

@@ -117,7 +117,10 @@ def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamSta
     """
     fresh = fresh_state(problem)
     cleared = dict.fromkeys(
-        ("past_wear", "past_energy", "past_feedback", "past_spans", "order", "wear_exponents")
+        (
+            *("past_wear", "past_sums", "past_feedback", "past_spans", "order", "wear_exponents"),
+            *("separation", "part", "whole_steps"),
+        )
     )
     depth = moved_depth(state.cylinder_depth[old.places], old.along, new.along)
     found = state.replaced(

@@ -46,8 +46,11 @@ _AXES = {
     "decay": 0,
     "approach_factor": 2,
     "wear_exponents": 2,
+    "separation": 2,
+    "part": 2,
+    "whole_steps": 2,
     "past_wear": 2,
-    "past_energy": 1,
+    "past_sums": 2,
     "past_feedback": 3,
     "past_spans": 1,
     "order": 0,
@@ -113,11 +116,20 @@ class WearState:
         [m/N^(2/3)], where a load has a spring.
     wear_exponents : ndarray, shape (stations, contacts, realisations, strips), optional
         Exponent of the wear of a strip as a power of its line load, in the last implicit step.
+    separation : ndarray, shape (stations, contacts, realisations, strips), optional
+        Mean distance between the deformed surfaces in each strip, 0 in those wholly in contact [m];
+        None where the edge of a contact is not resolved within a strip, see `edges`.
+    part : ndarray, shape as `separation`, optional
+        Part of each strip that is in contact.
+    whole_steps : ndarray, shape as `separation`, optional
+        Steps since each strip has been wholly in contact, at most `edges.SETTLED`.
     past_wear : ndarray, shape (6, stations + rollers, realisations, strips), optional
         Wear per roller pass of cylinder and rollers [m], and divided differences of order 1 to 5 of
-        their depths over the exposure (see `implicit`) at the present and at past points.
-    past_energy : ndarray, shape (6, realisations), optional
-        The same of the energy [J].
+        their depths less separations over the exposure (see `implicit`) at the present and at past
+        points.
+    past_sums : ndarray, shape (6, sums, realisations), optional
+        The same of the energy [J] and, where edges of contacts are resolved within a strip, before
+        it of the sums of the depths of each body over the strips [m].
     past_feedback : ndarray, shape (6, stations, contacts, realisations), optional
         Part of the loads due to springs and terms [N], and its divided differences.
     past_spans : ndarray, shape (5, realisations), optional
@@ -154,8 +166,11 @@ class WearState:
     decay: FloatArray | None = None
     approach_factor: FloatArray | None = None
     wear_exponents: FloatArray | None = None
+    separation: FloatArray | None = None
+    part: FloatArray | None = None
+    whole_steps: FloatArray | None = None
     past_wear: FloatArray | None = None
-    past_energy: FloatArray | None = None
+    past_sums: FloatArray | None = None
     past_feedback: FloatArray | None = None
     past_spans: FloatArray | None = None
     order: IntArray | None = None

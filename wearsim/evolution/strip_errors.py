@@ -2,7 +2,7 @@
 
 A test is repeated on strips of twice the width, with a greater tolerance of its steps: the error
 accumulates in it as in the test, which contacts solved on coarse strips at a few times do not show.
-The error estimate is the difference of the two tests times a safety factor, less a quarter of the
+The error estimate is the difference of the two tests times a safety factor, less a part of the
 error estimate of the steps of the coarse test, which is usually several times its true error. A
 difference is three times the error of the test where that is proportional to the square of the
 width of the strips, and equal to it where strips that enter the contact one by one dominate, as
@@ -29,9 +29,10 @@ from wearsim.types import FloatArray, Grid
 
 LOOSER = 10.0  # tolerance of the coarse test over that of the test
 LOOSEST = 0.1  # greatest tolerance of a coarse test
-COVER = 0.5  # safety factor on the difference
-FRESH_COVER = 2.0  # the same before wear: later, wear reduces errors of the shape of a groove
-STEPS = 0.25  # part of the error estimate of the coarse steps that is subtracted from it
+# safety factors on the differences of depth, volume and profile; those before wear are greater:
+# later, wear reduces errors of the shape of a groove
+COVER, FRESH_COVER = np.array([[0.5], [0.6], [0.5]]), np.array([[1.25], [1.9], [1.5]])
+STEPS = 0.15  # part of the error estimate of the coarse steps that is subtracted from it
 LEAST = 0.1  # estimate over the difference, at least
 OF_PROFILE = 0.1  # estimate of depth and volume over that of the profile, both relative, at least
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered

@@ -214,17 +214,47 @@ def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearStat
     if state.loop_strips is not None:  # line loads; without a factorisation the loop begins again
         arrays["loop_strips"] = averaged(state.loop_strips, old, new)
         arrays["loop_strips"][1:] = 0.0
+    if state.separation is not None:
+        arrays |= _edges_on_grid(problem, state, old)
     columns: dict[str, Any] = {
         name: averaged(getattr(contacts, name), old, new)
         for name in ("line_load", "half_length", "dissipation")
     }
-    state = state.replaced(
-        **arrays, contacts=replace(contacts, y=new.y, **columns), **_auxiliary(problem, state, old)
-    )
+    contacts = replace(contacts, y=new.y, separation=None, **columns)
+    state = state.replaced(**arrays, contacts=contacts, **_auxiliary(problem, state, old))
     if abs(new.spacing / old.spacing - 1.0) < _ALIGNED:
         return state  # the added strips are without load
     solved = solve_present(problem, state, carried_loads(problem, state.contacts))
     return state.replaced(contacts=solved, solves=state.solves + problem.contacts_each)
+
+
+def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[str, FloatArray]:
+    """Return the fields of a state about the edges of contacts on the strips of a problem.
+
+    On added strips the surfaces are apart by the change of the gap beyond the old outer ones, and
+    come closer as there.
+    """
+    new, gap = problem.grid, problem.nominal_gap
+    assert state.separation is not None
+    assert state.past_sums is not None
+    arrays = {
+        name: averaged(getattr(state, name), old, new)
+        for name in ("separation", "part", "whole_steps")
+    }
+    past = averaged(np.asarray(state.past_wear), old, new)
+    inside = np.flatnonzero(shares(old, new).sum(axis=1) > 0.0)
+    for added, edge in (
+        (slice(0, inside[0]), inside[0]),
+        (slice(inside[-1] + 1, None), inside[-1]),
+    ):
+        beyond = gap[..., added] - gap[..., edge : edge + 1]
+        arrays["separation"][..., added] = arrays["separation"][..., edge : edge + 1] + beyond
+        past[1:, ..., added] = past[1:, ..., edge : edge + 1]
+    # strips partly in contact are not joined with others whole
+    arrays["whole_steps"] = np.where(arrays["part"] < 1.0, 0.0, np.floor(arrays["whole_steps"]))
+    ratio = old.spacing / new.spacing
+    sums = np.concatenate([ratio * state.past_sums[:, :-1], state.past_sums[:, -1:]], axis=1)
+    return arrays | {"past_wear": past, "past_sums": sums}
 
 
 def _auxiliary(problem: WearProblem, state: WearState, old: Grid) -> dict[str, WearState]:

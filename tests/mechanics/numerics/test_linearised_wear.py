@@ -20,10 +20,10 @@ def compared(load, old_load, wear, old_wear, exponents, greatest=1.0):
     both = np.stack([wear, np.zeros_like(wear)]), np.stack([old_wear, np.zeros_like(wear)])
     compliance, worn = np.empty((1, 1, 2, load.shape[1])), np.empty((2, 1, load.shape[1]))
     rows, base, opened = np.array([[0, 1]]), np.zeros_like(worn), np.empty_like(load)
-    constant = linearised_wear(old_load, both[1], exponents, rows, load, compliance, opened)
-    sizes = wear_of_bodies(
-        load, old_load, *both, compliance, constant, rows, base, greatest, exponents, worn
-    )
+    slopes = np.ones_like(load)
+    constant = linearised_wear(old_load, both[1], exponents, slopes, rows, load, compliance, opened)
+    arguments = load, old_load, *both, compliance, constant, rows, base, greatest, slopes
+    sizes = wear_of_bodies(*arguments, exponents, worn, np.empty_like(load))
     assert (worn[0] == wear).all()
     return exponents[0], sizes[:, 0]
 
@@ -31,7 +31,8 @@ def compared(load, old_load, wear, old_wear, exponents, greatest=1.0):
 def test_ratio_is_extended_to_strips_without_load():
     compliance = np.empty((1, 1, 2, 6))
     opened = np.empty_like(LOAD)
-    constant = linearised_wear(LOAD, WEAR, np.ones((1, 6)), ROWS, 7.0 * LOAD, compliance, opened)
+    ones = np.ones((1, 6))
+    constant = linearised_wear(LOAD, WEAR, ones, ones, ROWS, 7.0 * LOAD, compliance, opened)
     assert (opened == 7.0 * LOAD).all()
     assert compliance[0, 0, 0] == pytest.approx([2.0, 2.0, 3.0, 4.0, 5.0, 5.0])
     assert not compliance[0, 0, 1].any()
@@ -41,7 +42,8 @@ def test_ratio_is_extended_to_strips_without_load():
 def test_contact_without_load_has_no_compliance():
     compliance = np.empty((2, 1, 2, 3))
     none = np.zeros((2, 3))
-    linearised_wear(none, np.zeros((2, 2, 3)), np.ones((2, 3)), ROWS, none, compliance, none)
+    ones = np.ones((2, 3))
+    linearised_wear(none, np.zeros((2, 2, 3)), ones, ones, ROWS, none, compliance, none)
     assert not compliance.any()
 
 
@@ -50,7 +52,8 @@ def test_linearisation_has_value_and_slope_of_a_power_law():
     wear = np.stack([load**exponent, 2.0 * load**exponent])
     compliance = np.empty((1, 1, 2, 3))
     opened, gap = np.empty_like(load), np.array([[5.0, 4.0, 6.0]])
-    constant = linearised_wear(load, wear, np.full((1, 3), exponent), ROWS, gap, compliance, opened)
+    exponents, slopes = np.full((1, 3), exponent), np.ones((1, 3))
+    constant = linearised_wear(load, wear, exponents, slopes, ROWS, gap, compliance, opened)
     slope = compliance[0, 0]
     assert constant[:, 0] + slope * load == pytest.approx(wear[:, 0])
     assert opened == pytest.approx(gap + constant.sum(axis=0))
@@ -81,13 +84,15 @@ def test_contacts_on_one_body_add_their_wear():
     wear = np.array([[[1.0], [2.0]], [[10.0], [20.0]]])
     compliance, worn = np.empty((1, 2, 2, 1)), np.empty((3, 1, 1))
     constant = linearised_wear(
-        loads, wear, np.full((2, 1), 0.5), rows, loads, compliance, opened := np.empty((2, 1))
+        *(loads, wear, np.full((2, 1), 0.5), np.ones((2, 1)), rows, loads, compliance),
+        opened := np.empty((2, 1)),
     )
     # both contacts wear the first body
     assert opened.ravel().tolist() == [1.0 + 0.5 * (3.0 + 10.0), 2.0 + 0.5 * (3.0 + 20.0)]
     base = np.full((3, 1, 1), 100.0)
     sizes = wear_of_bodies(
-        loads, loads, wear, wear, compliance, constant, rows, base, 1.0, np.ones((2, 1)), worn
+        *(loads, loads, wear, wear, compliance, constant, rows, base, 1.0, np.ones((2, 1))),
+        *(np.ones((2, 1)), worn, np.empty((2, 1))),
     )
     assert worn.ravel().tolist() == [3.0, 10.0, 20.0]
     assert sizes[:, 0].tolist() == [0.0, 23.0, 223.0]

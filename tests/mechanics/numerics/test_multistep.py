@@ -48,7 +48,7 @@ class Solution:
 def errors_of(differences, spans, value, order):
     """Relative errors at each order, and the error of one solution at an order."""
     own = np.empty_like(value)
-    sizes = local_errors(differences, spans, value, np.array([order]), own)
+    sizes = local_errors(differences, spans, value, np.array([order]), np.ones_like(value), own)
     return sizes[:, 0], own
 
 
@@ -125,13 +125,13 @@ def chosen(sizes, order, part=1.0, aim=1.0, keep=0.9):
     spans = np.array([[1.0 + k] if k <= known else [np.inf] for k in range(ROWS - 1)])
     differences, value = np.zeros((ROWS, 1, 1, 1)), np.ones((1, 1, 1))
     differences[2:] = 1.0
-    unit = local_errors(differences, spans, value, np.array([order]), np.empty_like(value))
+    orders = np.array([order])
+    unit = local_errors(differences, spans, value, orders, value, np.empty_like(value))
     for k, size in enumerate(sizes):
         differences[k + 2] = size / unit[k, 0]
     orders, own = np.array([0]), np.empty_like(value)
-    found = next_steps(
-        differences, spans, value, np.array([order]), part * ONE, aim, keep, own, orders
-    )
+    arguments = differences, spans, value, np.array([order]), part * ONE, aim, keep, MAX_ORDER
+    found = next_steps(*arguments, value, own, orders)
     return found[0, 0], orders[0], found[1, 0]
 
 

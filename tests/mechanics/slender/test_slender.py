@@ -51,6 +51,7 @@ def solve(grid, gaps, loads, wear=None, start=None, lengths="coupled", found=Non
         line_load[None],
         approach[None],
         half_length[None],
+        np.zeros((1, count, n)),
         status,
         iterations,
     )

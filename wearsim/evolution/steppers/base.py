@@ -87,7 +87,9 @@ class Trial:
 
     def reject(self, failure: StepError | ContactError, step: float) -> None:
         """Propose a shorter step after one that failed."""
-        self._cause, self.proposed = failure, 0.2 * step
+        if self._cause is None or self._cause.cause != "lost":  # contacts fail close to zero load
+            self._cause = failure
+        self.proposed = 0.2 * step
         self.rejected += 1
 
     def accepts(self, excess: float, step: float, ratio: float) -> bool:

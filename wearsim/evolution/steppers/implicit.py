@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import NamedTuple
@@ -13,15 +14,26 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.contacts import at_least
 from wearsim.evolution.error_estimates import (
+    COVER as COVER_OF_DOUBLING,
+)
+from wearsim.evolution.error_estimates import (
+    DEPTH_EXPONENT,
+    VOLUME_EXPONENT,
     greatest_depth,
     with_pass_errors,
 )
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
-from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
+from wearsim.evolution.steppers.loads import (
+    abrupt_loads,
+    mean_force,
+    smooth_loads,
+    with_feedback,
+)
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.jit import kernel_input
@@ -37,22 +49,39 @@ from wearsim.mechanics.numerics.multistep import (
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SHARE = 0.5  # part of the tolerance that a step may add to the profiles
-COVER = np.array([[5.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
+COVER = np.array([[4.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
+# least errors of depth and profile, over that of the volume, all relative and with their factors: a
+# groove of wrong volume has the wrong depth and width, which further wear does not correct
+OF_VOLUME = 0.33, 0.5
 # of a step at a lower order, compared with other orders: the differences that a step leaves are
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
+# greatest order where edges are resolved within a strip: beyond the first derivative the wear of
+# strips that the edge has just crossed is not smooth, and pressures would overshoot
+EDGE_ORDER = 3
+# safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
+EDGES, OF_EDGES = 3.0, 5.0
+# safety factors of volume and profile, also those of step doubling, whose error of the volume is a
+# sum of absolute changes
+OF_STEPS = COVER[1:, 0].tolist()
+OF_STEPS_WITH_EDGES = [OF_EDGES * OF_STEPS[0], OF_STEPS[1]]
+DOUBLED = math.inf, COVER_OF_DOUBLING
+# the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
+# number, to a least part of itself at the second one
+ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
+LEAST_AIM_OF_ROWS = 0.7  # the same where rows of a log are shorter than a step
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
 
-_PAST = attrgetter("past_wear", "past_energy", "past_feedback", "past_spans", "order")
+_PAST = attrgetter("past_wear", "past_sums", "past_feedback", "past_spans", "order")
 
 
 class Past(NamedTuple):
     """Rates, differences and past points of a state; see `WearState`."""
 
     wear: FloatArray
-    energy: FloatArray
+    sums: FloatArray
     feedback: FloatArray | None
     spans: FloatArray
     order: IntArray
@@ -95,9 +124,12 @@ class ImplicitStepper(StepDoublingStepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        part, aim = (passes / stop) ** PART_EXPONENT, SHARE * self.tolerance
+        factors = OF_STEPS if state.part is None else OF_STEPS_WITH_EDGES
+        left = self._left(problem, state, stop, factors)
+        part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
-            past.wear, past.spans, depths, past.order, part, aim, KEEP, own, order
+            *(past.wear, past.spans, depths, past.order, part, aim, KEEP, _most(end)),
+            *(edges.parts_of_bodies(end), own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
         if step.min() <= WHOLE_PASSES:
@@ -107,6 +139,7 @@ class ImplicitStepper(StepDoublingStepper):
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, part, aim, KEEP)
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
+        over = over * left  # it shortens the next step
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
@@ -125,10 +158,14 @@ class ImplicitStepper(StepDoublingStepper):
         half, end = doubled.path
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        part = (end.passes / stop) ** PART_EXPONENT
+        left = self._left(problem, state, stop, DOUBLED)
+        if not problem.varying:  # many rows of a log average out within a step
+            left = np.where(doubled.varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
+        part = (end.passes / stop) ** PART_EXPONENT / left
         scale = part / self.tolerance
         over, ratio = next_steps(
-            past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, own, order
+            *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, _most(end)),
+            *(edges.parts_of_bodies(end), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
@@ -139,14 +176,52 @@ class ImplicitStepper(StepDoublingStepper):
         if unknown.any():
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
+        over = np.where(unknown, over, over * left)
         if self.forced_step is not None:  # steps of a fixed length may be too long for fourth order
             order = np.minimum(order, MAX_ORDER - 1)
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
         return Attempt((half, end.replaced(order=order, **others)), over, ratio)
 
+    def _left(
+        self, problem: WearProblem, state: WearState, stop: float, cover: Sequence[float]
+    ) -> FloatArray:
+        """Return the part of its usual error that a step aims at, by the errors before it, (N,).
+
+        Errors of the volume add up during a test if they have the same sign.
+
+        Parameters
+        ----------
+        problem : WearProblem
+        state : WearState
+            State at the start of the step.
+        stop : float
+            Passes at the end of the test.
+        cover : sequence of float
+            Safety factors that the errors of volume and profile of the state contain.
+        """
+        volumes = _volumes(problem, state.stacked).tolist()
+        _, *fixed = state.irreducible
+        errors = (state.volume_error - fixed[0]).tolist(), (state.profile_error - fixed[1]).tolist()
+        low, high = ADDED_UP
+        found = []
+        columns = state.passes.tolist(), volumes, *errors
+        for passes, volume, of_volume, of_profile in zip(*columns, strict=True):
+            grown, worst = passes / stop, 0.0
+            if volume > 0.0:
+                worst = of_volume / (volume * cover[0]) * grown**VOLUME_EXPONENT
+                worst = max(worst, of_profile / cover[1] * grown**DEPTH_EXPONENT)
+            part = (high - worst / self.tolerance) / (high - low)
+            found.append(min(max(part, LEAST_AIM), 1.0))
+        return np.array(found)
+
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
         return implicit_step
+
+
+def _volumes(problem: WearProblem, depths: FloatArray) -> FloatArray:
+    """Return the volume of depths of all bodies, as `WearState.stacked`, (realisations,) [m^3]."""
+    return np.asarray((problem.volume_weights[1][:, None] * depths.sum(axis=-1)).sum(axis=0))
 
 
 def _estimates(
@@ -176,9 +251,10 @@ def _estimates(
     stiffness = np.zeros(shape[0])
     if problem.has_spring:
         stiffness = np.broadcast_to(problem.stiffness, problem.shape).flatten()
+    crossed = edges.crossed_strips(end)
     errors, sizes = carried_errors(
         np.asarray(start.stepping_error),
-        added,
+        added if crossed is None else edges.with_sum(end, added, crossed),
         contacts.line_load,
         problem.wear_parts(contacts, passes).reshape(2, *shape),
         np.asarray(end.wear_exponents).reshape(shape),
@@ -193,8 +269,18 @@ def _estimates(
     if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
+    if crossed is not None:
+        at_edges = np.where(crossed, EDGES * added, 0.0)
+        sizes[2] = np.hypot(
+            sizes[2], np.sqrt((at_edges**2).sum(axis=(0, 2)) / edges.squares(depths))
+        )
+        sizes[:2] *= OF_EDGES
     found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
+    worn = _volumes(problem, depths)
+    relative = found[1] / np.where(worn > 0.0, worn, np.inf)
+    found[0] = np.maximum(found[0], OF_VOLUME[0] * relative * depths.max(axis=(0, 2)))
+    found[2] = np.maximum(found[2], OF_VOLUME[1] * relative)
     depth, volume, profile = found + end.irreducible
     return {
         "stepping_error": errors,
@@ -220,9 +306,14 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, exposure)
     wear, energy = _wear_per_pass(here, state.contacts)
+    of_edges: dict[str, FloatArray | None] = {"separation": None, "part": None, "whole_steps": None}
+    if edges.resolves_edges(problem, state.contacts):
+        of_edges |= edges.starting_edges(problem, state.contacts)
+    sums = _sums_per_pass(wear if of_edges["part"] is not None else None, energy)
     return state.replaced(
+        **of_edges,
         past_wear=_starting(wear, exposure),
-        past_energy=_starting(energy, exposure),
+        past_sums=_starting(sums, exposure)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
@@ -251,6 +342,17 @@ def _energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> Fl
     """Return the energy that all contacts dissipate in a roller pass, shape (N,) [J]."""
     power = problem.total_power(problem.values_of(contacts, "power"))
     return np.asarray(power / problem.kinematics.pass_rate)
+
+
+def _most(state: WearState) -> int:
+    """Return the greatest order of steps from a state."""
+    return MAX_ORDER if state.part is None else EDGE_ORDER
+
+
+def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
+    """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
+    sums = energy[None] if wear is None else np.concatenate([wear.sum(axis=-1), energy[None]])
+    return np.asarray(sums[..., None])
 
 
 @dataclass(frozen=True)
@@ -308,7 +410,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     as the depths, so that Archard's wear law holds to round-off. Passes are counted one by one: the
     formula is applied to the depths half a pass later, ``u + f/2`` with the wear per pass f, whose
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
-    decrease, or contact would be lost, is repeated at first order.
+    decrease is repeated at second order, and at first order if they still decrease; so is one in
+    which contact would be lost. A step in which the load jumps is of first order. The state
+    returned has the order of its formula.
 
     Raises
     ------
@@ -320,6 +424,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = _conditions(here, problem, state, passes)
     order = Past.of(state).order
+    if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
+        order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:
         end, decreased = _step(here, state, passes, conditions, order)
     except StepError:
@@ -327,12 +433,14 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         if len(order) > 1 or order[0] == 1:
             raise
         return _step(here, state, passes, conditions, np.ones_like(order))[0]
-    again: IntArray = (decreased & (order > 1)).nonzero()[0]
-    if again.size:
-        conditions = _Conditions(*(column[..., again] for column in vars(conditions).values()))
-        some = here.at(again), state.at(again), passes[again]
-        part, _ = _step(*some, conditions, np.ones_like(again))
-        end = end.with_others(again, part)
+    # strips that leave the contact: their depth can decrease from the third order on
+    for lower in (2, 1) if np.count_nonzero(decreased) else ():
+        again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
+        if again.size:
+            columns = (column[..., again] for column in vars(conditions).values())
+            some = here.at(again), state.at(again), passes[again], _Conditions(*columns)
+            part, decreased[again] = _step(*some, np.full_like(again, lower))
+            end = end.with_others(again, part)
     return end
 
 
@@ -348,25 +456,29 @@ def _step(
     Both have one entry per realisation, as has `order`.
     """
     realisations, start, past = len(passes), state.stacked, Past.of(state)
+    level = start if state.separation is None else start - edges.separated_bodies(problem, state)
     half_pass = np.where(passes > WHOLE_PASSES, 0.5, 0.0)
     weights = np.empty((2, ROWS, realisations))
     factor, spans = np.empty(realisations), np.empty((ROWS - 1, realisations))
     formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
     added, guess = extrapolated(weights, past.wear)
-    old_energy = past.energy[:, None, :, None]
-    energy = extrapolated(weights, old_energy)[0]
+    old_sums = past.sums[..., None]
+    sums = extrapolated(weights, old_sums)[0]
     feedback = None
     if past.feedback is not None:
         old = past.feedback.reshape(ROWS, -1, realisations, 1)
         feedback = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
         feedback = feedback.reshape(problem.shape)
-    base = start + added
-    step = EndOfStep(problem, state, base, conditions.force, passes, worn_passes)
-    end, worn, feedback = step.solved(start + guess, feedback)
-    rate = _energy_per_pass(problem, end.contacts)[None, :, None]
-    energy = energy + worn_passes[:, None] * rate
-    new_energy = new_differences(rate, energy, half_pass, old_energy, spans)
+    step = EndOfStep(problem, state, level + added, added, conditions.force, passes, worn_passes)
+    end, worn, feedback, parts = step.solved(level + guess, feedback)
+    rates, change = worn / worn_passes[:, None], added + worn
+    energy_rate = _energy_per_pass(problem, end.contacts)
+    sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
+    sums = sums + worn_passes[:, None] * sum_rates
+    if parts is not None:
+        end = edges.with_volume(end, parts, sums[:-1, :, 0] - (end.stacked - start).sum(axis=-1))
+        change = end.stacked - edges.separated_bodies(problem, end) - level
     past_feedback = None
     if feedback is not None:
         new = feedback.reshape(-1, realisations, 1)
@@ -374,13 +486,12 @@ def _step(
         past_feedback = past_feedback.reshape(ROWS, *problem.shape)
     end = end.replaced(
         passes=state.passes + passes,
-        energy=state.energy + energy[0, :, 0],
-        past_wear=new_differences(
-            worn / worn_passes[:, None], added + worn, half_pass, past.wear, spans
-        ),
-        past_energy=new_energy[:, 0, :, 0],
+        energy=state.energy + sums[-1, :, 0],
+        past_wear=new_differences(rates, change, half_pass, past.wear, spans),
+        past_sums=new_differences(sum_rates, sums, half_pass, old_sums, spans)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
+        order=order,
     )
-    decreased = (base + worn < start).any(axis=(0, 2)) | (energy[0, :, 0] < 0.0)
+    decreased = (end.stacked < start).any(axis=(0, 2)) | (sums[-1, :, 0] < 0.0)
     return end, decreased

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
+from wearsim.evolution.steppers.edges import edges_of_step
 from wearsim.evolution.steppers.loads import (
     APPROACH_EXPONENT,
     advanced_terms,
@@ -20,6 +22,13 @@ from wearsim.evolution.steppers.loads import (
     with_feedback,
 )
 from wearsim.evolution.steppers.single_step import REALISATION, carried_loads
+from wearsim.mechanics.numerics.edge_strips import (
+    EdgeStrips,
+    compare_edges,
+    end_edges,
+    linearise_edges,
+)
+from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
 from wearsim.plugins import SharedWear
 from wearsim.types import BoolArray, FloatArray
@@ -68,6 +77,27 @@ class _Slope:
         return self._exponent
 
 
+class Solved(NamedTuple):
+    """Solution of an implicit step.
+
+    Parameters
+    ----------
+    end : WearState
+        Depths, contacts, load terms and number of solves at the end.
+    worn : ndarray, shape (stations + rollers, realisations, strips)
+        Wear of the bodies by the formula [m].
+    feedback : ndarray, shape (stations, contacts, realisations), optional
+        Part of the loads due to springs and load terms, in equilibrium with them [N].
+    parts : ndarray, shape (stations + rollers, realisations, strips), optional
+        Part of each strip that is in contact, where edges are resolved within a strip.
+    """
+
+    end: WearState
+    worn: FloatArray
+    feedback: FloatArray | None
+    parts: FloatArray | None
+
+
 @dataclass(frozen=True)
 class EndOfStep:
     """Equations of an implicit step: depths ``base + wear of worn_passes at the end``.
@@ -78,8 +108,8 @@ class EndOfStep:
         Problem with every process at its value for the step.
     start : WearState
         State at the start of the step.
-    base : ndarray, shape (stations + rollers, realisations, strips)
-        Depths without the wear at the end [m].
+    base, added : ndarray, shape (stations + rollers, realisations, strips)
+        Depths without the wear at the end, and what they exceed those of the start by [m].
     force : ndarray, shape (realisations,) or (stations, 1, realisations)
         Load before feedback [N].
     passes : ndarray, shape (realisations,)
@@ -91,13 +121,12 @@ class EndOfStep:
     problem: WearProblem
     start: WearState
     base: FloatArray
+    added: FloatArray
     force: FloatArray
     passes: FloatArray
     worn_passes: FloatArray
 
-    def solved(
-        self, guess: FloatArray, feedback: FloatArray | None
-    ) -> tuple[WearState, FloatArray, FloatArray | None]:
+    def solved(self, guess: FloatArray, feedback: FloatArray | None) -> Solved:
         """Solve contacts, wear and loads together.
 
         The wear enters the contact problem as a compliance: it is linearised in the line load about
@@ -114,12 +143,7 @@ class EndOfStep:
 
         Returns
         -------
-        end : WearState
-            Depths, contacts, load terms and number of solves at the end.
-        worn : ndarray
-            Wear of the bodies, shape as `base` [m].
-        feedback : ndarray, optional
-            That part, in equilibrium with springs and load terms.
+        Solved
 
         Raises
         ------
@@ -134,23 +158,29 @@ class EndOfStep:
             loads = np.maximum(prescribed + feedback, LEAST_GUESS * np.minimum(prescribed, before))
         target = loads
         stations, depths, contacts = problem.shape[0], guess, start.contacts
+        edges = edges_of_step(problem, start, self.base, self.added)
         gap = problem.gap(*separated(self.base, stations))
+        level = guess[problem.body_rows].sum(axis=1).reshape(-1, problem.grid.strips)
         # line loads and wear about which the wear is linearised
         line_load, wear = contacts.line_load, self._parts(contacts)
         shape = line_load.shape
         exponents = np.asarray(start.wear_exponents).reshape(shape)
         active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
         iterations = np.zeros(len(active), dtype=np.int64)
+        gaps, slopes, linear = gap.reshape(shape).copy(), np.ones(shape), np.empty(shape)
         worn = np.empty_like(self.base)
         for iteration in range(1, MAX_FIXED_POINT + 1):
+            if edges is not None:
+                linearise_edges(edges, level, wear, gaps, slopes)
             opened = np.empty(shape)
             compliance = np.empty((len(active), len(problem.bodies), 2, shape[1]))
             constant = linearised_wear(
                 line_load,
                 wear,
                 exponents,
+                slopes,
                 problem.body_rows,
-                gap.reshape(shape),
+                gaps,
                 compliance,
                 opened,
             )
@@ -169,9 +199,18 @@ class EndOfStep:
                 problem.body_rows,
                 self.base,
                 MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT,
+                slopes,
                 exponents,
                 worn,
+                linear,
             )
+            if edges is not None:
+                assert solved.separation is not None
+                apart, load = kernel_input(solved.separation), kernel_input(solved.line_load)
+                of_edges = compare_edges(
+                    edges, active, gaps, slopes, linear, apart, load, new, level
+                )
+                rest = np.maximum(rest, of_edges)
             if np.count_nonzero(active) < len(active):  # of realisations that have converged
                 each = exponents.reshape(-1, len(active), shape[1])
                 each[:, ~active] = known.reshape(each.shape)[:, ~active]
@@ -195,16 +234,21 @@ class EndOfStep:
             converged = CONVERGED * problem.iteration_tolerance * relaxation
             active &= ~(change <= converged * depth)
             if not np.count_nonzero(active):
+                parts = None
+                if edges is not None:
+                    depths, parts, edge_state = self._ended(edges, level, solved, new, worn)
                 cylinder, roller = separated(depths, stations)
                 end = start.replaced(
                     cylinder_depth=cylinder,
                     roller_depth=roller,
+                    **({} if edges is None else edge_state),
                     solves=start.solves + iterations * problem.contacts_each,
                     contacts=solved,
                     terms=self._terms(solved),
                     wear_exponents=exponents.reshape(*problem.shape, -1),
                 )
-                return end, worn, None if feedback is None else target - prescribed
+                feedback = None if feedback is None else target - prescribed
+                return Solved(end, worn, feedback, parts)
             contacts, loads = solved, target
             if iteration < DAMPED_FROM:
                 line_load, wear = solved.line_load, new
@@ -215,6 +259,22 @@ class EndOfStep:
             f" not converge (last relative change {(change / depth).max():.1e})",
             start.to_arrays(),
         )
+
+    def _ended(
+        self,
+        edges: EdgeStrips,
+        level: FloatArray,
+        solved: ContactBatchSolution,
+        wear: FloatArray,
+        worn: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Return depths, `Solved.parts`, and fields of the state at the end of the step."""
+        depths, parts = np.empty_like(worn), np.empty_like(worn)
+        ended = np.empty((3, *level.shape))
+        end_edges(edges, level, solved.line_load, wear, worn, depths, parts, ended)
+        separation, part, whole_steps = ended.reshape(3, *self.problem.shape, -1)
+        fields = {"separation": separation, "part": part, "whole_steps": whole_steps}
+        return depths, parts, fields
 
     def _parts(self, contacts: ContactBatchSolution) -> FloatArray:
         """Return the contributions of the contacts to the wear, shape (2, contacts, strips) [m]."""

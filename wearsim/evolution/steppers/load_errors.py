@@ -8,7 +8,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import HERTZ, WearState
 from wearsim.evolution.steppers.loads import elastic_approaches, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement
-from wearsim.mechanics.numerics.multistep import ROWS, next_steps
+from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
 from wearsim.types import FloatArray, IntArray
 
 LEAST_LOAD = 0.01  # of the load without feedback; the error of smaller loads is compared with it
@@ -50,7 +50,7 @@ def next_steps_of_loads(
     relative = (feedback / scale).reshape(ROWS, -1, scale.shape[-1], 1)
     order, own = np.empty_like(orders), np.empty(relative.shape[1:])
     ones = np.ones_like(own)
-    found = next_steps(relative, spans, ones, orders, part, aim, keep, own, order)
+    found = next_steps(relative, spans, ones, orders, part, aim, keep, MAX_ORDER, ones, own, order)
     errors = np.abs(own.reshape(scale.shape) * scale)
     springs = np.broadcast_to(problem.stiffness, scale.shape)
     displaced = np.divide(errors, springs, out=np.zeros_like(errors), where=springs > 0.0)

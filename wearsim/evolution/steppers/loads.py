@@ -15,6 +15,7 @@ from wearsim.evolution.state import HERTZ, Depths, WearState
 from wearsim.types import BoolArray, FloatArray
 
 TREND = 0.9  # part of the variance of a smooth load that its linear trend explains
+ABRUPT = 0.05  # standard deviation within a step, over the mean, that is taken as that of a jump
 APPROACH_EXPONENT = 0.75  # approach as a power of the load: 2/3 in a Hertzian contact, 1 in a flat
 
 
@@ -86,6 +87,7 @@ def checked_loads(state: WearState, loads: FloatArray) -> FloatArray:
             f" {loads.min():.4g} N; the spring has run out of travel, or the recorded load or a"
             " random input falls to zero",
             {"normal_force": loads, "passes": state.passes},
+            cause="lost",
         )
     return loads
 
@@ -159,6 +161,14 @@ def smooth_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) ->
     middle, change = 0.5 * (loads[0] + loads[1]), np.abs(loads[1] - loads[0])
     trend = np.square(change) > TREND * 12.0 * np.square(deviation)
     return np.asarray(trend & (deviation > 0.0) & (change < middle))
+
+
+def abrupt_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) -> BoolArray:
+    """Return whether each load before feedback varies by more than a trend; as `smooth_loads`."""
+    start, stop = problem.time(first), problem.time(first + passes)
+    deviation = values_between([load.deviation for load in problem.loads], start, stop)
+    mean = values_between([load.mean for load in problem.loads], start, stop)
+    return np.asarray((deviation > ABRUPT * mean) & ~smooth_loads(problem, first, passes))
 
 
 def corrected_loads(

@@ -23,7 +23,7 @@ from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.loads import (
     elastic_approach,
 )
-from wearsim.types import FloatArray
+from wearsim.types import BoolArray, FloatArray
 
 # least error of the greatest depth over that of the profile; it is about 0.6 times that one except
 # where the difference crosses zero
@@ -40,11 +40,14 @@ class Doubled:
         States in the middle and at the end.
     added, reached : ndarray, shape (3, realisations)
         Errors, as of `sizes`, that the step adds and those at its end.
+    varies : ndarray of bool, shape (realisations,)
+        Whether load or inputs vary within the step other than by a trend that the scheme follows.
     """
 
     path: tuple[WearState, WearState]
     added: FloatArray
     reached: FloatArray
+    varies: BoolArray
 
 
 class StepDoublingStepper(Stepper):
@@ -102,10 +105,10 @@ class StepDoublingStepper(Stepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         after = end.stacked - coarse.stacked
         change = after - (state.stacked - coarse_start.stacked)
-        cover = np.full((3, len(step)), COVER)
+        varies = np.zeros(len(step), dtype=np.bool_)
         if bias is not None:
-            varies = sum(np.count_nonzero(worn, axis=(0, 1, 3)) for worn in bias[0])
-            cover = cover * np.where(np.asarray(varies) > 0, VARYING_COVER, 1.0)
+            varies = np.asarray(sum(np.count_nonzero(b, axis=(0, 1, 3)) for b in bias[0])) > 0
+        cover = COVER * np.where(varies, VARYING_COVER, 1.0)
         added, reached = (cover * np.abs(sizes(problem, end, one)) for one in (change, after))
         auxiliary = {
             name: solution.replaced(
@@ -127,7 +130,7 @@ class StepDoublingStepper(Stepper):
             profile_error=reached[2] + fixed[2],
             **auxiliary,
         )
-        return Doubled((half, end), added, reached)
+        return Doubled((half, end), added, reached, varies)
 
     def excess(
         self, problem: WearProblem, state: WearState, doubled: Doubled, stop: float

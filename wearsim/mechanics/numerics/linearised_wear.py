@@ -21,6 +21,7 @@ def linearised_wear(
     line_load: FloatArray,
     wear: FloatArray,
     exponents: FloatArray,
+    slopes: FloatArray,
     bodies: IntArray,
     gap: FloatArray,
     compliance: FloatArray,
@@ -28,7 +29,8 @@ def linearised_wear(
 ) -> FloatArray:
     """Linearise the wear u of each strip about its line load q_0.
 
-    u = (1 - e) u_0 + e (u_0/q_0) q, with the exponent e of u ~ q^e.
+    u = (1 - e) u_0 + e (u_0/q_0) q, with the exponent e of u ~ q^e. In a strip partly in contact
+    the gap there opens by u over the slope s of the mean wear, see `steppers.edges`.
 
     Parameters
     ----------
@@ -38,19 +40,21 @@ def linearised_wear(
         Depth u_0 that each contact wears off its two bodies [m].
     exponents : ndarray, shape (contacts, strips)
         Exponent e.
+    slopes : ndarray, shape (contacts, strips)
+        Slope s, infinite in strips that do not wear.
     bodies : ndarray of int, shape (contacts each, 2)
         Numbers of the two bodies of each contact, less than twice the number of contacts.
     gap : ndarray, shape (contacts, strips)
         Gap without this wear [m].
     compliance : ndarray, shape (realisations, contacts each, 2, strips)
-        Result: e u_0/q_0 [m/(N/m)]; u_0/q_0 is interpolated to strips without load.
+        Result: e u_0/(s q_0) [m/(N/m)]; u_0/q_0 is interpolated to strips without load.
     opened : ndarray, shape (contacts, strips)
         Result: gap opened by the constant part of the wear of all contacts [m].
 
     Returns
     -------
     ndarray, shape (2, contacts, strips)
-        The constant part (1 - e) u_0 [m].
+        The constant part (1 - e) u_0/s [m].
     """
     contacts, n = line_load.shape
     realisations = len(compliance)
@@ -65,7 +69,7 @@ def linearised_wear(
         for side in range(2):
             last = -1
             for i in range(n):
-                constant[side, k, i] = (1.0 - exponents[k, i]) * wear[side, k, i]
+                constant[side, k, i] = (1.0 - exponents[k, i]) * wear[side, k, i] / slopes[k, i]
                 worn[bodies[c, side], v, i] += constant[side, k, i]
                 if not line_load[k, i] > 0.0:
                     continue
@@ -79,7 +83,7 @@ def linearised_wear(
             for j in range(last + 1, n):
                 compliance[v, c, side, j] = compliance[v, c, side, last] if last >= 0 else 0.0
             for i in range(n):
-                compliance[v, c, side, i] *= exponents[k, i]
+                compliance[v, c, side, i] *= exponents[k, i] / slopes[k, i]
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for i in range(n):
@@ -98,8 +102,10 @@ def wear_of_bodies(
     bodies: IntArray,
     base: FloatArray,
     greatest: float,
+    slopes: FloatArray,
     exponents: FloatArray,
     worn: FloatArray,
+    linear: FloatArray,
 ) -> FloatArray:
     """Add the wear of all contacts, and compare it with that linearised about another solution.
 
@@ -117,10 +123,14 @@ def wear_of_bodies(
         Depths without this wear [m].
     greatest : float
         Upper bound of the exponents.
+    slopes : ndarray, shape (contacts, strips)
+        As in `linearised_wear`.
     exponents : ndarray, shape (contacts, strips)
         Updated by the two solutions in strips whose load has changed.
     worn : ndarray, shape (bodies, realisations, strips)
         Result: wear of the bodies [m].
+    linear : ndarray, shape (contacts, strips)
+        Result: opening of the gaps by the linearised wear [m].
 
     Returns
     -------
@@ -130,19 +140,19 @@ def wear_of_bodies(
     """
     contacts, n = loads.shape
     rows, realisations = worn.shape[0], worn.shape[1]
-    rest = np.empty((rows, realisations, n))
+    part, scaled = np.empty((rows, realisations, n)), np.empty((rows, realisations, n))
     for b in range(rows):
         for v in range(realisations):
             for i in range(n):
-                worn[b, v, i] = rest[b, v, i] = 0.0
+                worn[b, v, i] = part[b, v, i] = scaled[b, v, i] = 0.0
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for side in range(2):
             body = bodies[c, side]
             for i in range(n):
-                linear = constant[side, k, i] + compliance[v, c, side, i] * loads[k, i]
                 worn[body, v, i] += wear[side, k, i]
-                rest[body, v, i] += wear[side, k, i] - linear
+                scaled[body, v, i] += wear[side, k, i] / slopes[k, i]
+                part[body, v, i] += constant[side, k, i] + compliance[v, c, side, i] * loads[k, i]
         for i in range(n):
             new, old = wear[0, k, i] + wear[1, k, i], old_wear[0, k, i] + old_wear[1, k, i]
             if not (new > 0.0 and old > 0.0):
@@ -159,7 +169,11 @@ def wear_of_bodies(
             for i in range(n):
                 opening = worn[one, v, i] + worn[other, v, i]
                 depth = base[one, v, i] + base[other, v, i] + opening
-                difference = max(difference, abs(rest[one, v, i] + rest[other, v, i]))
+                opened = part[one, v, i] + part[other, v, i]
+                k = c * realisations + v
+                linear[k, i] = opened
+                rest = scaled[one, v, i] + scaled[other, v, i] - opened
+                difference = max(difference, abs(rest) * min(slopes[k, i], 1.0))
                 greatest_opening = max(greatest_opening, opening)
                 deepest = max(deepest, depth)
         sizes[0, v], sizes[1, v] = difference, greatest_opening
@@ -323,9 +337,10 @@ def compile_linearised_wear() -> None:
     """Compile the kernels of a step by a call for one contact of one strip."""
     strip, wear, worn = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     compliance, rows = np.ones((1, 1, 2, 1)), np.array([[0, 1]])
-    constant = linearised_wear(strip, wear, strip, rows, strip, compliance, np.ones((1, 1)))
+    constant = linearised_wear(strip, wear, strip, strip, rows, strip, compliance, np.ones((1, 1)))
     wear_of_bodies(
-        strip, strip, wear, wear, compliance, constant, rows, worn, 1.0, np.ones((1, 1)), worn
+        *(strip, strip, wear, wear, compliance, constant, rows),
+        *(worn, 1.0, strip, np.ones((1, 1)), worn, np.ones((1, 1))),
     )
     one = np.ones(1)
     carried_errors(

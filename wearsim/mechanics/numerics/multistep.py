@@ -156,6 +156,7 @@ def local_errors(
     spans: FloatArray,
     depths: FloatArray,
     orders: IntArray,
+    parts: FloatArray,
     errors: FloatArray,
 ) -> FloatArray:
     """Return the relative error that the last step has added at each order.
@@ -169,6 +170,8 @@ def local_errors(
         Values at the present point.
     orders : ndarray of int, shape (solutions,)
         Order of the step.
+    parts : ndarray, shape (rows, solutions, columns)
+        Part of each error that counts, 0 to 1.
     errors : ndarray, shape (rows, solutions, columns)
         Result: error at this order, computed less true values.
 
@@ -199,9 +202,10 @@ def local_errors(
             factor = product / (inverse + 1.0 / spans[k + 1, v])
             for r in range(rows):
                 for i in range(columns):
-                    total += differences[k + 2, r, v, i] * differences[k + 2, r, v, i]
+                    change = parts[r, v, i] * differences[k + 2, r, v, i]
+                    total += change * change
                     if k < orders[v]:
-                        errors[r, v, i] = factor * differences[k + 2, r, v, i]
+                        errors[r, v, i] = factor * change
             sizes[k, v] = np.sqrt(total / size) * factor if size > 0.0 else 0.0
     return sizes
 
@@ -215,6 +219,8 @@ def next_steps(
     part: FloatArray,
     aim: float,
     keep: float,
+    most: int,
+    parts: FloatArray,
     errors: FloatArray,
     next_orders: IntArray,
 ) -> FloatArray:
@@ -230,6 +236,10 @@ def next_steps(
     keep : float
         Part of the length of a step at a lower order that is compared with those at other orders:
         below one, the order is lowered for clearly longer steps only.
+    most : int
+        Greatest order of the next step, at most `MAX_ORDER`.
+    parts : ndarray, shape (rows, solutions, columns)
+        As of `local_errors`.
     errors : ndarray, shape (rows, solutions, columns)
         Result: error of the step, as of `local_errors`.
     next_orders : ndarray of int, shape (solutions,)
@@ -241,7 +251,7 @@ def next_steps(
         Error of the step relative to the greatest accepted one, zero where it is unknown, and
         ratio of the next step to it.
     """
-    sizes = local_errors(differences, spans, depths, orders, errors)
+    sizes = local_errors(differences, spans, depths, orders, parts, errors)
     found = np.empty((2, len(part)))
     for v in range(len(part)):
         known, order = 0, orders[v]
@@ -251,6 +261,7 @@ def next_steps(
         excess, ratio, best, longest = 0.0, 0.0, 1, 0.0
         if known > 0:
             excess = sizes[min(order, known) - 1, v] / LIMIT
+        known = min(known, most)
         for other in range(max(1, order - 1), min(order + 1, known) + 1):
             size = SAFETY * max(sizes[other - 1, v], 1e-12) ** (-1.0 / (other + 1))
             worth = keep * size if other < order else size
@@ -258,7 +269,7 @@ def next_steps(
                 longest, ratio, best = worth, size, other
         if known == 0:
             best, ratio = order, GROW[0]
-        elif order + 1 > known and order < MAX_ORDER and excess <= 1.0:
+        elif order + 1 > known and order < most and excess <= 1.0:
             best = order + 1  # the first steps have no estimate of the next order
         next_orders[v] = best
         found[0, v], found[1, v] = excess, min(ratio, GROW[best - 1])
@@ -273,7 +284,9 @@ def compile_multistep() -> None:
     formulas(spans, one, order, one, weights, np.empty(1), np.empty((ROWS - 1, 1)))
     extrapolated(weights, differences)
     new_differences(value, value, one, differences, spans)
-    next_steps(differences, spans, value, order, one, 1.0, 1.0, np.empty((1, 1, 1)), order.copy())
+    errors = np.empty((1, 1, 1))
+    arguments = differences, spans, value, order, one, 1.0, 1.0, MAX_ORDER
+    next_steps(*arguments, value, errors, order.copy())
 
 
 compile_alongside("solve_slender", compile_multistep)

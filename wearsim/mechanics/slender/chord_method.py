@@ -374,6 +374,7 @@ def solve_fully(
         line_load,
         approach,
         np.empty((1, 1, n)),
+        np.empty((1, 1, n)),
         status[0],
         status[1],
     )

@@ -171,6 +171,35 @@ def check_convergence(
 
 
 @subroutine
+def fill_separation(
+    k: int,
+    gap: FloatArray,
+    approach: float,
+    line_load: FloatArray,
+    state: NewtonState,
+    separation: FloatArray,
+) -> None:
+    """Fill the distance between the deformed surfaces of contact `k` in strips without load.
+
+    Strips that are not followed have the displacement of the nearest one that is.
+
+    Parameters
+    ----------
+    gap, line_load, separation : ndarray, shape (contacts, strips)
+        Gap [m], q [N/m] and the result [m].
+    approach : float
+        Approach relative to the least gap [m].
+    """
+    first, last = state.left[k], state.right[k] - 1
+    for i in range(gap.shape[1]):
+        near = min(max(i, first), last)
+        beyond = gap[k, i] - gap[k, near]
+        separation[k, i] = max(state.surface[k, near] + beyond - approach, 0.0)
+        if line_load[k, i] > 0.0:
+            separation[k, i] = 0.0
+
+
+@subroutine
 def fill_log_scales(
     contact_modulus: float,
     longitudinal_curvature: FloatArray,
@@ -198,6 +227,7 @@ def solve_slender(
     line_load: FloatArray,
     approach: FloatArray,
     half_length: FloatArray,
+    separation: FloatArray,
     status: IntArray,
     iterations: IntArray,
 ) -> None:
@@ -233,6 +263,8 @@ def solve_slender(
         Starting approaches; overwritten with delta [m].
     half_length : ndarray, shape (sets, contacts, strips)
         Filled: a [m].
+    separation : ndarray, shape (sets, contacts, strips)
+        Filled: distance between the deformed surfaces in strips without load [m].
     status, iterations : ndarray of int, shape (sets,)
         Filled: CONVERGED or the cause of failure; iterations of Newton's method.
     """
@@ -365,6 +397,7 @@ def solve_slender(
             if outcome == CONVERGED:
                 fill_half_lengths(spacing, total, lengths, half_length[number])
                 for k in range(contacts):
+                    fill_separation(k, gap[number], delta[k], total, state, separation[number])
                     delta[k] += lowest[k]
                 break
     if bodies is not None:

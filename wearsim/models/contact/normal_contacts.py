@@ -64,8 +64,9 @@ class NormalContacts(NamedTuple):
         Gap [m].
     longitudinal_curvature, loads : ndarray, shape (sets, contacts)
         Relative curvature along rolling [1/m] and loads [N].
-    line_load, half_length : ndarray, shape (sets, contacts, strips)
-        Output: q [N/m], whose values on entry are the initial guess, and a [m].
+    line_load, half_length, separation : ndarray, shape (sets, contacts, strips)
+        Output: q [N/m], whose values on entry are the initial guess, a [m], and the distance
+        between the surfaces in strips without load [m].
     approach : ndarray, shape (sets, contacts)
         Output: approach [m], whose values on entry are the initial guess.
     status, iterations : ndarray of int, shape (sets, contacts)
@@ -78,6 +79,7 @@ class NormalContacts(NamedTuple):
     line_load: FloatArray
     approach: FloatArray
     half_length: FloatArray
+    separation: FloatArray
     status: IntArray
     iterations: IntArray
 
@@ -100,6 +102,7 @@ class NormalContacts(NamedTuple):
             kernel_input(batch.normal_force).reshape(shape),
             line_load,
             approach,
+            np.zeros(wide),
             np.zeros(wide),
             status,
             iterations,
@@ -166,6 +169,7 @@ class NormalContacts(NamedTuple):
             self.line_load,
             self.approach,
             self.half_length,
+            self.separation,
             status,
             iterations,
         )

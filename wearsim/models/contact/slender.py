@@ -106,11 +106,12 @@ class Slender(StripModel):
         normal = self._solve_normal(batch, wear_compliance, coupling, warm)
         line_load = normal.line_load.reshape(batch.gap.shape)
         half_length = normal.half_length.reshape(batch.gap.shape)
+        separation = normal.separation.reshape(batch.gap.shape)
         approach = normal.approach.reshape(len(batch))
         iterations = normal.iterations.ravel()
         free = batch.bearing_torque is not None
         if not isinstance(self.theory, StripTheory) or (free and not batch.mean_radius):
-            return solved_one_by_one(
+            one_by_one = solved_one_by_one(
                 batch,
                 lambda k: self._complete(
                     line_load[k],
@@ -121,6 +122,7 @@ class Slender(StripModel):
                     batch.point(k),
                 ),
             )
+            return replace(one_by_one, separation=separation)
         if free:
             batch = with_balanced_creepage(
                 batch, line_load, half_length, self._grid, self._tangential, warm
@@ -141,6 +143,7 @@ class Slender(StripModel):
             approach=approach,
             longitudinal_creepage=batch.longitudinal,
             iterations=iterations,
+            separation=separation,
             **dict(zip(SUMS, sums, strict=True)),
         )
 

@@ -1,0 +1,87 @@
+"""Edges of contacts resolved within a strip: pressure in a growing groove."""
+
+import numpy as np
+import pytest
+
+import wearsim
+from tests.evolution.test_strip_errors import RIG
+from wearsim.errors import Interrupted
+
+RESOLVED = {"evolution.resolve_edges": True}
+SHORT = {**RESOLVED, "operation.duration": "20 min", "evolution.strip_error": False}
+CASES = {
+    "one": {},
+    "both wear": {"wear.roller.k_over_h": "1e-11 1/Pa"},
+    "three": {"roller.offset": ["-1 mm", "0.3 mm", "1 mm"]},
+}
+
+
+def run(changes: dict[str, object], **options: object) -> wearsim.Result:
+    return wearsim.run(wearsim.load_scenario(RIG, overrides=changes), **options)
+
+
+@pytest.fixture(scope="module")
+def groove() -> wearsim.Result:
+    return run(RESOLVED)
+
+
+def test_peak_pressure_is_that_of_rigid_bodies_and_falls(groove: wearsim.Result) -> None:
+    late = groove.time > 100.0 * 60.0
+    half_width = np.sqrt(2.0 * 0.5 * groove.depth[late])
+    line_load = 300.0 / (2.0 * half_width)
+    curvature, modulus = 1.0 / 0.02 + 1.0 / 0.025, 200e9 / (2.0 * (1.0 - 0.3**2))
+    rigid = np.sqrt(line_load * modulus * curvature / np.pi)
+    pressure = groove.peak_pressure[late]
+    assert pressure == pytest.approx(rigid, rel=5e-3)
+    assert (np.diff(pressure) < 2e-3 * pressure[1:]).all()
+
+
+def test_line_load_falls_towards_the_edge(groove: wearsim.Result) -> None:
+    load = groove.line_load[-1]
+    right = load[np.argmax(groove.y >= 0.0) :]
+    assert (np.diff(right) <= 2e-3 * right.max()).all()
+
+
+def test_depth_volume_and_energy_are_those_of_whole_strips(groove: wearsim.Result) -> None:
+    whole = run({"evolution.strip_error": False})
+    assert groove.depth[-1] == pytest.approx(whole.depth[-1], rel=1e-4)
+    assert groove.worn_volume[-1] == pytest.approx(whole.worn_volume[-1], rel=1e-4)
+    energy = groove.dissipated_energy[-1] * 1.1e-11
+    assert groove.worn_volume[-1] == pytest.approx(energy, rel=1e-11)
+    assert len(groove.passes) < len(whole.passes)
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_error_by_steps_is_covered(case: str) -> None:
+    result = run({**SHORT, **CASES[case]})
+    fine = {"contact.strips": len(result.y), "evolution.tolerance": 1e-5}
+    width = f"{float(len(result.y) * (result.y[1] - result.y[0]))!r} m"
+    true = run({**SHORT, **CASES[case], **fine, "contact.width": width})
+    assert result.depth_error[-1] < 5e-3 * result.depth[-1]
+    assert abs(result.depth[-1] - true.depth[-1]) <= result.depth_error[-1]
+    assert abs(result.worn_volume[-1] - true.worn_volume[-1]) <= result.volume_error[-1]
+
+
+def test_separate_rollers_wear_like_identical_ones() -> None:
+    wear: dict[str, object] = {"wear.roller.k_over_h": "1e-11 1/Pa"}
+    one = run({**SHORT, **wear})
+    three = run({**SHORT, **wear, "roller.offset": ["0 mm", "1e-9 mm", "-1e-9 mm"]})
+    assert three.depth[-1] == pytest.approx(one.depth[-1], rel=1e-3)
+
+
+def test_groove_on_strips_that_grow_keeps_its_volume() -> None:
+    result = run({**RESOLVED, "operation.duration": "4500 min", "evolution.strip_error": False})
+    energy = result.dissipated_energy[-1] * 1.1e-11
+    assert result.worn_volume[-1] == pytest.approx(energy, rel=1e-9)
+    assert result.peak_pressure[-1] == pytest.approx(177.75e6, rel=1e-2)
+
+
+def test_resumed_test_is_equal_to_the_bit(tmp_path) -> None:
+    file = tmp_path / "part.h5"
+    steps = iter(range(1000))
+    with pytest.raises(Interrupted):
+        run(SHORT, output=file, stop_requested=lambda: next(steps) > 12)
+    resumed, whole = wearsim.resume(file), run(SHORT)
+    assert np.array_equal(resumed.depth, whole.depth)
+    assert np.array_equal(resumed.profiles[-1], whole.profiles[-1])
+    assert np.array_equal(resumed.peak_pressure, whole.peak_pressure)

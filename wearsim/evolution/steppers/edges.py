@@ -1,0 +1,173 @@
+"""Strips at the edge of a contact, which grows across them.
+
+Where a groove grows, a strip comes into contact little by little: the edge of the contact crosses
+it in several steps. Ahead of the edge the surfaces are apart, and behind it they touch. With the
+mean depth u that both bodies have lost in a strip, and the mean separation s of the deformed
+surfaces in it, u - s is smooth in time before, while and after the strip comes into contact. The
+depth alone has a corner there, at which a multistep formula would give a wrong rate of wear, and
+thus a wrong pressure. The formulas are therefore applied to u - s.
+
+Across a strip of width dy the gap of the surfaces that have not touched rises by r. If the edge has
+crossed the part f of the strip, the surfaces are in contact at the depth
+
+    l = u_0 + (f - 1/2) r,   and   u = u_0 + r f^2 / 2,   s = r (1 - f)^2 / 2,
+
+where u_0 is the depth when the edge reached the strip: l = u - s, and du = f dl. A step with the
+formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear of the strip.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatchSolution
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState, separated
+from wearsim.mechanics.numerics.edge_strips import SETTLED, EdgeStrips, start_edges
+from wearsim.mechanics.numerics.jit import kernel_input
+from wearsim.mechanics.numerics.multistep import next_steps
+from wearsim.types import BoolArray, FloatArray
+
+
+def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool:
+    """Return whether steps resolve the edges of contacts within a strip.
+
+    The contact model must return the separation, and every contact its own body or station.
+    """
+    stations, each, _ = problem.shape
+    varies = problem.constant_load is None or len(problem.varying) > 0
+    apart = not problem.has_nodes and (stations == 1 or each == 1)
+    wanted = problem.resolve_edges and contacts.separation is not None
+    return wanted and apart and not varies
+
+
+def starting_edges(problem: WearProblem, contacts: ContactBatchSolution) -> dict[str, FloatArray]:
+    """Return `separation`, `part` and `whole_steps` of a state from its contacts."""
+    loaded = problem.values_of(contacts, "line_load") > 0.0
+    return {
+        "separation": np.where(loaded, 0.0, problem.values_of(contacts, "separation")),
+        "part": np.where(loaded, 1.0, 0.0),
+        "whole_steps": np.where(loaded, SETTLED, 0.0),
+    }
+
+
+def separated_bodies(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the separation of the contacts as parts of the bodies, as `WearState.stacked` [m].
+
+    The sum of the two bodies of a contact is its separation, which their wear closes together.
+    """
+    separation = state.separation
+    assert separation is not None
+    stations, _, realisations, strips = separation.shape
+    parts = np.zeros((stations + problem.rollers, realisations, strips))
+    parts[:stations] = separation.min(axis=1)
+    if stations == 1:
+        parts[0] *= problem.cylinder_wear_share
+        parts[1:] = separation[0] - parts[0]
+    return parts
+
+
+def edges_of_step(
+    problem: WearProblem, state: WearState, base: FloatArray, added: FloatArray
+) -> EdgeStrips | None:
+    """Return the strips of all contacts at the start of a step, None if its state has no edges.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    base, added : ndarray
+        Depths l_0 of the formula, and their increase without the wear at the end, of the bodies as
+        in `WearState.stacked` [m].
+    """
+    if state.separation is None or state.part is None or state.whole_steps is None:
+        return None
+    strips = problem.grid.strips
+    gap = np.broadcast_to(problem.nominal_gap, state.separation.shape)
+    arrays = (gap, state.part, state.separation, state.whole_steps)
+    gap, part, separation, whole_steps = (
+        kernel_input(array).reshape(-1, strips) for array in arrays
+    )
+    rows = state.stacked
+    edges = EdgeStrips(
+        problem.body_rows,
+        gap,
+        kernel_input(state.contacts.approach),
+        rows,
+        added,
+        base,
+        part,
+        separation,
+        whole_steps,
+        np.empty_like(gap),
+        np.empty_like(gap),
+        np.empty_like(rows),
+    )
+    start_edges(edges)
+    return edges
+
+
+def crossed_strips(state: WearState) -> BoolArray | None:
+    """Return which strips of the bodies an edge is crossing or has crossed lately."""
+    if state.whole_steps is None or state.part is None:
+        return None
+    lately = (state.part > 0.0) & (state.whole_steps < SETTLED)
+    return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
+
+
+def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
+    """Return errors of the depths that a step adds, which agree with those of their sums.
+
+    `with_volume` keeps the sums.
+    """
+    past, spans, orders = end.past_sums, end.past_spans, end.order
+    assert past is not None
+    assert spans is not None
+    assert orders is not None
+    parts = np.where(crossed, 0.0, parts_of_bodies(end))
+    errors = np.where(crossed, 0.0, errors)
+    sums = past[:, :-1, :, None]
+    ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
+    scale = np.ones(len(orders))
+    next_steps(sums, spans, ones, orders, scale, 1.0, 1.0, 1, ones, of_sums, order)
+    missing, width = of_sums - errors.sum(axis=-1, keepdims=True), parts.sum(axis=-1, keepdims=True)
+    shift = np.divide(missing, width, out=np.zeros_like(width), where=width > 0.0)
+    return np.asarray(errors + parts * shift)
+
+
+def squares(depths: FloatArray) -> FloatArray:
+    """Return the sum of the squares of all depths, (N,), infinite where it is 0 [m^2]."""
+    squares = (depths**2).sum(axis=(0, 2))
+    return np.asarray(np.where(squares > 0.0, squares, np.inf))
+
+
+def parts_of_bodies(state: WearState) -> FloatArray:
+    """Return the part of each strip's error that counts, as `WearState.stacked`.
+
+    The formulas also continue the separation of strips that are not in contact.
+    """
+    if state.part is None:
+        return np.ones(state.stacked.shape)
+    assert state.past_wear is not None
+    parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
+    return np.where(state.past_wear[0] > 0.0, parts, 0.0)
+
+
+def with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearState:
+    """Return the end of a step with the volume that the formula gives.
+
+    The depths of strips partly in contact follow from their shape, which keeps no volume. What is
+    missing is added evenly where the bodies are in contact, which changes no pressure.
+
+    Parameters
+    ----------
+    end : WearState
+    parts : ndarray
+        Part of each strip that is in contact, as `WearState.stacked`.
+    missing : ndarray, shape (stations + rollers, realisations)
+        Sum over the strips of the depths to be added [m].
+    """
+    width = parts.sum(axis=-1)
+    added = np.divide(missing, width, out=np.zeros_like(missing), where=width > 0.0)
+    cylinder, roller = separated(end.stacked + added[..., None] * parts, len(end.cylinder_depth))
+    return end.replaced(cylinder_depth=cylinder, roller_depth=roller)

@@ -1,0 +1,359 @@
+"""Strips that the edge of a contact crosses in a step; see `evolution.steppers.edges`.
+
+The letters of these kernels are those of that module: depth l in contact, mean depth u, depth u_0
+when the edge reached the strip, rise r of the gap across it, part f in contact. Contact number k is
+c * realisations + v, as in `linearised_wear`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
+from wearsim.mechanics.numerics.multistep import ROWS
+from wearsim.types import BoolArray, FloatArray, IntArray
+
+SETTLED = float(ROWS)  # steps after which all points of a formula lie in contact
+ELASTIC = 0.5
+LEAST, FULL, NONE = 0.1, 0.5, 1.0
+FLAT = 1e-15  # least rise of a gap across a strip [m]
+
+
+class EdgeStrips(NamedTuple):
+    """All strips at the start of a step.
+
+    Parameters
+    ----------
+    bodies : ndarray of int, shape (contacts each, 2)
+        Rows of the two bodies of each contact.
+    gap : ndarray, shape (contacts, strips)
+        Gap before wear [m].
+    approach : ndarray, shape (contacts,)
+        Approach of each contact [m].
+    rows : ndarray, shape (bodies, realisations, strips)
+        Mean depths of the bodies [m].
+    added : ndarray, shape (bodies, realisations, strips)
+        Increase of the depths in the step without the wear at its end [m].
+    base : ndarray, shape (bodies, realisations, strips)
+        Depths l_0 of the formula, of the bodies [m].
+    part, separation, whole_steps : ndarray, shape (contacts, strips)
+        As in `WearState`.
+    first, rise : ndarray, shape (contacts, strips)
+        u_0 and r [m], from `start_edges`.
+    greatest : ndarray, shape (bodies, realisations, strips)
+        Greatest f of the contacts of each body, from `start_edges`.
+    """
+
+    bodies: IntArray
+    gap: FloatArray
+    approach: FloatArray
+    rows: FloatArray
+    added: FloatArray
+    base: FloatArray
+    part: FloatArray
+    separation: FloatArray
+    whole_steps: FloatArray
+    first: FloatArray
+    rise: FloatArray
+    greatest: FloatArray
+
+
+@kernel
+def start_edges(strips: EdgeStrips) -> None:
+    """Fill u_0, r and greatest f of all strips.
+
+    Ahead of an edge, the deformed surfaces of a strip touch at its inner end or not yet.
+    """
+    contacts, n = strips.part.shape
+    rows, realisations, _ = strips.rows.shape
+    along_cam = strips.bodies[len(strips.bodies) - 1, 0] > 0
+    for b in range(rows):
+        for v in range(realisations):
+            for i in range(n):
+                # the contacts of a roller along a cam meet it one after another
+                strips.greatest[b, v, i] = 1.0 if along_cam else 0.0
+    for k in range(contacts):
+        one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
+        v, least = k % realisations, np.inf
+        for i in range(n):
+            depth = strips.rows[one, v, i] + strips.rows[other, v, i]
+            least = min(least, strips.gap[k, i] + depth)
+        elastic = ELASTIC * (strips.approach[k] - least)
+        for i in range(n):
+            part, apart = strips.part[k, i], strips.separation[k, i]
+            rise = 0.0
+            if 0.0 < part < 1.0:
+                rise = 2.0 * apart / (1.0 - part) ** 2
+            elif part <= 0.0:
+                ahead = strips.separation[k, min(i + 1, n - 1)]
+                ahead = max(ahead, strips.separation[k, max(i - 1, 0)])
+                rise = ahead - apart
+                if rise > 0.0:
+                    kept = (NONE - elastic / rise) / (NONE - FULL)
+                    rise *= min(max(kept, LEAST), 1.0)
+                rise = min(rise, 2.0 * apart)
+            rise = max(rise, FLAT)
+            depth = strips.rows[one, v, i] + strips.rows[other, v, i]
+            strips.rise[k, i] = rise
+            for b in (one, other):
+                strips.greatest[b, v, i] = max(strips.greatest[b, v, i], part)
+            strips.first[k, i] = depth - 0.5 * rise * part * part
+
+
+@subroutine
+def part_at(strips: EdgeStrips, k: int, i: int, level: float, grown: float) -> float:
+    """Return f of a strip at a depth l, where other contacts have increased the depth."""
+    if strips.part[k, i] >= 1.0:
+        return 1.0
+    part = 0.5 + (level - strips.first[k, i] - grown) / strips.rise[k, i]
+    return float(min(max(part, 0.0), 1.0))
+
+
+@subroutine
+def sum_of_wear(strips: EdgeStrips, wear: FloatArray, sums: FloatArray) -> None:
+    """Fill the wear of each body by all contacts."""
+    rows, realisations, n = sums.shape
+    for b in range(rows):
+        for v in range(realisations):
+            for i in range(n):
+                sums[b, v, i] = 0.0
+    for k in range(wear.shape[1]):
+        for side in range(2):
+            b = strips.bodies[k // realisations, side]
+            for i in range(n):
+                sums[b, k % realisations, i] += wear[side, k, i]
+
+
+@subroutine
+def by_others(
+    strips: EdgeStrips, wear: FloatArray, sums: FloatArray, k: int, i: int
+) -> tuple[float, float, float]:
+    """Return the wear of a strip by the other contacts of its bodies.
+
+    Where another contact reaches further across the strip, its wear lowers the part ahead of the
+    edge too; the other wear is joint, on the part that this contact has crossed.
+
+    Returns
+    -------
+    ahead, grown, joint : float
+        Wear at the end of the step that lowers the whole strip, the same in the whole step, and
+        joint wear [m].
+    """
+    ahead, grown, joint, realisations = 0.0, 0.0, 0.0, sums.shape[1]
+    part = strips.part[k, i]
+    for side in range(2):
+        b, v = strips.bodies[k // realisations, side], k % realisations
+        of_others = sums[b, v, i] - wear[side, k, i]
+        if of_others > 0.0:
+            share = 1.0
+            if part < 1.0:
+                share = max(strips.greatest[b, v, i] - part, 0.0) / (1.0 - part)
+            ahead += share * of_others
+            joint += (1.0 - share) * of_others
+            grown += share * of_others / sums[b, v, i] * (strips.added[b, v, i] + sums[b, v, i])
+    return ahead, grown, joint
+
+
+@kernel
+def linearise_edges(
+    strips: EdgeStrips,
+    level: FloatArray,
+    wear: FloatArray,
+    gaps: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Fill gaps without wear at the end of the step, and slopes of the mean wear, about a depth l.
+
+    Parameters
+    ----------
+    strips : EdgeStrips
+    level : ndarray, shape (contacts, strips)
+        Depth l [m].
+    wear : ndarray, shape (2, contacts, strips)
+        Wear of both bodies by each contact [m].
+    gaps, slopes : ndarray, shape (contacts, strips)
+        Result. The slope is infinite where a strip is not in contact.
+    """
+    contacts, n = level.shape
+    realisations = strips.rows.shape[1]
+    sums, scaled = np.empty(strips.rows.shape), np.empty(wear.shape)
+    sum_of_wear(strips, wear, sums)
+    for k in range(contacts):
+        one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
+        v = k % realisations
+        for i in range(n):
+            ahead, grown, _ = by_others(strips, wear, sums, k, i)
+            part = part_at(strips, k, i, level[k, i], grown)
+            base = strips.base[one, v, i] + strips.base[other, v, i]
+            worn = level[k, i] - base - ahead
+            slope, without = part, base
+            if part <= 0.0:
+                depth = strips.rows[one, v, i] + strips.rows[other, v, i]
+                slope, without = np.inf, max(level[k, i], depth)
+            elif part < 1.0:
+                slope += max(worn, 0.0) / strips.rise[k, i]
+                without = level[k, i] - part * worn / slope - ahead
+            gaps[k, i], slopes[k, i] = strips.gap[k, i] + without, slope
+            for side in range(2):  # what the scaled wear of a strip opens beyond its mean wear
+                scaled[side, k, i] = 0.0
+                if slope < np.inf:
+                    scaled[side, k, i] = (1.0 / slope - 1.0) * wear[side, k, i]
+    if contacts == realisations:
+        return
+    sum_of_wear(strips, scaled, sums)
+    for k in range(contacts):
+        for i in range(n):
+            for side in range(2):
+                b, v = strips.bodies[k // realisations, side], k % realisations
+                part, share = strips.part[k, i], 1.0
+                if part < 1.0:
+                    share = max(strips.greatest[b, v, i] - part, 0.0) / (1.0 - part)
+                gaps[k, i] -= share * (sums[b, v, i] - scaled[side, k, i])
+
+
+@kernel
+def compare_edges(
+    strips: EdgeStrips,
+    active: BoolArray,
+    gaps: FloatArray,
+    slopes: FloatArray,
+    linear: FloatArray,
+    apart: FloatArray,
+    loads: FloatArray,
+    wear: FloatArray,
+    level: FloatArray,
+) -> FloatArray:
+    """Update the depth l by a solution, and return how much its wear differs from the formula.
+
+    Parameters
+    ----------
+    strips : EdgeStrips
+    active : ndarray of bool, shape (realisations,)
+        Realisations whose depth is updated.
+    gaps, slopes : ndarray, shape (contacts, strips)
+        From `linearise_edges`.
+    linear, apart, loads : ndarray, shape (contacts, strips)
+        Opening of the gaps by the linearised wear [m], separation [m] and line load of the
+        solution [N/m].
+    wear : ndarray, shape (2, contacts, strips)
+        Its wear [m].
+    level : ndarray, shape (contacts, strips)
+        Depth l, overwritten [m].
+
+    Returns
+    -------
+    ndarray, shape (realisations,)
+        Greatest difference of the mean wear [m].
+    """
+    contacts, n = level.shape
+    realisations = len(active)
+    sums, rest = np.empty(strips.rows.shape), np.zeros(realisations)
+    sum_of_wear(strips, wear, sums)
+    for k in range(contacts):
+        one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
+        v = k % realisations
+        for i in range(n):
+            if active[v]:
+                level[k, i] = gaps[k, i] + linear[k, i] - apart[k, i] - strips.gap[k, i]
+            ahead, grown, joint = by_others(strips, wear, sums, k, i)
+            part = part_at(strips, k, i, level[k, i], grown)
+            base = strips.base[one, v, i] + strips.base[other, v, i]
+            mean = part * (level[k, i] - base - ahead)
+            own = wear[0, k, i] + wear[1, k, i]
+            if not loads[k, i] > 0.0:
+                rest[v] = max(rest[v], mean - joint)
+            elif slopes[k, i] == np.inf:
+                rest[v] = max(rest[v], own)
+            else:
+                rest[v] = max(rest[v], abs(mean - own - joint))
+    return rest
+
+
+@kernel
+def end_edges(
+    strips: EdgeStrips,
+    level: FloatArray,
+    loads: FloatArray,
+    wear: FloatArray,
+    worn: FloatArray,
+    depths: FloatArray,
+    parts: FloatArray,
+    fields: FloatArray,
+) -> None:
+    """Fill depths, parts of the bodies in contact, and fields of the state at the end of a step.
+
+    Parameters
+    ----------
+    strips : EdgeStrips
+    level, loads : ndarray, shape (contacts, strips)
+        Depth l [m] and line load [N/m] at the end of the step.
+    wear : ndarray, shape (2, contacts, strips)
+        Wear of both bodies by each contact [m].
+    worn, depths, parts : ndarray, shape (bodies, realisations, strips)
+        Wear of the bodies by the formula [m]; results: mean depths [m], greatest f.
+    fields : ndarray, shape (3, contacts, strips)
+        Result: `separation`, `part` and `whole_steps` as in `WearState`.
+    """
+    contacts, n = level.shape
+    rows, realisations, _ = worn.shape
+    sums, crossed = np.empty(worn.shape), np.empty(worn.shape, np.bool_)
+    sum_of_wear(strips, wear, sums)
+    for b in range(rows):
+        for v in range(realisations):
+            for i in range(n):
+                depths[b, v, i], parts[b, v, i] = strips.rows[b, v, i], 0.0
+                crossed[b, v, i] = False
+    for k in range(contacts):
+        one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
+        v = k % realisations
+        for i in range(n):
+            _, grown, joint = by_others(strips, wear, sums, k, i)
+            before, part, growth = strips.part[k, i], 0.0, 0.0
+            if loads[k, i] > 0.0:
+                part = part_at(strips, k, i, level[k, i], grown)
+                depth = strips.rows[one, v, i] + strips.rows[other, v, i]
+                growth = level[k, i] - depth - grown
+                if part < 1.0:
+                    growth = 0.5 * strips.rise[k, i] * (part * part - before * before)
+            own = wear[0, k, i] + wear[1, k, i]
+            ratio = max(growth, 0.0) / (own + joint) if own > 0.0 else 0.0
+            for side in range(2):
+                b = strips.bodies[k // realisations, side]
+                # a strip of a body follows the formula where all of its contacts do
+                crossed[b, v, i] |= strips.whole_steps[k, i] < SETTLED
+                depths[b, v, i] += ratio * wear[side, k, i]
+                parts[b, v, i] = max(parts[b, v, i], part)
+            fields[1, k, i] = part
+            steps = min(strips.whole_steps[k, i] + 1.0, SETTLED)
+            fields[2, k, i] = steps if part >= 1.0 else 0.0
+    for b in range(rows):
+        for v in range(realisations):
+            for i in range(n):
+                if not crossed[b, v, i]:
+                    depths[b, v, i] = strips.base[b, v, i] + worn[b, v, i]
+    for k in range(contacts):
+        one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
+        v = k % realisations
+        for i in range(n):
+            part = fields[1, k, i]
+            apart = max(depths[one, v, i] + depths[other, v, i] - level[k, i], 0.0)
+            if part > 0.0:
+                apart = 0.5 * strips.rise[k, i] * (1.0 - part) ** 2
+            fields[0, k, i] = apart
+
+
+def compile_edges() -> None:
+    """Compile the kernels of a step by a call for one contact of one strip."""
+    strip, rows, wear = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
+    bodies = np.array([[0, 1]])
+    strips = EdgeStrips(bodies, strip, np.ones(1), rows, rows, rows, *(strip,) * 5, rows.copy())
+    start_edges(strips)
+    linearise_edges(strips, strip, wear, np.ones((1, 1)), np.ones((1, 1)))
+    one = np.ones(1, np.bool_)
+    compare_edges(strips, one, strip, strip, strip, strip, strip, wear, np.ones((1, 1)))
+    end_edges(strips, strip, strip, wear, rows, rows.copy(), rows.copy(), np.ones((3, 1, 1)))
+
+
+compile_alongside("solve_slender", compile_edges)
