@@ -80,6 +80,16 @@ class _Figure(Figure):
         return png_of(self, DPI)
 
 
+@contextmanager
+def titled_figure(width: float, height: float, title: str | None = None) -> Iterator[Figure]:
+    """Give a figure of a width and height in inches, drawn with the settings of wearsim."""
+    with figure_style():
+        figure = _Figure(figsize=(width, height), layout="constrained")
+        if title:
+            figure.suptitle(title, fontsize=10.5)
+        yield figure
+
+
 def png_of(figure: Figure, dpi: int) -> bytes:
     """Return a figure as the content of a PNG file."""
     content = io.BytesIO()
@@ -107,10 +117,7 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 def figure_of(sheet: Sheet) -> Figure:
     """Return the figure of all panels of a view, in the arrangement of its sheet."""
-    with figure_style():
-        figure = _Figure(figsize=sheet.size, layout="constrained")
-        if sheet.title:
-            figure.suptitle(sheet.title, fontsize=10.5)
+    with titled_figure(*sheet.size, sheet.title) as figure:
         axes = dict(_arranged(figure, sheet))
         for name, panel in axes.items():
             draw(panel, sheet.panels[name])
@@ -138,8 +145,7 @@ def _arranged(figure: Figure, sheet: Sheet) -> Iterator[tuple[str, Axes]]:
 
 def png_of_panel(panel: Panel, dpi: int = 100) -> bytes:
     """Return one panel as the content of a small PNG file."""
-    with figure_style():
-        figure = _Figure(figsize=(5.2, 3.1), layout="constrained")  # as wide as the longest title
+    with titled_figure(5.2, 3.1) as figure:  # as wide as the longest title
         draw(figure.subplots(), panel)
         return png_of(figure, dpi)
 

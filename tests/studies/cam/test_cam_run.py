@@ -16,8 +16,8 @@ from tests.report.drawn import run_figure as cam_run_figure
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.mechanics.cam.stations import NUMBERS
-from wearsim.report.csv_files import export_csv
 from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.opening import export_csv
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.result import read_results

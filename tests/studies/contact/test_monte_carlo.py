@@ -12,9 +12,9 @@ from dissipation_examples import COARSE, NO_ANGLES, contact, field, normal, pape
 
 from wearsim.errors import ContactError, Interrupted, ScenarioError
 from wearsim.scenario import realise
-from wearsim.studies.contact import monte_carlo as study
 from wearsim.studies.contact.batch import Realisations, acting_inputs
 from wearsim.studies.contact.single import study_contact
+from wearsim.studies.dissipation import monte_carlo as study
 from wearsim.studies.dissipation.monte_carlo import dissipation
 from wearsim.studies.dissipation.result import DissipationResult
 from wearsim.studies.opening import open_dissipation

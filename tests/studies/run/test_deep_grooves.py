@@ -10,9 +10,9 @@ from study_examples import run_differences, short
 
 from wearsim.errors import Interrupted, ScenarioError, StepError
 from wearsim.scenario import Scenario
+from wearsim.studies import schedule
 from wearsim.studies.opening import open_results
 from wearsim.studies.run import run as studies
-from wearsim.studies.run import schedule
 
 RADIUS = 20e-3  # of the rig's roller
 

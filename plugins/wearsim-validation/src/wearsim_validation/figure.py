@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, RED, name_axes, titled_figure
 
+from wearsim.report.figures import name_axes, titled_figure
+from wearsim.report.panels import BLUE, GREEN, GREY, ORANGE, RED
 from wearsim.types import FloatArray
 
 _COLOURS = (BLUE, ORANGE, GREEN, RED, GREY)
