@@ -141,6 +141,7 @@ def opened(
         return contacts, loads
     numbers: IntArray = np.flatnonzero(np.broadcast_to(found, loads.shape))
     some = contacts.at(numbers)
-    zeros = {n: np.zeros_like(column) for n, column in vars(some).items() if n != "y"}
+    given = {n: column for n, column in vars(some).items() if n != "y" and column is not None}
+    zeros = {n: np.zeros_like(column) for n, column in given.items()}
     empty = ContactBatchSolution(some.y, **zeros)
     return contacts.with_others(numbers, empty), np.where(found, 0.0, loads)

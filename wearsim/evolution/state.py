@@ -243,7 +243,8 @@ class WearState:
             name: getattr(self, name) for name in _AXES if getattr(self, name) is not None
         }
         for name, column in vars(self.contacts).items():
-            arrays[_CONTACT + name] = np.array(column)
+            if column is not None:
+                arrays[_CONTACT + name] = np.array(column)
         arrays[_CONTACT + "y"] = np.tile(self.contacts.y, (len(self.contacts), 1))
         for name, state in self.auxiliary.items():
             arrays.update({f"{name}_{key}": a for key, a in state.to_arrays().items()})

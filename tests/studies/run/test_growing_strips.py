@@ -81,6 +81,7 @@ def test_resumed_run_with_grown_strips_equals_an_unbroken_one(tmp_path: Path) ->
 def test_realisations_with_grown_strips_equal_single_ones(tmp_path: Path) -> None:
     changes = {
         **DEEP,
+        "evolution.allow_deep": True,
         "operation.duration": "3000 min",
         "outputs.records": 3,
         "wear.cylinder.k_over_h": {

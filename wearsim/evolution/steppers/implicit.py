@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
-from wearsim.errors import StepError
+from wearsim.errors import ContactError, StepError
 from wearsim.evolution.contacts import at_least
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
@@ -177,8 +177,8 @@ class ImplicitStepper(StepDoublingStepper):
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
         over = np.where(unknown, over, over * left)
-        if self.forced_step is not None:  # steps of a fixed length may be too long for fourth order
-            order = np.minimum(order, MAX_ORDER - 1)
+        if self.forced_step is not None:  # fixed steps may be too long for higher orders
+            order = np.minimum(order, MAX_ORDER - 2)
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
         return Attempt((half, end.replaced(order=order, **others)), over, ratio)
 
@@ -428,9 +428,10 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:
         end, decreased = _step(here, state, passes, conditions, order)
-    except StepError:
-        # the past points may lead beyond the depth at which a spring is unloaded
-        if len(order) > 1 or order[0] == 1:
+    except (StepError, ContactError) as error:
+        # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
+        # on which the contact is not found
+        if len(order) > 1 or order[0] == 1 or getattr(error, "cause", "") == "edge":
             raise
         return _step(here, state, passes, conditions, np.ones_like(order))[0]
     # strips that leave the contact: their depth can decrease from the third order on
