@@ -9,7 +9,7 @@ import pytest
 
 from tests.report.made_up_ensembles import made_up
 from wearsim.errors import ResultsFileError
-from wearsim.report import csv_files as csv_export
+from wearsim.studies.ensemble import view as ensemble_view
 from wearsim.studies.opening import export_csv
 
 
@@ -22,7 +22,7 @@ def read(path):
 
 @pytest.mark.parametrize("block", [7, 10_000])
 def test_every_realisation_is_a_row_for_any_block_size(tmp_path, monkeypatch, block):
-    monkeypatch.setattr(csv_export, "_BLOCK", block)
+    monkeypatch.setattr(ensemble_view, "_BLOCK", block)
     result = made_up(30, failed=[4, 9], pending=3)
     export_csv(result, tmp_path)
     found = read(tmp_path / "realisations.csv")

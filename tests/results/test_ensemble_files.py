@@ -162,7 +162,7 @@ def test_kinds_of_files_are_distinguished(ensemble_file, tmp_path):
     run, study = tmp_path / "run.h5", tmp_path / "study.h5"
     write_results(run, some_run())
     write_results(study, some_study())
-    assert [kind_of(path) for path in (run, study, ensemble_file)] == [
+    assert [kind_of(path).name for path in (run, study, ensemble_file)] == [
         "run",
         "dissipation",
         "ensemble",

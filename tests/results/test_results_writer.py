@@ -102,7 +102,8 @@ def test_full_disk_raises_one_line_error(tmp_path: Path, at: str) -> None:
 def test_process_ends_normally_after_a_failure(tmp_path: Path, at: str) -> None:
     """HDF5 crashes at the end of a process if it still refers to a Python file."""
     code = (
-        "import sys; from run_examples import some_run; from wearsim.results import write_results\n"
+        "import sys; from run_examples import some_run\n"
+        "from wearsim.results.io.files import write_results\n"
         "from tests.faulty_storage import full_disk\n"
         f"write_results(sys.argv[1], some_run(), full_disk({at!r}))"
     )

@@ -61,7 +61,8 @@ def open_study(path: str | Path, kind: StudyKind | None = None) -> Any:
 def _about(file: Any) -> dict[str, Any]:
     """Return the fields of a file, none if it is foreign."""
     place = f"{INPUTS}/{ABOUT}"
-    found = json.loads(read_text(file[place])) if place in file else {}
+    # earlier layouts hold a scalar there
+    found = json.loads(read_text(file[place])) if place in file and file[place].shape else {}
     return found if isinstance(found, dict) else {}
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.cli.shared import console, note, plain
+from wearsim.cli.shared import console, note
+from wearsim.report.text import plain
 from wearsim_validation.case import VERDICTS
 
 if TYPE_CHECKING:
