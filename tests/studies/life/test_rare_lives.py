@@ -179,8 +179,8 @@ def test_subset_simulation_follows_where_importance_sampling_fails(
     assert found["tried"][IMPORTANCE]["refused"]
     show_view(result.view, json=False)
     text = " ".join(capsys.readouterr().out.split())
-    assert "by importance sampling: refused, effective sample size" in text
-    assert f"by subset simulation: {second.probability.value:.3g} [" in text
+    assert "by importance sampling refused, effective sample size" in text
+    assert f"by subset simulation {second.probability.value:.3g} [" in text
     alone = lives(tmp_path / "one.h5", many(friction__coefficient=0.1), 40, **options)
     assert list(alone.rare_estimates) == [SUBSET]
     assert alone.settings.rare_method == "subset"
