@@ -35,10 +35,8 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     The contact model must return the separation, and every contact its own body or station.
     """
     stations, each, _ = problem.shape
-    varies = problem.constant_load is None or len(problem.varying) > 0
     apart = not problem.has_nodes and (stations == 1 or each == 1)
-    wanted = problem.resolve_edges and contacts.separation is not None
-    return wanted and apart and not varies
+    return contacts.separation is not None and apart
 
 
 def starting_edges(problem: WearProblem, contacts: ContactBatchSolution) -> dict[str, FloatArray]:
@@ -115,6 +113,27 @@ def crossed_strips(state: WearState) -> BoolArray | None:
     return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
 
 
+def young_strips(state: WearState) -> BoolArray | None:
+    """Return which strips of the bodies take steps of first order.
+
+    Points of formulas of the state's order would lie ahead of the edge or close to it. There the
+    surfaces close as the power 3/2 of the distance from it, and higher orders would overshoot.
+    A worn roller of a cam meets the edges at all stations at different times. Its wear by one of
+    them has no past points, and both bodies of a contact must wear by the same formula: no strip
+    is young then.
+    """
+    if state.whole_steps is None or state.part is None or state.past_wear is None:
+        return None
+    assert state.order is not None
+    touching, stations = state.part > 0.0, len(state.part)
+    young, ahead = touching & (state.whole_steps < state.order[:, None]), ~touching
+    found = [(young.any(axis=axis) | ahead.all(axis=axis)) for axis in (1, 0)]
+    if stations > 1:
+        unworn = ~(state.past_wear[0][stations:] > 0.0).any(axis=(0, 2))
+        found = [one & unworn[:, None] for one in found]
+    return np.concatenate(found)
+
+
 def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
     """Return errors of the depths that a step adds, which agree with those of their sums.
 
@@ -144,13 +163,27 @@ def squares(depths: FloatArray) -> FloatArray:
 def parts_of_bodies(state: WearState) -> FloatArray:
     """Return the part of each strip's error that counts, as `WearState.stacked`.
 
-    The formulas also continue the separation of strips that are not in contact.
+    The formulas also continue the separation of strips that are not in contact, and those that the
+    edge has just crossed are not smooth enough for an estimate, see `first_order_errors`.
     """
-    if state.part is None:
+    young = young_strips(state)
+    if young is None:
         return np.ones(state.stacked.shape)
+    assert state.part is not None
     assert state.past_wear is not None
     parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
-    return np.where(state.past_wear[0] > 0.0, parts, 0.0)
+    return np.where(young | (state.past_wear[0] <= 0.0), 0.0, parts)
+
+
+def first_order_errors(end: WearState) -> FloatArray:
+    """Return the errors that a step adds to young strips in contact, as `WearState.stacked` [m]."""
+    young, past, spans = young_strips(end), end.past_wear, end.past_spans
+    assert young is not None
+    assert past is not None
+    assert spans is not None
+    factor = spans[0] / (1.0 / spans[0] + 1.0 / spans[1])
+    factor = np.where(np.isfinite(spans[1]), factor, 0.0)
+    return np.where(young & (past[0] > 0.0), factor[:, None] * past[2], 0.0)
 
 
 def with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearState:

@@ -270,7 +270,7 @@ def _estimates(
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
     if crossed is not None:
-        at_edges = np.where(crossed, EDGES * added, 0.0)
+        at_edges = EDGES * (np.where(crossed, added, 0.0) + edges.first_order_errors(end))
         sizes[2] = np.hypot(
             sizes[2], np.sqrt((at_edges**2).sum(axis=(0, 2)) / edges.squares(depths))
         )
@@ -464,6 +464,11 @@ def _step(
     formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
     added, guess = extrapolated(weights, past.wear)
+    scale, young = None, edges.young_strips(state)
+    if young is not None:
+        added = np.where(young, half_pass[:, None] * past.wear[0], added)
+        first = (conditions.mean * passes / conditions.own - half_pass) / worn_passes
+        scale = np.where(young, first[:, None], 1.0)
     old_sums = past.sums[..., None]
     sums = extrapolated(weights, old_sums)[0]
     feedback = None
@@ -471,9 +476,10 @@ def _step(
         old = past.feedback.reshape(ROWS, -1, realisations, 1)
         feedback = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
         feedback = feedback.reshape(problem.shape)
-    step = EndOfStep(problem, state, level + added, added, conditions.force, passes, worn_passes)
+    step = EndOfStep(problem, state, level + added, added, conditions.force, passes, worn_passes, scale)
     end, worn, feedback, parts = step.solved(level + guess, feedback)
     rates, change = worn / worn_passes[:, None], added + worn
+    rates = rates if scale is None else rates / scale
     energy_rate = _energy_per_pass(problem, end.contacts)
     sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
     sums = sums + worn_passes[:, None] * sum_rates

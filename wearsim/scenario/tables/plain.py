@@ -161,7 +161,7 @@ class EvolutionTable(Options):
     )
     max_steps: int = Field(default=1_000_000, gt=0, description="Maximum number of steps.")
     resolve_edges: bool = Field(
-        default=False,
+        default=True,
         description="Resolve the edge of a contact within a strip: the pressure at the edge of a"
         " growing groove then converges. Implicit steps under constant load only.",
     )
