@@ -32,11 +32,13 @@ from wearsim.types import BoolArray, FloatArray
 def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool:
     """Return whether steps resolve the edges of contacts within a strip.
 
-    The contact model must return the separation, and every contact its own body or station.
+    The contact model must return the separation, every contact must have its own body or station,
+    and load and inputs must be constant: where they vary, an edge also retreats.
     """
     stations, each, _ = problem.shape
+    varies = problem.constant_load is None or len(problem.varying) > 0
     apart = not problem.has_nodes and (stations == 1 or each == 1)
-    return contacts.separation is not None and apart
+    return contacts.separation is not None and apart and not varies
 
 
 def starting_edges(problem: WearProblem, contacts: ContactBatchSolution) -> dict[str, FloatArray]:

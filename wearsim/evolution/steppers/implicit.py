@@ -476,7 +476,9 @@ def _step(
         old = past.feedback.reshape(ROWS, -1, realisations, 1)
         feedback = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
         feedback = feedback.reshape(problem.shape)
-    step = EndOfStep(problem, state, level + added, added, conditions.force, passes, worn_passes, scale)
+    step = EndOfStep(
+        problem, state, level + added, added, conditions.force, passes, worn_passes, scale
+    )
     end, worn, feedback, parts = step.solved(level + guess, feedback)
     rates, change = worn / worn_passes[:, None], added + worn
     rates = rates if scale is None else rates / scale
