@@ -17,20 +17,18 @@ from wearsim.cli.shared import (
     read_scenario,
 )
 
-AtAngles = Annotated[
-    str | None,
-    typer.Option(
-        "--at",
-        metavar="ANGLES",
-        help="Angles of the cam instead of the stations of a run: '10 deg,80 deg'.",
-        show_default=False,
-    ),
-]
-
 
 def cam(
     scenario: ScenarioFile,
-    at: AtAngles = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            "--at",
+            metavar="ANGLES",
+            help="Angles of the cam instead of the stations of a run: '10 deg,80 deg'.",
+            show_default=False,
+        ),
+    ] = None,
     settings: Settings = None,
     figure: Figure = None,
     json: Json = False,

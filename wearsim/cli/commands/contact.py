@@ -35,48 +35,43 @@ if TYPE_CHECKING:
     from wearsim.scenario import Scenario
 
 
-ProfileFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--profile",
-        metavar="FILE",
-        help="Profile of the cylinder: CSV with columns 'y [mm]' and 'height [um]', worn is"
-        " negative, or 'depth [um]'; or a surface, SDF or X3P.",
-        show_default=False,
-    ),
-]
-Cutoff = Annotated[
-    str | None,
-    typer.Option(
-        "--filter",
-        metavar="CUTOFF",
-        help="Cutoff wavelength of a Gaussian filter that removes roughness from the profile"
-        " (ISO 16610-21): '0.8 mm'.",
-        show_default=False,
-    ),
-]
-Against = Annotated[
-    str | None,
-    typer.Option(
-        metavar="MODEL",
-        help="Also solve the contact with this contact model, such as halfspace, and show the"
-        " difference.",
-        show_default=False,
-    ),
-]
-
-
 def contact(
     scenario: ScenarioFile,
-    profile: ProfileFile = None,
+    profile: Annotated[
+        Path | None,
+        typer.Option(
+            "--profile",
+            metavar="FILE",
+            help="Profile of the cylinder: CSV with columns 'y [mm]' and 'height [um]', worn is"
+            " negative, or 'depth [um]'; or a surface, SDF or X3P.",
+            show_default=False,
+        ),
+    ] = None,
     columns: Columns = None,
     units: Units = None,
     row: Row = None,
     mean_rows: MeanRows = None,
     at: At = None,
-    cutoff: Cutoff = None,
+    cutoff: Annotated[
+        str | None,
+        typer.Option(
+            "--filter",
+            metavar="CUTOFF",
+            help="Cutoff wavelength of a Gaussian filter that removes roughness from the profile"
+            " (ISO 16610-21): '0.8 mm'.",
+            show_default=False,
+        ),
+    ] = None,
     settings: Settings = None,
-    against: Against = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL",
+            help="Also solve the contact with this contact model, such as halfspace, and show the"
+            " difference.",
+            show_default=False,
+        ),
+    ] = None,
     figure: Figure = None,
     json: Json = False,
     force: Force = False,
@@ -152,16 +147,6 @@ def _notes_on_means(scenario: Scenario) -> list[str]:
     return notes
 
 
-Output = Annotated[Path | None, results_option("-dissipation.h5")]
-Plan = Annotated[
-    str | None,
-    typer.Option(
-        metavar="PLAN",
-        help="Sampling design: monte-carlo, latin-hypercube or sobol; default: that of the"
-        " scenario.",
-        show_default=False,
-    ),
-]
 _STOPPING = (
     "stopping after the current realisations, results are kept; repeat to stop at once and lose"
     " them"
@@ -171,9 +156,17 @@ _STOPPING = (
 def dissipation(
     scenario: ScenarioFile,
     realisations: Realisations = 1000,
-    output: Output = None,
+    output: Annotated[Path | None, results_option("-dissipation.h5")] = None,
     figure: FigureOption = None,
-    plan: Plan = None,
+    plan: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLAN",
+            help="Sampling design: monte-carlo, latin-hypercube or sobol; default: that of the"
+            " scenario.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,

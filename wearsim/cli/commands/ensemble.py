@@ -31,34 +31,6 @@ from wearsim.cli.shared import (
 if TYPE_CHECKING:
     from wearsim.studies.ensemble.result import EnsembleResult
 
-Output = Annotated[Path | None, results_option("-ensemble.h5")]
-Precision = Annotated[
-    str | None,
-    typer.Option(
-        metavar="TARGET",
-        help="Stop when the relative half-width of a 95 % confidence interval is reached,"
-        " 'depth.mean 1%'. First checked after 64 realisations.",
-        show_default=False,
-    ),
-]
-Until = Annotated[str | None, typer.Option(metavar="TARGET", hidden=True)]
-Plan = Annotated[
-    str | None,
-    typer.Option(
-        metavar="PLAN",
-        help="Sampling design: monte-carlo, latin-hypercube, sobol, saltelli or control-variate;"
-        " default: that of the scenario.",
-        show_default=False,
-    ),
-]
-Sweep = Annotated[
-    str | None,
-    typer.Option(
-        metavar="KEY=V1,V2,...",
-        help="Run and compare one ensemble per value: load.normal_force=250N,300N.",
-        show_default=False,
-    ),
-]
 STOPPING = "stopping after the next batch; repeat to stop at once"
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _WITHOUT_SPACE = re.compile(rf"({_NUMBER})([A-Za-zµμ°].*)")
@@ -69,14 +41,37 @@ _EXAMPLE = "such as load.normal_force=250N,300N,350N"
 def ensemble(
     scenario: ScenarioFile,
     realisations: Realisations = 1000,
-    output: Output = None,
+    output: Annotated[Path | None, results_option("-ensemble.h5")] = None,
     figure: FigureOption = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    precision: Precision = None,
-    until: Until = None,
-    plan: Plan = None,
-    sweep: Sweep = None,
+    precision: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TARGET",
+            help="Stop when the relative half-width of a 95 % confidence interval is reached,"
+            " 'depth.mean 1%'. First checked after 64 realisations.",
+            show_default=False,
+        ),
+    ] = None,
+    until: Annotated[str | None, typer.Option(metavar="TARGET", hidden=True)] = None,
+    plan: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLAN",
+            help="Sampling design: monte-carlo, latin-hypercube, sobol, saltelli or"
+            " control-variate; default: that of the scenario.",
+            show_default=False,
+        ),
+    ] = None,
+    sweep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY=V1,V2,...",
+            help="Run and compare one ensemble per value: load.normal_force=250N,300N.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,

@@ -32,142 +32,136 @@ from wearsim.cli.shared import (
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
 
-Profiles = Annotated[
-    list[Path] | None,
-    typer.Argument(
-        metavar="T1.csv T2.csv...",
-        help="Measured profiles, one of each test: CSV with columns 'y [mm]' and 'height [um]',"
-        " worn is negative, or 'depth [um]'; or a surface, SDF or X3P, whose lines are averaged.",
-        show_default=False,
-    ),
-]
-Tests = Annotated[
-    Path | None,
-    typer.Option(
-        "--tests",
-        metavar="TESTS.toml",
-        help="Tests as [[test]] tables: profile, depth with depth_std, or lift of a cam; angle of a"
-        " cam, before, at, group, set, std, body, shoulders, curvature, runout, columns, units.",
-        show_default=False,
-    ),
-]
-Before = Annotated[
-    str | None,
-    typer.Option(
-        "--before",
-        metavar="B1.csv,...",
-        help="Profiles of the same places before the tests, in the order of the tests.",
-        show_default=False,
-    ),
-]
-Shoulders = Annotated[
-    str | None,
-    typer.Option(
-        "--shoulders",
-        metavar="DISTANCE",
-        help="Distance from the middle of the groove beyond which the surface is unworn: '9 mm';"
-        " default: beyond the predicted groove.",
-        show_default=False,
-    ),
-]
-Curvature = Annotated[
-    bool,
-    typer.Option(
-        "--curvature",
-        help="Fit a curvature of each trace, as of a bow of the instrument's guide, beside offset"
-        " and inclination; needs unworn shoulders.",
-    ),
-]
-Share = Annotated[
-    str | None,
-    typer.Option(
-        "--share",
-        metavar="k=cylinder,roller",
-        help="One unknown factor of K/H of both bodies, in the ratio of the scenario.",
-        show_default=False,
-    ),
-]
-Fix = Annotated[
-    str | None,
-    typer.Option(
-        "--fix",
-        metavar="INPUT=VALUE,...",
-        help="Inputs that are known and equal in all tests: friction=0.1,load=310 N.",
-        show_default=False,
-    ),
-]
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output", "-o", metavar="OUT.h5", help="Results file; default: none.", show_default=False
-    ),
-]
-PosteriorFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--posterior",
-        metavar="K.toml",
-        help="Distribution of K/H of the next specimen, as a table of a scenario.",
-        show_default=False,
-    ),
-]
-PlanFlag = Annotated[
-    bool,
-    typer.Option("--plan", help="Power of planned tests instead of measured ones; needs -n."),
-]
-Numbers = Annotated[
-    str | None,
-    typer.Option(
-        "-n", metavar="3:60", help="Numbers of planned tests: 3:60 or 3,8,20.", show_default=False
-    ),
-]
-Measured = Annotated[
-    str | None,
-    typer.Option(
-        "--measured",
-        metavar="INPUT=SD,...",
-        help="Inputs that are measured in every planned test, with the standard deviation of the"
-        " logarithm: load=0.1,creepage=0.1.",
-        show_default=False,
-    ),
-]
-Draws = Annotated[
-    int | None,
-    typer.Option(
-        min=16,
-        metavar="M",
-        help="Draws of the inputs other than K/H; default: 256, 768 where traces leave few of them,"
-        " 128 where a wear test is needed for each of several K/H.",
-        show_default=False,
-    ),
-]
-Negligible = Annotated[
-    float,
-    typer.Option(min=0.0, metavar="SCATTER", help="Scatter of ln K/H that is negligible."),
-]
-
 
 def identify(
     scenario: ScenarioFile,
-    profiles: Profiles = None,
-    tests: Tests = None,
-    before: Before = None,
-    shoulders: Shoulders = None,
-    curvature: Curvature = False,
-    share: Share = None,
-    fix: Fix = None,
+    profiles: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="T1.csv T2.csv...",
+            help="Measured profiles, one of each test: CSV with columns 'y [mm]' and 'height [um]',"
+            " worn is negative, or 'depth [um]'; or a surface, SDF or X3P, whose lines are"
+            " averaged.",
+            show_default=False,
+        ),
+    ] = None,
+    tests: Annotated[
+        Path | None,
+        typer.Option(
+            "--tests",
+            metavar="TESTS.toml",
+            help="Tests as [[test]] tables: profile, depth with depth_std, or lift of a cam; angle"
+            " of a cam, before, at, group, set, std, body, shoulders, curvature, runout,"
+            " columns, units.",
+            show_default=False,
+        ),
+    ] = None,
+    before: Annotated[
+        str | None,
+        typer.Option(
+            "--before",
+            metavar="B1.csv,...",
+            help="Profiles of the same places before the tests, in the order of the tests.",
+            show_default=False,
+        ),
+    ] = None,
+    shoulders: Annotated[
+        str | None,
+        typer.Option(
+            "--shoulders",
+            metavar="DISTANCE",
+            help="Distance from the middle of the groove beyond which the surface is unworn: '9"
+            " mm'; default: beyond the predicted groove.",
+            show_default=False,
+        ),
+    ] = None,
+    curvature: Annotated[
+        bool,
+        typer.Option(
+            "--curvature",
+            help="Fit a curvature of each trace, as of a bow of the instrument's guide, beside"
+            " offset and inclination; needs unworn shoulders.",
+        ),
+    ] = False,
+    share: Annotated[
+        str | None,
+        typer.Option(
+            "--share",
+            metavar="k=cylinder,roller",
+            help="One unknown factor of K/H of both bodies, in the ratio of the scenario.",
+            show_default=False,
+        ),
+    ] = None,
+    fix: Annotated[
+        str | None,
+        typer.Option(
+            "--fix",
+            metavar="INPUT=VALUE,...",
+            help="Inputs that are known and equal in all tests: friction=0.1,load=310 N.",
+            show_default=False,
+        ),
+    ] = None,
     columns: Columns = None,
     units: Units = None,
     row: Row = None,
     mean_rows: MeanRows = None,
-    output: Output = None,
-    posterior: PosteriorFile = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="OUT.h5",
+            help="Results file; default: none.",
+            show_default=False,
+        ),
+    ] = None,
+    posterior: Annotated[
+        Path | None,
+        typer.Option(
+            "--posterior",
+            metavar="K.toml",
+            help="Distribution of K/H of the next specimen, as a table of a scenario.",
+            show_default=False,
+        ),
+    ] = None,
     figure: FigureOption = None,
-    plan: PlanFlag = False,
-    numbers: Numbers = None,
-    measured: Measured = None,
-    draws: Draws = None,
-    negligible: Negligible = 0.2,
+    plan: Annotated[
+        bool,
+        typer.Option("--plan", help="Power of planned tests instead of measured ones; needs -n."),
+    ] = False,
+    numbers: Annotated[
+        str | None,
+        typer.Option(
+            "-n",
+            metavar="3:60",
+            help="Numbers of planned tests: 3:60 or 3,8,20.",
+            show_default=False,
+        ),
+    ] = None,
+    measured: Annotated[
+        str | None,
+        typer.Option(
+            "--measured",
+            metavar="INPUT=SD,...",
+            help="Inputs that are measured in every planned test, with the standard deviation of"
+            " the logarithm: load=0.1,creepage=0.1.",
+            show_default=False,
+        ),
+    ] = None,
+    draws: Annotated[
+        int | None,
+        typer.Option(
+            min=16,
+            metavar="M",
+            help="Draws of the inputs other than K/H; default: 256, 768 where traces leave few of"
+            " them, 128 where a wear test is needed for each of several K/H.",
+            show_default=False,
+        ),
+    ] = None,
+    negligible: Annotated[
+        float,
+        typer.Option(min=0.0, metavar="SCATTER", help="Scatter of ln K/H that is negligible."),
+    ] = 0.2,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,

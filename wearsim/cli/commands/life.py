@@ -35,103 +35,93 @@ if TYPE_CHECKING:
     from wearsim.scenario import Scenario
     from wearsim.studies.life.result import LifeResult
 
-Designs = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="SCENARIO...",
-        help="Scenario, or two to compare with common draws; or files of earlier studies, .h5.",
-        show_default=False,
-    ),
-]
-Realisations = Annotated[
-    int, typer.Option("--realisations", "-n", min=1, metavar="N", help="Number of realisations.")
-]
-Limits = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--limit",
-        metavar="NAME=VALUE",
-        help="Limit that ends the life: depth=50um, roller_depth, lift_error, volume, width,"
-        " peak_pressure or clearance. May be repeated; the first that is reached counts.",
-        show_default=False,
-    ),
-]
 Life = "a number of passes, or turns of a cam, or a time such as '200 h'"
-Target = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LIFE",
-        help=f"Life of which the probability is estimated: {Life}.",
-        show_default=False,
-    ),
-]
-Shares = Annotated[
-    str,
-    typer.Option("--b", metavar="P1,P2,...", help="Percentages failed of the lives shown."),
-]
-Most = Annotated[
-    str | None,
-    typer.Option(
-        "--max",
-        metavar="LIFE",
-        help="Life at which tests are censored, as --target; default: ten times the longer of"
-        " target and test.",
-        show_default=False,
-    ),
-]
-Precision = Annotated[
-    str | None,
-    typer.Option(
-        metavar="TARGET",
-        help="Stop when the relative half-width of a 95 % confidence interval is reached:"
-        " 'b10 3%'.",
-        show_default=False,
-    ),
-]
-Rare = Annotated[
-    int,
-    typer.Option(
-        min=0,
-        metavar="N",
-        help="Number of further tests for a small probability of a life before --target.",
-        show_default=False,
-    ),
-]
-RareMethod = Annotated[
-    str,
-    typer.Option(
-        metavar="METHOD",
-        help="Method of --rare: importance sampling, subset simulation, or auto, the second with"
-        " at most as many tests again where the first fails.",
-    ),
-]
-Sweep = Annotated[
-    str | None,
-    typer.Option(
-        metavar="KEY=V1,V2,...",
-        help="Life for each value of a key, with common draws: cam.base_radius=25mm,27mm.",
-        show_default=False,
-    ),
-]
-Output = Annotated[Path | None, results_option("-life.h5")]
 _FILES = {".h5", ".hdf5"}
 
 
 def life(
-    designs: Designs,
-    realisations: Realisations = 400,
-    limit: Limits = None,
-    target: Target = None,
-    b: Shares = "1,10,50",
-    most: Most = None,
-    precision: Precision = None,
-    rare: Rare = 0,
-    rare_method: RareMethod = "auto",
-    output: Output = None,
+    designs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="SCENARIO...",
+            help="Scenario, or two to compare with common draws; or files of earlier studies, .h5.",
+            show_default=False,
+        ),
+    ],
+    realisations: Annotated[
+        int,
+        typer.Option("--realisations", "-n", min=1, metavar="N", help="Number of realisations."),
+    ] = 400,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="NAME=VALUE",
+            help="Limit that ends the life: depth=50um, roller_depth, lift_error, volume, width,"
+            " peak_pressure or clearance. May be repeated; the first that is reached counts.",
+            show_default=False,
+        ),
+    ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIFE",
+            help=f"Life of which the probability is estimated: {Life}.",
+            show_default=False,
+        ),
+    ] = None,
+    b: Annotated[
+        str,
+        typer.Option("--b", metavar="P1,P2,...", help="Percentages failed of the lives shown."),
+    ] = "1,10,50",
+    most: Annotated[
+        str | None,
+        typer.Option(
+            "--max",
+            metavar="LIFE",
+            help="Life at which tests are censored, as --target; default: ten times the longer of"
+            " target and test.",
+            show_default=False,
+        ),
+    ] = None,
+    precision: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TARGET",
+            help="Stop when the relative half-width of a 95 % confidence interval is reached:"
+            " 'b10 3%'.",
+            show_default=False,
+        ),
+    ] = None,
+    rare: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Number of further tests for a small probability of a life before --target.",
+            show_default=False,
+        ),
+    ] = 0,
+    rare_method: Annotated[
+        str,
+        typer.Option(
+            metavar="METHOD",
+            help="Method of --rare: importance sampling, subset simulation, or auto, the second"
+            " with at most as many tests again where the first fails.",
+        ),
+    ] = "auto",
+    output: Annotated[Path | None, results_option("-life.h5")] = None,
     figure: FigureOption = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    sweep: Sweep = None,
+    sweep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY=V1,V2,...",
+            help="Life for each value of a key, with common draws: cam.base_radius=25mm,27mm.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,

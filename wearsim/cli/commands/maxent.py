@@ -20,32 +20,29 @@ if TYPE_CHECKING:
 _COLUMNS, _ROWS = 60, 8
 _BLOCKS = " ▁▂▃▄▅▆▇█"
 
-Support = Annotated[
-    tuple[str, str],
-    typer.Option(
-        "--support",
-        metavar="LOW HIGH",
-        help="Least and greatest possible value: 0 inf.",
-        show_default=False,
-    ),
-]
-Mean = Annotated[float | None, typer.Option("--mean", help="Mean.", show_default=False)]
-Std = Annotated[float | None, typer.Option("--std", help="Standard deviation.", show_default=False)]
-MeanLog = Annotated[
-    float | None,
-    typer.Option(
-        "--mean-log",
-        help="Mean of the natural logarithm, instead of --std: a gamma distribution.",
-        show_default=False,
-    ),
-]
-
 
 def maxent(
-    support: Support,
-    mean: Mean = None,
-    std: Std = None,
-    mean_log: MeanLog = None,
+    support: Annotated[
+        tuple[str, str],
+        typer.Option(
+            "--support",
+            metavar="LOW HIGH",
+            help="Least and greatest possible value: 0 inf.",
+            show_default=False,
+        ),
+    ],
+    mean: Annotated[float | None, typer.Option("--mean", help="Mean.", show_default=False)] = None,
+    std: Annotated[
+        float | None, typer.Option("--std", help="Standard deviation.", show_default=False)
+    ] = None,
+    mean_log: Annotated[
+        float | None,
+        typer.Option(
+            "--mean-log",
+            help="Mean of the natural logarithm, instead of --std: a gamma distribution.",
+            show_default=False,
+        ),
+    ] = None,
     figure: Figure = None,
     json: Json = False,
     force: Force = False,

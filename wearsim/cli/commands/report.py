@@ -20,29 +20,26 @@ from wearsim.cli.shared import (
     profile_choice,
 )
 
-Files = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="FILE.h5...",
-        help="Results files of any kind; several runs and ensembles are also compared.",
-        show_default=False,
-    ),
-]
-Page = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="PAGE",
-        help="Page to write, by default the name of the first file with .html.",
-        show_default=False,
-    ),
-]
-
 
 def report(
-    files: Files,
-    output: Page = None,
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE.h5...",
+            help="Results files of any kind; several runs and ensembles are also compared.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="PAGE",
+            help="Page to write, by default the name of the first file with .html.",
+            show_default=False,
+        ),
+    ] = None,
     measured: MeasuredFiles = None,
     angle: Angle = None,
     level: Level = False,

@@ -160,26 +160,22 @@ def show(file: ResultsFile, json: Json = False) -> None:
     show_view(open_results(file).view, json=json, stored=True)
 
 
-Files = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="FILE.h5 FILE.h5...",
-        help="Results files of runs and ensembles; all others are compared with the first.",
-        show_default=False,
-    ),
-]
-Observable = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME",
-        help="Quantity to compare: depth, width, worn_volume, dissipated_energy...",
-    ),
-]
-
-
 def compare(
-    files: Files,
-    observable: Observable = "depth",
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE.h5 FILE.h5...",
+            help="Results files of runs and ensembles; all others are compared with the first.",
+            show_default=False,
+        ),
+    ],
+    observable: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Quantity to compare: depth, width, worn_volume, dissipated_energy...",
+        ),
+    ] = "depth",
     figure: Figure = None,
     json: Json = False,
     force: Force = False,
@@ -214,28 +210,27 @@ def _labels(files: list[Path]) -> list[str]:
     return names
 
 
-Folder = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="DIR",
-        help="Folder for the CSV files, by default the name of the results file.",
-        show_default=False,
-    ),
-]
-
-
-Decimal = Annotated[
-    str,
-    typer.Option(
-        "--decimal", metavar="SIGN", help="Decimal sign: '.', or ',' with semicolons between cells."
-    ),
-]
-
-
 def export(
-    file: ResultsFile, output: Folder = None, decimal: Decimal = ".", force: Force = False
+    file: ResultsFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Folder for the CSV files, by default the name of the results file.",
+            show_default=False,
+        ),
+    ] = None,
+    decimal: Annotated[
+        str,
+        typer.Option(
+            "--decimal",
+            metavar="SIGN",
+            help="Decimal sign: '.', or ',' with semicolons between cells.",
+        ),
+    ] = ".",
+    force: Force = False,
 ) -> None:
     """Write a results file as CSV, with units in the headers."""
     if decimal not in {".", ","}:

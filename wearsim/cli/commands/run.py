@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from wearsim.studies.run.result import Result
 
 
-Output = Annotated[Path | None, results_option(".h5")]
-
-
 Until = Annotated[
     str | None,
     typer.Option(
@@ -48,7 +45,7 @@ Until = Annotated[
 
 def run(
     scenario: ScenarioFile,
-    output: Output = None,
+    output: Annotated[Path | None, results_option(".h5")] = None,
     until: Until = None,
     settings: Settings = None,
     force: Force = False,
@@ -83,34 +80,29 @@ def run(
     show_view(result.view, json=json, files=files, known=loaded.notes)
 
 
-More = Annotated[
-    int | None,
-    typer.Option(
-        "--realisations",
-        "-n",
-        min=1,
-        help="New number of realisations of an ensemble; extends it.",
-        show_default=False,
-    ),
-]
-AllowDeep = Annotated[
-    bool,
-    typer.Option(
-        "--allow-deep",
-        help="Continue a wear test beyond a depth of a tenth of the roller's radius.",
-    ),
-]
-Failed = Annotated[
-    bool, typer.Option("--failed", help="Repeat the failed realisations of an ensemble.")
-]
-
-
 def resume(
     file: ResultsFile,
     until: Until = None,
-    allow_deep: AllowDeep = False,
-    failed: Failed = False,
-    realisations: More = None,
+    allow_deep: Annotated[
+        bool,
+        typer.Option(
+            "--allow-deep",
+            help="Continue a wear test beyond a depth of a tenth of the roller's radius.",
+        ),
+    ] = False,
+    failed: Annotated[
+        bool, typer.Option("--failed", help="Repeat the failed realisations of an ensemble.")
+    ] = False,
+    realisations: Annotated[
+        int | None,
+        typer.Option(
+            "--realisations",
+            "-n",
+            min=1,
+            help="New number of realisations of an ensemble; extends it.",
+            show_default=False,
+        ),
+    ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     json: Json = False,

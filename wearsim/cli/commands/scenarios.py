@@ -59,23 +59,29 @@ new = typer.Typer(
     rich_markup_mode=None,
 )
 
-Name = Annotated[
-    str,
-    typer.Argument(
-        metavar="NAME", help="Name of the contact model of the plugin: sponge.", show_default=False
-    ),
-]
-Directory = Annotated[
-    Path,
-    typer.Option(
-        "--directory", "-d", metavar="DIR", help="Folder in which the plugin's folder is created."
-    ),
-]
 NewScenario = Annotated[Path, typer.Argument(metavar="[FILE]", help="Name of the new file.")]
 
 
 @new.command("plugin")
-def new_plugin(name: Name, directory: Directory = Path()) -> None:
+def new_plugin(
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME",
+            help="Name of the contact model of the plugin: sponge.",
+            show_default=False,
+        ),
+    ],
+    directory: Annotated[
+        Path,
+        typer.Option(
+            "--directory",
+            "-d",
+            metavar="DIR",
+            help="Folder in which the plugin's folder is created.",
+        ),
+    ] = Path(),
+) -> None:
     """Create a plugin with a contact model, tests and a README."""
     from wearsim.plugins import ContactModelSpec, registry
     from wearsim.plugins.template import write_plugin
