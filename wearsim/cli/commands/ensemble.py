@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import wearsim
+from wearsim.cli.render import show_with_figure
 from wearsim.cli.shared import (
     FigureOption,
     Force,
@@ -24,14 +27,16 @@ from wearsim.cli.shared import (
     checking,
     note,
     read_scenario,
+    refuse,
     refuse_same_file,
     results_option,
+    settings_with,
 )
+from wearsim.errors import SolverError
 
 if TYPE_CHECKING:
     from wearsim.studies.ensemble.result import EnsembleResult
 
-STOPPING = "stopping after the next batch; repeat to stop at once"
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _WITHOUT_SPACE = re.compile(rf"({_NUMBER})([A-Za-zµμ°].*)")
 _QUANTITY = re.compile(rf"({_NUMBER})\s*(\S.*)?")
@@ -80,35 +85,32 @@ def ensemble(
 ) -> None:
     """Run a wear test for each realisation of the random inputs."""
     check_figure(figure, force, "--figure")
-    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
-    from wearsim.studies.ensemble import api
+    from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
+    from wearsim.studies.comparison.view import comparison_view
+    from wearsim.studies.ensemble.api import parse_target
     from wearsim.studies.ensemble.designs import parse_plan
     from wearsim.studies.ensemble.sweep import path_of, run_sweep
-    from wearsim.studies.kernels import kernels_of
 
-    options: dict[str, Any] = {"plan": plan, "workers": workers, "force": force}
     with checking("--plan"):
-        options["plan"] = plan if plan is None else parse_plan(plan)
+        chosen_plan = plan and parse_plan(plan)
     if until is not None:
-        if precision is not None:
-            raise typer.BadParameter("is the former name of --precision", param_hint="--until")
+        refuse(precision is not None, "is the former name of --precision", "--until")
         note("warning: --until of ensembles is now --precision; the old name will be removed")
         precision = until
-    with checking("--precision"):
-        options["precision"] = precision
-        if precision is not None:
-            api.parse_target(precision)
-    options["scheduler"] = checked_scheduler(scheduler, workers)
-    texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
+    if precision is not None:
+        with checking("--precision"):
+            parse_target(precision)
+    options: dict[str, Any] = {
+        "plan": chosen_plan,
+        "workers": workers,
+        "force": force,
+        "precision": precision,
+        "scheduler": checked_scheduler(scheduler, workers),
+    }
+    texts = settings_with(settings, seed=seed)
     path = output if output is not None else Path(f"{scenario.stem}-ensemble.h5")
-    if sweep is None:
-        key, files = "", {"": path}
-    else:
-        with checking("--sweep"):
-            key, values = parse_sweep(sweep)
-        if any(text.partition("=")[0].strip() == key for text in texts):
-            raise typer.BadParameter(f"{key} is also the key of --sweep", param_hint="--set")
-        files = {value: path_of(path, value) for value in values}
+    key, values = swept(sweep, texts)
+    files = {value: path_of(path, value) for value in values} if key else {"": path}
     scenarios = {
         value: read_scenario(scenario, [*texts, *([f"{key}={value}"] if key else [])])
         for value in files
@@ -116,39 +118,31 @@ def ensemble(
     for value, file in files.items():
         refuse_same_file(figure, file, scenarios[value].paths)
 
-    def announce(value: str, file: Path) -> None:
+    def announce(value: str, file: Path | None) -> None:
         if not quiet:
             note(f"{key} = {value}: {file}")
 
     first = scenarios[next(iter(files))]
-    watcher = EnsembleWatcher(quiet, kernels=lambda: kernels_of(first))
-    with stop_on_signals(STOPPING) as stop, watcher as watch:
-        options |= {
-            "on_progress": watch,
-            "stop_requested": stop.is_set,
-            "on_notice": watch.notice,
-        }
-        if key:
-            options["on_value"] = announce
-            results = run_sweep(
-                list(scenarios.values()), list(files), realisations, path, **options
-            )
+    with watching(EnsembleWatcher, first, quiet, BATCHES) as watch:
+        options |= watch.callbacks
+        if not key:
+            result = wearsim.ensemble(first, realisations, path, **options)
         else:
-            results = [api.ensemble(scenarios[""], realisations, path, **options)]
+            designs = list(scenarios.values())
+            results = run_sweep(
+                designs, list(files), realisations, path, on_value=announce, **options
+            )
     if not key:
-        report(results[0], json, figure, watch.workers)
+        show_ensemble(result, json, figure, watch.workers)
         return
-    for result in results:
-        _end(result)
-    from wearsim.cli.render import draw_figure, show_view
-    from wearsim.studies.comparison.view import comparison_view
-
-    view = comparison_view(results, list(files), "depth", key)
-    draw_figure(view.panels(), figure)
-    show_view(view, json=json, files={"figure": figure}, more={"figure": figure})
+    for item in results:
+        _refuse_failed(item)
+    show_with_figure(comparison_view(results, list(files), "depth", key), figure, json=json)
 
 
-def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str = "") -> None:
+def show_ensemble(
+    result: EnsembleResult, json: bool, figure: Path | None, workers: str = ""
+) -> None:
     """Write an ensemble or lives to stdout and failures to stderr, and draw the figure.
 
     Parameters
@@ -166,24 +160,36 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
     SolverError
         If all realisations failed.
     """
-    from wearsim.cli.render import draw_figure, show_view
     from wearsim.studies.execution.processes import InProcess
 
     if workers == InProcess.describe:
         workers = "this process, one realisation at a time"
-    view = result.view
-    draw_figure(view.panels(), figure)
-    files = {"workers": workers, "results file": result.path, "figure": figure}
-    show_view(view, json=json, files=files, more={"workers": workers or None, "figure": figure})
-    _end(result)
+    files, more = {"workers": workers, "results file": result.path}, {"workers": workers or None}
+    show_with_figure(result.view, figure, json=json, files=files, more=more)
+    _refuse_failed(result)
 
 
-def _end(result: EnsembleResult) -> None:
+def _refuse_failed(result: EnsembleResult) -> None:
     """Raise an error if all realisations failed."""
     if result.failed and not result.count:
-        from wearsim.errors import SolverError
-
         raise SolverError(f"{result.path}: all realisations failed")
+
+
+def swept(sweep: str | None, settings: Sequence[str]) -> tuple[str, tuple[str, ...]]:
+    """Return key and values of --sweep, which are empty without it.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it cannot be read, or its key is also the key of a setting.
+    """
+    if sweep is None:
+        return "", ()
+    with checking("--sweep"):
+        key, values = parse_sweep(sweep)
+    given = any(text.partition("=")[0].strip() == key for text in settings)
+    refuse(given, f"{key} is also the key of --sweep", "--set")
+    return key, values
 
 
 def parse_sweep(text: str) -> tuple[str, tuple[str, ...]]:

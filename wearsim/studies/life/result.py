@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from wearsim.studies.life.rare_estimates import rare_estimates
-from wearsim.studies.life.stored_settings import LifeComparison, LifeTarget
+from wearsim.studies.life.stored_settings import LifeComparison
 from wearsim.studies.life.values import LifeValues
 from wearsim.types import IntArray
-from wearsim.uq.estimation.estimates import Target
+from wearsim.uq.estimation.estimates import LIFE, Estimate, Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 from wearsim.uq.sensitivity.effects import TAIL, SignedEffect
 from wearsim.uq.survival.distributions import (
@@ -331,19 +331,23 @@ class LifeResult(LifeValues):
             len(common),
         )
 
-    def estimate_for(self, target: Target | LifeTarget) -> Any:
+    def estimate_for(self, target: Target) -> Estimate:
         """Return the estimate to which a target applies.
 
         Examples
         --------
         >>> lives = wearsim.open_results("rig-life.h5")
-        >>> from wearsim.studies.life.stored_settings import LifeTarget
-        >>> lives.estimate_for(LifeTarget.parse("b10 3%")).value  # takes 32 realisations
+        >>> from wearsim.uq.estimation.estimates import Target
+        >>> lives.estimate_for(Target.parse("b10 3%")).quantile(0.1).value  # takes 32 realisations
         nan
         """
-        if isinstance(target, Target):
+        if target.observable != LIFE:
             return super().estimate_for(target)
-        return self.b(100.0 * target.share) if self.count >= _FEWEST else UNKNOWN
+        share = float(target.statistic)
+        life = self.b(100.0 * share) if self.count >= _FEWEST else UNKNOWN
+        return Estimate(
+            self.count, UNKNOWN, UNKNOWN, ((share, life),), math.nan, math.nan, self.method
+        )
 
     @property
     def rare(self) -> RareProbability | None:
