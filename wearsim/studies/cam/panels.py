@@ -54,7 +54,7 @@ _SAMPLES = 97  # of a panel of the turn between its stations
 _MAGNIFIED = 0.2  # greatest depth in the drawing of the worn cam, of the base radius
 
 
-def cam_sheet(study: CamStudy) -> Sheet:
+def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of a cam: its shape, motion, pressure angle, speeds, and loads."""
     turn = study.turn
     samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
@@ -130,8 +130,8 @@ def cam_sheet(study: CamStudy) -> Sheet:
     }
     rows = [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]]
     height = 8.6
-    if (measured := turn.cam.measured) is not None:
-        panels["residuals"] = _residuals(turn.cam.motion, measured)
+    if (points := turn.cam.measured) is not None:
+        panels["residuals"] = _residuals(turn.cam.motion, points)
         rows, height = [*rows, ["residuals", "residuals"]], 10.8
     return Sheet(
         turn.scenario.title, panels, rows, (12.0, height), widths=[1.0, 1.25], main="motion"

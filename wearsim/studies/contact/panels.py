@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from wearsim.report.measured import Measured
 from wearsim.report.panels import (
     BLACK,
     BLUE,
@@ -28,7 +31,7 @@ STICK, SLIDE = "#7fb2d9", "#f2c9a1"
 Y = Axis("y", "mm")
 
 
-def contact_sheet(study: ContactStudy) -> Sheet:
+def contact_sheet(study: ContactStudy, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of a contact: fields if it has any, and always those over the strips."""
     title = (
         f"{study.title}\n{study.described_model}\n"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.report.measured import Measured
 from wearsim.report.panels import (
     BLACK,
     BLUE,
@@ -38,7 +39,7 @@ _SHADES = ("#d6e4f2", "#a9c7e4", "#6f9fce")
 _UNIT = look(unit="1e-12 1/Pa", per_si=1e12)  # of K/H
 
 
-def identification_sheet(result: IdentificationResult) -> Sheet:
+def identification_sheet(result: IdentificationResult, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of an identification.
 
     K/H of each specimen with the pooled distribution, and the density of m and t; traces with the

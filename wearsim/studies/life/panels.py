@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.report.measured import Measured
 from wearsim.report.panels import (
     BLACK,
     DASHES,
@@ -63,7 +64,12 @@ class _Design:
         return f"{self.label}: {words}" if self.several else words
 
 
-def life_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
+def life_sheet(result: LifeResult, measured: Sequence[Measured] = ()) -> Sheet:
+    """Return the panels of the lives of one design."""
+    return lives_sheet([result], [result.title])
+
+
+def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
     """Return the panels of the lives of designs.
 
     Parameters

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from wearsim.errors import WearsimError
 from wearsim.evolution.limits import SAME_VALUE, Limit
 from wearsim.report.csv_files import computed
-from wearsim.report.measured import ComputedProfile, Measured
+from wearsim.report.measured import ComputedProfile
 from wearsim.report.text import (
     ROUNDING,
     count,
@@ -37,8 +37,6 @@ _NOT_MODEL = (
     " model, of the wear law or of the inputs."
 )
 
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 _RECORDS = {
     "cylinder_depth_profiles.csv": "cylinder_depth_profile",
     "roller_depth_profiles.csv": "roller_depth_profile",
@@ -55,7 +53,7 @@ class RunView(StudyView[Result]):
     has the history.
     """
 
-    verb = "run"
+    verb, sheet = "run", "wearsim.studies.run.panels:run_sheet"
 
     def __init__(self, result: Result) -> None:
         super().__init__(result)
@@ -70,6 +68,8 @@ class RunView(StudyView[Result]):
         if result.failure:
             self.heading = "state before the failure"
         self.has_angles = result.is_cam
+        if result.is_cam:
+            self.sheet = "wearsim.studies.cam.panels:cam_run_sheet"
         self.basis = NO_STEPPING_ERROR if is_exact else _NOT_MODEL
 
     def standing(self) -> str:
@@ -236,16 +236,6 @@ class RunView(StudyView[Result]):
                 " of model or inputs)"
             )
         return footer(used, error, lapse(result.raw.wall_seconds))
-
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; measured profiles are drawn over the groove."""
-        from wearsim.studies.run.panels import run_sheet  # noqa: PLC0415  (only of figures)
-
-        if not self.result.is_cam:
-            return run_sheet(self.result, measured)
-        from wearsim.studies.cam.panels import cam_run_sheet  # noqa: PLC0415  (not of a cylinder)
-
-        return cam_run_sheet(self.result, measured)
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the worn profile with which measured ones are compared, of a cam at an angle."""
