@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,11 +35,6 @@ from wearsim.errors import SolverError
 
 if TYPE_CHECKING:
     from wearsim.studies.ensemble.result import EnsembleResult
-
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_WITHOUT_SPACE = re.compile(rf"({_NUMBER})([A-Za-zµμ°].*)")
-_QUANTITY = re.compile(rf"({_NUMBER})\s*(\S.*)?")
-_EXAMPLE = "such as load.normal_force=250N,300N,350N"
 
 
 def ensemble(
@@ -185,65 +179,10 @@ def swept(sweep: str | None, settings: Sequence[str]) -> tuple[str, tuple[str, .
     """
     if sweep is None:
         return "", ()
+    from wearsim.studies.ensemble.sweep import parse_sweep
+
     with checking("--sweep"):
         key, values = parse_sweep(sweep)
     given = any(text.partition("=")[0].strip() == key for text in settings)
     refuse(given, f"{key} is also the key of --sweep", "--set")
     return key, values
-
-
-def parse_sweep(text: str) -> tuple[str, tuple[str, ...]]:
-    """Return the key and the values of a sweep.
-
-    Parameters
-    ----------
-    text : str
-        "load.normal_force=250N,300N"; the space before a unit may be left out.
-
-    Returns
-    -------
-    key : str
-        Dotted key.
-    values : tuple of str
-        Two or more different values, with a space before the unit.
-
-    Raises
-    ------
-    ValueError
-        If there is no key, an empty value, fewer than two values, or two equal ones.
-    """
-    key, equals, listed = text.partition("=")
-    if not equals or not key.strip():
-        raise ValueError(f"'{text}' is not a key with values, expected one {_EXAMPLE}")
-    values = tuple(
-        _WITHOUT_SPACE.sub(r"\1 \2", value) if _WITHOUT_SPACE.fullmatch(value) else value
-        for value in map(str.strip, listed.split(","))
-    )
-    if not all(values):
-        raise ValueError(f"'{text}' has an empty value, expected values {_EXAMPLE}")
-    if len(values) < 2:
-        raise ValueError(f"'{text}' has one value, expected two or more {_EXAMPLE}")
-    for number, value in enumerate(values):
-        for before in values[:number]:
-            if _are_equal(before, value):
-                raise ValueError(f"'{before}' and '{value}' are the same value; remove one")
-    return key.strip(), values
-
-
-def _are_equal(one: str, other: str) -> bool:
-    """Return whether two values are equal, also in different units."""
-    matches = [_QUANTITY.fullmatch(value) for value in (one, other)]
-    if matches[0] is None or matches[1] is None:
-        return one == other
-    (first, unit), (second, other_unit) = matches[0].groups(), matches[1].groups()
-    if not (unit and other_unit):
-        return not (unit or other_unit) and float(first) == float(second)
-    from wearsim.units import conversion
-
-    try:
-        factor = conversion(other_unit, unit)
-    except ValueError:  # reported when the scenario is read
-        return one == other
-    from fractions import Fraction
-
-    return Fraction(first) == Fraction(second) * factor

@@ -23,7 +23,7 @@ from wearsim.report.panels import (
     look,
 )
 from wearsim.report.text import shown
-from wearsim.studies.contact.outline import patch_edges, patch_strips
+from wearsim.studies.contact.outline import patch_outlines
 from wearsim.studies.contact.single import ContactStudy
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray
 
@@ -55,7 +55,7 @@ def _fields(fields: ContactFields, solution: ContactSolution) -> dict[str, Panel
     greatest = float(solution.half_length.max())
     along = Axis("x (rolling direction)", "mm", limits=(-1.35 * greatest, 1.2 * greatest))
     across = Axis("y", "mm", limits=(None, None))
-    outlines = _outlines(solution)
+    outlines = patch_outlines(solution.y, solution.half_length)
     ground = [Patch(*outline, colour=BLACK) for outline in outlines]
     edges = [Line(*outline, colour=BLACK, width=0.8) for outline in outlines]
 
@@ -120,25 +120,6 @@ def _spread_out(length: int, wanted: int) -> IntArray:
     """Return evenly spaced indices, about as many as wanted, that keep away from both ends."""
     step = max(length // wanted, 1)
     return np.arange((length - 1) % step // 2 + step // 2, length, step)
-
-
-def _outlines(solution: ContactSolution) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the outline of each patch, up to the edges beyond the centres of strips."""
-    found = []
-    for strips in patch_strips(solution.half_length):
-        y, a = solution.y[strips], solution.half_length[strips]
-        patch = np.zeros_like(solution.half_length)
-        patch[strips] = a
-        edges = patch_edges(solution.y, patch)
-        assert edges is not None
-        part = np.linspace(0.0, 1.0, 12)
-        left, right = edges[0] + (y[0] - edges[0]) * part, y[-1] + (edges[1] - y[-1]) * part
-        across = np.concatenate([left, y, right])
-        ends = np.sqrt(part)  # the square of the half-length is linear there
-        height = np.concatenate([a[0] * ends, a, a[-1] * ends[::-1]])
-        outline = np.concatenate([height, -height[::-1]])
-        found.append((np.concatenate([across, across[::-1]]), outline))
-    return found
 
 
 def _strips(study: ContactStudy) -> dict[str, Panel]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -48,10 +47,9 @@ from wearsim.report.text import (
 from wearsim.studies.cam.panels import ANGLE, segment_marks
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.ensemble.file.data import Effect
-from wearsim.studies.ensemble.file.schema import PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.run.panels import HEIGHT, Y
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
@@ -171,45 +169,11 @@ def _density(result: EnsembleResult) -> Panel:
     )
 
 
-def convergence_of(
-    result: EnsembleResult, target: Target, points: int = 40
-) -> tuple[IntArray, list[Interval]]:
-    """Return the estimates from the first realisations of an ensemble, for rising numbers of them.
-
-    Parameters
-    ----------
-    result : EnsembleResult
-        With at least one completed realisation.
-    target : Target
-        Quantity to estimate.
-    points : int
-        Approximate number of sample sizes, evenly spaced in their logarithm.
-
-    Returns
-    -------
-    counts : ndarray of int
-        Numbers of completed realisations.
-    intervals : list of Interval
-    """
-    spaced = np.geomspace(1, result.count, min(points, result.count))
-    counts = np.unique(spaced.round().astype(np.int64))
-    raw, name = result.raw, target.observable
-    # kept in memory, since a file's arrays are read again at every access
-    held = {name: raw.column(name, -1)[:, None]}
-    held |= {"control": raw.variables["control"]} if raw.control else {}
-    numbers, intervals = np.arange(raw.requested), []
-    for last in result.numbers[counts - 1]:
-        status = np.where(numbers <= last, raw.status, PENDING)
-        part = replace(result, raw=replace(raw, variables=held, status=status))
-        intervals.append(target.interval(part.estimate_for(target)))
-    return counts, intervals
-
-
 def _convergence(result: EnsembleResult) -> Panel:
     """Return the convergence of the estimate of the target, by default of the mean depth."""
     target = Target.parse(result.until or _DEFAULT)
     named = OBSERVABLES[target.observable]
-    counts, found = convergence_of(result, target)
+    counts, found = result.convergence(target)
     value, low, high = (
         np.array([getattr(item, end) for item in found]) for end in ("value", "low", "high")
     )

@@ -35,7 +35,7 @@ from wearsim.studies.life.stored_settings import swept_variable
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.survival.fits import FAMILIES, Family
-from wearsim.uq.survival.lives import cumulative_incidence, median_positions, survival_curve
+from wearsim.uq.survival.lives import cumulative_incidence, median_positions
 
 _POINTS = 200  # of a curve
 _MOST_MARKS = 500
@@ -153,14 +153,13 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
     ]
     for design in designs:
         result, colour = design.result, design.colour
-        life, survival, low, high = survival_of(result)
-        steps = not result.is_exact
+        curve, steps = result.survival_curve(), not result.is_exact
         marks += [
-            Band(life, low, high, steps=steps, colour=colour, alpha=0.2),
-            Line(life, survival, steps=steps, colour=colour, label=design.named),
+            Band(curve.life, curve.low, curve.high, steps=steps, colour=colour, alpha=0.2),
+            Line(curve.life, curve.survival, steps=steps, colour=colour, label=design.named),
         ]
-        if result.censored and len(survival):
-            end, dash = float(survival[-1]), look(dash="", marker="|", size=12.0)
+        if result.censored:
+            end, dash = float(curve.survival[-1]), look(dash="", marker="|", size=12.0)
             text = f"{result.censored} censored"
             style = look(offset=(-4.0, 6.0), anchor="right")
             marks += [
@@ -178,32 +177,6 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
     x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
     y = Axis("survival", "%", limits=_SHARE)
     return Panel("Survival, with 95 % band", x, y, marks, text)
-
-
-def survival_of(result: LifeResult) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return lives, and the survival with its band at each."""
-    if not result.is_exact:
-        curve = survival_curve(np.minimum(result.lives, result.most), result.observed)
-        start, one = np.zeros(1), np.ones(1)
-        end = curve.survival[-1:] if len(curve.life) else one
-        last = np.array([result.most]) if result.censored else curve.life[-1:]
-        return (
-            np.concatenate([start, curve.life, last]),
-            np.concatenate([one, curve.survival, end]),
-            np.concatenate([one, curve.low, curve.low[-1:] if len(curve.low) else one]),
-            np.concatenate([one, curve.high, curve.high[-1:] if len(curve.high) else one]),
-        )
-    distribution = result.distribution
-    end_of_life: float = min(distribution.quantile_of_mean(0.999), result.most)
-    life = np.linspace(0.0, end_of_life, _POINTS)[1:]
-    found = [distribution.probability_before(float(n)) for n in life]
-    survival, low, high = (
-        np.array([1.0, *(1.0 - getattr(item, name) for item in found)])
-        for name in ("value", "high", "low")
-    )
-    # the survival falls, so that a bound at one life is one for those before or after it
-    low, high = np.maximum.accumulate(low[::-1])[::-1], np.minimum.accumulate(high)
-    return np.append(0.0, life), survival, low, high
 
 
 def _scale(family: Family) -> Callable[[FloatArray], FloatArray]:

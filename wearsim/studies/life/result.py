@@ -23,10 +23,17 @@ from wearsim.uq.survival.distributions import (
     LifeDistribution,
 )
 from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
-from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
+from wearsim.uq.survival.lives import (
+    SurvivalCurve,
+    life_quantile,
+    lower_bound,
+    probability_before,
+    survival_curve,
+)
 from wearsim.uq.survival.rare_events import RareProbability
 
 _QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
+_POINTS = 200  # of a curve
 _FEWEST = 32  # realisations below which a target is not reached
 
 
@@ -203,6 +210,34 @@ class LifeResult(LifeValues):
         """
         found = self.probability_before(life)
         return Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low)
+
+    def survival_curve(self) -> SurvivalCurve:
+        """Return the survival with its band from 0 to the last life, or the maximum of the tests.
+
+        Examples
+        --------
+        >>> curve = wearsim.open_results("rig-life.h5").survival_curve()
+        >>> curve.life[0], curve.survival[0]
+        (0.0, 1.0)
+        """
+        if not self.is_exact:
+            curve = survival_curve(np.minimum(self.lives, self.most), self.observed)
+            last = [self.most] if self.censored else curve.life[-1:]
+            parts = [
+                np.concatenate([[1.0], part, part[-1:] if len(part) else [1.0]])
+                for part in (curve.survival, curve.low, curve.high)
+            ]
+            return SurvivalCurve(np.concatenate([[0.0], curve.life, last]), *parts)
+        end = min(self.distribution.quantile_of_mean(0.999), self.most)
+        life = np.linspace(0.0, end, _POINTS)
+        ended = [self.distribution.probability_before(float(n)) for n in life[1:]]
+        survival, low, high = (
+            np.array([1.0, *(1.0 - getattr(item, name) for item in ended)])
+            for name in ("value", "high", "low")
+        )
+        # the survival falls, so that a bound at one life is one for those before or after it
+        low, high = np.maximum.accumulate(low[::-1])[::-1], np.minimum.accumulate(high)
+        return SurvivalCurve(life, survival, low, high)
 
     @cached_property
     def fits(self) -> list[LifeFit]:
