@@ -15,7 +15,7 @@ from wearsim.report.text import PER_SI, count, pass_unit
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from wearsim.report.measured import Measured
+    from wearsim.levelling import Measured
 
 BLUE, ORANGE, GREEN, RED, GREY = "#2066a8", "#d1701c", "#3a8a5c", "#b3282d", "#8a8a8a"
 BLACK = "black"

@@ -18,7 +18,7 @@ from wearsim.report.text import by_roller, shown, with_interval
 from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
-    from wearsim.report.measured import ComputedProfile, Measured
+    from wearsim.levelling import ComputedProfile, Measured
     from wearsim.report.panels import Sheet
 
 

@@ -32,8 +32,8 @@ from wearsim.cli.shared import (
 from wearsim.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from wearsim.levelling import Measured
     from wearsim.profiles import ProfileChoice
-    from wearsim.report.measured import Measured
     from wearsim.report.view import View
 
 
@@ -110,9 +110,10 @@ def measured_profiles(
         given = {"--level": level, "--angle": angle}
         refuse_options(given, "needs a measured profile, --measured")
         return []
+    from wearsim.levelling import Measured, levelled, rms
     from wearsim.profiles import load_profile, sign_note
     from wearsim.quantities import quantity
-    from wearsim.report.measured import Measured, levelled, residual_text, rms
+    from wearsim.report.measured import residual_text
     from wearsim.report.text import shown
 
     with checking("--angle"):

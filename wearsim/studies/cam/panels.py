@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.levelling import Measured
 from wearsim.mechanics.cam import Motion, Stations, surface_points
-from wearsim.report.measured import Measured
 from wearsim.report.panels import (
     BLACK,
     GREEN,

@@ -6,7 +6,7 @@ from textwrap import fill
 
 import numpy as np
 
-from wearsim.report.measured import ComputedProfile
+from wearsim.levelling import ComputedProfile
 from wearsim.report.panels import (
     BLACK,
     Axis,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     BLUE,

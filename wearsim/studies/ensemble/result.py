@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import WearsimError, unknown_name
-from wearsim.report.measured import ComputedProfile
+from wearsim.levelling import ComputedProfile
 from wearsim.report.text import sufficient_for
 from wearsim.studies.ensemble.file.data import Band, Course, Effect
 from wearsim.studies.ensemble.file.schema import DONE, KEPT, PENDING, QUANTILES

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from wearsim.levelling import ComputedProfile
 from wearsim.report.csv_files import computed, drawn
-from wearsim.report.measured import ComputedProfile
 from wearsim.report.text import (
     NINETY_PERCENT,
     NOTHING,

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from wearsim.errors import ResultsFileError
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.text import part_with_interval
 from wearsim.report.view import Row, Rows, Table, View
 from wearsim.studies.life.result import LifeResult

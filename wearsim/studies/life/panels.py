@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     DASHES,

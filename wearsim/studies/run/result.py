@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.errors import WearsimError, unknown_name
 from wearsim.evolution.limits import SAME_VALUE, Limit
-from wearsim.report.measured import ComputedProfile
+from wearsim.levelling import ComputedProfile
 from wearsim.results.content import (
     Array,
     Arrays,

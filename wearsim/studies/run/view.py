@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.levelling import ComputedProfile
 from wearsim.report.csv_files import computed
-from wearsim.report.measured import ComputedProfile
 from wearsim.report.text import (
     ROUNDING,
     count,
