@@ -315,9 +315,9 @@ class Panel:
     figure_only: bool = False
 
 
-def look(**options: Any) -> dict[str, Any]:
-    """Return options of marks or panels, to be shared by several of them."""
-    return options
+def dots(x: Any, y: Any, marker: str = "o", **style: Any) -> Line:
+    """Return points without a curve."""
+    return Line(x, y, dash="", marker=marker, **style)
 
 
 def message(title: str, *lines: str) -> Panel:

@@ -20,7 +20,6 @@ from wearsim.report.panels import (
     Panel,
     Patch,
     Sheet,
-    look,
 )
 from wearsim.report.text import shown
 from wearsim.studies.contact.outline import patch_outlines
@@ -142,8 +141,8 @@ def _strips(study: ContactStudy) -> dict[str, Panel]:
             text = reference.model
             if key == "dissipation":
                 text += f"; difference {shown(errors.dissipation, '%', 2)} (L2)"
-            style = look(dash="--", width=1.0, colour=BLACK, label=text)
-            marks.append(Line(reference.y[near], theirs[near], **style))
+            curve = reference.y[near], theirs[near]
+            marks.append(Line(*curve, dash="--", width=1.0, colour=BLACK, label=text))
             top = 1.25 * 1.05 * max(float(values.max()), float(theirs.max()))
         y, caption = Axis(label, unit, limits=(0.0, top)), f"{title} across the track."
         found[name] = Panel(title, Y, y, marks, caption, legend="upper center")

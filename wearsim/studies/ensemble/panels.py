@@ -25,9 +25,9 @@ from wearsim.report.panels import (
     Whiskers,
     convergence,
     depth_axes,
+    dots,
     evenly_spaced,
     histogram,
-    look,
     measured_marks,
     message,
     worn_limits,
@@ -177,14 +177,11 @@ def _convergence(result: EnsembleResult) -> Panel:
     value, low, high = (
         np.array([getattr(item, end) for item in found]) for end in ("value", "low", "high")
     )
-    marks = []
-    if result.until:
-        style = look(across="y", dash="--", colour=GREEN)
-        label = f"target: ±{100 * target.width:g} %"
-        marks = [
-            Span(value[-1] * (1.0 - target.width), **style),
-            Span(value[-1] * (1.0 + target.width), **style, label=label),
-        ]
+    labels = {-target.width: "", target.width: f"target: ±{100 * target.width:g} %"}
+    marks = [
+        Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
+        for part, label in (labels.items() if result.until else ())
+    ]
     title = f"{statistic_in_words(target).capitalize()}, with 95 % interval"
     return convergence(title, named.words, named.unit, counts, value, low, high, marks)
 
@@ -192,13 +189,12 @@ def _convergence(result: EnsembleResult) -> Panel:
 def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
     """Return the mean worn profile with its 95 % range, and measured profiles over it."""
     found = result.worn_profile()
-    marks: list[Mark] = []
+    marks: list[Mark] = [Line(found.y, found.height, colour=BLACK, label="mean")]
     if found.label:
-        marks.append(Band(found.y, found.low, found.high, label=found.label))
-    marks.append(Line(found.y, found.height, colour=BLACK, label="mean"))
+        marks.insert(0, Band(found.y, found.low, found.high, label=found.label))
     if found.start.any():
-        start = look(dash="--", width=1.0, colour=GREY, label="start of the tests")
-        marks.append(Line(found.y, found.start, **start))
+        label = "start of the tests"
+        marks.append(Line(found.y, found.start, dash="--", width=1.0, colour=GREY, label=label))
     limits = worn_limits(found.y, found.start - found.low, *(one.y for one in measured))
     title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
     title += "" if found.kept == result.count else f", of the first {count(found.kept)}"
@@ -262,10 +258,9 @@ def effects_panel(title: str, of: str, effects: list[Effect]) -> Panel:
     bars = Bars(places - 0.3, places + 0.3, widths, horizontal=True, colour=colours, alpha=0.55)
     marks: list[Mark] = [bars, _intervals(places, first, BLACK)]
     if any(item.total for item in effects):
-        below = places + 0.38
+        below, values = places + 0.38, [index.value for index in total]
         marks.append(_intervals(below, total, ORANGE))
-        style = look(dash="", marker="D", colour=ORANGE, label="total, with interactions")
-        marks.append(Line([index.value for index in total], below, **style))
+        marks.append(dots(values, below, "D", colour=ORANGE, label="total, with interactions"))
     share = f"{100.0 * largest.first.value:.0f} % of the variance"
     return Panel(
         title,
@@ -319,8 +314,8 @@ def draws_panels(
     drawn = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1)
     finite = np.flatnonzero(np.isfinite(values))
     every = finite[evenly_spaced(len(finite), MOST_POINTS)]
-    style = look(dash="", marker="o", alpha=0.5)
-    points = Line(drawn[every], values[every], **style, more={"realisation": (every, "1")})
+    more = {"realisation": (every, "1")}
+    points = dots(drawn[every], values[every], alpha=0.5, more=more)
     title = f"{name.capitalize()} against {item['key']}"
     text = f"One point for each of {count(len(every))} tests."
     return {"draws": Panel(title, Axis(item["key"], unit, 1.0 / size), axis, [points], text)}
