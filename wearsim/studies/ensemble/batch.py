@@ -205,7 +205,7 @@ def observables_of(
     stepper: Stepper, problem: WearProblem, state: WearState, threshold: float
 ) -> list[Observables]:
     """Return the observables of every realisation of a state."""
-    row = history_row(stepper, problem, state, None, threshold)
+    row = history_row(stepper, problem, state, threshold)
     count = problem.kinematics.multiplicity[:, None]
     energy, time = row["dissipated_energy"], row["time"]
     started = time > 0.0

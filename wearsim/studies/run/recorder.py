@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from operator import itemgetter
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -84,11 +84,7 @@ _WITHOUT_REALISATION = {n for n, item in ALL_VARIABLES.items() if "realisation" 
 
 
 def history_row(
-    stepper: Stepper,
-    problem: WearProblem,
-    state: WearState,
-    before: WearState | None,
-    threshold: float,
+    stepper: Stepper, problem: WearProblem, state: WearState, threshold: float
 ) -> Variables:
     """Return the observables of every realisation; `threshold` [m] bounds the groove's width."""
     problem, state, loads = present_contacts(stepper, problem, state)
@@ -105,7 +101,6 @@ def history_row(
     return {
         "passes": state.passes,
         "time": problem.time(state.passes),
-        "step_passes": state.passes - (state if before is None else before).passes,
         "depth": depth(problem, state),
         "width": groove_width(problem, state, threshold),
         "worn_volume": volume(problem, state),
@@ -128,6 +123,94 @@ def history_row(
         **{n: problem.mean_over_turn(problem.per_roller(v))[0] for n, v in approach.items()},
         **cam_history(problem, state),
     }
+
+
+class History:
+    """Observables of a single test at its start and after each of its steps.
+
+    Where the contacts of a state carry the present loads, nothing is solved for its observables.
+    They are then computed together with those of later states, as realisations of one problem.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    threshold : float
+        Depth that bounds the groove's width [m].
+    rows : iterable of mapping
+        Rows of an earlier part of the test.
+    """
+
+    def __init__(self, stepper: Stepper, threshold: float, rows: Iterable[Variables] = ()) -> None:
+        self._stepper, self._threshold = stepper, threshold
+        #: rows, and after them states that wait: problem, state and passes of the step
+        self._rows: list[Any] = [*rows]
+        self._computed = len(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def add(self, problem: WearProblem, state: WearState, before: WearState) -> None:
+        """Add a state after a step from the state `before`, at the start of the test itself."""
+        waiting = self._rows[self._computed :]
+        strips = problem.contacts_each * problem.grid.strips * (len(waiting) + 1)
+        if waiting and (strips > MOST_WAITING or waiting[0][0] is not problem):
+            self.compute()
+        step = state.passes - before.passes
+        if _carries_loads(self._stepper, problem, state):
+            self._rows.append((problem, state.replaced(**_NOT_OBSERVED), step))
+        else:
+            self.compute()
+            self._rows.append(_rows_of(self._stepper, problem, state, step, self._threshold)[0])
+            self._computed = len(self._rows)
+
+    def compute(self) -> list[Variables]:
+        """Return all rows, computed; an interrupt leaves them as they are or computed."""
+        waiting = self._rows[self._computed :]
+        if waiting:
+            problems, states, steps = zip(*waiting, strict=True)
+            several = problems[0].at(np.zeros(len(waiting), dtype=np.int64))
+            state, step = joined_states(states), np.concatenate(steps)
+            found = _rows_of(self._stepper, several, state, step, self._threshold)
+            self._rows[self._computed :] = found
+            self._computed = len(self._rows)
+        return self._rows
+
+    def shorten(self, count: int) -> None:
+        """Keep the first rows only."""
+        del self._rows[count:]
+        self._computed = min(self._computed, count)
+
+
+MOST_WAITING = 200_000  # strips of all contacts of the states that wait in a `History`
+#: what observables do not depend on
+_NOT_OBSERVED = dict.fromkeys(
+    (
+        *("coarse_step_solution", "half_quadrature_solution", "wear_exponents", "past_wear"),
+        *("separation", "part", "whole_steps", "past_sums", "past_feedback", "stepping_error"),
+    )
+)
+
+
+def _carries_loads(stepper: Stepper, problem: WearProblem, state: WearState) -> bool:
+    """Return whether nothing is solved for the observables: the end of a step at constant load."""
+    constant = problem.constant_load is not None and not problem.varying
+    plain = not (problem.terms or problem.pauses or problem.has_nodes)
+    return constant and plain and state.past_spans is not None and not stepper.pass_by_pass
+
+
+def _rows_of(
+    stepper: Stepper,
+    problem: WearProblem,
+    state: WearState,
+    step: FloatArray,
+    threshold: float,
+) -> list[Variables]:
+    """Return the row of each realisation of a state in the form of the results file."""
+    row = history_row(stepper, problem, state, threshold) | {"step_passes": step}
+    return [
+        {n: v[place] if n in _WITHOUT_REALISATION else v[..., place, None] for n, v in row.items()}
+        for place in range(len(step))
+    ]
 
 
 def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Variables:
@@ -231,9 +314,9 @@ class Recorder:
         sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
         sums |= {f"{name}_error" for name in ESTIMATED}
         steps = {name: column for name, column in (history or {}).items() if name not in sums}
-        self._history = _rows(steps) or [
-            _single(history_row(stepper, problem, state, None, threshold))
-        ]
+        self._history = History(stepper, threshold, _rows(steps))
+        if not steps:
+            self._history.add(problem, state, state)
         #: errors of the finished test due to its strips, see `strip_errors.strip_errors`
         self.strip_errors: FloatArray | None = None
         #: errors of observables of the finished test, see `observed_errors`
@@ -247,8 +330,7 @@ class Recorder:
         stepper, end = self.stepper, advance.end
         for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
             self._record(advance, *states_at(stepper, advance, [one]))
-        row = history_row(stepper, advance.problem, end, advance.path[0], self.threshold)
-        self._history.append(_single(row))
+        self._history.add(advance.problem, end, advance.path[0])
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end, advance.problem.grid
         self._thin(float(end.passes[0]))
@@ -270,8 +352,7 @@ class Recorder:
             if one[2] < state.passes[0]:
                 self._record(advance, *states_at(stepper, advance, [one]))
         self._record(advance, advance.problem, state)
-        row = history_row(stepper, advance.problem, state, start, self.threshold)
-        self._history.append(_single(row))
+        self._history.add(advance.problem, state, start)
         self._kept = len(self._history), len(self._records), start, advance.problem.grid
 
     def _record(self, advance: Advance, problem: WearProblem, state: WearState) -> None:
@@ -292,7 +373,8 @@ class Recorder:
 
     def drop_unfinished(self) -> None:
         """Remove the rows of an interrupted `add`."""
-        del self._history[self._kept[0] :], self._records[self._kept[1] :]
+        self._history.shorten(self._kept[0])
+        del self._records[self._kept[1] :]
 
     @property
     def state(self) -> WearState:
@@ -311,7 +393,7 @@ class Recorder:
         Errors are sums of those due to steps, to the stations of a cam and, where they are known,
         to strips.
         """
-        columns = _columns(self._history)
+        columns = _columns(self._history.compute())
         for name, part in zip(ERRORS, self.errors_by_strips, strict=True):
             by_steps = columns[f"{name}_by_steps"]
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
@@ -341,11 +423,11 @@ class Recorder:
     @property
     def observed(self) -> dict[str, FloatArray]:
         """The observables that have an estimated error besides depth and volume."""
-        return {name: self.column(name) for name in ESTIMATED if name in self._history[0]}
+        return {name: self.column(name) for name in ESTIMATED if name in self._history.compute()[0]}
 
     def column(self, name: str) -> FloatArray:
         """Return a variable of the history except errors, first axis step."""
-        return np.array([row[name] for row in self._history])
+        return np.array([row[name] for row in self._history.compute()])
 
     @property
     def last_record(self) -> Variables:
