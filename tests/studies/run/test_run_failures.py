@@ -24,6 +24,7 @@ from wearsim.errors import (
 from wearsim.evolution.steppers import implicit
 from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario, parse_scenario
+from wearsim.studies import schedule
 from wearsim.studies.opening import open_results
 from wearsim.studies.run import recorder
 from wearsim.studies.run import run as studies
@@ -53,9 +54,9 @@ class InterruptAtCall:
 
 PLACES = [
     (implicit, "implicit_step"),  # three in a step: two halves and the coarse solution
-    (recorder, "take_side_step"),
+    (schedule, "take_side_step"),
     (recorder, "record_row"),
-    (recorder, "due_records"),
+    (recorder, "history_row"),
 ]
 
 
@@ -80,6 +81,7 @@ def test_interrupt_in_a_step_keeps_the_previous_step(
     scenario, unbroken = nine_records
     with monkeypatch.context() as patch:
         patch.setattr(module, name, InterruptAtCall(getattr(module, name), at, late))
+        patch.setattr(recorder, "MOST_WAITING", 0)  # every state is observed by itself
         with pytest.raises(Interrupted, match=r"stopped at pass \d+ of 6000; continue with"):
             studies.run(scenario, path)
     stopped = open_results(path)
