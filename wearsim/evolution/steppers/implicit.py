@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ from wearsim.evolution.error_estimates import (
     with_pass_errors,
 )
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
@@ -106,7 +106,12 @@ class ImplicitStepper(StepDoublingStepper):
 
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state with the rates and differences that the formulas need."""
-        return state if state.past_spans is not None else with_rates(problem, state)
+        if state.past_spans is not None:
+            return state
+        state = with_rates(problem, state)
+        if self.forced_step is None and edges.resolves_edges(problem, state.contacts):
+            state = edges.with_unresolved_edges(problem, state)
+        return state
 
     def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the length of the first step, shape (realisations,) [passes]."""
@@ -116,6 +121,30 @@ class ImplicitStepper(StepDoublingStepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step, estimate its error, and choose order and length of the next one."""
+        if state.part is None:
+            return self._attempt(problem, state, step, stop, scheme)
+        attempts, places = [], []
+        for some, here, start in edges.by_resolution(problem, state):
+            tried = self._attempt(here, start, step[some], stop, scheme)
+            if start.part is None:
+                ends = tuple(edges.with_unresolved_edges(here, end) for end in tried.path)
+                tried = replace(tried, path=ends)
+            attempts.append(tried)
+            places.append(some)
+        if len(attempts) == 1:
+            return attempts[0]
+        order = np.argsort(np.concatenate(places))
+        path = (joined_states([one.path[0] for one in attempts]).at(order),)
+        columns = (
+            np.concatenate([getattr(one, n) for one in attempts])[order]
+            for n in ("excess", "ratio")
+        )
+        return Attempt(path, *columns)
+
+    def _attempt(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
+    ) -> Attempt:
+        """Take a step in tests that all resolve edges or all do not."""
         varies = problem.constant_load is None or len(problem.varying) > 0
         if varies or self.forced_step is not None:  # local errors miss peaks of a load
             return self._attempt_doubled(problem, state, step, stop, scheme)
@@ -306,12 +335,9 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, exposure)
     wear, energy = _wear_per_pass(here, state.contacts)
-    of_edges: dict[str, FloatArray | None] = {"separation": None, "part": None, "whole_steps": None}
-    if edges.resolves_edges(problem, state.contacts):
-        of_edges |= edges.starting_edges(problem, state.contacts)
-    sums = _sums_per_pass(wear if of_edges["part"] is not None else None, energy)
+    sums = _sums_per_pass(None, energy)
     return state.replaced(
-        **of_edges,
+        **dict.fromkeys(edges.FIELDS),
         past_wear=_starting(wear, exposure),
         past_sums=_starting(sums, exposure)[..., 0],
         past_feedback=past_feedback,
@@ -421,6 +447,13 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     """
     if state.past_spans is None:
         state = with_rates(problem, state)
+    if state.part is not None:
+        parts = edges.by_resolution(problem, state)
+        if len(parts) > 1 or parts[0][2].part is None:
+            ends = [_split_step(*part, passes) for part in parts]
+            order = np.argsort(np.concatenate([some for some, _, _ in parts]))
+            return joined_states(ends).at(order)
+        state = parts[0][2]
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = _conditions(here, problem, state, passes)
     order = Past.of(state).order
@@ -443,6 +476,14 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
             part, decreased[again] = _step(*some, np.full_like(again, lower))
             end = end.with_others(again, part)
     return end
+
+
+def _split_step(
+    places: IntArray, problem: WearProblem, state: WearState, passes: FloatArray
+) -> WearState:
+    """Return the end of a step of some tests, see `edges.by_resolution`."""
+    end = implicit_step(problem, state, passes[places])
+    return edges.with_unresolved_edges(problem, end) if state.part is None else end
 
 
 def _step(
