@@ -71,9 +71,11 @@ def test_line_load_at_the_edge_converges(groove: wearsim.Result, fine: wearsim.R
     sides = np.append(groove.y - 0.5 * spacing, groove.y[-1] + 0.5 * spacing)
     true = np.diff(np.interp(sides, ends, sums)) / spacing
     edge = np.sqrt(2.0 * 0.5 * groove.depth[-1])
-    outer = np.abs(groove.y) > edge - 0.5e-3 - 0.5 * spacing
-    difference = np.abs(groove.line_load[-1] - true)[outer].sum()
-    assert difference < 0.02 * true[outer].sum()
+    outer = (np.abs(groove.y) > edge - 0.5e-3 - 0.5 * spacing) & (true > 0.0)
+    difference = np.abs(groove.line_load[-1] - true)
+    assert difference[outer].sum() < 0.03 * true[outer].sum()
+    last = outer & (np.abs(groove.y) > edge - 0.5 * spacing)
+    assert (difference < 0.01 * true)[outer & ~last].all()
 
 
 def test_line_load_falls_towards_the_edge(groove: wearsim.Result) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -12,7 +12,6 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.contacts import at_least
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
 )
@@ -26,12 +25,11 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step
+from wearsim.evolution.steppers.conditions import Conditions, conditions_of, exposure
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
 from wearsim.evolution.steppers.loads import (
     abrupt_loads,
-    mean_force,
-    smooth_loads,
     with_feedback,
 )
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
@@ -61,7 +59,7 @@ PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power o
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
 # safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
-EDGES, OF_EDGES = 3.0, 5.0
+EDGES, OF_EDGES = 8.0, 5.0
 # safety factors of volume and profile, also those of step doubling, whose error of the volume is a
 # sum of absolute changes
 OF_STEPS = COVER[1:, 0].tolist()
@@ -135,11 +133,8 @@ class ImplicitStepper(StepDoublingStepper):
             return attempts[0]
         order = np.argsort(np.concatenate(places))
         path = (joined_states([one.path[0] for one in attempts]).at(order),)
-        columns = (
-            np.concatenate([getattr(one, n) for one in attempts])[order]
-            for n in ("excess", "ratio")
-        )
-        return Attempt(path, *columns)
+        excess = np.concatenate([one.excess for one in attempts])[order]
+        return Attempt(path, excess, np.concatenate([one.ratio for one in attempts])[order])
 
     def _attempt(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
@@ -324,7 +319,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     times = problem.time(state.passes)
     here = problem.at_time(times, times)
     force = problem.force(times)
-    exposure = _exposure(here, problem, force)
+    own = exposure(here, problem, force)
     spans = np.full((ROWS - 1, len(state.passes)), np.inf)
     spans[0] = 0.0
     feedback, error = problem.has_spring or bool(problem.terms), state.stepping_error
@@ -333,13 +328,13 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
         loads = carried_loads(here, state.contacts)
         past_feedback[0] = loads - with_feedback(here, force, np.zeros(()), ())
     if past_feedback is not None and problem.has_spring:
-        past_feedback[1] = unloading(here, state, exposure)
+        past_feedback[1] = unloading(here, state, own)
     wear, energy = _wear_per_pass(here, state.contacts)
     sums = _sums_per_pass(None, energy)
     return state.replaced(
         **dict.fromkeys(edges.FIELDS),
-        past_wear=_starting(wear, exposure),
-        past_sums=_starting(sums, exposure)[..., 0],
+        past_wear=_starting(wear, own),
+        past_sums=_starting(sums, own)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
@@ -381,54 +376,6 @@ def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
     return np.asarray(sums[..., None])
 
 
-@dataclass(frozen=True)
-class _Conditions:
-    """Prescribed conditions of a step.
-
-    Wear is nearly proportional to the load and the friction coefficient. Their product, integrated
-    over the passes, is the exposure; the formulas take it as independent variable, in which wear
-    is smooth also where load and friction vary.
-
-    Parameters
-    ----------
-    force : ndarray, shape (realisations,) or (stations, 1, realisations)
-        Load before feedback for the solution at the end of the step [N].
-    own, mean : ndarray, shape (realisations,)
-        Exposure per pass in these conditions, and its mean over the step.
-    """
-
-    force: FloatArray
-    own: FloatArray
-    mean: FloatArray
-
-
-def _conditions(
-    here: WearProblem, problem: WearProblem, state: WearState, passes: FloatArray
-) -> _Conditions:
-    """Return the conditions of a step; `here` is the problem with processes at their means.
-
-    The load is that at the end of the step where it varies smoothly, and else its mean.
-    """
-    if problem.constant_load is not None and not problem.varying:
-        exposure = _exposure(here, problem, problem.constant_load)
-        return _Conditions(problem.constant_load, exposure, exposure)
-    force = mean = mean_force(problem, state, passes)
-    smooth = smooth_loads(problem, state.passes, passes)
-    if smooth.any():
-        force = np.where(smooth, problem.force(problem.time(state.passes + passes)), mean)
-    return _Conditions(force, _exposure(here, problem, force), _exposure(here, problem, mean))
-
-
-def _exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> FloatArray:
-    """Return the exposure per pass for a load before feedback, shape (realisations,) [N]."""
-    if force.ndim > 1:  # of a cam
-        force = problem.mean_over_turn(force)[0, 0]
-    exposure = at_least(problem, force + here.inputs.mean_offset)
-    if any(item.name == "friction" for item in problem.varying):
-        exposure = exposure * here.inputs.friction.mean(axis=0)
-    return np.asarray(exposure)
-
-
 def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
@@ -455,7 +402,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
             return joined_states(ends).at(order)
         state = parts[0][2]
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
-    conditions = _conditions(here, problem, state, passes)
+    conditions = conditions_of(here, problem, state, passes)
     order = Past.of(state).order
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
@@ -472,7 +419,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
         if again.size:
             columns = (column[..., again] for column in vars(conditions).values())
-            some = here.at(again), state.at(again), passes[again], _Conditions(*columns)
+            some = here.at(again), state.at(again), passes[again], Conditions(*columns)
             part, decreased[again] = _step(*some, np.full_like(again, lower))
             end = end.with_others(again, part)
     return end
@@ -490,7 +437,7 @@ def _step(
     problem: WearProblem,
     state: WearState,
     passes: FloatArray,
-    conditions: _Conditions,
+    conditions: Conditions,
     order: IntArray,
 ) -> tuple[WearState, BoolArray]:
     """Return the state after an implicit step, and whether depths or energy would decrease.
