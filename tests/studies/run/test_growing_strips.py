@@ -63,7 +63,7 @@ def test_resumed_run_with_grown_strips_equals_an_unbroken_one(tmp_path: Path) ->
     def stop() -> bool:
         nonlocal left
         left += 1
-        return left in {10, 25, 40}
+        return left in {10, 20, 30}
 
     path = tmp_path / "run.h5"
     with pytest.raises(Interrupted):

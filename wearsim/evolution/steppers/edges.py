@@ -117,7 +117,7 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
     }
     column, sums = begins[:, None], state.past_sums.copy()
     fields = {n: np.where(column, one, getattr(state, n)) for n, one in found.items()}
-    sums[:, :-1] = np.where(begins, state.past_wear.sum(axis=-1), sums[:, :-1])
+    sums[:, :-1] = np.where(begins, over_strips(state.past_wear), sums[:, :-1])
     return state.replaced(**fields, past_sums=sums)
 
 
@@ -221,15 +221,20 @@ def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArr
     ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
     scale = np.ones(len(orders))
     next_steps(sums, spans, ones, orders, scale, 1.0, 1.0, 1, ones, of_sums, order)
-    missing, width = of_sums - errors.sum(axis=-1, keepdims=True), parts.sum(axis=-1, keepdims=True)
+    missing, width = of_sums - over_strips(errors)[..., None], over_strips(parts)[..., None]
     shift = np.divide(missing, width, out=np.zeros_like(width), where=width > 0.0)
     return np.asarray(errors + parts * shift)
 
 
-def squares(depths: FloatArray) -> FloatArray:
-    """Return the sum of the squares of all depths, (N,), infinite where it is 0 [m^2]."""
-    squares = (depths**2).sum(axis=(0, 2))
-    return np.asarray(np.where(squares > 0.0, squares, np.inf))
+def over_strips(values: FloatArray) -> FloatArray:
+    """Return sums over the last axis, with the same round-off for any layout in memory."""
+    return np.asarray(kernel_input(values).sum(axis=-1))
+
+
+def relative_size(errors: FloatArray, depths: FloatArray) -> FloatArray:
+    """Return the Euclidean norm of errors of all depths over that of the depths, shape (N,)."""
+    size, whole = (sum_in_order(over_strips(values**2), 0) for values in (errors, depths))
+    return np.asarray(np.sqrt(size / np.where(whole > 0.0, whole, np.inf)))
 
 
 def parts_of_bodies(state: WearState) -> FloatArray:
@@ -272,7 +277,7 @@ def with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearS
     missing : ndarray, shape (stations + rollers, realisations)
         Sum over the strips of the depths to be added [m].
     """
-    width = parts.sum(axis=-1)
+    width = over_strips(parts)
     added = np.divide(missing, width, out=np.zeros_like(missing), where=width > 0.0)
     cylinder, roller = separated(end.stacked + added[..., None] * parts, len(end.cylinder_depth))
     return end.replaced(cylinder_depth=cylinder, roller_depth=roller)

@@ -107,9 +107,13 @@ class ImplicitStepper(StepDoublingStepper):
         if state.past_spans is not None:
             return state
         state = with_rates(problem, state)
-        if self.forced_step is None and edges.resolves_edges(problem, state.contacts):
-            state = edges.with_unresolved_edges(problem, state)
-        return state
+        return (
+            edges.with_unresolved_edges(problem, state) if self._resolves(problem, state) else state
+        )
+
+    def _resolves(self, problem: WearProblem, state: WearState) -> bool:
+        """Return whether edges of contacts are resolved; step doubling compares whole strips."""
+        return self.forced_step is None and edges.resolves_edges(problem, state.contacts)
 
     def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the length of the first step, shape (realisations,) [passes]."""
@@ -119,12 +123,14 @@ class ImplicitStepper(StepDoublingStepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step, estimate its error, and choose order and length of the next one."""
+        if state.part is None and self._resolves(problem, state):
+            state = edges.with_unresolved_edges(problem, state)
         if state.part is None:
             return self._attempt(problem, state, step, stop, scheme)
         attempts, places = [], []
         for some, here, start in edges.by_resolution(problem, state):
             tried = self._attempt(here, start, step[some], stop, scheme)
-            if start.part is None:
+            if tried.path[-1].part is None:
                 ends = tuple(edges.with_unresolved_edges(here, end) for end in tried.path)
                 tried = replace(tried, path=ends)
             attempts.append(tried)
@@ -144,6 +150,8 @@ class ImplicitStepper(StepDoublingStepper):
         if varies or self.forced_step is not None:  # local errors miss peaks of a load
             return self._attempt_doubled(problem, state, step, stop, scheme)
         end = scheme(problem, state, step)
+        if end.part is not None and edges.unresolved(end).all():
+            end = edges.without_edges(end)
         end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
@@ -295,9 +303,7 @@ def _estimates(
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
     if crossed is not None:
         at_edges = EDGES * (np.where(crossed, added, 0.0) + edges.first_order_errors(end))
-        sizes[2] = np.hypot(
-            sizes[2], np.sqrt((at_edges**2).sum(axis=(0, 2)) / edges.squares(depths))
-        )
+        sizes[2] = np.hypot(sizes[2], edges.relative_size(at_edges, depths))
         sizes[:2] *= OF_EDGES
     found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
@@ -372,7 +378,7 @@ def _most(state: WearState) -> int:
 
 def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
     """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
-    sums = energy[None] if wear is None else np.concatenate([wear.sum(axis=-1), energy[None]])
+    sums = energy[None] if wear is None else np.concatenate([edges.over_strips(wear), energy[None]])
     return np.asarray(sums[..., None])
 
 
@@ -410,10 +416,15 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         end, decreased = _step(here, state, passes, conditions, order)
     except (StepError, ContactError) as error:
         # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
-        # on which the contact is not found
-        if len(order) > 1 or order[0] == 1 or getattr(error, "cause", "") == "edge":
+        # on which the contact is not found; strips that are not cut are the simpler problem
+        last = order[0] == 1 and state.part is None
+        if len(order) > 1 or last or getattr(error, "cause", "") == "edge":
             raise
-        return _step(here, state, passes, conditions, np.ones_like(order))[0]
+        first = np.ones_like(order)
+        if state.part is None:
+            return _step(here, state, passes, conditions, first)[0]
+        whole = edges.without_edges(state)
+        return edges.with_unresolved_edges(here, _step(here, whole, passes, conditions, first)[0])
     # strips that leave the contact: their depth can decrease from the third order on
     for lower in (2, 1) if np.count_nonzero(decreased) else ():
         again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
@@ -474,7 +485,9 @@ def _step(
     sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
     sums = sums + worn_passes[:, None] * sum_rates
     if parts is not None:
-        end = edges.with_volume(end, parts, sums[:-1, :, 0] - (end.stacked - start).sum(axis=-1))
+        end = edges.with_volume(
+            end, parts, sums[:-1, :, 0] - edges.over_strips(end.stacked - start)
+        )
         change = end.stacked - edges.separated_bodies(problem, end) - level
     past_feedback = None
     if feedback is not None:
