@@ -30,6 +30,7 @@ from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import next_steps
 from wearsim.types import BoolArray, FloatArray, IntArray
 
+YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
@@ -240,8 +241,9 @@ def relative_size(errors: FloatArray, depths: FloatArray) -> FloatArray:
 def parts_of_bodies(state: WearState) -> FloatArray:
     """Return the part of each strip's error that counts, as `WearState.stacked`.
 
-    The formulas also continue the separation of strips that are not in contact, and those that the
-    edge has just crossed are not smooth enough for an estimate, see `first_order_errors`.
+    The formulas also continue the separation of strips that are not in contact. Those that the edge
+    has just crossed are not smooth enough for an estimate, which is too great, see
+    `first_order_errors`.
     """
     young = young_strips(state)
     if young is None:
@@ -249,7 +251,7 @@ def parts_of_bodies(state: WearState) -> FloatArray:
     assert state.part is not None
     assert state.past_wear is not None
     parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
-    return np.where(young | (state.past_wear[0] <= 0.0), 0.0, parts)
+    return np.where(state.past_wear[0] > 0.0, np.where(young, YOUNG * parts, parts), 0.0)
 
 
 def first_order_errors(end: WearState) -> FloatArray:
