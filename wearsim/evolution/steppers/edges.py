@@ -27,9 +27,12 @@ from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.mechanics.numerics.edge_strips import SETTLED, EdgeStrips, start_edges
 from wearsim.mechanics.numerics.jit import kernel_input
-from wearsim.mechanics.numerics.multistep import next_steps
+from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
 from wearsim.types import BoolArray, FloatArray, IntArray
 
+# greatest order where edges are resolved within a strip: beyond the first derivative the wear of
+# strips that the edge has just crossed is not smooth, and pressures would overshoot
+EDGE_ORDER = 3
 YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
@@ -184,6 +187,11 @@ def crossed_strips(state: WearState) -> BoolArray | None:
         return None
     lately = (state.part > 0.0) & (state.whole_steps < SETTLED)
     return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
+
+
+def most(state: WearState) -> int:
+    """Return the greatest order of steps from a state."""
+    return MAX_ORDER if state.part is None else EDGE_ORDER
 
 
 def young_strips(state: WearState) -> BoolArray | None:

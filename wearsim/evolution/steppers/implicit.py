@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
@@ -24,7 +23,7 @@ from wearsim.evolution.error_estimates import (
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers import edges
-from wearsim.evolution.steppers.base import Attempt, Step
+from wearsim.evolution.steppers.base import Attempt, Step, joined_attempts
 from wearsim.evolution.steppers.conditions import Conditions, conditions_of, exposure
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
@@ -32,7 +31,7 @@ from wearsim.evolution.steppers.loads import (
     abrupt_loads,
     with_feedback,
 )
-from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
+from wearsim.evolution.steppers.single_step import carried_loads, energy_per_pass, wear_per_pass
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
@@ -55,9 +54,6 @@ OF_VOLUME = 0.33, 0.5
 # less smooth after a change of order; where inputs vary they are not smooth at any order
 KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
-# greatest order where edges are resolved within a strip: beyond the first derivative the wear of
-# strips that the edge has just crossed is not smooth, and pressures would overshoot
-EDGE_ORDER = 3
 # safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
 EDGES, OF_EDGES = 8.0, 5.0
 # safety factors of volume and profile, also those of step doubling, whose error of the volume is a
@@ -135,12 +131,7 @@ class ImplicitStepper(StepDoublingStepper):
                 tried = replace(tried, path=ends)
             attempts.append(tried)
             places.append(some)
-        if len(attempts) == 1:
-            return attempts[0]
-        order = np.argsort(np.concatenate(places))
-        path = (joined_states([one.path[0] for one in attempts]).at(order),)
-        excess = np.concatenate([one.excess for one in attempts])[order]
-        return Attempt(path, excess, np.concatenate([one.ratio for one in attempts])[order])
+        return joined_attempts(attempts, places)
 
     def _attempt(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
@@ -160,7 +151,16 @@ class ImplicitStepper(StepDoublingStepper):
         left = self._left(problem, state, stop, factors)
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
-            *(past.wear, past.spans, depths, past.order, part, aim, KEEP, _most(end)),
+            *(
+                past.wear,
+                past.spans,
+                depths,
+                past.order,
+                part,
+                aim,
+                KEEP,
+                edges.most(end),
+            ),
             *(edges.parts_of_bodies(end), own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
@@ -196,7 +196,16 @@ class ImplicitStepper(StepDoublingStepper):
         part = (end.passes / stop) ** PART_EXPONENT / left
         scale = part / self.tolerance
         over, ratio = next_steps(
-            *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, _most(end)),
+            *(
+                past.wear,
+                past.spans,
+                depths,
+                past.order,
+                scale,
+                1.0,
+                1.0,
+                edges.most(end),
+            ),
             *(edges.parts_of_bodies(end), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
@@ -335,7 +344,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
         past_feedback[0] = loads - with_feedback(here, force, np.zeros(()), ())
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, own)
-    wear, energy = _wear_per_pass(here, state.contacts)
+    wear, energy = wear_per_pass(here, state.contacts)
     sums = _sums_per_pass(None, energy)
     return state.replaced(
         **dict.fromkeys(edges.FIELDS),
@@ -355,25 +364,6 @@ def _starting(rates: FloatArray, exposure: FloatArray) -> FloatArray:
     differences[0] = rates
     differences[1] = rates / exposure.reshape(-1, *(1,) * (rates.ndim - 2))
     return differences
-
-
-def _wear_per_pass(
-    problem: WearProblem, contacts: ContactBatchSolution
-) -> tuple[FloatArray, FloatArray]:
-    """Return depth [m] and energy [J] per roller pass, (stations + rollers, N, strips) and (N,)."""
-    cylinder, roller = WearIncrement(problem, contacts, 1.0).depths
-    return np.concatenate([cylinder[:, 0], roller[0]]), _energy_per_pass(problem, contacts)
-
-
-def _energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
-    """Return the energy that all contacts dissipate in a roller pass, shape (N,) [J]."""
-    power = problem.total_power(problem.values_of(contacts, "power"))
-    return np.asarray(power / problem.kinematics.pass_rate)
-
-
-def _most(state: WearState) -> int:
-    """Return the greatest order of steps from a state."""
-    return MAX_ORDER if state.part is None else EDGE_ORDER
 
 
 def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
@@ -481,7 +471,7 @@ def _step(
     end, worn, feedback, parts = step.solved(level + guess, feedback)
     rates, change = worn / worn_passes[:, None], added + worn
     rates = rates if scale is None else rates / scale
-    energy_rate = _energy_per_pass(problem, end.contacts)
+    energy_rate = energy_per_pass(problem, end.contacts)
     sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
     sums = sums + worn_passes[:, None] * sum_rates
     if parts is not None:

@@ -293,3 +293,17 @@ def worn_state(
         terms=terms,
         energy=state.energy + problem.total_power(power) * (passes / problem.kinematics.pass_rate),
     )
+
+
+def wear_per_pass(
+    problem: WearProblem, contacts: ContactBatchSolution
+) -> tuple[FloatArray, FloatArray]:
+    """Return depth [m] and energy [J] per roller pass, (stations + rollers, N, strips) and (N,)."""
+    cylinder, roller = WearIncrement(problem, contacts, 1.0).depths
+    return np.concatenate([cylinder[:, 0], roller[0]]), energy_per_pass(problem, contacts)
+
+
+def energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
+    """Return the energy that all contacts dissipate in a roller pass, shape (N,) [J]."""
+    power = problem.total_power(problem.values_of(contacts, "power"))
+    return np.asarray(power / problem.kinematics.pass_rate)
