@@ -29,15 +29,12 @@ from wearsim.cli.shared import (
     refuse_options,
     write_notes,
 )
-from wearsim.errors import ScenarioError
 
 if TYPE_CHECKING:
     from wearsim.levelling import Measured
     from wearsim.profiles import ProfileChoice
     from wearsim.report.view import View
 
-
-_MISALIGNED = 0.5  # ratio of residuals below which levelling is suggested
 
 MeasuredFiles = Annotated[
     list[Path] | None,
@@ -110,11 +107,10 @@ def measured_profiles(
         given = {"--level": level, "--angle": angle}
         refuse_options(given, "needs a measured profile, --measured")
         return []
-    from wearsim.levelling import Measured, levelled, rms
+    from wearsim.levelling import Measured, levelled
     from wearsim.profiles import load_profile, sign_note
     from wearsim.quantities import quantity
-    from wearsim.report.measured import residual_text
-    from wearsim.report.text import shown
+    from wearsim.report.measured import level_hint, residual_text
 
     with checking("--angle"):
         at = None if angle is None else quantity(angle, "rad")
@@ -130,19 +126,11 @@ def measured_profiles(
     computed = None if test is None else test.profile(at)
     if computed is None:
         return profiles
-    for place, profile in enumerate(profiles):
-        try:
-            corrected = levelled(profile, computed)
-        except ScenarioError:
-            if level:
-                raise
-            corrected = profile
-        text = f"{profile.label}: {residual_text(corrected if level else profile, computed)}"
-        if level:
-            profiles[place] = corrected
-        elif rms(corrected, computed) < _MISALIGNED * rms(profile, computed):
-            text += f"; rms {shown(rms(corrected, computed), 'um', 3)} with --level"
-        note(text)
+    if level:
+        profiles = [levelled(profile, computed) for profile in profiles]
+    for profile in profiles:
+        hint = "" if level else level_hint(profile, computed)
+        note(f"{profile.label}: {residual_text(profile, computed)}{hint}")
     return profiles
 
 

@@ -102,12 +102,9 @@ class RealisationsView(StudyView[Shown]):
             band = result.band("lift_error_curve")
             tables["lift_error.csv"] = [_band("angle", "rad", "lift error", band)]
         if result.failed:
-            numbers, errors = zip(*result.errors.items(), strict=True)
-            failures = [
-                Column("realisation", list(map(str, numbers))),
-                Column("error", list(errors)),
-            ]
-            tables["failures.csv"] = [failures]
+            numbers, errors = map(str, result.errors), result.errors.values()
+            failures = {"realisation": list(numbers), "error": list(errors)}
+            tables["failures.csv"] = [[Column(*column) for column in failures.items()]]
         return tables
 
 
@@ -179,8 +176,8 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         if not result.count:
             return rows
         if result.until:
-            reached = _target_met(result, Target.parse(result.until))
-            rows.append(Row(f"precision {result.until}", reached))
+            met = _target_met(result, Target.parse(result.until))
+            rows.append(Row(f"precision {result.until}", met))
         saved = result.estimate("depth", -1, ()).variance_saved
         if saved is not None:
             text = f"removes {shown(saved, '%', 3)} of the variance of the mean depth"

@@ -25,7 +25,6 @@ from wearsim.studies.ensemble.view import RealisationsView
 from wearsim.studies.life.result import LifeResult
 from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.sensitivity.effects import SignedEffect
 from wearsim.uq.survival.lives import fewest_lives, least_survival
 from wearsim.uq.survival.rare_events import RareProbability
 
@@ -37,6 +36,7 @@ ERROR = (
 )
 
 _LIMIT_UNITS = {"volume": "mm^3", "peak_pressure": "MPa"}
+_UNKNOWN = (NOTHING, NOTHING)
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
 
@@ -111,15 +111,16 @@ class LifeView(RealisationsView[LifeResult]):
         result = self.result
         if not result.count:
             return []
-        tables = [lives_table([""], [result])]
-        if len(result.fits) >= 2:
-            tables.append(self._fits())
         lines = [
             [name.replace("_", " "), shown(share, "%", 3), self._angle(name)]
             for name, share in result.first_limits.items()
         ]
-        tables.append(Table("", lines, ["first limit", "share", ""]))
-        return [*tables, self._effects()]
+        return [
+            lives_table([""], [result]),
+            *([self._fits()] if len(result.fits) >= 2 else []),
+            Table("", lines, ["first limit", "share", ""]),
+            self._effects(),
+        ]
 
     def _fits(self) -> Table:
         """Return the fitted distributions, best first."""
@@ -161,7 +162,7 @@ class LifeView(RealisationsView[LifeResult]):
                 f"not significant, at most {shown(item.first.high, '%', 2)}"
                 if item.without_effect
                 else part_with_interval(item.first),
-                *(effect_cells(changes[item.name]) if item.name in changes else (NOTHING, NOTHING)),
+                *(map(_change, changes[item.name].factors) if item.name in changes else _UNKNOWN),
             ]
             for item in result.sensitivity("life")
         ]
@@ -252,8 +253,7 @@ class LifeView(RealisationsView[LifeResult]):
             "interval_method": result.method,
             "seed": result.raw.seed,
             "wall_seconds": result.raw.wall_seconds,
-            "output": str(result.path) if result.path else None,
-            "notes": list(result.notes),
+            **self.ending(),
             "warnings": list(result.warnings),
         }
 
@@ -334,14 +334,9 @@ def rounded_lives(*lives: float) -> list[str]:
     return [count(round(life / unit) * unit) if math.isfinite(life) else NOTHING for life in lives]
 
 
-def effect_cells(effect: SignedEffect) -> tuple[str, str]:
-    """Return the change of life at the 10 % and the 90 % quantile of an input, with intervals."""
-    low, high = effect.factors
-    return _change(low), _change(high)
-
-
 def _change(factor: Interval) -> str:
-    change = [100.0 * (one - 1.0) for one in (factor.value, factor.low, factor.high)]
+    """Return a change of the life by an input, with its interval."""
+    change = [100.0 * (end - 1.0) for end in (factor.value, factor.low, factor.high)]
     if not math.isfinite(factor.half_width):
         return NOTHING
     if factor.half_width == 0.0:
