@@ -156,8 +156,8 @@ class ContactBatch:
         shape = self.shape or (len(self),)
         axes = ("station", "contact", "realisation") if self.shape else ("contact",)
         indices = [int(i) for i in np.unravel_index(number, shape)]
-        each = zip(axes[-len(shape) :], indices, shape, strict=True)
-        return indices, ", ".join(f"{axis} {i}" for axis, i, length in each if length > 1)
+        axis_places = zip(axes[-len(shape) :], indices, shape, strict=True)
+        return indices, ", ".join(f"{axis} {i}" for axis, i, length in axis_places if length > 1)
 
 
 def _kind(point: OperatingPoint) -> tuple[object, ...]:
@@ -225,7 +225,7 @@ class ContactBatchSolution:
         if len(solutions) == 1:  # in a third of the time, without copies
             values = vars(solutions[0])
             return cls(values["y"], *(np.asarray(values[name])[None] for name in _OUTPUTS))
-        columns = {n: np.array([getattr(one, n) for one in solutions]) for n in _OUTPUTS}
+        columns = {n: np.array([getattr(solution, n) for solution in solutions]) for n in _OUTPUTS}
         return cls(y=solutions[0].y, **columns)
 
     def __len__(self) -> int:
@@ -321,8 +321,8 @@ class SharedWear:
             numbers: list[int] = self.bodies[:, side].tolist()
             depth: dict[int, FloatArray] = {}
             for contact, number in enumerate(numbers):
-                own = worn[..., contact, :]
-                depth[number] = depth[number] + own if number in depth else own
+                of_contact = worn[..., contact, :]
+                depth[number] = depth[number] + of_contact if number in depth else of_contact
             for contact, number in enumerate(numbers):
                 gap[..., contact, :] += depth[number]
         return gap
@@ -360,13 +360,13 @@ class SharedWear:
             numbers = np.array([number for number, other in enumerate(kinds) if other == kind])
             part = wear if len(numbers) == len(wear) else wear[numbers]
             members = _membership(bodies, contacts, kind)
-            own, shared = np.zeros((len(part), contacts, part.shape[-1])), part.copy()
+            separate, shared = np.zeros((len(part), contacts, part.shape[-1])), part.copy()
             for side in (0, 1):
                 alone = members[:, side] == NO_BODY
                 if not kind[side] and np.count_nonzero(alone):  # an idle body's wear is zero
-                    own[:, alone] += part[:, alone, side]
+                    separate[:, alone] += part[:, alone, side]
                     shared[:, alone, side] = 0.0
-            groups.append((numbers, own, members, shared))
+            groups.append((numbers, separate, members, shared))
         return groups
 
 

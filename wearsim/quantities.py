@@ -290,10 +290,12 @@ class _OneOrList:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        one = handler.generate_schema(get_args(source)[0])
-        several = core_schema.tuple_variable_schema(one)
-        read_one, read_list = SchemaValidator(one), SchemaValidator(several)
-        write_one: Callable[[Any], Any] = one.get("serialization", {}).get("function", lambda v: v)
+        single = handler.generate_schema(get_args(source)[0])
+        several = core_schema.tuple_variable_schema(single)
+        read_one, read_list = SchemaValidator(single), SchemaValidator(several)
+        write_one: Callable[[Any], Any] = single.get("serialization", {}).get(
+            "function", lambda v: v
+        )
 
         def read(value: object, info: ValidationInfo) -> Any:
             if isinstance(value, list | tuple):
@@ -305,7 +307,7 @@ class _OneOrList:
 
         return core_schema.with_info_plain_validator_function(
             read,
-            json_schema_input_schema=core_schema.union_schema([one, several]),
+            json_schema_input_schema=core_schema.union_schema([single, several]),
             serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
         )
 

@@ -76,8 +76,8 @@ def open_ensemble(path: str | Path) -> EnsembleResult:
     from wearsim.studies.ensemble.file.parts import read_ensemble  # noqa: PLC0415
 
     data, kind = read_ensemble(path), kind_of(path)
-    found: EnsembleResult = kind.load("result")(data, Path(path))
-    return found
+    result: EnsembleResult = kind.load("result")(data, Path(path))
+    return result
 
 
 def comparison_of(

@@ -138,7 +138,7 @@ def plugins(json: Json = False) -> None:
     """List contact models, wear laws, loads, random inputs and motion laws."""
     from wearsim.plugins import registry
 
-    found = registry()
+    installed = registry()
     entries: list[dict[str, Any]] = [
         {
             "name": item.spec.name,
@@ -151,11 +151,11 @@ def plugins(json: Json = False) -> None:
             "summary": item.spec.summary,
             "references": list(item.spec.references),
         }
-        for item in found.all()
+        for item in installed.all()
     ]
     if json:
         keys = ("entry_point", "distribution", "version", "cause")
-        broken = [{key: getattr(item, key) for key in keys} for item in found.broken]
+        broken = [{key: getattr(item, key) for key in keys} for item in installed.broken]
         write_json({"plugins": entries, "broken": broken})
         return
     for entry in entries:
@@ -163,7 +163,7 @@ def plugins(json: Json = False) -> None:
     write_list(_HEADS, [[str(entry[head]) for head in _HEADS] for entry in entries])
     for refusal in filter(None, (entry["refused"] for entry in entries)):
         note(f"refused: {refusal}")
-    for item in found.broken:
+    for item in installed.broken:
         note(
             f"broken: plugin '{item.entry_point}' of {item.distribution} {item.version}"
             f" failed to load: {item.cause}"

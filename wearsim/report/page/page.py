@@ -118,8 +118,8 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> Part:
     tables, computed = view.tables(), view.profile()
     if measured and computed is not None:
         residuals = [
-            Row(one.label, residual_text(one, view.profile(one.angle) or computed))
-            for one in measured
+            Row(profile.label, residual_text(profile, view.profile(profile.angle) or computed))
+            for profile in measured
         ]
         tables.insert(-1, Table("Measured profiles", residuals))
     remarks = [*filter(None, [view.failures]), *view.warnings, *view.notes]

@@ -102,8 +102,8 @@ def _form(part: Any, quantity: Quantity | None = None) -> str | None:
 
 def _limits(marks: Iterable[Any]) -> dict[str, Any]:
     """Return the bounds of a number, by their names in pydantic."""
-    found = [(name, getattr(mark, name, None)) for mark in marks for name in _LIMITS]
-    return {name: bound for name, bound in found if bound is not None}
+    limits = [(name, getattr(mark, name, None)) for mark in marks for name in _LIMITS]
+    return {name: bound for name, bound in limits if bound is not None}
 
 
 def in_words(limits: Mapping[str, Any]) -> str:
@@ -300,10 +300,10 @@ class RandomInput:
     @property
     def scalar(self) -> Distribution:
         """Distribution of one value; the marginal one for a field or a process."""
-        found = getattr(self.distribution, "marginal", self.distribution)
-        if not isinstance(found, Distribution):
+        distribution = getattr(self.distribution, "marginal", self.distribution)
+        if not isinstance(distribution, Distribution):
             raise TypeError(f"{self.name} sets several values")
-        return found
+        return distribution
 
     @property
     def extremes(self) -> tuple[float, float]:

@@ -267,5 +267,5 @@ def split_keys(
     raw: Mapping[str, object], model: type[BaseModel]
 ) -> tuple[dict[str, object], dict[str, object]]:
     """Split a table into the keys of `model` and all others."""
-    own = {key: value for key, value in raw.items() if key in model.model_fields}
-    return own, {key: value for key, value in raw.items() if key not in own}
+    known = {key: value for key, value in raw.items() if key in model.model_fields}
+    return known, {key: value for key, value in raw.items() if key not in known}

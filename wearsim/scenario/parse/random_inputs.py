@@ -176,8 +176,8 @@ def read_random_input(
         The number, or the numbers, that it sets.
     """
     before, kind = len(mistakes.entries), raw["distribution"]
-    own, options = split_keys(raw, RandomInputTable)
-    table = validate_options(mistakes, RandomInputTable, own, name)
+    keys, options = split_keys(raw, RandomInputTable)
+    table = validate_options(mistakes, RandomInputTable, keys, name)
     named = isinstance(kind, str)
     spec = mistakes.find_plugin(RandomInputSpec, kind, name, "distribution") if named else None
     if spec is None or not _check_role(mistakes, spec, name, target):
@@ -257,10 +257,10 @@ def _read_marginal(
         )
     if not isinstance(raw, dict):
         return None
-    own, options = split_keys(raw, RandomInputTable)
-    kind = own.pop("distribution", None)
-    for key in sorted(own):
-        mistakes.add(place, key, f"belongs in [{name}], not in its marginal", shown(own[key]))
+    keys, options = split_keys(raw, RandomInputTable)
+    kind = keys.pop("distribution", None)
+    for key in sorted(keys):
+        mistakes.add(place, key, f"belongs in [{name}], not in its marginal", shown(keys[key]))
     spec = None
     if kind is None:
         mistakes.add(place, "distribution", "is missing", None, expected)

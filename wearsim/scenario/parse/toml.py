@@ -130,7 +130,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             mistakes.append(Mistake("", f"{dotted:.60}", *TOO_DEEP))
             continue
         try:
-            tables = [_descend(one, names, key) for one in (document, plain)]
+            tables = [_descend(whole, names, key) for whole in (document, plain)]
             unused = set()
             if dotted == PROFILE and isinstance(value, Profile):
                 unused = {name for name in tables[0] if name in _OF_PROFILE_FILES}
@@ -346,14 +346,14 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
 
 def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
     """Return the keys above the tables; add a mistake for each unknown key and table."""
-    own = {key: data[key] for key in TopTable.model_fields if key in data}
-    for key in [key for key in data if key not in TABLES and key not in own]:
+    keys = {key: data[key] for key in TopTable.model_fields if key in data}
+    for key in [key for key in data if key not in TABLES and key not in keys]:
         if isinstance(data[key], dict):
             hint = nearest(key, TABLES) or f" (known: {', '.join(TABLES)})"
             mistakes.add(key, "", f"unknown table{hint}")
         else:
             mistakes.add("", key, f"unknown key{mistakes.hint(key, TopTable.model_fields)}")
-    return validate(mistakes, TopTable, own, "") or TopTable()
+    return validate(mistakes, TopTable, keys, "") or TopTable()
 
 
 def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> Any:

@@ -121,9 +121,9 @@ def _from_laws(
 
 def _from_law(mistakes: Mistakes, place: str, raw: dict[str, object], unit: str) -> Segment | None:
     """Return the segment of an entry, or None after adding its mistakes."""
-    own, rest = split_keys(raw, MotionTable)
-    entry = validate_options(mistakes, MotionTable, own, place)
-    name = own.get("law")
+    keys, rest = split_keys(raw, MotionTable)
+    entry = validate_options(mistakes, MotionTable, keys, place)
+    name = keys.get("law")
     spec = (
         mistakes.find_plugin(MotionLawSpec, name, place, "law") if isinstance(name, str) else None
     )

@@ -129,8 +129,8 @@ def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bo
             f"{target} was not reached by {result.requested} realisations",
         ),
     )
-    found = [text for applies, text in warnings if applies]
-    return [*plausibility_warnings(result.scenario), *found]
+    texts = [text for applies, text in warnings if applies]
+    return [*plausibility_warnings(result.scenario), *texts]
 
 
 class EnsembleWork:

@@ -279,11 +279,11 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
 def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
     """Return the estimates of an observable, and below them their intervals."""
-    named, found = OBSERVABLES[name], result.estimate(name, -1, QUANTILES)
+    named, estimate = OBSERVABLES[name], result.estimate(name, -1, QUANTILES)
     if result.is_constant(name) and result.count > 1:
-        value, _ = cells(found.mean, named.unit)
+        value, _ = cells(estimate.mean, named.unit)
         return [(named.label, value, CONSTANT, *[NOTHING] * len(QUANTILES))]
-    items = [found.mean, found.std, *(interval for _, interval in found.quantiles)]
+    items = [estimate.mean, estimate.std, *(interval for _, interval in estimate.quantiles)]
     texts = [cells(item, named.unit) for item in items]
     if named.unit == "deg":  # the mean of 359 and 1 deg is not 180 deg
         texts[:2] = [(NOTHING, "")] * 2
@@ -310,9 +310,9 @@ def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
 
 def _target_met(result: EnsembleResult, target: Target) -> str:
     """Return whether a target is reached, and the half-width of the interval."""
-    found = result.estimate_for(target)
-    interval, achieved = target.interval(found), target.achieved(found)
-    is_reached, realisations = target.reached(found), f"{count(result.count)} realisations"
+    estimate = result.estimate_for(target)
+    interval, achieved = target.interval(estimate), target.achieved(estimate)
+    is_reached, realisations = target.reached(estimate), f"{count(result.count)} realisations"
     word = "reached" if is_reached else "not reached"
     if not math.isfinite(interval.half_width) or math.isnan(interval.value):
         return f"{word}: {TOO_FEW_REALISATIONS}"
@@ -327,9 +327,11 @@ def _target_met(result: EnsembleResult, target: Target) -> str:
     return f"{text}, but the sample is too small" if too_small else text
 
 
-def _estimate(found: Estimate) -> dict[str, Any]:
-    data = asdict(found)
-    data["quantiles"] = [{"probability": p, **asdict(interval)} for p, interval in found.quantiles]
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    data = asdict(estimate)
+    data["quantiles"] = [
+        {"probability": p, **asdict(interval)} for p, interval in estimate.quantiles
+    ]
     return data
 
 

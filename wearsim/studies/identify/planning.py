@@ -114,15 +114,15 @@ def plan_tests(
         name = ", ".join(f"{key} measured to {std:.3g}" for key, std in stds.items())
         designs.append((name, with_measured(scenario, stds)))
     return [
-        _planned(name, _kernel(one, draws, on_progress), tests, negligible, sets, scenario.seed)
-        for name, one in designs
+        _planned(name, _kernel(design, draws, on_progress), tests, negligible, sets, scenario.seed)
+        for name, design in designs
     ]
 
 
 def sizes(first: int, last: int) -> list[int]:
     """Return at most nine numbers of tests from the first to the last, about equal in ratio."""
-    found = np.geomspace(first, last, _MOST_SIZES).round().astype(int)
-    return sorted({first, last, *found.tolist()})
+    spaced = np.geomspace(first, last, _MOST_SIZES).round().astype(int)
+    return sorted({first, last, *spaced.tolist()})
 
 
 def _kernel(
@@ -134,8 +134,8 @@ def _kernel(
     depth = float(closed_form_depths(scenario, known, 1)[0])
     passes = float(scenario.total_passes)
     grown = Grower(scenario, draws, on_progress=on_progress).grow((depth, depth), [passes])
-    found = depth_likelihood(depth, DEPTH_ERROR * depth, grown.by_passes[passes], "cylinder")
-    return kernel_of(found, scenario.file)
+    likelihood = depth_likelihood(depth, DEPTH_ERROR * depth, grown.by_passes[passes], "cylinder")
+    return kernel_of(likelihood, scenario.file)
 
 
 def _planned(
@@ -147,8 +147,8 @@ def _planned(
         name,
         kernel.variance**0.5,
         tuple(tests),
-        {t: tuple(random for random, _ in found) for t, found in rates.items()},
-        {t: tuple(explained for _, explained in found) for t, found in rates.items()},
+        {t: tuple(random for random, _ in pairs) for t, pairs in rates.items()},
+        {t: tuple(explained for _, explained in pairs) for t, pairs in rates.items()},
         {t: power.needed(t) for t in SCATTERS},
     )
 

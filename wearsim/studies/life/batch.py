@@ -85,8 +85,8 @@ def observe_lives(
 
     done, failed = bisect_failures(step, np.arange(len(runs)))
     results: dict[int, LifeRun | Exception] = dict(failed)
-    for places, found in done:
-        results.update(zip(places.tolist(), found, strict=True))
+    for places, lives in done:
+        results.update(zip(places.tolist(), lives, strict=True))
     return [results[place] for place in range(len(runs))]
 
 
@@ -232,15 +232,15 @@ class _Group:
 
     def _errors_by_stations(self, problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
         """Return the errors due to the stations of a cam by quantity, (tests,) [SI]."""
-        found = extremes(problem, state)
-        if not found:
+        extreme_values = extremes(problem, state)
+        if not extreme_values:
             none = np.zeros(len(state.passes))
             return {"depth": none, "lift error": none, "peak pressure": none}
-        lift = found["least_wear"].error + found["greatest_wear"].error
+        lift = extreme_values["least_wear"].error + extreme_values["greatest_wear"].error
         errors = {
-            "depth": found["depth"].error,
+            "depth": extreme_values["depth"].error,
             "lift error": lift.max(axis=0),
-            "peak pressure": found["peak_pressure"].error.max(axis=0),
+            "peak pressure": extreme_values["peak_pressure"].error.max(axis=0),
         }
         return {name: np.nan_to_num(values) for name, values in errors.items()}
 

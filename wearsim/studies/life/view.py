@@ -128,8 +128,8 @@ class LifeView(RealisationsView[LifeResult]):
         for fit in result.fits:
             intervals = [fit.interval(share / 100.0) for share in shares]
             cells = [
-                "{1} ({0}..{2})".format(*rounded_lives(one.low, one.value, one.high))
-                for one in intervals
+                "{1} ({0}..{2})".format(*rounded_lives(interval.low, interval.value, interval.high))
+                for interval in intervals
             ]
             scale = f"{count(math.exp(fit.mu))} {result.unit}"
             parameters = (
@@ -223,7 +223,7 @@ class LifeView(RealisationsView[LifeResult]):
             "probability_before_target": probability,
             "rare": self._rare(),
             "first_limits": result.first_limits,
-            "angles_deg": {name: np.degrees(found) for name, found in result.angles.items()},
+            "angles_deg": {name: np.degrees(angles) for name, angles in result.angles.items()},
             "fits": [
                 {
                     "family": fit.family,
@@ -304,18 +304,18 @@ def life_text(result: LifeResult, share: float) -> str:
 
 def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
     """Return the life that a percentage does not reach, and its interval, which may be empty."""
-    found, most = result.b(share), count(result.most)
-    low, value, high = rounded_lives(found.low, found.value, found.high)
-    if math.isnan(found.value):
+    life, most = result.b(share), count(result.most)
+    low, value, high = rounded_lives(life.low, life.value, life.high)
+    if math.isnan(life.value):
         fewest = fewest_lives(0.01 * share)
         if result.count < fewest and not result.is_exact:
             return f"takes {fewest} lives", ""
-        return f"above {most}", f"from {low}" if math.isfinite(found.low) else NOTHING
-    if found.low == found.high:
+        return f"above {most}", f"from {low}" if math.isfinite(life.low) else NOTHING
+    if life.low == life.high:
         ends = result.b_error(share)
-        return rounded_lives(ends[0], found.value, ends[1])[1], ""
-    if math.isfinite(found.low):
-        return value, f"{low}..{high}" if math.isfinite(found.high) else f"from {low}"
+        return rounded_lives(ends[0], life.value, ends[1])[1], ""
+    if math.isfinite(life.low):
+        return value, f"{low}..{high}" if math.isfinite(life.high) else f"from {low}"
     bound = result.lower_bound(share)  # of a small sample
     return value, f"from {rounded_lives(bound)[0]} (one-sided)" if math.isfinite(
         bound
@@ -375,22 +375,28 @@ def target_text(result: LifeResult) -> str:
     assert result.target is not None
     if obstacle := result.probability_obstacle(result.target):
         return f"not stated: {obstacle}"
-    found = result.probability_before(result.target)
-    if not 0.0 < found.value < _SMALL:
-        return part_with_interval(found)
-    interval = f" [{found.low:.2g}, {found.high:.2g}]" if found.low < found.high else ""
-    return f"{found.value:.3g}{interval}"
+    probability = result.probability_before(result.target)
+    if not 0.0 < probability.value < _SMALL:
+        return part_with_interval(probability)
+    interval = (
+        f" [{probability.low:.2g}, {probability.high:.2g}]"
+        if probability.low < probability.high
+        else ""
+    )
+    return f"{probability.value:.3g}{interval}"
 
 
-def rare_text(found: RareProbability) -> str:
+def rare_text(estimate: RareProbability) -> str:
     """Return the probability of a rare event, or why there is none."""
-    if not found.is_reliable:
-        return f"refused, {found.obstacle}"
-    chance = found.probability
-    text = f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(found.tests)} tests"
-    text += f", variation {shown(found.variation, '%', 2)}"
-    if found.effective_size is not None:
-        text += f", effective sample size {found.effective_size:.0f}"
+    if not estimate.is_reliable:
+        return f"refused, {estimate.obstacle}"
+    chance = estimate.probability
+    text = (
+        f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(estimate.tests)} tests"
+    )
+    text += f", variation {shown(estimate.variation, '%', 2)}"
+    if estimate.effective_size is not None:
+        text += f", effective sample size {estimate.effective_size:.0f}"
     return text
 
 

@@ -239,8 +239,8 @@ class RunInProgress:
             elif stations > 0.5 * relative:
                 remedy = "more cam.stations decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
-        for remedy, found in beyond.items():
-            names, errors_text = map(" and ".join, zip(*found, strict=True))
+        for remedy, texts in beyond.items():
+            names, errors_text = map(" and ".join, zip(*texts, strict=True))
             self.warn(
                 f"estimated error of {names}: {errors_text}, above the tolerance of"
                 f" {100.0 * tolerance:.2g} %; {remedy}"

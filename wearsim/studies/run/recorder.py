@@ -188,7 +188,7 @@ def states_at(
         )
         states.append(state.at(places[-1]))
     problem, state = advance.problem.at(np.concatenate(places)), joined_states(states)
-    passes = np.array([one[2] for one in due])
+    passes = np.array([record[2] for record in due])
     later = np.flatnonzero(passes > state.passes)
     if not later.size:
         return problem, state
@@ -245,8 +245,8 @@ class Recorder:
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
         stepper, end = self.stepper, advance.end
-        for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
-            self._record(advance, *states_at(stepper, advance, [one]))
+        for record in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
+            self._record(advance, *states_at(stepper, advance, [record]))
         row = history_row(stepper, advance.problem, end, advance.path[0], self.threshold)
         self._history.append(_single(row))
         # a single assignment: an interrupt before it leaves the previous step current
@@ -266,9 +266,9 @@ class Recorder:
             Passes at the end of the test without this stop.
         """
         stepper, start = self.stepper, advance.path[0]
-        for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
-            if one[2] < state.passes[0]:
-                self._record(advance, *states_at(stepper, advance, [one]))
+        for record in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
+            if record[2] < state.passes[0]:
+                self._record(advance, *states_at(stepper, advance, [record]))
         self._record(advance, advance.problem, state)
         row = history_row(stepper, advance.problem, state, start, self.threshold)
         self._history.append(_single(row))

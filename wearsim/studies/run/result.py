@@ -437,14 +437,14 @@ class Result(StudyResult[RunData]):
     def _final_errors(self, last: Arrays) -> dict[str, Number]:
         """Return the estimated errors of the final state, the greatest one over the rollers."""
         variables = self.raw.schema.variables
-        found: dict[str, Number] = {}
+        errors: dict[str, Number] = {}
         for name in ESTIMATED:
             error = last.get(f"{name}_error")
             if error is not None:
                 over_rollers = "roller" in variables[name].dims
                 greatest = error.max(axis=0) if over_rollers else error
-                found[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
-        return found
+                errors[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
+        return errors
 
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
         """Return the final state of a cam, and depth and lift error per station."""

@@ -204,8 +204,8 @@ class RunView(StudyView[Result]):
     def origin(self) -> dict[str, Any]:
         """Return length, records, scenario, files, plugins and software for JSON."""
         result = self.result
-        own = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
-        return {**own, **super().origin()}
+        length = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
+        return {**length, **super().origin()}
 
     def line(self) -> str:
         """Return the footer of the run, with the estimated errors of its steps and strips."""
