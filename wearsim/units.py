@@ -65,14 +65,14 @@ class QuantityError(ValueError):
         super().__init__(", ".join(part for part in parts if part))
 
 
-def shown(value: object) -> str:
+def as_written(value: object) -> str:
     """Return `value` as written in a TOML file, abbreviated if long."""
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list | tuple):
-        text = f"[{', '.join(shown(item) for item in value)}]"
+        text = f"[{', '.join(as_written(item) for item in value)}]"
     elif isinstance(value, str):
         text = f'"{value}"'
     else:

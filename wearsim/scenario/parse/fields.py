@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from wearsim.plugins import Distribution, FrictionField, JointDistribution, Options, Process
 from wearsim.quantities import HostQuantity, Quantity
 from wearsim.types import FloatArray
-from wearsim.units import in_engineers_unit, shown
+from wearsim.units import as_written, in_engineers_unit
 from wearsim.uq.sampling.sampler import BELOW_ONE
 
 _LIMITS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
@@ -93,7 +93,7 @@ def _form(part: Any, quantity: Quantity | None = None) -> str | None:
                 return item.expected
         return _form(get_args(part)[0])
     if get_origin(part) is Literal:
-        return "one of " + ", ".join(shown(item) for item in get_args(part))
+        return "one of " + ", ".join(as_written(item) for item in get_args(part))
     if _is_model(part) or get_origin(part) is dict:
         return "a table"
     names = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
@@ -147,7 +147,7 @@ class RandomTarget:
                 ends[k] = str(end)
             elif self.quantity:
                 ends[k] = self.quantity.write(end)
-        return shown(ends)
+        return as_written(ends)
 
 
 def target_of(field: FieldInfo) -> RandomTarget | None:

@@ -62,7 +62,7 @@ from wearsim.scenario.tables.plugin import (
     read_wear,
 )
 from wearsim.types import Profile
-from wearsim.units import shown
+from wearsim.units import as_written
 
 #: Keys that exclude each other: an override of one removes the others.
 _ALTERNATIVES = {**ALTERNATIVES, "creepage": (("misalignment", "yaw"), ("misalignment", "tilt"))}
@@ -145,7 +145,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
         except ValueError as error:
             unfit = isinstance(error, tomlkit.exceptions.ConvertError)
             what = "has a value that TOML cannot hold" if unfit else str(error)
-            mistakes.append(Mistake("", dotted, what, shown(value)))
+            mistakes.append(Mistake("", dotted, what, as_written(value)))
     if mistakes:
         raise ScenarioError(file, mistakes)
     written = tomlkit.dumps(document)
@@ -321,7 +321,7 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
     match = re.fullmatch(r"(?P<what>.*) \(at (?P<place>.*)\)", message, re.DOTALL)
     if re.fullmatch(r".*\.toml", text.strip()):
         remedy = "TOML; load_scenario reads a file"
-        return Mistake("", "", "is the name of a file, not its text", shown(text), remedy)
+        return Mistake("", "", "is the name of a file, not its text", as_written(text), remedy)
     if match is None:
         return Mistake("", "", f"is not valid TOML: {message}")
     what = match["what"][:1].lower() + match["what"][1:]
@@ -364,7 +364,7 @@ def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> A
     raw = data.get(table, {})
     if not isinstance(raw, dict):
         mistakes.add(
-            "", table, "is not a table", shown(raw), f"a line [{table}] and its keys below"
+            "", table, "is not a table", as_written(raw), f"a line [{table}] and its keys below"
         )
         return None
     check_alternatives(mistakes, raw, table)

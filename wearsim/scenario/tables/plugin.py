@@ -27,7 +27,7 @@ from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.types import Grid, Material
-from wearsim.units import shown
+from wearsim.units import as_written
 
 
 class ContactTable(Options):
@@ -303,7 +303,7 @@ def read_load(mistakes: Mistakes, raw: Mapping[str, object]) -> LoadChoice | Non
     rest = {key: value for key, value in rest.items() if key not in tables}
     for name in [key for key in rest if key not in spec.options.model_fields]:
         if kinds.get(name) == "term":
-            got = shown(rest.pop(name))
+            got = as_written(rest.pop(name))
             mistakes.add("load", name, "is a term of the load", got, f"a table [load.{name}]")
     options = validate(mistakes, spec.options, rest, "load", LoadTable)
     if options is None:
@@ -350,7 +350,7 @@ def described_model(model: str, scenario_text: str) -> str:
     table = tomllib.loads(scenario_text).get("contact", {})
     automatic = table.get("model") == AUTO and "chosen" in table
     given = [
-        f"{key} = {shown(value)}"
+        f"{key} = {as_written(value)}"
         for key, value in (table["chosen"].get("options", {}) if automatic else table).items()
         if key not in ContactTable.model_fields
     ]

@@ -209,7 +209,7 @@ def at_creepage(point: OperatingPoint, solution: ContactSolution) -> OperatingPo
     return replace(point, creepage=creepage, bearing_torque=None, rolling_radius=None)
 
 
-def excess(
+def error_above_tolerance(
     name: str,
     model: ContactModel,
     grid: Grid,

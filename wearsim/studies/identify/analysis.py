@@ -28,7 +28,7 @@ from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.identify.traces import Trace, level, measured_depth
 from wearsim.studies.identify.trajectories import Grown, Trajectories
 from wearsim.types import FloatArray
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.noise import Noise, fit_noise
 
 _FIRST_NOISE = Noise(1e-6, 0.2e-3, 0.1e-6)  # of a trace without shoulders, before its own is fitted
@@ -92,7 +92,7 @@ class Identified:
     item : Measurement
     likelihood : DrawLikelihood
         For the draws of the test.
-    kernel : Kernel
+    kernel : LikelihoodMixture
         Likelihood of ln K/H.
     depth : tuple of float, optional
         Measured depth: value, and ends of the 95 % interval [m]; None without shoulders, and where
@@ -109,7 +109,7 @@ class Identified:
 
     item: Measurement
     likelihood: DrawLikelihood
-    kernel: Kernel
+    kernel: LikelihoodMixture
     depth: tuple[float, float, float] | None
     model_depth: tuple[float, float, float]
     area: tuple[float, float, float] | None
@@ -119,7 +119,7 @@ class Identified:
     shares: Mapping[str, float] = field(default_factory=dict)
 
 
-def kernel_of(likelihood: DrawLikelihood, name: str) -> Kernel:
+def kernel_of(likelihood: DrawLikelihood, name: str) -> LikelihoodMixture:
     """Return the likelihood of ln K/H, the draws of the other inputs averaged.
 
     Raises
@@ -130,7 +130,9 @@ def kernel_of(likelihood: DrawLikelihood, name: str) -> Kernel:
     known = np.isfinite(likelihood.log_evidence)
     if not known.any():
         raise ScenarioError(name, [Mistake("", "", "no draw of the inputs describes this groove")])
-    return Kernel.of(likelihood.log_evidence[known], likelihood.mean[known], likelihood.std[known])
+    return LikelihoodMixture.of(
+        likelihood.log_evidence[known], likelihood.mean[known], likelihood.std[known]
+    )
 
 
 def identified(

@@ -33,7 +33,7 @@ from wearsim.studies.identify.result import IdentificationResult
 from wearsim.studies.identify.traces import Trace, read_trace, smoothed
 from wearsim.studies.identify.trajectories import Grower, Trajectories, check_law
 from wearsim.studies.progress import shown_progress
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 from wearsim.uq.hierarchy.verdict import NEGLIGIBLE
 
 MOST_DRAWS = 768  # where a trace leaves few of the first ones
@@ -331,7 +331,7 @@ def _passes(scenario: Scenario, item: Measurement) -> float:
     except ValueError as error:
         what = error.what if isinstance(error, QuantityError) else "is no number of passes"
         expected = 'a time such as "100 min", or "2e5 passes", of a cam also "1e5 turns"'
-        raise item.refused(Mistake("", "at", what, shown(item.at), expected)) from error
+        raise item.refused(Mistake("", "at", what, as_written(item.at), expected)) from error
     if not 0.0 < passes <= scenario.total_passes * (1.0 + 1e-9):
         what, expected = "is not within the test", f"up to {scenario.total_time / 60.0:.6g} min"
         raise item.refused(Mistake("", "at", what, item.at, expected))

@@ -15,7 +15,7 @@ from wearsim.quantities import quantity
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import amount, can_be_random
 from wearsim.studies.identify.measurements import Measurement, key_of
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 
 _SPAN = 6.0  # standard deviations of a measured value that are considered
 _POINTS = 801
@@ -43,7 +43,7 @@ def with_known(scenario: Scenario, test: Measurement) -> Scenario:
         if not can_be_random(key) or (item is not None and item.role == "joint"):
             by = "" if item is None else f" alone, since {item.name} sets it with others"
             what, expected = f"cannot be random{by}", "only a known value in set"
-            raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
+            raise test.refused(Mistake("", f"std.{key}", what, as_written(error), expected))
         if item is None:
             changed = _changed(known, {key: _normal(key, test.values[key], error)}, test, "std")
             random += [random_input for random_input in changed.random if random_input.name == key]
@@ -102,7 +102,7 @@ def _std(item: RandomInput, error: object, key: str, test: Measurement) -> float
     if 0.0 < std < math.inf:
         return std
     expected = kind.expected("positive") if kind else "a number above 0"
-    raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
+    raise test.refused(Mistake("", f"std.{key}", what, as_written(error), expected))
 
 
 def _measured(item: RandomInput, value: float, std: float, test: Measurement) -> RandomInput:

@@ -14,7 +14,7 @@ from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.scenario.parse.mistakes import nearest
 from wearsim.scenario.parse.toml import as_toml
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 
 #: Short names of inputs.
 SHORT = {
@@ -250,7 +250,9 @@ def _read_test(
     """Return one test, and add its mistakes."""
 
     def wrong(key: str, what: str, got: object, expected: str) -> None:
-        mistakes.append(Mistake(place, key, what, None if got is None else shown(got), expected))
+        mistakes.append(
+            Mistake(place, key, what, None if got is None else as_written(got), expected)
+        )
 
     def amount(key: str, unit: str, expected: str) -> float | None:
         if key not in table:

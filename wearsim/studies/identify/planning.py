@@ -19,7 +19,7 @@ from wearsim.studies.identify.inputs import with_measured
 from wearsim.studies.identify.likelihood import depth_likelihood
 from wearsim.studies.identify.measurements import key_of
 from wearsim.studies.identify.trajectories import CYLINDER, ROLLER, Grower, check_law, factors
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.verdict import MOST_TESTS, NEGLIGIBLE, POWER_SETS, Power
 
 SCATTERS = (0.2, 0.4, 0.8)
@@ -127,7 +127,7 @@ def sizes(first: int, last: int) -> list[int]:
 
 def _kernel(
     scenario: Scenario, draws: int | None, on_progress: Callable[[int, int], None] | None
-) -> Kernel:
+) -> LikelihoodMixture:
     """Return the likelihood of ln K/H by a test of mean inputs that wears as the scenario."""
     cylinder, roller = factors(scenario)
     known = {CYLINDER: np.array([cylinder]), ROLLER: np.array([roller])}
@@ -139,7 +139,12 @@ def _kernel(
 
 
 def _planned(
-    name: str, kernel: Kernel, tests: Sequence[int], negligible: float, sets: int, seed: int
+    name: str,
+    kernel: LikelihoodMixture,
+    tests: Sequence[int],
+    negligible: float,
+    sets: int,
+    seed: int,
 ) -> PlannedDesign:
     power = Power([kernel], negligible=negligible, seed=seed, sets=sets)
     rates = {t: [power.rates(count, t) for count in tests] for t in (0.0, *SCATTERS)}

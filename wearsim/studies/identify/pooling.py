@@ -15,7 +15,7 @@ from wearsim.studies.identify.likelihood import DrawLikelihood
 from wearsim.studies.identify.result import IdentificationData
 from wearsim.studies.preparation import origin_of
 from wearsim.types import FloatArray
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import PRIOR_SCALE, Posterior
 from wearsim.uq.hierarchy.verdict import ALPHA, MOST_TESTS, Design, Power, word
 
@@ -36,13 +36,13 @@ class Specimen:
     name : str
     tests : list of list of Identified
         Traces of each test in the order of passes.
-    kernel : Kernel
+    kernel : LikelihoodMixture
         Likelihood of ln K/H.
     """
 
     name: str
     tests: list[list[Identified]]
-    kernel: Kernel
+    kernel: LikelihoodMixture
 
 
 def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
@@ -87,7 +87,7 @@ def _same_inputs(first: Identified, other: Identified) -> bool:
     return known and len(first.likelihood.mean) == len(other.likelihood.mean)
 
 
-def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> Kernel:
+def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> LikelihoodMixture:
     """Return the likelihood of ln K/H of a specimen from all of its tests."""
     kernels = []
     for test in tests:
@@ -108,10 +108,10 @@ def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> Kernel:
         what = "its tests contradict each other: no K/H describes them all"
         raise ScenarioError(name, [Mistake("", "group", what)])
     step = grid[1] - grid[0]
-    return Kernel.of(np.log(np.maximum(weight, 1e-300)), grid, np.full_like(grid, step))
+    return LikelihoodMixture.of(np.log(np.maximum(weight, 1e-300)), grid, np.full_like(grid, step))
 
 
-def log_density(kernel: Kernel, grid: FloatArray) -> FloatArray:
+def log_density(kernel: LikelihoodMixture, grid: FloatArray) -> FloatArray:
     """Return the logarithm of the likelihood of ln K/H of a specimen, whose integral is 1."""
     away = (grid[:, None] - kernel.centre) / kernel.std
     parts = -0.5 * away**2 + np.log(kernel.weight / kernel.std) - 0.5 * np.log(2.0 * np.pi)
@@ -289,7 +289,7 @@ def _to_decide(
     measure = [key for key, part in sorted(shares.items(), key=lambda item: -item[1]) if part > 0.1]
     count, kernels = len(specimens), [specimen.kernel for specimen in specimens]
     known = float(np.mean([k.variance - k.variance_of_inputs for k in kernels]))
-    measured = Kernel(np.ones(1), np.zeros(1), np.array([np.sqrt(MEASURED**2 + known)]))
+    measured = LikelihoodMixture(np.ones(1), np.zeros(1), np.array([np.sqrt(MEASURED**2 + known)]))
     now, then = (Power(k, negligible=negligible, seed=seed) for k in (kernels, [measured]))
     return {
         "scatter": SHOWN,
