@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 
 from wearsim.types import ContactSolution, Creepage, FloatArray, IntArray, OperatingPoint
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +129,13 @@ class ContactBatch:
     def __len__(self) -> int:
         return len(self.gap)
 
+    def replaced(self, **others: Any) -> ContactBatch:
+        """Return the contacts with arrays of the same length, in a tenth of the time of `replace`.
+
+        The arrays are not checked.
+        """
+        return _unchecked(ContactBatch, self.__dict__ | others)
+
     def at(self, numbers: IntArray) -> ContactBatch:
         """Return some of the contacts, by number and in that order."""
         arrays = {name: getattr(self, name) for name in _INPUTS}
@@ -158,6 +168,13 @@ class ContactBatch:
         indices = [int(i) for i in np.unravel_index(number, shape)]
         axis_places = zip(axes[-len(shape) :], indices, shape, strict=True)
         return indices, ", ".join(f"{axis} {i}" for axis, i, length in axis_places if length > 1)
+
+
+def _unchecked(kind: type[T], values: Mapping[str, Any]) -> T:
+    """Return an object with given attributes, without the assignments of a frozen dataclass."""
+    found = object.__new__(kind)
+    found.__dict__.update(values)
+    return found
 
 
 def _kind(point: OperatingPoint) -> tuple[object, ...]:
@@ -218,6 +235,11 @@ class ContactBatchSolution:
     longitudinal_creepage: FloatArray
     iterations: IntArray
     separation: FloatArray | None = None
+
+    @classmethod
+    def of_columns(cls, values: Mapping[str, Any]) -> ContactBatchSolution:
+        """Return solutions with all fields given, in a fifth of the time of the constructor."""
+        return _unchecked(cls, values)
 
     @classmethod
     def of(cls, solutions: Sequence[ContactSolution]) -> ContactBatchSolution:

@@ -161,8 +161,14 @@ class _Group:
         for place, number in enumerate(numbers):
             passes = float(advance.end.passes[place])
             self.tests[number].history.append((passes, relative[:, place]))
+        # the only state of a path may be known to be below all limits
+        reached = (relative.max(axis=0) >= 1.0) | (len(advance.path) > 2)
         open_places = np.array(
-            [place for place, number in enumerate(numbers) if self.tests[number].found is None],
+            [
+                k
+                for k, number in enumerate(numbers)
+                if self.tests[number].found is None and reached[k]
+            ],
             dtype=np.int64,
         )
 

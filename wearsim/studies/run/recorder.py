@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from wearsim.errors import ContactError, StepError
+from wearsim.errors import ContactError, SolverError, StepError
 from wearsim.evolution.integrate import Advance
 from wearsim.evolution.observables import depth, groove_width, present_contacts, volume
 from wearsim.evolution.problem import WearProblem
@@ -365,9 +365,13 @@ class Recorder:
             self._kept = (self._kept[0], len(self._records), *self._kept[2:])
 
     def drop_unfinished(self) -> None:
-        """Remove the rows of an interrupted `add`."""
+        """Remove the rows of an interrupted `add`, and records whose side steps fail."""
         self._history.shorten(self._kept[0])
         del self._records[self._kept[1] :]
+        try:
+            self._compute_records()
+        except SolverError:
+            del self._records[-len(self._waiting) :]
 
     @property
     def state(self) -> WearState:
