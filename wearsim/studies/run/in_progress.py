@@ -305,9 +305,10 @@ class RunInProgress:
         passes and all are reached; `start` is the pass at the start of the step.
         """
         choice, state = self.scenario.contact, self.recorder.state
+        if choice.auto is None or choice.model == REFERENCE:
+            return
         due = start == 0.0 or any(start < part * self.stop <= self._passes for part in (0.5, 1.0))
-        known = REFERENCE in registry().names(ContactModelSpec)
-        if choice.auto is None or choice.model == REFERENCE or not (due and known):
+        if not due or REFERENCE not in registry().names(ContactModelSpec):
             return
         materials = self.scenario.cylinder.material, self.scenario.roller.material
         problem = self.present
