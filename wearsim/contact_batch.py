@@ -92,7 +92,7 @@ class ContactBatch:
         Raises
         ------
         ValueError
-            If the points are not of one kind, or their number is not that of the gaps.
+            If the points are not of one kind, or are not as many as the gaps.
         """
         creepages, first = [point.creepage for point in points], points[0]
         if len(points) > 1 and len({_kind(point) for point in points}) > 1:

@@ -41,7 +41,7 @@ class ComputedProfile(NamedTuple):
     y : ndarray, shape (strips,)
         Axial position [m].
     height : ndarray, shape (strips,)
-        Height above the nominal surface, of an ensemble that of the mean [m].
+        Height above the nominal surface, of an ensemble its mean [m].
     low, high : ndarray, shape (strips,)
         Ends of the band of an ensemble, which are equal for a run [m].
     start : ndarray, shape (strips,)
@@ -84,7 +84,7 @@ _FEWEST = 8  # unworn points on each side
 def levelled(measured: Measured, computed: ComputedProfile) -> Measured:
     """Return a measured profile without offset, inclination and axial shift.
 
-    Offset and inclination are those of the straight line through the points outside the computed
+    A straight line gives offset and inclination, fitted to the points outside the computed
     groove, the shift makes the middles of both grooves equal. The depth is not fitted.
 
     Parameters

@@ -355,7 +355,7 @@ def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
     Returns
     -------
     Profile
-        At equally spaced points, at most as far apart as those of the input.
+        At equally spaced points, at most as far apart as in the input.
 
     Raises
     ------

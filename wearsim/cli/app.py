@@ -94,7 +94,7 @@ class LazyVerb(TyperCommand):
 
 
 def _add_option(command: Any, option: Any) -> None:
-    """Add a global option to a command and to those of a group; only its callback is called."""
+    """Add a global option to a command, or all commands of a group; only its callback is called."""
     if not any(item.name == option.name for item in command.params):
         added = copy(option)
         added.expose_value = False

@@ -113,7 +113,7 @@ class Line(Mark):
 
 @dataclass(frozen=True)
 class Records(Mark):
-    """A curve for each record: all of them in a figure, that of the slider on a page.
+    """A curve for each record: all of them in a figure, the slider's on a page.
 
     Parameters
     ----------

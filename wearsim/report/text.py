@@ -148,7 +148,7 @@ class Named(NamedTuple):
         return PER_SI[self.unit]
 
 
-#: observables of an ensemble by name; the last four are those of cams
+#: observables of an ensemble by name; the last four are of cams
 OBSERVABLES: Mapping[str, Named] = {
     "depth": Named("depth", "um"),
     "width": Named("width", "mm"),

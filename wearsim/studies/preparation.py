@@ -151,7 +151,7 @@ def check_plugins(path: Path, data: StudyData) -> None:
 
 
 def changed_origins(data: StudyData, scenario: Scenario) -> list[str]:
-    """Return a warning for every software version that differs from that of a file.
+    """Return a warning for every software version that differs from a file's.
 
     Parameters
     ----------

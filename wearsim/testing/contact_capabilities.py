@@ -79,7 +79,7 @@ def _uneven_compliance(fixture: ContactFixture) -> FloatArray:
 
 @CAPABILITIES.specified_in(_CAPABILITIES)
 def wear_compliance(fixture: ContactFixture) -> None:
-    """With a wear compliance c the solution is that of the gap plus c q."""
+    """With a wear compliance c the solution equals a solution for the gap plus c q."""
     compliance = _uneven_compliance(fixture)
     if _is_refused(fixture, "wear_compliance", lambda: fixture.solve(wear_compliance=compliance)):
         return

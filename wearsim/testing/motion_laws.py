@@ -95,7 +95,7 @@ def lift_spans_the_rise(fixture: MotionLawFixture) -> None:
 
 @MOTION_LAW.specified_in(_LIFT)
 def derivatives_match_the_lift(fixture: MotionLawFixture) -> None:
-    """The derivatives are those of the lift, and are continuous within the segment."""
+    """The derivatives belong to the lift, and are continuous within the segment."""
     scale = fixture.rise / fixture.angle
     last = None
     for angle in fixture.parts:

@@ -138,7 +138,7 @@ def quantile_is_reproducible(fixture: RandomInputFixture) -> None:
 
 @SCALAR.specified_in(_DISTRIBUTION)
 def mean_and_std_match_quantile(fixture: RandomInputFixture) -> None:
-    """Mean and standard deviation are those of the quantile function."""
+    """Mean and standard deviation follow from the quantile function."""
     from scipy.special import ndtr  # noqa: PLC0415  (slow to import)
 
     scores = np.linspace(-8.1, 8.1, 40_001)

@@ -200,7 +200,7 @@ TERM: Checks[LoadFixture] = Checks()
 
 @ANY.specified_in("wearsim.plugins.LoadSpec")
 def factory_matches_role(fixture: LoadFixture) -> None:
-    """The factory of a base builds a Load, that of a term a LoadTerm."""
+    """The factory of a base builds a Load, the factory of a term a LoadTerm."""
     role = fixture.configured.spec.role
     required = Load if role == "base" else LoadTerm
     require(

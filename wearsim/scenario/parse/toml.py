@@ -217,7 +217,7 @@ TABLES: dict[str, type[Options]] = {
 REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
 _ABSENT = {*REQUIRED, "wear", "cam", "follower", "lubricant"}  # tables without defaults
 
-#: functions that read the tables with more checks than those of their models
+#: functions that read the tables with more checks than their models have
 READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
     "roller": read_roller,
     "cylinder": read_cylinder,

@@ -180,7 +180,7 @@ def _is_wider_than_profile(scenario: Scenario) -> bool:
 class Realisations:
     """One contact of a scenario for every realisation of its random inputs.
 
-    The contact is that of the first roller on the cylinder at the start of the load. A realisation
+    The contact belongs to the first roller on the cylinder at the start of the load. A realisation
     does not depend on others of its batch, except that all share the strips.
 
     Parameters

@@ -31,7 +31,7 @@ class ContactErrors:
     Parameters
     ----------
     dissipation : float
-        L2 norm over the strips of the difference of P_l(y), over that of the reference.
+        L2 norm over the strips of the difference of P_l(y), over the norm of the reference.
     greatest : float
         Greatest difference of P_l(y), over the greatest value of the reference.
     power, peak_pressure, half_length : float
@@ -57,7 +57,7 @@ class ContactReference:
     model : str
         Name of the model.
     y : ndarray, shape (strips,)
-        Axial position of its strips [m], which may extend beyond those of the contact.
+        Axial position of its strips [m], which may extend beyond the contact's.
     dissipation : ndarray, shape (strips,)
         P_l(y) [W/m].
     line_load : ndarray, shape (strips,)
@@ -270,7 +270,7 @@ def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:
 
 
 def _differences(values: FloatArray, reference: FloatArray) -> ContactErrors:
-    """Return the differences of values from those of a reference, ordered as by `_values`."""
+    """Return the differences of values from a reference, ordered as by `_values`."""
     count = len(_SCALARS)
     power, pressure, length = (
         values[: count - 1] / _nonzero(reference[: count - 1]) - 1.0

@@ -81,7 +81,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
 
 
 def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
-    """Return one problem whose realisations are those of the given problems, all compatible."""
+    """Return one problem with the realisations of the given problems, all compatible."""
     columns = (
         np.concatenate([getattr(problem.inputs, item.name) for problem in problems], axis=1)
         for item in fields(ContactInputs)
@@ -320,7 +320,7 @@ def add_strip_errors(
     results: Mapping[int, RunObservations | Exception],
     observe: Observe | None = None,
 ) -> dict[int, tuple[FloatArray, dict[str, FloatArray]]]:
-    """Add the errors due to the strips to those of the results, by the same tests on coarse ones.
+    """Add the errors due to the strips to the results, by the same tests on coarse strips.
 
     Parameters
     ----------

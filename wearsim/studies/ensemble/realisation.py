@@ -158,7 +158,7 @@ def _inverse(t: FloatArray) -> FloatArray:
 
 
 AXIS_REALISATIONS = 64  # realisations that determine the axis, whatever the ensemble's size
-WIDTH_MARGIN = 1.05  # width of the axis over that of the widest of these realisations
+WIDTH_MARGIN = 1.05  # width of the axis over the widest of these realisations
 
 
 def profile_axis(scenario: Scenario) -> Grid:
@@ -175,7 +175,7 @@ def profile_axis(scenario: Scenario) -> Grid:
     Raises
     ------
     WearsimError
-        If no strips fit any of the first realisations; the error is that of the first one.
+        If no strips fit any of the first realisations, with the error of the first one.
     """
     drawer, reach, error = Drawer(scenario, "monte-carlo"), [], None
     for number in range(AXIS_REALISATIONS):

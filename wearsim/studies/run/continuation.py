@@ -100,7 +100,7 @@ def without_limit_rows(data: RunData, state: WearState) -> RunData:
 
 EXTENSIONS = 10  # of a test that ends before its limit, each to twice its length
 LONGER = 4.0  # times the test, from which on a limit gives a warning
-PRESSURE = 2.0  # times that of the fresh contact, which no groove reaches
+PRESSURE = 2.0  # times the peak pressure of the fresh contact, which no groove reaches
 _DEPTHS = ("depth", "roller depth", "lift error", "clearance")
 
 

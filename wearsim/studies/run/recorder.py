@@ -127,7 +127,7 @@ class History:
     """Observables of a single test at its start and after each of its steps.
 
     Where the contacts of a state carry the present loads, nothing is solved for its observables.
-    They are then computed together with those of later states, as realisations of one problem.
+    They are then computed together with later states, as realisations of one problem.
 
     Parameters
     ----------

@@ -254,7 +254,7 @@ class Result(StudyResult[RunData]):
         """Estimated numerical errors after each step, by the name of the quantity [SI].
 
         They are due to steps, strips and the stations of a cam; not a number where they are not
-        estimated. That of the depth applies to either body, and that of the worn volume to both.
+        estimated. The error of the depth applies to either body, of the worn volume to both.
 
         Examples
         --------

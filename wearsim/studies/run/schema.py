@@ -48,12 +48,12 @@ _ESTIMATED = {
     "least_wear_angle": "the angle of the least wear",
     "greatest_wear_angle": "the angle of the greatest wear",
 }
-#: their names; that of the error ends on "_error"
+#: their names; the name of the error ends on "_error"
 ESTIMATED = tuple(_ESTIMATED)
 
 
 def _with_errors(variables: Iterable[Variable]) -> Iterator[Variable]:
-    """Yield variables, and those of their estimated errors."""
+    """Yield variables, and the variables of their estimated errors."""
     for item in variables:
         yield item
         if item.name in _ESTIMATED:
