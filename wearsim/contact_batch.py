@@ -12,6 +12,7 @@ import numpy as np
 from wearsim.types import ContactSolution, Creepage, FloatArray, IntArray, OperatingPoint
 
 T = TypeVar("T")
+NO_BODY = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,9 +293,6 @@ class ContactBatchSolution:
 _OUTPUTS = tuple(
     item.name for item in fields(ContactBatchSolution) if item.name not in {"y", "separation"}
 )
-
-
-NO_BODY = -1
 
 
 @dataclass(frozen=True)

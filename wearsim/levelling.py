@@ -10,6 +10,10 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.types import FloatArray
 
+_WORN = 0.01  # part of the greatest depth above which a strip counts as worn
+_DEEP = 0.3  # part of the greatest depth above which points give the middle of a groove
+_FEWEST = 8  # unworn points on each side
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -74,11 +78,6 @@ def rms(measured: Measured, computed: ComputedProfile) -> float:
     """Return the root mean square of measured minus computed heights, nan without points [m]."""
     residual = residuals(measured, computed)[2]
     return float(np.sqrt(np.mean(residual**2))) if residual.size else float("nan")
-
-
-_WORN = 0.01  # part of the greatest depth above which a strip counts as worn
-_DEEP = 0.3  # part of the greatest depth above which points give the middle of a groove
-_FEWEST = 8  # unworn points on each side
 
 
 def levelled(measured: Measured, computed: ComputedProfile) -> Measured:

@@ -40,6 +40,7 @@ _UNITS = (
 )
 _CLEARLY = 3.0  # heights above the ends of a profile over those below
 _INSTALL = "pip install 'wearsim[surfaces]'"
+_ALPHA = math.sqrt(math.log(2.0) / math.pi)
 
 
 @dataclass(frozen=True)
@@ -333,9 +334,6 @@ def _chosen_row(surface: _Surface, file: str, choice: ProfileChoice) -> Profile:
     total = np.where(known, chosen, 0.0).sum(axis=0)[measured]
     y = surface.along - 0.5 * (surface.along[0] + surface.along[-1])
     return _profile_of(y[measured], total / known.sum(axis=0)[measured], file)
-
-
-_ALPHA = math.sqrt(math.log(2.0) / math.pi)
 
 
 def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:

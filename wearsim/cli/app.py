@@ -64,6 +64,9 @@ _MODULES = {
     "dissipation": "contact",
     "resume": "run",
 }
+FAILED = 1
+INTERRUPTED = 130
+TRACEBACK = "WEARSIM_TRACEBACK"
 
 
 class LazyVerb(TyperCommand):
@@ -169,11 +172,6 @@ def _summary(point: EntryPoint) -> str:
     lines = ((point.dist and point.dist.read_text("METADATA")) or "").splitlines()
     summaries = [line.partition(": ")[2] for line in lines if line.startswith("Summary: ")]
     return summaries[0] if summaries else f"From {_distribution(point)}."
-
-
-FAILED = 1
-INTERRUPTED = 130
-TRACEBACK = "WEARSIM_TRACEBACK"
 
 
 class Shell(TyperGroup):

@@ -20,6 +20,8 @@ from wearsim.testing.checks import (
 from wearsim.types import FloatArray
 
 _POINTS = 2001
+MOTION_LAW: Checks[MotionLawFixture] = spec_checks()
+_LIFT = "wearsim.plugins.MotionLaw.lift"
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,6 @@ class MotionLawFixture(Fixture[MotionLawSpec]):
         """Angles between the breaks, with both ends of every part."""
         edges = [0.0, *self.instance.breaks, self.angle]
         return [np.linspace(*pair, _POINTS) for pair in itertools.pairwise(edges)]
-
-
-MOTION_LAW: Checks[MotionLawFixture] = spec_checks()
-_LIFT = "wearsim.plugins.MotionLaw.lift"
 
 
 @MOTION_LAW.specified_in("wearsim.plugins.MotionLawSpec")

@@ -36,6 +36,8 @@ from wearsim.types import FloatArray
 from wearsim.uq.sampling.sobol import Stream
 
 _MAX_POINTS = 2**20  # upper limit of the search for a sufficient number
+# probabilities between the extremes at which a random option of the load is tried
+_BETWEEN = np.array([0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99])
 
 
 class LocalFriction:
@@ -163,10 +165,6 @@ def _least(count: int, unresolved: Callable[[int], str | None]) -> int:
     """Return the least resolving count above one that does not resolve."""
     counts = range(count + 1, _MAX_POINTS)
     return count + 1 + bisect_left(counts, True, key=lambda points: unresolved(points) is None)
-
-
-# probabilities between the extremes at which a random option of the load is tried
-_BETWEEN = np.array([0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99])
 
 
 def _is_wider_than_profile(scenario: Scenario) -> bool:

@@ -22,6 +22,8 @@ INSTALL = {"halfspace": "pip install ./plugins/wearsim-halfspace"}
 
 #: Builds a model with some options for strips.
 Build = Callable[[Options, Grid], ContactModel]
+_SOLUTIONS = 2  # of a reference
+_SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
 
 
 @dataclass(frozen=True)
@@ -256,10 +258,6 @@ def error_above_tolerance(
         f"P_l(y) differs by {100.0 * error:.2g} % from '{name}' (whose own error is"
         f" {100.0 * error_of_reference:.2g} %), tolerance {100.0 * tolerance:g} %"
     )
-
-
-_SOLUTIONS = 2  # of a reference
-_SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
 
 
 def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:

@@ -38,6 +38,9 @@ from wearsim.types import FloatArray, Grid, IntArray
 
 _RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
 _ARRAYS = ("from_apex", "roller", "weight", "slip_profile")
+MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
+MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
+SCALARS = ("depth_error", "volume_error", "steps", "solves")
 
 
 def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
@@ -106,12 +109,7 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
     )
 
 
-MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
-
-MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
-
 Observables = dict[str, float]
-SCALARS = ("depth_error", "volume_error", "steps", "solves")
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,8 @@ DRAWS = 1_000_000  # draws from which the mean of the control variate is compute
 _BLOCK = 65536
 _FIRST_DRAW = 2**31  # number of the first of these draws, beyond any realisation
 _NEWTON_TOLERANCE = 1e-14
+AXIS_REALISATIONS = 64  # realisations that determine the axis, whatever the ensemble's size
+WIDTH_MARGIN = 1.05  # width of the axis over the widest of these realisations
 
 
 def control_of(drawer: Drawer, draws: int = DRAWS) -> dict[str, float] | None:
@@ -155,10 +157,6 @@ def _inverse(t: FloatArray) -> FloatArray:
             break
         x = new
     return np.asarray(x)
-
-
-AXIS_REALISATIONS = 64  # realisations that determine the axis, whatever the ensemble's size
-WIDTH_MARGIN = 1.05  # width of the axis over the widest of these realisations
 
 
 def profile_axis(scenario: Scenario) -> Grid:

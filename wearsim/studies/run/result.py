@@ -25,6 +25,7 @@ from wearsim.studies.run.schema import CAM_RUN, ESTIMATED, RUN
 from wearsim.types import FloatArray
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
+_DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -114,8 +115,6 @@ def read_results(path: str | Path) -> RunData:
 
 
 Number: TypeAlias = float | list[float]
-
-_DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False)
