@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.models.annotations import BoxAnnotation, ColorBar, Label
-from bokeh.models.annotations import Span as Rule
+from bokeh.models.annotations import BoxAnnotation, ColorBar, Label, Span as Rule
 from bokeh.models.axes import LinearAxis
 from bokeh.models.formatters import BasicTickFormatter, NumeralTickFormatter
 from bokeh.models.mappers import LinearColorMapper
