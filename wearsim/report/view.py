@@ -19,6 +19,7 @@ from wearsim.uq.estimation.intervals import Interval
 if TYPE_CHECKING:
     from wearsim.report.measured import ComputedProfile, Measured
     from wearsim.report.panels import Sheet
+    from wearsim.report.surfaces import Sampling, Surface
 
 
 class Row(NamedTuple):
@@ -179,6 +180,16 @@ class View(ABC):
     def origin(self) -> dict[str, Any]:
         """Return scenario, files, plugins and software for JSON, if they are stored."""
         return {}
+
+    def surface(self, sampling: Sampling) -> Surface | None:
+        """Return the surface of a body as closed curves, for CAD and CAM, if there is one.
+
+        Parameters
+        ----------
+        sampling : Sampling
+            Chord tolerance or number of points, and position across the track.
+        """
+        return None
 
     def profile(self, angle: float | None = None) -> ComputedProfile | None:
         """Return the worn profile with which measured ones are compared, if there is one.

@@ -10,15 +10,20 @@ import typer
 
 from wearsim.cli.shared import (
     At,
+    Chord,
     Columns,
     Figure,
     Force,
     Json,
     MeanRows,
+    Points,
     ResultsFile,
     Row,
+    Spline,
+    SurfaceFile,
     Units,
     check_figure,
+    check_surface,
     checking,
     note,
     profile_choice,
@@ -234,14 +239,47 @@ Decimal = Annotated[
 ]
 
 
+Position = Annotated[
+    str | None,
+    typer.Option(
+        "--position",
+        metavar="Y",
+        help="Position across the track of --surface: '2 mm'; default: where it is worn deepest.",
+        show_default=False,
+    ),
+]
+
+
 def export(
-    file: ResultsFile, output: Folder = None, decimal: Decimal = ".", force: Force = False
+    file: ResultsFile,
+    output: Folder = None,
+    decimal: Decimal = ".",
+    surface: SurfaceFile = None,
+    chord: Chord = None,
+    points: Points = None,
+    position: Position = None,
+    spline: Spline = False,
+    force: Force = False,
 ) -> None:
-    """Write a results file as CSV, with units in the headers."""
+    """Write a results file as CSV with units in the headers, or the surface of a cam alone."""
     if decimal not in {".", ","}:
         raise typer.BadParameter(f"'{decimal}' is neither '.' nor ','", param_hint="--decimal")
+    sampling = check_surface(
+        surface, force, chord=chord, points=points, position=position, spline=spline
+    )
     from wearsim.studies.opening import export_csv, open_results
 
+    if surface is not None and sampling is not None:
+        from wearsim.atomic_write import refuse_inputs
+        from wearsim.cli.render import write_surface
+
+        refuse_inputs(surface, [file], "the surface", option="--surface")
+        found = open_results(file).view.surface(sampling)
+        if found is None:
+            raise typer.BadParameter(f"requires the run of a cam, not {file}", "--surface")
+        write_surface(found, surface, spline=spline)
+        if output is None:
+            return
     sign: Literal[".", ","] = "," if decimal == "," else "."
     folder = output if output is not None else Path(file.stem)
     for path in export_csv(open_results(file), folder, force=force, decimal=sign):

@@ -115,10 +115,10 @@ class CamTurn:
 
     def at(self, panel: Panel, theta: FloatArray) -> Point:
         """Return the state at angles within a panel [rad]."""
-        inner = np.full(len(theta), self._is_inner(panel))
+        inner = np.full(len(theta), self.is_inner(panel))
         return self.point(self.cam.motion.lift_in(panel.segment, theta), theta, inner)
 
-    def _is_inner(self, panel: Panel) -> bool:
+    def is_inner(self, panel: Panel) -> bool:
         """Return whether the roller touches the inner flank of a groove in a panel."""
         if self.load is None or not self.cam.groove:
             return False
@@ -342,7 +342,7 @@ class CamTurn:
     def at_stations(self, stations: Stations) -> Point:
         """Return the state at stations, at both sides of a boundary between segments."""
         segments = np.array([panel.segment for panel in stations.panels])[stations.panel]
-        flanks = np.array([self._is_inner(panel) for panel in stations.panels])
+        flanks = np.array([self.is_inner(panel) for panel in stations.panels])
         lift = np.empty((3, stations.count))
         for number in np.unique(segments):
             chosen = segments == number
@@ -393,19 +393,19 @@ class CamTurn:
         follower = self.cam.follower
         if not follower.swings or self.cam.groove:
             return []
-
-        def radius(panel: Panel, theta: FloatArray) -> FloatArray:
-            point = self.at(panel, theta)
-            x, y = surface_points(follower, point.kinematics, point.angle)[1]
-            return np.asarray(np.hypot(x, y))
-
-        greatest, theta = extreme(self.panels, radius)
+        greatest, theta = extreme(self.panels, self.radius)
         if greatest < follower.centre_distance:
             return []
         got = f"{1e3 * greatest:.6g} mm at {self.place(theta)}"
         what = "the cam reaches the pivot of the arm: its greatest radius is"
         expected = f"less than {1e3 * follower.centre_distance:.6g} mm, follower.centre_distance"
         return [Mistake("cam", "base_radius", what, got, expected)]
+
+    def radius(self, panel: Panel, theta: FloatArray) -> FloatArray:
+        """Return the distance of the cam's surface from its axis at angles within a panel [m]."""
+        point = self.at(panel, theta)
+        x, y = surface_points(self.cam.follower, point.kinematics, point.angle)[1]
+        return np.asarray(np.hypot(x, y))
 
     def _undercut(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the curvature of the pitch curve times the roller's radius, 1 at a cusp."""

@@ -12,6 +12,7 @@ from wearsim.errors import WearsimError
 from wearsim.evolution.limits import SAME_VALUE, Limit
 from wearsim.report.csv_files import computed
 from wearsim.report.measured import ComputedProfile, Measured
+from wearsim.report.surfaces import Sampling, Surface
 from wearsim.report.text import (
     ROUNDING,
     count,
@@ -264,12 +265,18 @@ class RunView(StudyView[Result]):
         for file, name in _RECORDS.items():
             if name != "roller_depth_profile" or raw.records[name].any():
                 tables[file] = [list(self._records(name))]
-        if self.result.is_cam:
-            from wearsim.studies.cam.export import worn_cam  # noqa: PLC0415
-
-            worn = worn_cam(self.result)
-            tables["worn_cam.csv"] = [[Column(name, values) for name, values in worn.items()]]
+        surface = self.surface(Sampling())
+        if surface is not None:
+            tables["worn_cam.csv"] = [surface.columns]
         return tables
+
+    def surface(self, sampling: Sampling) -> Surface | None:
+        """Return the surface of a cam, unworn and worn; None for a cylinder."""
+        if not self.result.is_cam:
+            return None
+        from wearsim.studies.cam.surface import worn_surface  # noqa: PLC0415  (not of a cylinder)
+
+        return worn_surface(self.result, sampling)
 
     def _records(self, name: str) -> Iterator[Column]:
         """Yield y, and a column for every record and contact."""
