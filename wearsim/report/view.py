@@ -17,6 +17,7 @@ from wearsim.report.text import by_roller, shown, with_interval
 from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
+    from wearsim.report.animation import Animation
     from wearsim.report.measured import ComputedProfile, Measured
     from wearsim.report.panels import Sheet
     from wearsim.report.surfaces import Sampling, Surface
@@ -189,6 +190,10 @@ class View(ABC):
         sampling : Sampling
             Chord tolerance or number of points, and position across the track.
         """
+        return None
+
+    def animation(self) -> Animation | None:
+        """Return the animation of what moves, if anything does."""
         return None
 
     def profile(self, angle: float | None = None) -> ComputedProfile | None:

@@ -22,6 +22,7 @@ from wearsim.cli.shared import (
     Spline,
     SurfaceFile,
     Units,
+    check_ending,
     check_figure,
     check_surface,
     checking,
@@ -67,10 +68,22 @@ Level = Annotated[
     ),
 ]
 
+Animate = Annotated[
+    Path | None,
+    typer.Option(
+        "--animate",
+        metavar="FILE",
+        help="Animation of a worn cam instead of the figure: .gif, or .mp4 where ffmpeg is"
+        " installed.",
+        show_default=False,
+    ),
+]
+
 
 def plot(
     file: ResultsFile,
     figure: Figure = None,
+    animate: Animate = None,
     measured: MeasuredFiles = None,
     angle: Angle = None,
     level: Level = False,
@@ -82,9 +95,14 @@ def plot(
     force: Force = False,
 ) -> None:
     """Draw the figure of a results file of any kind."""
-    path = figure if figure is not None else Path(f"{file.stem}.png")
     from wearsim.atomic_write import refuse_inputs
     from wearsim.cli.render import draw_figure
+
+    if animate is not None:
+        _animate(file, animate, force)
+        if figure is None and not measured:
+            return
+    path = figure if figure is not None else Path(f"{file.stem}.png")
     from wearsim.studies.opening import open_results
 
     refuse_inputs(path, [file], "the figure")
@@ -98,6 +116,22 @@ def plot(
     choice = profile_choice(columns, units, row, mean_rows, at)
     draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path)
     note(f"figure: {path}")
+
+
+def _animate(file: Path, path: Path, force: bool) -> None:
+    """Write the animation of a results file."""
+    from wearsim.atomic_write import refuse_inputs
+    from wearsim.report.animation import ENDINGS, check_animation, save_animation
+    from wearsim.studies.opening import open_results
+
+    check_ending(path, force, "--animate", ENDINGS, "format of an animation")
+    check_animation(path)
+    refuse_inputs(path, [file], "the animation", option="--animate")
+    animation = open_results(file).view.animation()
+    if animation is None:
+        raise typer.BadParameter(f"requires the run of a cam, not {file}", param_hint="--animate")
+    save_animation(animation, path)
+    note(f"animation: {path}, {path.stat().st_size / 1e6:.1f} MB")
 
 
 def measured_profiles(
@@ -276,7 +310,9 @@ def export(
         refuse_inputs(surface, [file], "the surface", option="--surface")
         found = open_results(file).view.surface(sampling)
         if found is None:
-            raise typer.BadParameter(f"requires the run of a cam, not {file}", "--surface")
+            raise typer.BadParameter(
+                f"requires the run of a cam, not {file}", param_hint="--surface"
+            )
         write_surface(found, surface, spline=spline)
         if output is None:
             return

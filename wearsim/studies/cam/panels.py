@@ -31,6 +31,13 @@ from wearsim.report.panels import (
 )
 from wearsim.report.text import PER_SI, shown, with_error
 from wearsim.scenario.tables.cam_points import MeasuredPoints
+from wearsim.studies.cam.drawing import (
+    axis_mark,
+    circle,
+    factor_for,
+    follower_marks,
+    rotation_marks,
+)
 from wearsim.studies.cam.grooves import grooves_at
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
@@ -51,7 +58,6 @@ ANGLE = Axis(
     "angle", "deg", limits=(0.0, 2.0 * np.pi), ticks=[0.25 * np.pi * place for place in range(9)]
 )
 _SAMPLES = 97  # of a panel of the turn between its stations
-_MAGNIFIED = 0.2  # greatest depth in the drawing of the worn cam, of the base radius
 
 
 def cam_sheet(study: CamStudy) -> Sheet:
@@ -177,27 +183,22 @@ def _curve(places: FloatArray, **options: Any) -> Line:
 
 
 def _shape(turn: CamTurn, point: Point) -> Panel:
-    """Return the cam, its pitch curve and the roller at the start of the turn."""
-    centre, surface = surface_points(turn.cam.follower, point.kinematics, point.angle)
-    around = np.linspace(0.0, 2.0 * np.pi, 181)
-    circle = np.stack([np.cos(around), np.sin(around)])
-    roller = centre[:, :1] + turn.scenario.roller.radius * circle
+    """Return the cam, its pitch curve and the follower at the start of the turn."""
+    follower, base = turn.cam.follower, turn.cam.base_radius
+    centre, surface = surface_points(follower, point.kinematics, point.angle)
+    reach = 1.25 * float(np.hypot(*centre).max())
+    start = float(turn.at_angles(np.zeros(1)).kinematics.lift[0])
     marks = [
         _curve(between_flanks(surface, point), width=1.6, label="cam"),
         _curve(centre, width=0.8, dash="--", colour=GREY, label="pitch curve"),
-        _curve(roller, width=1.2, colour=ORANGE, label="roller at 0 deg"),
-        _curve(
-            turn.cam.base_radius * circle, width=0.6, dash=":", colour=GREY, label="base circle"
-        ),
-        _centre(),
+        Line(*circle(base), width=0.6, dash=":", colour=GREY, label="base circle"),
+        *follower_marks(follower, start, turn.scenario.roller.radius, reach, "roller at 0 deg"),
+        axis_mark(),
+        *rotation_marks(0.5 * base),
     ]
-    style = look(legend="below", columns=4, equal=True)
-    text = "The cam, the path of the roller's centre, and the roller at the start of a turn."
-    return Panel("Cam", Axis("x", "mm"), Axis("y", "mm"), marks, text, **style)
-
-
-def _centre() -> Line:
-    return Line([0.0], [0.0], dash="", marker="+", size=8.0, colour=BLACK)
+    style = look(legend="below", columns=3, equal=True)
+    text = "The cam, the path of the roller's centre, and the follower at the start of a turn."
+    return Panel("Cam, turning clockwise", Axis("x", "mm"), Axis("y", "mm"), marks, text, **style)
 
 
 def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
@@ -260,7 +261,7 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     deepest = depth.max(axis=1)
     worn = stations.values_between(deepest, places)
     point = turn.at_stations(fine)
-    factor = _round(_MAGNIFIED * turn.cam.base_radius / max(float(deepest.max()), 1e-12))
+    factor = factor_for(turn, float(deepest.max()))
     follower, found = turn.cam.follower, point.kinematics
     fresh = surface_points(follower, found, point.angle)[1]
     cut = surface_points(follower, found, point.angle, factor * worn)[1]
@@ -276,13 +277,7 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     text = f"The cam before wear, and at the end with its depth magnified {factor:g} times."
     style = look(legend="below", columns=2, equal=True)
     axes = Axis("x", "mm"), Axis("y", "mm")
-    return Panel("Worn cam", *axes, [*marks, _centre()], text, **style)
-
-
-def _round(value: float) -> float:
-    """Return a value rounded down to one digit."""
-    scale = 10.0 ** np.floor(np.log10(value))
-    return float(np.floor(value / scale) * scale)
+    return Panel("Worn cam", *axes, [*marks, axis_mark()], text, **style)
 
 
 def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
