@@ -30,13 +30,13 @@ class Animation:
         Returns the panel of a frame by its number; all have the same limits of the axes.
     count : int
         Number of frames.
-    per_second : float
+    per_second : int
         Frames per second.
     """
 
     frame: Callable[[int], Panel]
     count: int
-    per_second: float
+    per_second: int
 
 
 def check_animation(path: Path) -> None:
@@ -70,11 +70,12 @@ def save_animation(animation: Animation, path: Path) -> None:
     check_animation(path)
     kind = PillowWriter if path.suffix.lower() == ".gif" else FFMpegWriter
     writer: AbstractMovieWriter = kind(fps=animation.per_second)
-    spans = [np.ptp(axis.limits) for axis in (animation.frame(0).x, animation.frame(0).y)]
-    height = _ABOVE + (_WIDTH - _ASIDE) * float(spans[1] / spans[0])
+    first = animation.frame(0)
+    width, height = (float(np.ptp(np.array(axis.limits, float))) for axis in (first.x, first.y))
+    size = _WIDTH, round(_ABOVE + (_WIDTH - _ASIDE) * height / width, 1)
     with (
         TemporaryDirectory() as folder,
-        titled_figure(_WIDTH, round(height, 1)) as figure,
+        titled_figure(*size) as figure,
         replacement(path) as target,
     ):
         part = Path(folder) / path.name

@@ -171,6 +171,7 @@ def closed_spline(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     closed = np.vstack([points, points[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
     periodic = make_interp_spline(along, closed, k=_DEGREE, bc_type="periodic")
-    slopes = [(1, periodic(along[end], 1)) for end in (0, -1)]
-    clamped = make_interp_spline(along, closed, k=_DEGREE, bc_type=([slopes[0]], [slopes[1]]))
+    slope = periodic(along[0], 1)
+    ends: Any = [(1, slope)], [(1, slope)]
+    clamped = make_interp_spline(along, closed, k=_DEGREE, bc_type=ends)
     return np.asarray(clamped.t), np.asarray(clamped.c)

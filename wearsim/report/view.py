@@ -19,7 +19,7 @@ from wearsim.uq.estimation.intervals import Interval
 if TYPE_CHECKING:
     from wearsim.report.animation import Animation
     from wearsim.report.measured import ComputedProfile, Measured
-    from wearsim.report.panels import Sheet
+    from wearsim.report.panels import Panel, Sheet
     from wearsim.report.surfaces import Sampling, Surface
 
 
@@ -80,6 +80,7 @@ class Table(NamedTuple):
     heads: Sequence[str] = ()
 
 
+_FIRST = 9  # answers that a page shows first, by default
 STUDY = "Study"  # title of the table on the computation, which stands first
 ORIGIN = "Origin"  # title of the table on scenario, files and software
 
@@ -102,6 +103,24 @@ class Frame(NamedTuple):
     columns: Sequence[tuple[str, str, Any]]
     axis: str
     numbers: Iterable[int]
+
+
+class Overview(NamedTuple):
+    """What a page shows first, for the person who decides.
+
+    Parameters
+    ----------
+    picture : Panel, optional
+        What was studied.
+    groups : mapping of str to list of Row
+        Short answers by title, such as "Loads" and "Limits".
+    excluded : sequence of str
+        What the results do not contain.
+    """
+
+    picture: Panel | None
+    groups: Mapping[str, Rows]
+    excluded: Sequence[str] = ()
 
 
 class Repetition(NamedTuple):
@@ -147,6 +166,12 @@ class View(ABC):
     @abstractmethod
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over computed ones."""
+
+    def overview(self) -> Overview:
+        """Return what a page shows first; by default the main panel and the first answers."""
+        sheet = self.panels()
+        main = sheet.first if sheet.panels else None
+        return Overview(main, {"Results": self.rows()[1:_FIRST]})
 
     def line(self) -> str:
         """Return method, numerical or sampling error and time on one line, or an empty text."""

@@ -122,8 +122,8 @@ def turning(result: Result) -> Animation:
         for unworn, worn in zip(places[::2], places[1::2], strict=True)
     ]
     starts = turn.cam.motion.starts[:-1]
-    x, y = surface_points(follower, turn.at_angles(starts).kinematics, starts)[1]
-    rays = x + 1j * y
+    edges = surface_points(follower, turn.at_angles(starts).kinematics, starts)[1]
+    rays = edges[0] + 1j * edges[1]
     reach = 0.0 if follower.swings else 1.3 * (follower.rest + float(lifts.max()))
     limits = _limits(turn, outlines, moved, reach)
     radius = turn.scenario.roller.radius - factor * worn_roller
@@ -146,10 +146,10 @@ def turning(result: Result) -> Animation:
         marks += [axis_mark(), *rotation_marks(0.4 * turn.cam.base_radius)]
         text = f"{math.degrees(theta[number]):.0f} deg, lift error {shown(errors[number], 'um', 3)}"
         marks.append(Text(limits[0][0], 0.02, text, parts="y", size=10.0, offset=(6.0, 0.0)))
-        axes = [Axis(name, "mm", limits=ends) for name, ends in zip("xy", limits, strict=True)]
-        return Panel(title, *axes, marks, legend="upper left", equal=True)
+        x, y = (Axis(name, "mm", limits=ends) for name, ends in zip("xy", limits, strict=True))
+        return Panel(title, x, y, marks, legend="upper left", equal=True)
 
-    return Animation(frame, _FRAMES, 18.0)
+    return Animation(frame, _FRAMES, 18)
 
 
 def _limits(

@@ -63,8 +63,7 @@ _SAMPLES = 97  # of a panel of the turn between its stations
 def cam_sheet(study: CamStudy) -> Sheet:
     """Return the panels of a cam: its shape, motion, pressure angle, speeds, and loads."""
     turn = study.turn
-    samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
-    fine = turn.at_stations(Stations(turn.panels, samples))
+    fine = _fine(turn)
     lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
     found, angle, point = fine.kinematics, fine.angle, study.point
     shaded = " (skids shaded)" if study.skids else ""
@@ -94,7 +93,7 @@ def cam_sheet(study: CamStudy) -> Sheet:
     margin = (0.1, 0.0)  # the names of the segments lie below
     inner = Axis(limits=ANGLE.limits, ticks=ANGLE.ticks, unit="deg")
     panels = {
-        "shape": _shape(turn, fine),
+        "shape": shape_panel(turn),
         "motion": Panel(
             "Motion of the follower",
             inner,
@@ -144,6 +143,12 @@ def cam_sheet(study: CamStudy) -> Sheet:
     )
 
 
+def _fine(turn: CamTurn) -> Point:
+    """Return the state at many angles of every smooth part of the turn."""
+    samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
+    return turn.at_stations(Stations(turn.panels, samples))
+
+
 def _right(
     name: str,
     unit: str,
@@ -182,9 +187,9 @@ def _curve(places: FloatArray, **options: Any) -> Line:
     return Line(places[0], places[1], **options)
 
 
-def _shape(turn: CamTurn, point: Point) -> Panel:
+def shape_panel(turn: CamTurn) -> Panel:
     """Return the cam, its pitch curve and the follower at the start of the turn."""
-    follower, base = turn.cam.follower, turn.cam.base_radius
+    point, follower, base = _fine(turn), turn.cam.follower, turn.cam.base_radius
     centre, surface = surface_points(follower, point.kinematics, point.angle)
     reach = 1.25 * float(np.hypot(*centre).max())
     start = float(turn.at_angles(np.zeros(1)).kinematics.lift[0])

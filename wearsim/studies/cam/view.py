@@ -84,8 +84,8 @@ class CamView(View):
             away, unit = np.abs(measured.residual), "um" if measured.unit == "m" else "mrad"
             rms = shown(float(np.sqrt((away**2).mean())), unit, 3)
             most, noise = shown(float(away.max()), unit, 3), shown(measured.noise, unit, 3)
-            place = shown(float(measured.angle[away.argmax()]), "deg")
-            words = f"rms {rms}, at most {most} at {place}; noise {noise}"
+            where = shown(float(measured.angle[away.argmax()]), "deg")
+            words = f"rms {rms}, at most {most} at {where}; noise {noise}"
             rows.append(Row(f"residuals of the {measured.quantity}", words))
         return rows
 

@@ -25,7 +25,7 @@ from wearsim.report.text import (
     with_error,
     within,
 )
-from wearsim.report.view import Column, Columns, Frame, Row, Rows, width_row
+from wearsim.report.view import Column, Columns, Frame, Overview, Row, Rows, width_row
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.schema import ALL_VARIABLES, AXES
@@ -41,6 +41,9 @@ _NOT_MODEL = (
 if TYPE_CHECKING:
     from wearsim.report.animation import Animation
     from wearsim.report.panels import Sheet
+_IN_OVERVIEW = {"roller depth", "width", "worn volume", "lift error, peak to peak"}
+#: what wear tests do not contain
+EXCLUDED = ("fatigue (pitting)", "heating", "plastic flow", "load carried by a lubricant film")
 _RECORDS = {
     "cylinder_depth_profiles.csv": "cylinder_depth_profile",
     "roller_depth_profiles.csv": "roller_depth_profile",
@@ -259,6 +262,28 @@ class RunView(StudyView[Result]):
         from wearsim.studies.cam.panels import cam_run_sheet  # noqa: PLC0415  (not of a cylinder)
 
         return cam_run_sheet(self.result, measured)
+
+    def overview(self) -> Overview:
+        """Return the worn body, its loads, and limits that are passed or not."""
+        result, excluded = self.result, [*EXCLUDED, "scatter of the inputs"]
+        sheet = self.panels()
+        if result.is_cam:
+            from wearsim.studies.cam.overview import CAM_EXCLUDED, loads  # noqa: PLC0415
+
+            found, main = loads(result.scenario), sheet.panels["shape"]
+            excluded += CAM_EXCLUDED
+        else:
+            named = {row.label: row for row in self.rows()}
+            found = [named[name] for name in ("normal force", "peak pressure")]
+            main = sheet.first
+        limits = [
+            Row(row.label.removeprefix("limit of "), f"{verdict}, {row.text}")
+            for row, item in zip(limit_rows(result), limits_json(result), strict=True)
+            for verdict in ("failed" if item["reached"] else "passed",)
+        ] or [Row("limits", "none in the scenario, table [limit]")]
+        shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
+        groups = {"Loads": found, "Limits": limits, "Wear": shown_rows}
+        return Overview(main, groups, excluded)
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the worn profile with which measured ones are compared, of a cam at an angle."""
