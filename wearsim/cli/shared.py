@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from wearsim.errors import ResultsFileError
+from wearsim.errors import ArgumentError, ResultsFileError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -73,6 +73,30 @@ def write_notes(notes: Iterable[str], warnings: Iterable[str] = ()) -> None:
     """Write notes and warnings on a scenario or a study to stderr."""
     for text in (*(f"note: {text}" for text in notes), *(f"warning: {text}" for text in warnings)):
         note(text)
+
+
+def refuse(condition: object, text: str, option: str) -> None:
+    """Raise a usage error of an option or an argument if a condition holds.
+
+    Raises
+    ------
+    typer.BadParameter
+        With the text.
+    """
+    if condition:
+        raise typer.BadParameter(text, param_hint=option)
+
+
+def refuse_options(given: Mapping[str, object], text: str) -> None:
+    """Raise a usage error if one of several options is given, which are listed by name.
+
+    Raises
+    ------
+    typer.BadParameter
+        For the first one.
+    """
+    for option, value in given.items():
+        refuse(value not in (None, False), text, option)
 
 
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
@@ -235,23 +259,21 @@ def profile_choice(
     from wearsim.quantities import quantity
 
     pairs = {"--columns": columns, "--units": units}
-    found: list[tuple[str, str] | None] = []
+    chosen: list[tuple[str, str] | None] = []
     for option, text in pairs.items():
         names = [name.strip() for name in text.split(",")] if text is not None else []
-        if text is not None and (len(names) != 2 or not all(names)):
-            message = f"'{text}' is not two names, expected position and height such as y,z"
-            raise typer.BadParameter(message, param_hint=option)
-        found.append((names[0], names[1]) if names else None)
+        message = f"'{text}' is not two names, expected position and height such as y,z"
+        refuse(text is not None and (len(names) != 2 or not all(names)), message, option)
+        chosen.append((names[0], names[1]) if names else None)
     rows = None
     if mean_rows is not None:
         first, _, last = mean_rows.partition(":")
-        if not (first.isdigit() and last.isdigit()):
-            message = f"'{mean_rows}' is no range of rows, expected one such as 0:10"
-            raise typer.BadParameter(message, param_hint="--mean-rows")
+        message = f"'{mean_rows}' is no range of rows, expected one such as 0:10"
+        refuse(not (first.isdigit() and last.isdigit()), message, "--mean-rows")
         rows = int(first), int(last)
     with checking("--at"):
         position = quantity(at, "m") if at is not None else None
-    return ProfileChoice(found[0], found[1], row, rows, position)
+    return ProfileChoice(chosen[0], chosen[1], row, rows, position)
 
 
 def results_option(ending: str) -> Any:
@@ -272,18 +294,52 @@ def results_option(ending: str) -> Any:
 
 
 @contextmanager
-def checking(option: str) -> Iterator[None]:
-    """Turn a ValueError into a usage error of an option.
+def checking(option: str, text: str = "", kind: type[Exception] = ValueError) -> Iterator[None]:
+    """Turn a ValueError, or another kind of error, into a usage error of an option.
 
     Raises
     ------
     typer.BadParameter
-        With the message of the ValueError.
+        With the text, or the message of the error.
     """
     try:
         yield
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint=option) from error
+    except kind as error:
+        raise typer.BadParameter(text or str(error), param_hint=option) from error
+
+
+@contextmanager
+def checking_arguments(**options: str) -> Iterator[None]:
+    """Turn errors of arguments into usage errors of the options that stand for them.
+
+    Parameters
+    ----------
+    **options
+        Options by argument, where they have not its name.
+
+    Raises
+    ------
+    typer.BadParameter
+        With the message of the error.
+    """
+    try:
+        yield
+    except ArgumentError as error:
+        hint = options.get(error.argument, f"--{error.argument}")
+        raise typer.BadParameter(str(error), param_hint=hint) from error
+
+
+def settings_with(settings: list[str] | None, **values: object) -> list[str]:
+    """Return the settings of --set, and those of options that stand for a key, if they are given.
+
+    Parameters
+    ----------
+    settings : list of str, optional
+    **values
+        Values by key.
+    """
+    given = {key: value for key, value in values.items() if value is not None}
+    return [*(settings or []), *(f"{key}={value}" for key, value in given.items())]
 
 
 def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
@@ -341,11 +397,9 @@ def check_ending(
     """
     if path is None:
         return
-    if path.suffix.lower() not in endings:
-        known = " or ".join(filter(None, [", ".join(endings[:-1]), endings[-1]]))
-        raise typer.BadParameter(
-            f"'{path}' has no known {what}, expected {known}", param_hint=option
-        )
+    known = " or ".join(filter(None, [", ".join(endings[:-1]), endings[-1]]))
+    text = f"'{path}' has no known {what}, expected {known}"
+    refuse(path.suffix.lower() not in endings, text, option)
     check_new_file(path, force, option)
 
 
@@ -371,9 +425,7 @@ def check_surface(
     """
     given = {"--chord": chord, "--points": points, "--position": position, "--spline": spline}
     if path is None:
-        for option, value in given.items():
-            if value:
-                raise typer.BadParameter("needs a file, --surface", param_hint=option)
+        refuse_options(given, "needs a file, --surface")
         return None
     from wearsim.quantities import quantity
     from wearsim.report.surfaces import CHORD, ENDINGS, Sampling, dxf_library
@@ -381,12 +433,10 @@ def check_surface(
     check_ending(path, force, "--surface", ENDINGS, "format of a surface")
     if path.suffix.lower() == ".dxf":
         dxf_library()
-    elif spline:
-        raise typer.BadParameter(f"is for a .dxf, and the surface is {path}", param_hint="--spline")
-    if chord is not None and points is not None:
-        raise typer.BadParameter(
-            "is given beside --chord; delete one of them", param_hint="--points"
-        )
+    elsewhere = spline and path.suffix.lower() != ".dxf"
+    refuse(elsewhere, f"is for a .dxf, and the surface is {path}", "--spline")
+    twice = chord is not None and points is not None
+    refuse(twice, "is given beside --chord; delete one of them", "--points")
     with checking("--chord"):
         length = CHORD if chord is None else quantity(chord, "m")
         if length <= 0.0:
@@ -401,8 +451,7 @@ def check_new_file(path: Path, force: bool, option: str = "-o") -> None:
 
     Parameters and errors as of `check_figure`.
     """
-    if not path.parent.is_dir():
-        raise typer.BadParameter(f"folder {path.parent} does not exist", param_hint=option)
+    refuse(not path.parent.is_dir(), f"folder {path.parent} does not exist", option)
     refuse_existing(path, force, option)
 
 
@@ -428,11 +477,8 @@ def refuse_same_file(figure: Path | None, output: Path, inputs: Iterable[Path]) 
     from wearsim.atomic_write import refuse_inputs, same_file
 
     refuse_inputs(figure, inputs, option="--figure")
-    if same_file(figure, output):
-        raise typer.BadParameter(
-            f"{figure} is also the results file given by -o; give them different names",
-            param_hint="--figure",
-        )
+    text = f"{figure} is also the results file given by -o; give them different names"
+    refuse(same_file(figure, output), text, "--figure")
 
 
 def checked_scheduler(scheduler: str | None, workers: int | None) -> str:

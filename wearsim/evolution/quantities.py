@@ -336,22 +336,24 @@ def width(y: FloatArray, worn: FloatArray, threshold: float) -> FloatArray:
 
     The crossing is interpolated linearly between strips, so that the width grows continuously.
     """
-    above = worn > threshold
-    first, last = above.argmax(axis=-1), len(y) - 1 - above[..., ::-1].argmax(axis=-1)
-    left, right = (_crossing(y, worn, threshold, *s) for s in ((first, -1), (last, 1)))
-    return np.where(above.any(axis=-1), right - left, 0.0)
+    rows, last = worn.reshape(-1, len(y)), len(y) - 1
+    above = rows > threshold
+    ends = above.argmax(axis=1), last - above[:, ::-1].argmax(axis=1)
+    left, right = (
+        _crossing(y, rows, threshold, inner, np.minimum(np.maximum(inner + side, 0), last))
+        for inner, side in zip(ends, (-1, 1), strict=True)
+    )
+    return np.where(above.any(axis=1), right - left, 0.0).reshape(worn.shape[:-1])
 
 
 def _crossing(
-    y: FloatArray, worn: FloatArray, threshold: float, strip: IntArray, side: int
+    y: FloatArray, rows: FloatArray, threshold: float, inner: IntArray, outer: IntArray
 ) -> FloatArray:
-    """Return where depths fall to a threshold between each strip and that beside it [m]."""
-    beside = np.clip(strip + side, 0, len(y) - 1)
-    inner, outer = (
-        np.take_along_axis(worn, place[..., None], axis=-1)[..., 0] for place in (strip, beside)
-    )
-    part = (inner - threshold) / np.where(inner > outer, inner - outer, np.inf)
-    return np.asarray(y[strip] + part * (y[beside] - y[strip]))
+    """Return where the depths of each row fall to a threshold between two strips [m]."""
+    row = np.arange(len(rows))
+    high, low = rows[row, inner], rows[row, outer]
+    part = (high - threshold) / np.where(high > low, high - low, np.inf)
+    return np.asarray(y[inner] + part * (y[outer] - y[inner]))
 
 
 def worn_volume(worn: FloatArray, spacing: float, radius: FloatArray | float) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.panels import GREY, ORANGE, Axis, Band, Line, Mark, Panel, Sheet, Span
 from wearsim.report.view import Row, Rows, View
 from wearsim.uq.distributions.base import MaxentDistribution

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -17,8 +18,8 @@ from wearsim.report.text import by_roller, shown, with_interval
 from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
+    from wearsim.levelling import ComputedProfile, Measured
     from wearsim.report.animation import Animation
-    from wearsim.report.measured import ComputedProfile, Measured
     from wearsim.report.panels import Panel, Sheet
     from wearsim.report.surfaces import Sampling, Surface
 
@@ -136,6 +137,8 @@ class View(ABC):
 
     Attributes
     ----------
+    result : object
+        What is shown.
     title : str
     question : str
         What was asked, in a sentence.
@@ -146,7 +149,10 @@ class View(ABC):
     notes, warnings : sequence of str
     """
 
+    result: Any
     title: str
+    #: function of the result and of measured profiles, "module:name"; imported for figures only
+    sheet: str
     question: str = ""
     basis: str = ""
     heading: str = "results"
@@ -163,9 +169,10 @@ class View(ABC):
     def data(self) -> dict[str, Any]:
         """Return all numbers for JSON, in SI units."""
 
-    @abstractmethod
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over computed ones."""
+        sheet: Sheet = resolve_name(self.sheet)(self.result, measured)
+        return sheet
 
     def overview(self) -> Overview:
         """Return what a page shows first; by default the main panel and the first answers."""

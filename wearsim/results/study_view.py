@@ -37,6 +37,7 @@ class StudyView(View, Generic[Shown]):
     result : StudyResult
     """
 
+    result: Shown
     verb = ""  # that repeats the study
     basis = SAMPLING
 

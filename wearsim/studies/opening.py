@@ -11,7 +11,7 @@ from wearsim.results.kinds import kind_of, open_study
 from wearsim.results.viewed import Viewed, kind_of_result
 
 if TYPE_CHECKING:
-    from wearsim.report.measured import Measured
+    from wearsim.levelling import Measured
     from wearsim.report.view import View
     from wearsim.studies.dissipation.result import DissipationResult
     from wearsim.studies.ensemble.result import EnsembleResult

@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+import wearsim
+from wearsim.atomic_write import refuse_inputs
+from wearsim.cli.render import draw_figure, show_view, write_surface, write_table_file
 from wearsim.cli.shared import (
     Chord,
     Figure,
@@ -24,16 +27,6 @@ from wearsim.cli.shared import (
     read_scenario,
 )
 
-AtAngles = Annotated[
-    str | None,
-    typer.Option(
-        "--at",
-        metavar="ANGLES",
-        help="Angles of the cam instead of the stations of a run: '10 deg,80 deg', or ranges"
-        " '0:359:1 deg': first, last and step.",
-        show_default=False,
-    ),
-]
 MotionTable = Annotated[
     Path | None,
     typer.Option(
@@ -48,7 +41,16 @@ _MOST_ANGLES = 100_000
 
 def cam(
     scenario: ScenarioFile,
-    at: AtAngles = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            "--at",
+            metavar="ANGLES",
+            help="Angles of the cam instead of the stations of a run: '10 deg,80 deg', or ranges"
+            " '0:359:1 deg': first, last and step.",
+            show_default=False,
+        ),
+    ] = None,
     settings: Settings = None,
     figure: Figure = None,
     table: MotionTable = None,
@@ -66,19 +68,14 @@ def cam(
     with checking("--at"):
         angles = None if at is None else _angles(at)
     loaded = read_scenario(scenario, settings)
-    from wearsim.atomic_write import refuse_inputs
-    from wearsim.cli.progress import Display
-    from wearsim.studies.cam.study import study_cam
-    from wearsim.studies.kernels import kernels_of
+    from wearsim.cli.progress import Display, watching
 
     files = {"figure": figure, "table": table, "surface": surface}
     for option, file in (("-o", figure), ("--table", table), ("--surface", surface)):
         if file is not None:
             refuse_inputs(file, loaded.paths, option=option)
-    with Display(quiet=False, kernels=lambda: kernels_of(loaded, "contacts"), transient=True):
-        study = study_cam(loaded, angles)
-    from wearsim.cli.render import draw_figure, show_view, write_surface, write_table_file
-
+    with watching(Display, loaded, kind="contacts"):
+        study = wearsim.study_cam(loaded, angles)
     view = study.view
     draw_figure(view.panels(), figure)
     if table is not None:

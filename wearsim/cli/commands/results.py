@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+import wearsim
+from wearsim.atomic_write import refuse_inputs
+from wearsim.cli.render import draw_figure, show_view, show_with_figure, write_surface
 from wearsim.cli.shared import (
     At,
     Chord,
@@ -28,12 +31,15 @@ from wearsim.cli.shared import (
     checking,
     note,
     profile_choice,
+    refuse,
+    refuse_options,
     write_notes,
 )
+from wearsim.errors import ScenarioError
 
 if TYPE_CHECKING:
+    from wearsim.levelling import Measured
     from wearsim.profiles import ProfileChoice
-    from wearsim.report.measured import Measured
     from wearsim.report.view import View
 
 
@@ -95,24 +101,17 @@ def plot(
     force: Force = False,
 ) -> None:
     """Draw the figure of a results file of any kind."""
-    from wearsim.atomic_write import refuse_inputs
-    from wearsim.cli.render import draw_figure
-
     if animate is not None:
         _animate(file, animate, force)
         if figure is None and not measured:
             return
     path = figure if figure is not None else Path(f"{file.stem}.png")
-    from wearsim.studies.opening import open_results
-
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
-    view = open_results(file).view
+    view = wearsim.open_results(file).view
     check_figure(path, force)
-    if measured and view.profile() is None:
-        raise typer.BadParameter(
-            f"requires wear tests; {file} holds none: {view.question}", param_hint="--measured"
-        )
+    text = f"requires wear tests; {file} holds none: {view.question}"
+    refuse(measured and view.profile() is None, text, "--measured")
     choice = profile_choice(columns, units, row, mean_rows, at)
     draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path)
     note(f"figure: {path}")
@@ -120,16 +119,13 @@ def plot(
 
 def _animate(file: Path, path: Path, force: bool) -> None:
     """Write the animation of a results file."""
-    from wearsim.atomic_write import refuse_inputs
     from wearsim.report.animation import ENDINGS, check_animation, save_animation
-    from wearsim.studies.opening import open_results
 
     check_ending(path, force, "--animate", ENDINGS, "format of an animation")
     check_animation(path)
     refuse_inputs(path, [file], "the animation", option="--animate")
-    animation = open_results(file).view.animation()
-    if animation is None:
-        raise typer.BadParameter(f"requires the run of a cam, not {file}", param_hint="--animate")
+    animation = wearsim.open_results(file).view.animation()
+    refuse(animation is None, f"requires the run of a cam, not {file}", "--animate")
     save_animation(animation, path)
     note(f"animation: {path}, {path.stat().st_size / 1e6:.1f} MB")
 
@@ -146,21 +142,17 @@ def measured_profiles(
     How signs were read and the residuals go to stderr.
     """
     if not files:
-        for name, given in (("--level", level), ("--angle", angle)):
-            if given:
-                raise typer.BadParameter("needs a measured profile, --measured", param_hint=name)
+        given = {"--level": level, "--angle": angle}
+        refuse_options(given, "needs a measured profile, --measured")
         return []
-    at = None
-    if angle is not None:
-        from wearsim.quantities import quantity
-
-        with checking("--angle"):
-            at = quantity(angle, "rad")
-    from wearsim.errors import ScenarioError
+    from wearsim.levelling import Measured, levelled, rms
     from wearsim.profiles import load_profile, sign_note
-    from wearsim.report.measured import Measured, levelled, residual_text, rms
+    from wearsim.quantities import quantity
+    from wearsim.report.measured import residual_text
     from wearsim.report.text import shown
 
+    with checking("--angle"):
+        at = None if angle is None else quantity(angle, "rad")
     read = {file: load_profile(file, choice) for file in files}
     signs = (sign_note(profile, choice, str(file)) for file, profile in read.items())
     write_notes(filter(None, signs))
@@ -168,10 +160,8 @@ def measured_profiles(
         Measured(file.stem, profile.y, profile.height, at) for file, profile in read.items()
     ]
     test = next((view for view in views if view.profile() is not None), None)
-    if at is not None and not (test is not None and test.has_angles):
-        raise typer.BadParameter(
-            "is for the run of a cam; ensembles hold the deepest groove", param_hint="--angle"
-        )
+    text = "is for the run of a cam; ensembles hold the deepest groove"
+    refuse(at is not None and not (test is not None and test.has_angles), text, "--angle")
     computed = None if test is None else test.profile(at)
     if computed is None:
         return profiles
@@ -193,52 +183,39 @@ def measured_profiles(
 
 def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
-    from wearsim.cli.render import show_view
-    from wearsim.studies.opening import open_results
-
-    show_view(open_results(file).view, json=json, stored=True)
-
-
-Files = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="FILE.h5 FILE.h5...",
-        help="Results files of runs and ensembles; all others are compared with the first.",
-        show_default=False,
-    ),
-]
-Observable = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME",
-        help="Quantity to compare: depth, width, worn_volume, dissipated_energy...",
-    ),
-]
+    show_view(wearsim.open_results(file).view, json=json, stored=True)
 
 
 def compare(
-    files: Files,
-    observable: Observable = "depth",
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE.h5 FILE.h5...",
+            help="Results files of runs and ensembles; all others are compared with the first.",
+            show_default=False,
+        ),
+    ],
+    observable: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Quantity to compare: depth, width, worn_volume, dissipated_energy...",
+        ),
+    ] = "depth",
     figure: Figure = None,
     json: Json = False,
     force: Force = False,
 ) -> None:
     """Compare runs and ensembles, with confidence intervals."""
-    if len(files) < 2:
-        raise typer.BadParameter(
-            f"there is one file, {files[0]}; give another one to compare", param_hint="FILE.h5"
-        )
-    from wearsim.atomic_write import refuse_inputs
-    from wearsim.cli.render import draw_figure, show_view
-    from wearsim.studies.opening import comparison_of, open_results
-
+    text = f"there is one file, {files[0]}; give another one to compare"
+    refuse(len(files) < 2, text, "FILE.h5")
     if figure is not None:
         refuse_inputs(figure, files, "the comparison")
-    results = [open_results(file) for file in files]
+    from wearsim.studies.opening import comparison_of
+
+    results = [wearsim.open_results(file) for file in files]
     check_figure(figure, force)
-    view = comparison_of(results, _labels(files), observable)
-    draw_figure(view.panels(), figure)
-    show_view(view, json=json, files={"figure": figure}, more={"figure": figure})
+    show_with_figure(comparison_of(results, _labels(files), observable), figure, json=json)
 
 
 def _labels(files: list[Path]) -> list[str]:
@@ -248,75 +225,61 @@ def _labels(files: list[Path]) -> list[str]:
         return stems
     names = [str(file) for file in files]
     for name in names:
-        if names.count(name) > 1:
-            raise typer.BadParameter(f"{name} is given twice", param_hint="FILE.h5")
+        refuse(names.count(name) > 1, f"{name} is given twice", "FILE.h5")
     return names
-
-
-Folder = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="DIR",
-        help="Folder for the CSV files, by default the name of the results file.",
-        show_default=False,
-    ),
-]
-
-
-Decimal = Annotated[
-    str,
-    typer.Option(
-        "--decimal", metavar="SIGN", help="Decimal sign: '.', or ',' with semicolons between cells."
-    ),
-]
-
-
-Position = Annotated[
-    str | None,
-    typer.Option(
-        "--position",
-        metavar="Y",
-        help="Position across the track of --surface: '2 mm'; default: where it is worn deepest.",
-        show_default=False,
-    ),
-]
 
 
 def export(
     file: ResultsFile,
-    output: Folder = None,
-    decimal: Decimal = ".",
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Folder for the CSV files, by default the name of the results file.",
+            show_default=False,
+        ),
+    ] = None,
+    decimal: Annotated[
+        str,
+        typer.Option(
+            "--decimal",
+            metavar="SIGN",
+            help="Decimal sign: '.', or ',' with semicolons between cells.",
+        ),
+    ] = ".",
     surface: SurfaceFile = None,
     chord: Chord = None,
     points: Points = None,
-    position: Position = None,
+    position: Annotated[
+        str | None,
+        typer.Option(
+            "--position",
+            metavar="Y",
+            help="Position across the track of --surface: '2 mm'; default: where it is worn"
+            " deepest.",
+            show_default=False,
+        ),
+    ] = None,
     spline: Spline = False,
     force: Force = False,
 ) -> None:
     """Write a results file as CSV with units in the headers, or the surface of a cam alone."""
-    if decimal not in {".", ","}:
-        raise typer.BadParameter(f"'{decimal}' is neither '.' nor ','", param_hint="--decimal")
+    refuse(decimal not in {".", ","}, f"'{decimal}' is neither '.' nor ','", "--decimal")
     sampling = check_surface(
         surface, force, chord=chord, points=points, position=position, spline=spline
     )
-    from wearsim.studies.opening import export_csv, open_results
+    from wearsim.studies.opening import export_csv
 
     if surface is not None and sampling is not None:
-        from wearsim.atomic_write import refuse_inputs
-        from wearsim.cli.render import write_surface
-
         refuse_inputs(surface, [file], "the surface", option="--surface")
-        found = open_results(file).view.surface(sampling)
-        if found is None:
-            raise typer.BadParameter(
-                f"requires the run of a cam, not {file}", param_hint="--surface"
-            )
+        found = wearsim.open_results(file).view.surface(sampling)
+        refuse(found is None, f"requires the run of a cam, not {file}", "--surface")
         write_surface(found, surface, spline=spline)
         if output is None:
             return
     sign: Literal[".", ","] = "," if decimal == "," else "."
     folder = output if output is not None else Path(file.stem)
-    for path in export_csv(open_results(file), folder, force=force, decimal=sign):
+    for path in export_csv(wearsim.open_results(file), folder, force=force, decimal=sign):
         typer.echo(str(path))

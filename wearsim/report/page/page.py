@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from wearsim.atomic_write import replacement
 from wearsim.errors import PluginError
-from wearsim.report.measured import Measured, residual_text
+from wearsim.levelling import Measured
+from wearsim.report.measured import residual_text
 from wearsim.report.panels import Panel
 from wearsim.report.view import Row, Table, View
 

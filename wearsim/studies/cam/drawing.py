@@ -18,7 +18,7 @@ from wearsim.report.panels import (
     Panel,
     Patch,
     Text,
-    look,
+    dots,
 )
 from wearsim.report.surfaces import CHORD, Sampling
 from wearsim.report.text import shown
@@ -41,7 +41,7 @@ def factor_for(turn: CamTurn, depth: float) -> float:
 
 def axis_mark() -> Line:
     """Return the axis of the cam."""
-    return Line([0.0], [0.0], dash="", marker="+", size=8.0, colour=BLACK)
+    return dots([0.0], [0.0], "+", size=8.0, colour=BLACK)
 
 
 def circle(radius: float, centre: complex = 0.0) -> tuple[FloatArray, FloatArray]:
@@ -94,12 +94,14 @@ def follower_marks(
     marks: list[Mark] = [Line(*circle(radius, centre), width=1.2, colour=ORANGE, label=label)]
     if follower.swings:
         pivot = follower.centre_distance
-        style = look(marker="o", size=3.0, width=2.0, colour=ORANGE, label="arm")
-        marks.append(Line([centre.real, pivot], [centre.imag, 0.0], **style))
-        style = look(dash="", marker="^", size=9.0, colour=BLACK, label="pivot")
-        return [*marks, Line([pivot], [0.0], **style)]
-    style = look(width=2.0, colour=ORANGE)
-    return [*marks, Line([centre.real, max(reach, centre.real)], [centre.imag] * 2, **style)]
+        ends = [centre.real, pivot], [centre.imag, 0.0]
+        return [
+            *marks,
+            Line(*ends, marker="o", size=3.0, width=2.0, colour=ORANGE, label="arm"),
+            dots([pivot], [0.0], "^", size=9.0, colour=BLACK, label="pivot"),
+        ]
+    ends = [centre.real, max(reach, centre.real)], [centre.imag, centre.imag]
+    return [*marks, Line(*ends, width=2.0, colour=ORANGE)]
 
 
 def turning(result: Result) -> Animation:
@@ -140,8 +142,8 @@ def turning(result: Result) -> Animation:
             label = f"worn, wear x {factor:g}"
             marks.append(Line(cut.real, cut.imag, width=1.5, label=label))
         for ray in rays * turned:
-            style = look(dash=":", width=0.6, colour=GREY)
-            marks.append(Line([0.0, ray.real], [0.0, ray.imag], **style))
+            ends = [0.0, ray.real], [0.0, ray.imag]
+            marks.append(Line(*ends, dash=":", width=0.6, colour=GREY))
         marks += follower_marks(follower, float(moved[number]), radius, reach)
         marks += [axis_mark(), *rotation_marks(0.4 * turn.cam.base_radius)]
         text = f"{math.degrees(theta[number]):.0f} deg, lift error {shown(errors[number], 'um', 3)}"

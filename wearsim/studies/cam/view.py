@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.mechanics.cam import surface_points
-from wearsim.report.measured import Measured
 from wearsim.report.text import NOTHING, PER_SI, in_unit, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.studies.cam.checks import harmonic_depth
@@ -16,7 +15,6 @@ from wearsim.studies.cam.study import CamStudy
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
     from wearsim.report.surfaces import Sampling, Surface
 
 
@@ -44,15 +42,16 @@ class CamView(View):
     Panels: shape, motion, pressure angle, loads, speeds. The table of pandas has the stations.
     """
 
+    sheet = "wearsim.studies.cam.panels:cam_sheet"
     question = "Which motion, loads and contact does the cam have along its angle?"
 
     def __init__(self, study: CamStudy) -> None:
-        self.study, self.title = study, study.turn.scenario.title
+        self.result, self.title = study, study.turn.scenario.title
         self.notes, self.warnings = study.notes, study.warnings
 
     def rows(self) -> Rows:
         """Return the numbers of the turn."""
-        study, turn = self.study, self.study.turn
+        study, turn = self.result, self.result.turn
 
         def place(unit: str, value: float, theta: float) -> str:
             return f"{shown(value, unit)} at {turn.place(theta)}"
@@ -91,7 +90,7 @@ class CamView(View):
 
     def tables(self) -> list[Table]:
         """Return motion, loads and contact at the stations, in engineering units."""
-        study, point, turn = self.study, self.study.point, self.study.turn
+        study, point, turn = self.result, self.result.point, self.result.turn
         found, lift = point.kinematics, "deg" if turn.cam.follower.swings else "mm"
         columns = [
             ("angle [deg]", point.angle, "deg"),
@@ -116,7 +115,7 @@ class CamView(View):
 
     def _segment_names(self) -> list[str]:
         """Return the name of the segment of each station."""
-        study, motion = self.study, self.study.turn.cam.motion
+        study, motion = self.result, self.result.turn.cam.motion
         numbers = motion.segment_at(study.point.angle).tolist()
         if study.weight is not None:
             stations = study.turn.stations
@@ -125,7 +124,7 @@ class CamView(View):
 
     def _columns(self) -> dict[str, tuple[str, Any]]:
         """Return the values at the stations by their keys: unit and numbers in SI."""
-        study, point, turn = self.study, self.study.point, self.study.turn
+        study, point, turn = self.result, self.result.point, self.result.turn
         found, unit = point.kinematics, turn.cam.lift_unit
         x, y = surface_points(turn.cam.follower, found, point.angle)[1]
         jerk = turn.cam.motion.jerk(point.angle)
@@ -173,8 +172,8 @@ class CamView(View):
 
     def data(self) -> dict[str, Any]:
         """Return the study in SI units."""
-        study, motion = self.study, self.study.turn.cam.motion
-        measured, smoothing = self.study.turn.cam.measured, {}
+        study, motion = self.result, self.result.turn.cam.motion
+        measured, smoothing = self.result.turn.cam.measured, {}
         if measured is not None:
             unit = measured.unit
             smoothing["smoothing"] = {
@@ -217,16 +216,10 @@ class CamView(View):
             "notes": study.notes,
         }
 
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; there is no profile to measure."""
-        from wearsim.studies.cam.panels import cam_sheet  # noqa: PLC0415  (only of figures)
-
-        return cam_sheet(self.study)
-
     def columns(self) -> Mapping[str, Columns]:
         """Return the motion table, one row for each station."""
         values = {name: found for name, (_, found) in self._columns().items()}
-        swings, film = self.study.turn.cam.follower.swings, "film_thickness_m" in values
+        swings, film = self.result.turn.cam.follower.swings, "film_thickness_m" in values
         chosen = [
             *_MOTION[:1],
             *([("lift of the arm", "lift_rad", "deg")] if swings else []),
@@ -242,12 +235,12 @@ class CamView(View):
         """Return the surface of the cam before wear."""
         from wearsim.studies.cam.surface import unworn_surface  # noqa: PLC0415  (only of files)
 
-        return unworn_surface(self.study.turn, sampling)
+        return unworn_surface(self.result.turn, sampling)
 
     def frame(self) -> Frame:
         """Return the stations, one row each."""
         columns = [(name, unit, values) for name, (unit, values) in self._columns().items()]
-        return Frame(columns, "station", range(len(self.study.point.angle)))
+        return Frame(columns, "station", range(len(self.result.point.angle)))
 
 
 def _without_rounding(values: FloatArray) -> list[float]:

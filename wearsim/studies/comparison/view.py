@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.errors import ResultsFileError
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.text import NOTHING, OBSERVABLES, cells, count, si_key, si_unit, with_interval
 from wearsim.report.view import STUDY, Frame, Row, Rows, Table, View
 from wearsim.studies.comparison.compare import (

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     GREEN,
@@ -39,7 +41,7 @@ _LABELS = (
 )
 
 
-def dissipation_sheet(result: DissipationResult) -> Sheet:
+def dissipation_sheet(result: DissipationResult, measured: Sequence[Measured] = ()) -> Sheet:
     """Return convergence of mean and deviation, density of the power, and power per length."""
     found, constant = result.convergence(), result.summaries["power"].is_constant
     panels = {"density": _density(result)}

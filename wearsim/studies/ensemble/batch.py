@@ -32,8 +32,8 @@ from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.run.assemble import coarse_stepper
 from wearsim.studies.run.draws import Draws
-from wearsim.studies.run.recorder import Due, due_records, history_row, states_at
-from wearsim.studies.schedule import RecordSchedule
+from wearsim.studies.run.recorder import history_row
+from wearsim.studies.schedule import Due, RecordSchedule, due_records, states_at
 from wearsim.types import FloatArray, Grid, IntArray
 
 _RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
@@ -205,7 +205,7 @@ def observables_of(
     stepper: Stepper, problem: WearProblem, state: WearState, threshold: float
 ) -> list[Observables]:
     """Return the observables of every realisation of a state."""
-    row = history_row(stepper, problem, state, None, threshold)
+    row = history_row(stepper, problem, state, threshold)
     count = problem.kinematics.multiplicity[:, None]
     energy, time = row["dissipated_energy"], row["time"]
     started = time > 0.0

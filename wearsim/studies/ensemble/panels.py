@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     BLUE,
@@ -26,9 +25,9 @@ from wearsim.report.panels import (
     Whiskers,
     convergence,
     depth_axes,
+    dots,
     evenly_spaced,
     histogram,
-    look,
     measured_marks,
     message,
     worn_limits,
@@ -48,10 +47,9 @@ from wearsim.report.text import (
 from wearsim.studies.cam.panels import ANGLE, segment_marks
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.ensemble.file.data import Effect
-from wearsim.studies.ensemble.file.schema import PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.run.panels import HEIGHT, Y
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
@@ -171,56 +169,19 @@ def _density(result: EnsembleResult) -> Panel:
     )
 
 
-def convergence_of(
-    result: EnsembleResult, target: Target, points: int = 40
-) -> tuple[IntArray, list[Interval]]:
-    """Return the estimates from the first realisations of an ensemble, for rising numbers of them.
-
-    Parameters
-    ----------
-    result : EnsembleResult
-        With at least one completed realisation.
-    target : Target
-        Quantity to estimate.
-    points : int
-        Approximate number of sample sizes, evenly spaced in their logarithm.
-
-    Returns
-    -------
-    counts : ndarray of int
-        Numbers of completed realisations.
-    intervals : list of Interval
-    """
-    spaced = np.geomspace(1, result.count, min(points, result.count))
-    counts = np.unique(spaced.round().astype(np.int64))
-    raw, name = result.raw, target.observable
-    # kept in memory, since a file's arrays are read again at every access
-    held = {name: raw.column(name, -1)[:, None]}
-    held |= {"control": raw.variables["control"]} if raw.control else {}
-    numbers, intervals = np.arange(raw.requested), []
-    for last in result.numbers[counts - 1]:
-        status = np.where(numbers <= last, raw.status, PENDING)
-        part = replace(result, raw=replace(raw, variables=held, status=status))
-        intervals.append(target.interval(part.estimate_for(target)))
-    return counts, intervals
-
-
 def _convergence(result: EnsembleResult) -> Panel:
     """Return the convergence of the estimate of the target, by default of the mean depth."""
     target = Target.parse(result.until or _DEFAULT)
     named = OBSERVABLES[target.observable]
-    counts, found = convergence_of(result, target)
+    counts, found = result.convergence(target)
     value, low, high = (
         np.array([getattr(item, end) for item in found]) for end in ("value", "low", "high")
     )
-    marks = []
-    if result.until:
-        style = look(across="y", dash="--", colour=GREEN)
-        label = f"target: ±{100 * target.width:g} %"
-        marks = [
-            Span(value[-1] * (1.0 - target.width), **style),
-            Span(value[-1] * (1.0 + target.width), **style, label=label),
-        ]
+    labels = {-target.width: "", target.width: f"target: ±{100 * target.width:g} %"}
+    marks = [
+        Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
+        for part, label in (labels.items() if result.until else ())
+    ]
     title = f"{statistic_in_words(target).capitalize()}, with 95 % interval"
     return convergence(title, named.words, named.unit, counts, value, low, high, marks)
 
@@ -228,13 +189,12 @@ def _convergence(result: EnsembleResult) -> Panel:
 def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
     """Return the mean worn profile with its 95 % range, and measured profiles over it."""
     found = result.worn_profile()
-    marks: list[Mark] = []
+    marks: list[Mark] = [Line(found.y, found.height, colour=BLACK, label="mean")]
     if found.label:
-        marks.append(Band(found.y, found.low, found.high, label=found.label))
-    marks.append(Line(found.y, found.height, colour=BLACK, label="mean"))
+        marks.insert(0, Band(found.y, found.low, found.high, label=found.label))
     if found.start.any():
-        start = look(dash="--", width=1.0, colour=GREY, label="start of the tests")
-        marks.append(Line(found.y, found.start, **start))
+        label = "start of the tests"
+        marks.append(Line(found.y, found.start, dash="--", width=1.0, colour=GREY, label=label))
     limits = worn_limits(found.y, found.start - found.low, *(one.y for one in measured))
     title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
     title += "" if found.kept == result.count else f", of the first {count(found.kept)}"
@@ -298,10 +258,9 @@ def effects_panel(title: str, of: str, effects: list[Effect]) -> Panel:
     bars = Bars(places - 0.3, places + 0.3, widths, horizontal=True, colour=colours, alpha=0.55)
     marks: list[Mark] = [bars, _intervals(places, first, BLACK)]
     if any(item.total for item in effects):
-        below = places + 0.38
+        below, values = places + 0.38, [index.value for index in total]
         marks.append(_intervals(below, total, ORANGE))
-        style = look(dash="", marker="D", colour=ORANGE, label="total, with interactions")
-        marks.append(Line([index.value for index in total], below, **style))
+        marks.append(dots(values, below, "D", colour=ORANGE, label="total, with interactions"))
     share = f"{100.0 * largest.first.value:.0f} % of the variance"
     return Panel(
         title,
@@ -355,8 +314,8 @@ def draws_panels(
     drawn = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1)
     finite = np.flatnonzero(np.isfinite(values))
     every = finite[evenly_spaced(len(finite), MOST_POINTS)]
-    style = look(dash="", marker="o", alpha=0.5)
-    points = Line(drawn[every], values[every], **style, more={"realisation": (every, "1")})
+    more = {"realisation": (every, "1")}
+    points = dots(drawn[every], values[every], alpha=0.5, more=more)
     title = f"{name.capitalize()} against {item['key']}"
     text = f"One point for each of {count(len(every))} tests."
     return {"draws": Panel(title, Axis(item["key"], unit, 1.0 / size), axis, [points], text)}

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from wearsim.levelling import ComputedProfile
 from wearsim.report.csv_files import computed, drawn
-from wearsim.report.measured import ComputedProfile, Measured
 from wearsim.report.text import (
     NINETY_PERCENT,
     NOTHING,
@@ -43,9 +43,6 @@ from wearsim.studies.ensemble.file.data import Band, Effect, EnsembleData
 from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, LIFE, PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.uq.estimation.estimates import Estimate, Target
-
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 
 QUANTILES = (0.05, 0.5, 0.95)
 INTERVAL = "  95 % interval"
@@ -122,7 +119,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
     realisations.
     """
 
-    verb = "ensemble"
+    verb, sheet = "ensemble", "wearsim.studies.ensemble.panels:ensemble_sheet"
 
     def __init__(self, result: EnsembleResult) -> None:
         super().__init__(result)
@@ -271,12 +268,6 @@ class EnsembleView(RealisationsView[EnsembleResult]):
             errors = [within(name, item.half_width, item.value) for name, item in items]
             error = f"{', '.join(errors)} (95 % intervals)"
         return footer(used, error, lapse(raw.wall_seconds))
-
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; measured profiles are drawn over the mean profile."""
-        from wearsim.studies.ensemble.panels import ensemble_sheet  # noqa: PLC0415  (only of figures)
-
-        return ensemble_sheet(self.result, measured)
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the mean profile, with which measured ones are compared."""

@@ -26,8 +26,7 @@ from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.run.assemble import assemble_problem, prepared_model, start_height
 from wearsim.studies.run.draws import Drawer, Draws
 from wearsim.studies.run.grid import Extent, extent_of, lattice, strips_of_run
-from wearsim.studies.run.recorder import due_records, states_at
-from wearsim.studies.schedule import RecordSchedule
+from wearsim.studies.schedule import RecordSchedule, due_records, states_at
 from wearsim.types import FloatArray, Grid, IntArray
 
 CYLINDER, ROLLER = "wear.cylinder.k_over_h", "wear.roller.k_over_h"

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import tomlkit
 
-from wearsim.report.measured import Measured
 from wearsim.report.text import NOTHING, lapse, shown, with_range
 from wearsim.report.view import Column, Columns, Frame, Repetition, Row, Rows, Table
 from wearsim.results.study_view import StudyView
@@ -31,8 +30,6 @@ _HEADS = (
     "residuals",
 )
 
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 _NEXT = ("median_per_Pa", "low_per_Pa", "high_per_Pa")
 
 
@@ -43,7 +40,7 @@ class IdentificationView(StudyView[IdentificationResult]):
     tests and traces; the table of pandas has the tests.
     """
 
-    verb = "identify"
+    verb, sheet = "identify", "wearsim.studies.identify.panels:identification_sheet"
     basis = _ERROR
 
     def __init__(self, result: IdentificationResult) -> None:
@@ -125,12 +122,6 @@ class IdentificationView(StudyView[IdentificationResult]):
             "file": result.path,
             "wall_seconds": result.raw.wall_seconds,
         }
-
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; the measured profiles are those of the study."""
-        from wearsim.studies.identify.panels import identification_sheet  # noqa: PLC0415  (only of figures)
-
-        return identification_sheet(self.result)
 
     def columns(self) -> Mapping[str, Columns]:
         """Return the tests, and all traces below each other."""

@@ -34,17 +34,12 @@ from wearsim.studies.ensemble.sweep import path_of
 from wearsim.studies.life.rare import next_stages
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
 from wearsim.studies.life.result import LifeResult
-from wearsim.studies.life.settings import (
-    SHARES,
-    design_variable,
-    settings_of,
-    with_limits,
-    with_rare_events,
-)
-from wearsim.studies.life.stored_settings import LifeSettings, LifeTarget
+from wearsim.studies.life.settings import SHARES, checked_study, design_variable
+from wearsim.studies.life.stored_settings import LifeSettings, life_target
 from wearsim.studies.opening import open_ensemble
 from wearsim.studies.preparation import check_plugins
 from wearsim.types import FloatArray, Grid
+from wearsim.uq.estimation.estimates import Target
 
 
 def life(
@@ -125,10 +120,17 @@ def life(
     >>> print(f"B10 {lives.b(10).value:.3g} {lives.unit}")
     B10 8.51e+05 passes
     """
-    scenario = with_limits(with_chosen_model(as_scenario(scenario), test=True), limits)
-    aim = None if precision is None else LifeTarget.parse(precision)
-    settings = settings_of(scenario, realisations, target, b, most)
-    settings = with_rare_events(scenario, settings, rare, precision, rare_method)
+    scenario, settings, aim = checked_study(
+        with_chosen_model(as_scenario(scenario), test=True),
+        realisations,
+        limits=limits,
+        target=target,
+        b=b,
+        most=most,
+        precision=precision,
+        rare=rare,
+        rare_method=rare_method,
+    )
     if variable and (found := design_variable(scenario, variable)):
         settings = replace(settings, variable=asdict(found))
     if output is not None:
@@ -227,7 +229,7 @@ def resume_life(
     settings = replace(settings, plain=total)
     grid = Grid(data.variables["y"], data.strip_width)
     runner = LifeRunner(scenario, total, grid, settings, data.life["base"])
-    aim = LifeTarget.parse(data.until) if data.until else None
+    aim = life_target(data.until) if data.until else None
     hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
     finish = EnsembleWork.run_failed_again if failed else partial(_finish_stages, runner=runner)
     grown = {"life": {**data.life, "plain": total}}
@@ -248,7 +250,7 @@ def _finish_stages(work: EnsembleWork, runner: LifeRunner) -> None:
 
 
 def _prepared(
-    scenario: Scenario, settings: LifeSettings, aim: LifeTarget | None
+    scenario: Scenario, settings: LifeSettings, aim: Target | None
 ) -> tuple[LifeRunner, tuple[EnsembleData, dict[str, FloatArray]]]:
     """Return the runner of a study, and the content of its file before the first realisation."""
     fixed = {settings.factor: settings.reference} if settings.factor else {}

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from wearsim.errors import ResultsFileError
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.text import part_with_interval
 from wearsim.report.view import Row, Rows, Table, View
 from wearsim.studies.life.result import LifeResult
@@ -89,9 +89,9 @@ class LivesView(View):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels of all designs."""
-        from wearsim.studies.life.panels import life_sheet  # noqa: PLC0415  (only of figures)
+        from wearsim.studies.life.panels import lives_sheet  # noqa: PLC0415  (only of figures)
 
-        return life_sheet(self.results, self.labels)
+        return lives_sheet(self.results, self.labels)
 
 
 def lives_view(

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from wearsim.studies.life.rare_estimates import rare_estimates
-from wearsim.studies.life.stored_settings import LifeComparison, LifeTarget
+from wearsim.studies.life.stored_settings import LifeComparison
 from wearsim.studies.life.values import LifeValues
 from wearsim.types import IntArray
-from wearsim.uq.estimation.estimates import Target
+from wearsim.uq.estimation.estimates import LIFE, Estimate, Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 from wearsim.uq.sensitivity.effects import TAIL, SignedEffect
 from wearsim.uq.survival.distributions import (
@@ -23,10 +23,17 @@ from wearsim.uq.survival.distributions import (
     LifeDistribution,
 )
 from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
-from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
+from wearsim.uq.survival.lives import (
+    SurvivalCurve,
+    life_quantile,
+    lower_bound,
+    probability_before,
+    survival_curve,
+)
 from wearsim.uq.survival.rare_events import RareProbability
 
 _QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
+_POINTS = 200  # of a curve
 _FEWEST = 32  # realisations below which a target is not reached
 
 
@@ -204,6 +211,34 @@ class LifeResult(LifeValues):
         found = self.probability_before(life)
         return Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low)
 
+    def survival_curve(self) -> SurvivalCurve:
+        """Return the survival with its band from 0 to the last life, or the maximum of the tests.
+
+        Examples
+        --------
+        >>> curve = wearsim.open_results("rig-life.h5").survival_curve()
+        >>> curve.life[0], curve.survival[0]
+        (0.0, 1.0)
+        """
+        if not self.is_exact:
+            curve = survival_curve(np.minimum(self.lives, self.most), self.observed)
+            last = [self.most] if self.censored else curve.life[-1:]
+            parts = [
+                np.concatenate([[1.0], part, part[-1:] if len(part) else [1.0]])
+                for part in (curve.survival, curve.low, curve.high)
+            ]
+            return SurvivalCurve(np.concatenate([[0.0], curve.life, last]), *parts)
+        end = min(self.distribution.quantile_of_mean(0.999), self.most)
+        life = np.linspace(0.0, end, _POINTS)
+        ended = [self.distribution.probability_before(float(n)) for n in life[1:]]
+        survival, low, high = (
+            np.array([1.0, *(1.0 - getattr(item, name) for item in ended)])
+            for name in ("value", "high", "low")
+        )
+        # the survival falls, so that a bound at one life is one for those before or after it
+        low, high = np.maximum.accumulate(low[::-1])[::-1], np.minimum.accumulate(high)
+        return SurvivalCurve(life, survival, low, high)
+
     @cached_property
     def fits(self) -> list[LifeFit]:
         """Fits to the lives above zero, best first by Akaike's criterion."""
@@ -331,19 +366,23 @@ class LifeResult(LifeValues):
             len(common),
         )
 
-    def estimate_for(self, target: Target | LifeTarget) -> Any:
+    def estimate_for(self, target: Target) -> Estimate:
         """Return the estimate to which a target applies.
 
         Examples
         --------
         >>> lives = wearsim.open_results("rig-life.h5")
-        >>> from wearsim.studies.life.stored_settings import LifeTarget
-        >>> lives.estimate_for(LifeTarget.parse("b10 3%")).value  # takes 32 realisations
+        >>> from wearsim.uq.estimation.estimates import Target
+        >>> lives.estimate_for(Target.parse("b10 3%")).quantile(0.1).value  # takes 32 realisations
         nan
         """
-        if isinstance(target, Target):
+        if target.observable != LIFE:
             return super().estimate_for(target)
-        return self.b(100.0 * target.share) if self.count >= _FEWEST else UNKNOWN
+        share = float(target.statistic)
+        life = self.b(100.0 * share) if self.count >= _FEWEST else UNKNOWN
+        return Estimate(
+            self.count, UNKNOWN, UNKNOWN, ((share, life),), math.nan, math.nan, self.method
+        )
 
     @property
     def rare(self) -> RareProbability | None:

@@ -7,11 +7,10 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from wearsim.report.measured import Measured
 from wearsim.report.text import (
     NOTHING,
     count,
@@ -38,8 +37,6 @@ ERROR = (
     " error of the model."
 )
 
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 _LIMIT_UNITS = {"volume": "mm^3", "peak_pressure": "MPa"}
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
@@ -50,7 +47,7 @@ class LifeView(RealisationsView[LifeResult]):
     Panels: survival, probability plots, effects of the inputs, limits. Files: as of an ensemble.
     """
 
-    verb = "life"
+    verb, sheet = "life", "wearsim.studies.life.panels:life_sheet"
     basis = ERROR
 
     def __init__(self, result: LifeResult) -> None:
@@ -270,12 +267,6 @@ class LifeView(RealisationsView[LifeResult]):
             tried[method] = {**asdict(item), "probability": known, "refused": not item.is_reliable}
         method = next(reversed(tried))
         return {**tried[method], "method": method, "tried": tried}
-
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; there is no profile to measure."""
-        from wearsim.studies.life.panels import life_sheet  # noqa: PLC0415  (only of figures)
-
-        return life_sheet([self.result], [self.title])
 
     def overview(self) -> Overview:
         """Return the design with its loads, the lives with intervals, and what moves them."""

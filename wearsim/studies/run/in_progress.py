@@ -41,14 +41,13 @@ from wearsim.studies.run.recorder import (
     Checkpointed,
     Event,
     Finished,
+    History,
     Recorder,
     Started,
     Stepped,
     Warned,
-    history_row,
 )
 from wearsim.studies.run.result import Result, RunData
-from wearsim.studies.run.schema import ESTIMATED
 from wearsim.studies.schedule import RecordSchedule
 from wearsim.types import FloatArray, Grid
 
@@ -187,11 +186,15 @@ class RunInProgress:
         ]
         last, most = passes[-1:], self.scenario.evolution.max_steps
 
+        history = History(stepper, self.recorder.threshold)
+
         def observe(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
-            row = history_row(stepper, problem, state, None, self.recorder.threshold)
-            return {name: row[name] for name in ESTIMATED if name in row}
+            history.add(problem, state, state)
+            return {}
 
         (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most, observe)
+        if coarse is not None:
+            coarse.observed = history.compute()
         if coarse is None:
             self.warn(
                 "error by strips: not estimated, as the test fails on strips of twice the width"
