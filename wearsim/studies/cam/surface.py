@@ -19,7 +19,7 @@ from wearsim.report.surfaces import Curve, Sampling, Surface
 from wearsim.report.view import Column
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.run.result import Result
-from wearsim.types import FloatArray
+from wearsim.types import BoolArray, FloatArray
 
 _DOUBLED = 1e-9  # m, distance of points that are one
 _SAMPLES = 801  # of a part, at which the distance of the chords is computed
@@ -76,7 +76,9 @@ class _Outlines:
             away = max(away, _away(parts, angle, points))
             for name, places in zip(("unworn", "worn"), points, strict=False):
                 label = f"{flank}, {name}" if flank else name
-                curves.append(Curve(label, places.real, places.imag))
+                # the depth can jump between segments, where the unworn curve has one point
+                kept = _distinct(places[None])
+                curves.append(Curve(label, places[kept].real, places[kept].imag))
             tables.append((flank, angle, points))
         return Surface(self.turn.scenario.title, curves, _columns(tables), away)
 
@@ -115,9 +117,16 @@ def _points(
     """Return angles and points, shape (curves, points), none of them twice."""
     each = [part[0](angle) for part, angle in zip(parts, angles, strict=True)]
     angle, points = np.concatenate(angles), np.concatenate(each, axis=1)
-    # of two equal points that at the start of a segment is kept, and not that at 360 deg
-    kept = (np.abs(np.roll(points, -1, axis=1) - points) > _DOUBLED).any(axis=0)
+    kept = _distinct(points)
     return angle[kept], points[:, kept]
+
+
+def _distinct(points: FloatArray) -> BoolArray:
+    """Return which points, the last axis, differ from the following one in any curve.
+
+    Of two equal points that at the start of a segment is kept, and not that at 360 deg.
+    """
+    return np.asarray((np.abs(np.roll(points, -1, axis=1) - points) > _DOUBLED).any(axis=0))
 
 
 def _away(parts: list[tuple[Points, float, float]], angle: FloatArray, points: FloatArray) -> float:
