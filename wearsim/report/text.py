@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # One SI unit in each engineering unit.
 PER_SI = {
-    **dict.fromkeys(("1", "m/s", "s", "N", "N m", "W", "J"), 1.0),
+    **dict.fromkeys(("1", "m/s", "m/s^2", "m/s^3", "s", "N", "N m", "W", "J"), 1.0),
     "%": 1e2,
     "um": 1e6,
     "mm": 1e3,
@@ -31,6 +31,7 @@ PER_SI = {
     "W/mm": 1e-3,
     "W/mm^2": 1e-6,
     "deg": math.degrees(1.0),
+    "mrad": 1e3,
     "rpm": 30.0 / math.pi,
 }
 NOTHING = "-"

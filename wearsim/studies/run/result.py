@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from wearsim.results.content import (
 from wearsim.results.io.files import read_study
 from wearsim.studies.run.schema import CAM_RUN, ESTIMATED, RUN
 from wearsim.types import FloatArray
+
+if TYPE_CHECKING:
+    import xarray
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
 _DROPPED = {"station", "roller", "realisation"}
@@ -247,6 +250,25 @@ class Result(StudyResult[RunData]):
             worn = grooves_at(self, angle)[0][-1]
         height = start - worn
         return ComputedProfile(self.y, height, height, height, start)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return all variables of the results file as a dataset of xarray; see `StudyResult`.
+
+        Of a cam it also has depth and lift error along a coordinate "angle", one per degree.
+
+        Examples
+        --------
+        >>> from wearsim.scenario.examples import shipped_scenario
+        >>> cam = shipped_scenario("cam-concentric").changed({"operation.turns": 1000})
+        >>> wearsim.run(cam).to_xarray()["lift_error_along_angle"].dims
+        ('record', 'angle')
+        """
+        dataset = super().to_xarray()
+        if not self.is_cam:
+            return dataset
+        from wearsim.studies.cam.grooves import with_angles  # noqa: PLC0415  (not of a cylinder)
+
+        return with_angles(dataset, self)
 
     @property
     def errors(self) -> dict[str, FloatArray]:
