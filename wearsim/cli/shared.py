@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from wearsim.errors import ArgumentError, ResultsFileError
+from wearsim.arguments import ArgumentError
+from wearsim.errors import ResultsFileError
 
 if TYPE_CHECKING:
     from rich.console import Console
