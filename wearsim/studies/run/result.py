@@ -260,12 +260,10 @@ class Result(StudyResult[RunData]):
         >>> wearsim.run("rig.toml").to_xarray()["cylinder_depth_profile"].dims
         ('record', 'station', 'realisation', 'y')
         """
-        dataset = super().to_xarray()
-        if not self.is_cam:
-            return dataset
-        from wearsim.studies.cam.grooves import with_angles  # noqa: PLC0415  (not of a cylinder)
+        from wearsim.studies.cam.grooves import with_angles  # noqa: PLC0415  (of a cam)
 
-        return with_angles(dataset, self)
+        dataset = super().to_xarray()
+        return with_angles(dataset, self) if self.is_cam else dataset
 
     @property
     def errors(self) -> dict[str, FloatArray]:
