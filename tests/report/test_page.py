@@ -137,10 +137,16 @@ def test_first_screen_of_a_cam_has_picture_loads_and_limits(cam):
     text = first_screen(page)
     for part in ("Loads", "peak pressure, new", "drive torque", "Limits", "1000 rpm"):
         assert part in text
-    assert "depth failed, reached after about" in text
-    assert "lift error passed, not reached" in text
+    assert "depth failed after about" in text
+    assert "lift error passed: 0.06" in text
     assert "Not included:" in page
     assert "fatigue (pitting)" in page
+
+
+def test_first_screen_of_a_comparison_has_the_limits_of_each(cam):
+    text = first_screen(page_of([cam, cam]))
+    assert "Loads" not in text  # they would be those of one cam
+    assert re.search(r"Limits of 1: .* Limits of 2: ", text)
 
 
 def with_limits(result, limits):
@@ -215,7 +221,7 @@ def test_life_shows_its_quantiles_and_survival(life):
     digits = [f"{float(f'{end:.3g}'):,.0f}" for end in (found.value, found.low, found.high)]
     assert "{} passes, 95 %: {} to {}".format(*digits) in text
     assert "What moves the life" in text
-    assert "of the scatter; life" in text
+    assert re.search(r"% of the scatter; life \+\d+ %, -\d+ %", text)
     plots = plots_of(life)
     (curve,) = data_of(titled(plots, "Survival"), "y")
     places = np.searchsorted(-curve.data["y"], -90.0)

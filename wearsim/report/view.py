@@ -116,11 +116,14 @@ class Overview(NamedTuple):
         Short answers by title, such as "Loads" and "Limits".
     excluded : sequence of str
         What the results do not contain.
+    alone : bool
+        Whether the overviews of further views on the page do not belong to it.
     """
 
     picture: Panel | None
     groups: Mapping[str, Rows]
     excluded: Sequence[str] = ()
+    alone: bool = False
 
 
 class Repetition(NamedTuple):

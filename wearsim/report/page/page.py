@@ -70,11 +70,15 @@ def first_of(views: Sequence[View]) -> First:
     """Return the first screen of views: of each group that of the first view that has it."""
     from wearsim.report.figures import png_of_panel  # noqa: PLC0415  (imports matplotlib)
 
-    overviews = [view.overview() for view in views]
+    overviews = [views[0].overview()]
+    if not overviews[0].alone:
+        overviews += [view.overview() for view in views[1:]]
     groups: dict[str, list[Row]] = {}
     for overview in overviews:
         groups = {**overview.groups, **groups}
-    excluded = list(dict.fromkeys(text for one in overviews for text in one.excluded))
+    # what one of the results contains is included
+    lists = [one.excluded for one in overviews if one.excluded]
+    excluded = [text for text in lists[0] if all(text in one for one in lists)] if lists else []
     panel = next((one.picture for one in overviews if one.picture is not None), None)
     if panel is None:
         return First(groups, excluded, "", "")

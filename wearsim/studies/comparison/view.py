@@ -11,7 +11,7 @@ import numpy as np
 from wearsim.errors import ResultsFileError
 from wearsim.levelling import Measured
 from wearsim.report.text import NOTHING, OBSERVABLES, cells, count, si_key, si_unit, with_interval
-from wearsim.report.view import STUDY, Frame, Row, Rows, Table, View
+from wearsim.report.view import STUDY, Frame, Overview, Row, Rows, Table, View
 from wearsim.studies.comparison.compare import (
     Comparable,
     Compared,
@@ -83,6 +83,17 @@ class ComparisonView(View):
         labels = list(dict.fromkeys(label for texts in answers for label in texts))
         lines = [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels]
         return Table("", lines, ["at the end", *(row.label for row in self.comparison.rows)])
+
+    def overview(self) -> Overview:
+        """Return the comparison, and the limits of each of the results."""
+        own = super().overview()
+        labels = [row.label for row in self.comparison.rows]
+        groups, excluded = dict(own.groups), list[str]()
+        for label, view in zip(labels, self._views, strict=True):
+            found = view.overview()
+            groups[f"Limits of {label}"] = found.groups.get("Limits", [])
+            excluded += [text for text in found.excluded if text not in excluded]
+        return Overview(own.picture, groups, excluded, alone=True)
 
     def data(self) -> dict[str, Any]:
         """Return the comparison in SI units; all results are compared with the first."""

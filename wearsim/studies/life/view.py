@@ -285,14 +285,16 @@ class LifeView(RealisationsView[LifeResult]):
         if result.count:
             texts = limit_texts(scenario.limit.given)
             first = (result.first_limits.get(name, 0.0) for name in scenario.limit.given)
-            groups["Limits"] = [
+            groups["First limit"] = [
                 Row(text, f"the first in {shown(share, '%', 3)} of the tests")
                 for text, share in zip(texts, first, strict=True)
             ]
             groups["Life"] = [
                 Row(f"B{share:g}", _three_digits(result, share)) for share in result.settings.shares
             ]
-            groups["What moves the life"] = self._movers()
+            groups["What moves the life (with the input at its 10 % and 90 % quantile)"] = (
+                self._movers()
+            )
         return Overview(main or self.panels().first, groups, excluded)
 
     def _movers(self) -> Rows:
@@ -306,8 +308,7 @@ class LifeView(RealisationsView[LifeResult]):
             text = f"{shown(item.first.value, '%', 2)} of the scatter"
             if item.name in changes:
                 low, high = (one.value - 1.0 for one in changes[item.name].factors)
-                text += f"; life {100.0 * low:+.0f} % with its 10 % quantile,"
-                text += f" {100.0 * high:+.0f} % with that of 90 %"
+                text += f"; life {100.0 * low:+.0f} %, {100.0 * high:+.0f} %"
             rows.append(Row(item.name, text))
         return rows or [Row("inputs", "none significantly")]
 

@@ -252,23 +252,17 @@ class Result(StudyResult[RunData]):
         return ComputedProfile(self.y, height, height, height, start)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return all variables of the results file as a dataset of xarray; see `StudyResult`.
-
-        Of a cam it also has depth and lift error along a coordinate "angle", one per degree.
+        """Return all variables of the file; of a cam also depth and lift error along "angle".
 
         Examples
         --------
-        >>> from wearsim.scenario.examples import shipped_scenario
-        >>> cam = shipped_scenario("cam-concentric").changed({"operation.turns": 1000})
-        >>> wearsim.run(cam).to_xarray()["lift_error_along_angle"].dims
-        ('record', 'angle')
+        >>> wearsim.run("rig.toml").to_xarray()["cylinder_depth_profile"].dims
+        ('record', 'station', 'realisation', 'y')
         """
-        dataset = super().to_xarray()
-        if not self.is_cam:
-            return dataset
-        from wearsim.studies.cam.grooves import with_angles  # noqa: PLC0415  (not of a cylinder)
+        from wearsim.studies.cam.grooves import with_angles  # noqa: PLC0415  (of a cam)
 
-        return with_angles(dataset, self)
+        dataset = super().to_xarray()
+        return with_angles(dataset, self) if self.is_cam else dataset
 
     @property
     def errors(self) -> dict[str, FloatArray]:

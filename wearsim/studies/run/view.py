@@ -40,7 +40,7 @@ _NOT_MODEL = (
 if TYPE_CHECKING:
     from wearsim.report.animation import Animation
 
-_IN_OVERVIEW = {"roller depth", "width", "worn volume", "lift error, peak to peak"}
+_IN_OVERVIEW = {"roller depth", "width", "lift error, peak to peak"}
 #: what wear tests do not contain
 EXCLUDED = ("fatigue (pitting)", "heating", "plastic flow", "load carried by a lubricant film")
 _RECORDS = {
@@ -268,11 +268,8 @@ class RunView(StudyView[Result]):
             named = {row.label: row for row in self.rows()}
             found = [named[name] for name in ("normal force", "peak pressure")]
             main = sheet.first
-        limits = [
-            Row(row.label.removeprefix("limit of "), f"{verdict}, {row.text}")
-            for row, item in zip(limit_rows(result), result.limits, strict=True)
-            for verdict in ("failed" if item["reached"] else "passed",)
-        ] or [Row("limits", "none in the scenario, table [limit]")]
+        limits = limit_rows(result, brief=True)
+        limits = limits or [Row("limits", "none in the scenario, table [limit]")]
         shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
         groups = {"Loads": found, "Limits": limits, "Wear": shown_rows}
         return Overview(main, groups, excluded)
@@ -398,27 +395,29 @@ def _last(value: Any) -> int:
     return int(np.ravel(value)[-1])
 
 
-def limit_rows(result: Result) -> Rows:
-    """Return a row for each limit of [limit]: passed or not, when, and by how much."""
+def limit_rows(result: Result, *, brief: bool = False) -> Rows:
+    """Return a row for each limit of [limit]: reached or not, when, and by how much.
+
+    Parameters
+    ----------
+    result : Result
+    brief : bool
+        Whether the rows say that limits are passed or failed, and leave out by how much.
+    """
     rows = list[Row]()
     for item in result.limits:
-        unit = _UNITS.get(item["quantity"], "um")
-        end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)}"
-        name = item["quantity"].replace("_", " ")
-        by = f"{abs(100.0 * item['excess']):.3g} %"
-        if not item["reached"]:
-            rows.append(Row(f"limit of {name}", f"not reached: {end} at the end, {by} below"))
-            continue
-        passes = item["reached_at_passes"]
-        when = f"{count(round(passes))} passes"
-        if result.is_cam:
-            when = f"{count(round(passes / result.raw.kinematics['physical_rollers']))} turns"
-        time = simulated(passes / result.raw.kinematics["pass_rate"])
+        unit, name = _UNITS.get(item["quantity"], "um"), item["quantity"].replace("_", " ")
         side = "above" if item["excess"] >= 0.0 else "below"
-        rows.append(
-            Row(
-                f"limit of {name}",
-                f"reached after about {when}, {time}: {end} at the end, {by} {side}",
-            )
-        )
+        by = "" if brief else f", {abs(100.0 * item['excess']):.3g} % {side}"
+        end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)} at the end{by}"
+        words = ("failed", "passed") if brief else ("reached", "not reached")
+        text = words[1]
+        if item["reached"]:
+            passes = item["reached_at_passes"]
+            when = f"{count(round(passes))} passes"
+            if result.is_cam:
+                when = f"{count(round(passes / result.raw.kinematics['physical_rollers']))} turns"
+            time = simulated(passes / result.raw.kinematics["pass_rate"])
+            text = f"{words[0]} after about {when}, {time}"
+        rows.append(Row(name if brief else f"limit of {name}", f"{text}: {end}"))
     return rows
