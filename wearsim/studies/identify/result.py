@@ -157,12 +157,12 @@ class IdentificationResult(StudyResult[IdentificationData]):
     @property
     def scatter_of_k(self) -> dict[str, float]:
         """Scatter of ln K/H with its 90 and 95 % intervals."""
-        found: dict[str, float] = self.raw.summary["scatter_of_k"]
-        return found
+        scatter: dict[str, float] = self.raw.summary["scatter_of_k"]
+        return scatter
 
     @property
     def bayes_factor(self) -> float:
-        """Evidence of equal wear factors over that of scattered ones."""
+        """Evidence of equal wear factors over the evidence of scattered ones."""
         return float(self.raw.summary["bayes_factor"])
 
     @property
@@ -226,7 +226,7 @@ class IdentificationResult(StudyResult[IdentificationData]):
         >>> print(wearsim.identify("rig.toml", depths).posterior_toml().splitlines()[3])
         [wear.cylinder.k_over_h]
         """
-        found, scatter = self.raw.summary["next_specimen"], self.scatter_of_k
+        following, scatter = self.raw.summary["next_specimen"], self.scatter_of_k
         return (
             f"# K/H of the next specimen by {len(self.raw.specimens)} specimens\n"
             f"# {self.verdict_words}\n"
@@ -234,6 +234,6 @@ class IdentificationResult(StudyResult[IdentificationData]):
             f" (95 %: {scatter['low']:.3g} to {scatter['high']:.3g})\n"
             "[wear.cylinder.k_over_h]\n"
             'distribution = "lognormal"\n'
-            f'median = "{found["median_per_Pa"]:.5g} 1/Pa"\n'
-            f"factor = {found['factor']:.5g}\n"
+            f'median = "{following["median_per_Pa"]:.5g} 1/Pa"\n'
+            f"factor = {following['factor']:.5g}\n"
         )

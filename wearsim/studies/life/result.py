@@ -46,7 +46,7 @@ class LifeResult(LifeValues):
     raw : EnsembleData
     path : Path, optional
     law : Distribution, optional
-        Distribution of the wear factor, instead of that of the scenario.
+        Distribution of the wear factor, instead of the scenario's.
 
     Examples
     --------
@@ -161,17 +161,19 @@ class LifeResult(LifeValues):
         if not self.is_exact:
             lives = self._lives(name)
             return life_quantile(np.minimum(lives, self.most), np.isfinite(lives), share)
-        found = self._distribution(name).quantile(share)
-        if found.value <= self.most:
+        quantile = self._distribution(name).quantile(share)
+        if quantile.value <= self.most:
             return Interval(
-                found.value, found.low, found.high if found.high <= self.most else math.inf
+                quantile.value,
+                quantile.low,
+                quantile.high if quantile.high <= self.most else math.inf,
             )
-        return Interval(math.nan, min(found.low, self.most), math.inf)
+        return Interval(math.nan, min(quantile.low, self.most), math.inf)
 
     def lower_bound(self, percent: float) -> float:
         """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown.
 
-        It is that of the lives as counted.
+        It applies to the lives as counted.
 
         Examples
         --------
@@ -208,8 +210,10 @@ class LifeResult(LifeValues):
         >>> print(f"{lives.survival(675_000).value:.2%}")
         96.64%
         """
-        found = self.probability_before(life)
-        return Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low)
+        failed_before = self.probability_before(life)
+        return Interval(
+            1.0 - failed_before.value, 1.0 - failed_before.high, 1.0 - failed_before.low
+        )
 
     def survival_curve(self) -> SurvivalCurve:
         """Return the survival with its band from 0 to the last life, or the maximum of the tests.
@@ -246,21 +250,21 @@ class LifeResult(LifeValues):
         lives = np.minimum(self.lives[positive], self.most)
         if not len(lives):
             return []
-        found = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
-        return sorted((fit for fit in found if fit is not None), key=lambda fit: fit.aic)
+        fitted = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
+        return sorted((fit for fit in fitted if fit is not None), key=lambda fit: fit.aic)
 
     def _indices(
         self, name: str, groups: list[str]
     ) -> Mapping[str, tuple[Interval, Interval | None]]:
-        """Return first-order indices; those of "life" are of its logarithm, or unknown."""
+        """Return first-order indices, of "life" for its logarithm, or unknown."""
         if name != "life":
             return super()._indices(name, groups)
         if self.effects_obstacle:
             return dict.fromkeys(groups, (UNKNOWN, None))
         from wearsim.uq.sensitivity.sobol_indices import first_order  # noqa: PLC0415  (rarely needed)
 
-        found = first_order(self.log_lives, self.drawn_numbers(groups))
-        return {group: (index, None) for group, index in found.items()}
+        indices = first_order(self.log_lives, self.drawn_numbers(groups))
+        return {group: (index, None) for group, index in indices.items()}
 
     def tornado(self) -> dict[str, SignedEffect]:
         """Return the effect of each input on the logarithm of life, by its name, greatest first.
@@ -291,20 +295,24 @@ class LifeResult(LifeValues):
         if self.effects_obstacle:
             return {}
         drawn = self.drawn_numbers([item["name"] for item in self.raw.groups])
-        factor, logs, found = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
+        factor, logs, by_input = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
         if factor in drawn and self.is_known_throughout and not self.at_once:
             # life is kappa/K: kappa holds all that the other inputs change
             logs = np.log(self.values("life") * self.values(factor))
             low, middle, high = np.log((self.law or self._drawn_law).quantile(_QUANTILES)).tolist()
-            found[factor] = exact_effect(middle - low, middle - high)
+            by_input[factor] = exact_effect(middle - low, middle - high)
             del drawn[factor]
-        laws = {one.name: one.scalar for one in self.scenario.random if one.role == "scalar"}
+        laws = {
+            random_input.name: random_input.scalar
+            for random_input in self.scenario.random
+            if random_input.role == "scalar"
+        }
         scores = {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
-        found |= effects(logs, scores)
-        return dict(sorted(found.items(), key=lambda item: -item[1].size))
+        by_input |= effects(logs, scores)
+        return dict(sorted(by_input.items(), key=lambda item: -item[1].size))
 
     def compare(self, other: LifeResult) -> LifeComparison:
-        """Compare the lives with those of another design.
+        """Compare the lives with another design's.
 
         Parameters
         ----------
@@ -347,7 +355,7 @@ class LifeResult(LifeValues):
         paired = self.raw.seed == other.raw.seed
         first, second = self.distribution, other.distribution
         name = "known_lives" if math.isinf(most) else "lives"
-        one, two = (getattr(item, name) for item in both)
+        lives, other_lives = (getattr(item, name) for item in both)
         common = np.intersect1d(self.numbers, other.numbers)
         if paired and not (first.exact and second.exact):
             places = [np.searchsorted(item.numbers, common) for item in both]
@@ -355,8 +363,12 @@ class LifeResult(LifeValues):
                 paired = False
             else:
                 first, second = _at(first, places[0]), _at(second, places[1])
-                one, two = one[places[0]], two[places[1]]
-        machine = same_machine(one, two, most) if paired and len(one) == len(two) else None
+                lives, other_lives = lives[places[0]], other_lives[places[1]]
+        machine = (
+            same_machine(lives, other_lives, most)
+            if paired and len(lives) == len(other_lives)
+            else None
+        )
         if machine and all(item.settings.alone for item in both):  # for any wear factor
             machine = Interval(machine.value, machine.value, machine.value)
         return LifeComparison(
@@ -388,7 +400,7 @@ class LifeResult(LifeValues):
     def rare(self) -> RareProbability | None:
         """Probability of a life before the target from tests for rare events, if requested.
 
-        It is that of the last method in `rare_estimates`.
+        It is given by the last method in `rare_estimates`.
         """
         return next(reversed(self.rare_estimates.values()), None)
 
