@@ -46,7 +46,8 @@ from wearsim.mechanics.numerics.multistep import (
 )
 from wearsim.types import BoolArray, FloatArray, IntArray
 
-SHARE = 0.5  # part of the tolerance that a step may add to the profiles
+# part of the tolerance that a step may add to the profiles, by differences and by step doubling
+SHARE, DOUBLED_SHARE = 0.35, 0.9
 COVER = np.array([[4.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
 # least errors of depth and profile, over that of the volume, all relative and with their factors: a
 # groove of wrong volume has the wrong depth and width, which further wear does not correct
@@ -97,10 +98,24 @@ class ImplicitStepper(StepDoublingStepper):
     to the profiles, estimated by the next divided difference. The sum of these errors, as far as
     later wear has not reduced them, is the error estimate of the test. Where load or inputs vary,
     and with fixed steps, step doubling estimates it.
+
+    Parameters
+    ----------
+    tolerance, forced_step
+        As of `Stepper`.
+    by_doubling : bool
+        Whether step doubling estimates the error of all tests: the wear of a contact model may not
+        be smooth enough for differences.
     """
 
     taper = 4.0
     follows_trends = True
+
+    def __init__(
+        self, tolerance: float, forced_step: float | None = None, by_doubling: bool = False
+    ) -> None:
+        super().__init__(tolerance, forced_step)
+        self.by_doubling = by_doubling
 
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state with the rates and differences that the formulas need."""
@@ -115,7 +130,8 @@ class ImplicitStepper(StepDoublingStepper):
     ) -> Attempt:
         """Take a step, estimate its error, and choose order and length of the next one."""
         varies = problem.constant_load is None or len(problem.varying) > 0
-        if varies or self.forced_step is not None:  # local errors miss peaks of a load
+        # local errors miss peaks of a load
+        if varies or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
         end = scheme(problem, state, step)
         end = with_pass_errors(problem, state, end, end, scheme, step)
@@ -160,7 +176,7 @@ class ImplicitStepper(StepDoublingStepper):
         if not problem.varying:  # many rows of a log average out within a step
             left = np.where(doubled.varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
         part = (end.passes / stop) ** PART_EXPONENT / left
-        scale = part / self.tolerance
+        scale = part / (DOUBLED_SHARE * self.tolerance)
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, _most(end)),
             *(edges.parts_of_bodies(end), own, order),
