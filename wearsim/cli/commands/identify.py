@@ -107,7 +107,8 @@ PosteriorFile = Annotated[
     typer.Option(
         "--posterior",
         metavar="K.toml",
-        help="Distribution of K/H of the next specimen, as a table of a scenario.",
+        help="Distribution of K/H of the next specimen, as a table of a scenario; beside it K.csv,"
+        " with what is not known of its median and scatter, for `wearsim life --posterior`.",
         show_default=False,
     ),
 ]
@@ -181,6 +182,7 @@ def identify(
     loaded = read_scenario(scenario, [*(settings or []), *options])
     from wearsim.studies.identify.inputs import fixed
 
+    overrides: dict[str, object] = {}
     if fix is not None:
         with checking("--fix"):
             overrides = fixed(fix)
@@ -206,9 +208,11 @@ def identify(
             "give before and shoulders in the tests file", param_hint="--before or --shoulders"
         )
     inputs = [*loaded.paths, *(profiles or []), *([tests] if tests else [])]
-    if posterior is not None:
-        refuse_existing(posterior, force, "--posterior")
-    for path in (figure, posterior):
+    levels = None if posterior is None else posterior.with_suffix(".csv")
+    for path in (posterior, levels):
+        if path is not None:
+            refuse_existing(path, force, "--posterior")
+    for path in (figure, posterior, levels):
         refuse_same_file(path, output if output is not None else Path(), inputs)
     distance = None
     if shoulders is not None:
@@ -233,6 +237,7 @@ def identify(
             shoulders=distance,
             curvature=curvature,
             share=bodies,
+            fix=overrides,
             choice=choice,
             draws=draws,
             negligible=negligible,
@@ -250,6 +255,8 @@ def _finish(result: Any, posterior: Path | None, figure: Path | None, json: bool
     files = {"results file": result.path, "posterior": posterior, "figure": figure}
     if posterior is not None:
         save_text(result.posterior_toml(), posterior)
+        files["both levels"] = posterior.with_suffix(".csv")
+        save_text(result.posterior_csv(), posterior.with_suffix(".csv"))
     draw_figure(result.view.panels(), figure)
     more = {"posterior": posterior, "figure": figure}
     show_view(result.view, json=json, files=files, more=more)

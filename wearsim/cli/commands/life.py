@@ -113,6 +113,15 @@ Sweep = Annotated[
         show_default=False,
     ),
 ]
+Posterior = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="K.csv",
+        help="K/H with what is not known of it, from `wearsim identify --posterior`, instead of the"
+        " wear factor of the scenario; of a results file without new tests.",
+        show_default=False,
+    ),
+]
 Output = Annotated[Path | None, results_option("-life.h5")]
 _FILES = {".h5", ".hdf5"}
 
@@ -131,6 +140,7 @@ def life(
     figure: FigureOption = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    posterior: Posterior = None,
     sweep: Sweep = None,
     seed: Seed = None,
     settings: Settings = None,
@@ -167,7 +177,7 @@ def life(
                 raise typer.BadParameter("has no meaning for results files", param_hint=option)
         from wearsim.studies.life.stored_settings import swept_variable
 
-        results = [_opened(path, target, shares) for path in designs]
+        results = [_opened(path, target, shares, posterior) for path in designs]
         labels = _labels(designs)
         if swept_variable(results):
             labels = [one.variable.text for one in results if one.variable]
@@ -178,8 +188,13 @@ def life(
             from wearsim.studies.life.stored_settings import LifeTarget
 
             LifeTarget.parse(precision)
+    from wearsim.studies.life.factor import with_posterior
+
     texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
     labels, variants, key = _variants(designs, sweep, texts)
+    if posterior is not None:
+        with checking("--posterior"):
+            variants = [with_posterior(scenario, posterior) for scenario in variants]
     options: dict[str, Any] = {
         "limits": limit or [],
         "target": target,
@@ -299,8 +314,10 @@ def _shares(text: str) -> tuple[float, ...]:
     return shares
 
 
-def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeResult:
-    """Return the result in a file, for another target and other percentages."""
+def _opened(
+    path: Path, target: str | None, shares: tuple[float, ...], posterior: Path | None
+) -> LifeResult:
+    """Return the result in a file, for another target, other percentages and another K/H."""
     from wearsim.errors import ResultsFileError
     from wearsim.studies.life.result import LifeResult
     from wearsim.studies.life.settings import parse_life
@@ -319,6 +336,9 @@ def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeRe
                     f" {result.most:,.0f} {result.unit}"
                 )
         changed["target"] = found * result.settings.per_unit
+    if posterior is not None:
+        with checking("--posterior"):
+            result = result.with_posterior(posterior)
     return result.with_settings(**changed)
 
 

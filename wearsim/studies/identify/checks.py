@@ -148,12 +148,11 @@ def other_form(model: TraceLikelihood, found: DrawLikelihood) -> list[str]:
     grown = model.grown
     depth = {model.body: grown.depth[model.body][best]}
     alone = replace(grown, ln_k=grown.ln_k[best], depth=depth, energy=grown.energy[best])
-    line, curve = (
-        replace(model, grown=alone, curvature=curved).integrated() for curved in (False, True)
-    )
-    change = float(curve.mean[0] - line.mean[0])
-    scale = np.sqrt(max(float(curve.std[0] ** 2), (1.0 + _LEAST_PART) * float(line.std[0] ** 2)))
-    if abs(change) < _OTHER_FORM * np.sqrt(scale**2 - float(line.std[0] ** 2)):
+    curve = replace(model, grown=alone, curvature=True).integrated()
+    change = float(curve.mean[0] - found.mean[best[0]])
+    straight = float(found.std[best[0]] ** 2)
+    more = max(float(curve.std[0] ** 2) - straight, _LEAST_PART * straight)
+    if abs(change) < _OTHER_FORM * np.sqrt(more):
         return []
     what = (
         "the residuals may follow a curvature of the trace; with it K/H changes by"

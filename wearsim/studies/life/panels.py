@@ -190,7 +190,8 @@ def survival_of(result: LifeResult) -> tuple[FloatArray, FloatArray, FloatArray,
     distribution = result.distribution
     end_of_life: float = min(distribution.quantile_of_mean(0.999), result.most)
     life = np.linspace(0.0, end_of_life, _POINTS)[1:]
-    found = [distribution.probability_before(float(n)) for n in life]
+    estimates = result.uncertain or distribution
+    found = [estimates.probability_before(float(n)) for n in life]
     survival, low, high = (
         np.array([1.0, *(1.0 - getattr(item, name) for item in found)])
         for name in ("value", "high", "low")

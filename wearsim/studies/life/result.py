@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from wearsim.studies.life.factor import posterior_table
 from wearsim.studies.life.rare_estimates import rare_estimates
 from wearsim.studies.life.stored_settings import LifeComparison, LifeTarget
 from wearsim.studies.life.values import LifeValues
@@ -25,6 +27,7 @@ from wearsim.uq.survival.distributions import (
 from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
 from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
 from wearsim.uq.survival.rare_events import RareProbability
+from wearsim.uq.survival.two_levels import UncertainLife
 
 _QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
 _FEWEST = 32  # realisations below which a target is not reached
@@ -69,9 +72,13 @@ class LifeResult(LifeValues):
     def method(self) -> str:
         """Method of the intervals of lives, in words."""
         if self.settings.alone:
-            return "none: the wear factor is integrated exactly, and nothing else is random"
+            exact = "the wear factor is integrated exactly, and nothing else is random"
+            return (
+                f"credible, by the posterior of K/H: {exact}" if self.levels else f"none: {exact}"
+            )
         if self.is_exact:
-            return "Student's t of the probability of failure on the logit scale, inverted"
+            method = "Student's t of the probability of failure on the logit scale, inverted"
+            return f"credible, by the posterior of K/H, with {method}" if self.levels else method
         if self.censored:
             return "exact, between order statistics; lives beyond the maximum are censored"
         return "exact, between order statistics"
@@ -110,6 +117,28 @@ class LifeResult(LifeValues):
         inputs = {item.name: item for item in changed.random}
         return replace(self, law=inputs[settings.factor].scalar)
 
+    def with_posterior(self, file: str | Path) -> LifeResult:
+        """Return the lives with the posterior of K/H of an identification, without new tests.
+
+        Parameters
+        ----------
+        file : path
+            CSV of `wearsim identify --posterior`.
+
+        Raises
+        ------
+        ScenarioError
+            If the file cannot be used, or contains the scatter of an input that is random.
+        ValueError
+            As `with_wear_factor`.
+        """
+        key, table = posterior_table(self.scenario, file)
+        if self.settings.factor and key != self.settings.factor:
+            raise ValueError(
+                f"the posterior is of {key}, and the lives are of {self.settings.factor}"
+            )
+        return self.with_wear_factor(table)
+
     def b(self, percent: float) -> Interval:
         """Return the life that a percentage of the specimens does not reach, as B10.
 
@@ -123,7 +152,8 @@ class LifeResult(LifeValues):
         Interval
             Sampling interval; the value is nan beyond the censoring and with too few counted lives
             (69 for B1, 7 for B10), and -inf an end for which there are too few. See `b_error` for
-            the numerical error.
+            the numerical error. With a posterior of the wear factor the value is the predictive
+            one, and the interval is credible, see `uncertain_life`.
 
         Examples
         --------
@@ -132,7 +162,40 @@ class LifeResult(LifeValues):
         >>> print(f"{found.value:.3g}, 95 % interval {found.low:.3g} to {found.high:.3g}")
         8.5e+05, 95 % interval 7.98e+05 to 9.08e+05
         """
-        return self._b(percent, "life")
+        uncertain = self.uncertain_life(percent)
+        if uncertain is None:
+            return self._b(percent, "life")
+        return self._within_censoring(uncertain.interval)
+
+    def uncertain_life(self, percent: float) -> UncertainLife | None:
+        """Return the life of a percentage with what is not known of the wear factor.
+
+        Parameters
+        ----------
+        percent : float
+            10 for B10.
+
+        Returns
+        -------
+        UncertainLife or None
+            Predictive and plug-in life, credible interval, and the variance due to the wear tests
+            and to the realisations; None unless the wear factor has the distribution "posterior".
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.uncertain_life(10) is None
+        True
+        """
+        if self.uncertain is None:
+            return None
+        if percent not in self._uncertain_lives:
+            self._uncertain_lives[percent] = self.uncertain.quantile(percent / 100.0)
+        return self._uncertain_lives[percent]
+
+    @cached_property
+    def _uncertain_lives(self) -> dict[float, UncertainLife]:
+        return {}
 
     def b_error(self, percent: float) -> tuple[float, float]:
         """Return the life of a percentage if all lives are in error by their numerical bounds.
@@ -154,7 +217,10 @@ class LifeResult(LifeValues):
         if not self.is_exact:
             lives = self._lives(name)
             return life_quantile(np.minimum(lives, self.most), np.isfinite(lives), share)
-        found = self._distribution(name).quantile(share)
+        return self._within_censoring(self._distribution(name).quantile(share))
+
+    def _within_censoring(self, found: Interval) -> Interval:
+        """Return a life with its interval, unknown beyond the censoring."""
         if found.value <= self.most:
             return Interval(
                 found.value, found.low, found.high if found.high <= self.most else math.inf
@@ -188,8 +254,8 @@ class LifeResult(LifeValues):
         if not self.count or life > self.most:
             return UNKNOWN
         if self.is_exact:
-            obstacle = self.probability_obstacle(life)
-            return UNKNOWN if obstacle else self.distribution.probability_before(life)
+            lives = self.uncertain or self.distribution
+            return UNKNOWN if self.probability_obstacle(life) else lives.probability_before(life)
         return probability_before(np.minimum(self.lives, self.most), self.observed, life)
 
     def survival(self, life: float) -> Interval:
@@ -343,7 +409,8 @@ class LifeResult(LifeValues):
         """
         if isinstance(target, Target):
             return super().estimate_for(target)
-        return self.b(100.0 * target.share) if self.count >= _FEWEST else UNKNOWN
+        # more realisations do not reduce what is not known of the wear factor
+        return self._b(100.0 * target.share, "life") if self.count >= _FEWEST else UNKNOWN
 
     @property
     def rare(self) -> RareProbability | None:
