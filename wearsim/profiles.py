@@ -289,10 +289,10 @@ def _surface(content: bytes, file: str) -> _Surface:
     except ImportError as error:
         raise _error(file, f"{name} files need another package: {_INSTALL}") from error
     try:
-        found = reader.read(io.BytesIO(content))
+        surface = reader.read(io.BytesIO(content))
         if name == "SDF":
-            return _Surface(found.x_axis, found.y_axis, found.data)
-        (layer,) = found.layers
+            return _Surface(surface.x_axis, surface.y_axis, surface.data)
+        (layer,) = surface.layers
         height = np.atleast_2d(layer.z)
         return _Surface(layer.x_values, getattr(layer, "y_values", np.zeros(1)), height)
     except Exception as error:  # of any kind that the reader raises for a damaged file

@@ -8,8 +8,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from wearsim.levelling import Measured
 from wearsim.report.figures import figure_of
-from wearsim.report.measured import Measured
 from wearsim.report.page import page as pages
 from wearsim.report.page import plots
 from wearsim.studies.comparison.compare import Comparison

@@ -13,7 +13,7 @@ from tests.report.drawn import ensemble_figure
 from tests.report.made_up_ensembles import INPUTS, made_up
 from wearsim.report.figures import save_figure
 from wearsim.report.panels import GREY
-from wearsim.studies.ensemble.panels import LINES, convergence_of
+from wearsim.studies.ensemble.panels import LINES
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.uq.estimation.estimates import Target
 
@@ -82,7 +82,7 @@ def test_convergence_ends_at_the_estimate_of_all(figure, result):
 @pytest.mark.parametrize("plan", ["monte-carlo", "sobol", "saltelli", "control-variate"])
 def test_convergence_equals_estimates_of_fewer_realisations(plan):
     whole, target = made_up(100, plan, failed=[5]), Target.parse("depth.mean 1%")
-    counts, found = convergence_of(whole, target)
+    counts, found = whole.convergence(target)
     place = int(np.flatnonzero(counts >= 40)[0])
     last = int(whole.numbers[counts[place] - 1])
     status = np.where(np.arange(100) <= last, whole.raw.status, 0)

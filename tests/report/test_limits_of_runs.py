@@ -17,7 +17,7 @@ from wearsim.scenario import Scenario
 from wearsim.studies.dry_run import dry_run
 from wearsim.studies.dry_run_table import plan
 from wearsim.studies.run.result import Result
-from wearsim.studies.run.view import limit_rows, limits_json
+from wearsim.studies.run.view import limit_rows
 
 LIMITS = {"depth": "5 um", "lift_error": "1 mm", "volume": "1 mm^3", "peak_pressure": "500 MPa"}
 
@@ -33,7 +33,7 @@ def result() -> Result:
 
 
 def test_limit_is_reached_when_and_by_how_much_the_history_says(result):
-    depth, lift, _, pressure = limits_json(result)
+    depth, lift, _, pressure = result.limits
     course = np.asarray(result.values("depth"))
     passes = np.asarray(result.passes)
     assert depth["reached"]
@@ -50,7 +50,7 @@ def test_limit_is_reached_when_and_by_how_much_the_history_says(result):
 
 def test_rows_and_page_say_reached_or_not(result):
     rows = {row.label: row.text for row in limit_rows(result)}
-    turns = limits_json(result)[0]["reached_at_passes"]
+    turns = result.limits[0]["reached_at_passes"]
     assert f"reached after about {turns:,.0f} turns" in rows["limit of depth"]
     assert "of 5.000 um at the end" in rows["limit of depth"]
     assert rows["limit of depth"].endswith("% above")
@@ -63,7 +63,7 @@ def test_rows_and_page_say_reached_or_not(result):
 def test_dry_run_forecasts_when_limits_are_reached(result):
     data = dry_run(scenario())
     forecast = {item["quantity"]: item for item in data["forecast"]["limits"]}
-    run = {item["quantity"]: item for item in limits_json(result)}
+    run = {item["quantity"]: item for item in result.limits}
     for name in ("depth", "lift_error", "peak_pressure"):
         assert (forecast[name]["reached_at_passes"] is None) == (not run[name]["reached"])
     ratio = forecast["depth"]["reached_at_passes"] / run["depth"]["reached_at_passes"]

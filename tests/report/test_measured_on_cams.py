@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 import wearsim
 from tests.studies.cam.cam_text import prescribed
 from wearsim.cli.app import app
-from wearsim.report.measured import Measured, residual_text
+from wearsim.levelling import Measured
+from wearsim.report.measured import residual_text
 from wearsim.studies.cam.grooves import grooves_at
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.result import Result

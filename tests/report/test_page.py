@@ -18,7 +18,7 @@ import wearsim
 from tests.report.drawn import page_of, plots_of
 from wearsim.cli.app import app
 from wearsim.errors import WearsimError
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.comparison.compare import compare
 from wearsim.studies.identify.measurements import Measurement

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from tests.report.drawn import contact_figure, identification_figure, run_figure
 from wearsim.errors import PluginError, ResultsFileError
+from wearsim.levelling import Measured
 from wearsim.report.figures import save_figure
-from wearsim.report.measured import Measured
 from wearsim.scenario import load_scenario
 from wearsim.studies.contact.single import ContactStudy, study_contact
 from wearsim.studies.identify.api import identify

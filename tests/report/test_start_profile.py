@@ -6,7 +6,7 @@ import pytest
 import wearsim
 from tests.evolution import SCENARIOS
 from tests.report.drawn import ensemble_figure, run_figure
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.text import shown
 from wearsim.scenario import parse_scenario
 

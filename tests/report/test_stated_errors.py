@@ -10,7 +10,6 @@ import pytest
 import wearsim
 from wearsim.report.text import with_error
 from wearsim.studies.run.run import run
-from wearsim.studies.run.view import passes_error
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 
@@ -44,7 +43,7 @@ def test_passes_at_a_limit_have_the_error_of_the_limited_quantity(limited):
     fine = {"contact.strips": 401, "evolution.tolerance": 1e-5}
     scenario = wearsim.load_scenario(RIG, overrides=fine)
     true = run(scenario, until="depth 20 um").passes[-1]
-    error = passes_error(limited)
+    error = limited.passes_error
     assert abs(limited.passes[-1] - true) <= error <= 5e-3 * true
     assert error == pytest.approx(1.5 * limited.depth_error[-1] / 20e-6 * true, rel=0.05)
     assert f" ± {round(error, -1):.0f} of" in limited.view.standing()

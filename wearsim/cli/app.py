@@ -152,9 +152,9 @@ def installed_verbs() -> dict[str, LazyVerb]:
     """Return the verbs of all installed distributions by name, sorted."""
     from importlib.metadata import entry_points
 
-    found, verbs = entry_points(group=GROUP), {}
-    for name in sorted(found.names):
-        points = list(found.select(name=name))
+    points_by_name, verbs = entry_points(group=GROUP), {}
+    for name in sorted(points_by_name.names):
+        points = list(points_by_name.select(name=name))
         line = "; ".join(map(_summary, points))
         verbs[name] = LazyVerb(name, line, partial(_installed, name, points))
     return verbs

@@ -10,11 +10,11 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
 from wearsim.cli.shared import console, note
-from wearsim.report.text import count, lapse, shown, simulated
-from wearsim.studies.kernels import compilation_counted
+from wearsim.report.text import OBSERVABLES, count, lapse, shown, simulated, with_interval
+from wearsim.studies.kernels import compilation_counted, kernels_of
 from wearsim.studies.run.recorder import Event, Finished, Started, Stepped, Warned
 
 if TYPE_CHECKING:
@@ -78,6 +78,12 @@ class Display:
         self._quiet, self._now, self._written = quiet, now, now()
         self._notebook: Any = None  # output of a notebook
         self._kernels, self._reports, self._compiling, self._open = kernels, 0, False, ExitStack()
+        self.stop_requested: Callable[[], bool] | None = None
+
+    @property
+    def callbacks(self) -> dict[str, Any]:
+        """Arguments with which a study reports to this display, and asks whether to stop."""
+        return {"on_progress": self, "stop_requested": self.stop_requested}
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
@@ -163,6 +169,11 @@ class RunWatcher(Display):
 
     _is_first_step = True
 
+    @property
+    def callbacks(self) -> dict[str, Any]:
+        """Arguments with which a run reports to this display, and asks whether to stop."""
+        return {"on_event": self, "stop_requested": self.stop_requested}
+
     def __call__(self, event: Event) -> None:
         """Show an event."""
         if isinstance(event, Started):
@@ -209,6 +220,11 @@ class EnsembleWatcher(Display):
 
     workers = ""
 
+    @property
+    def callbacks(self) -> dict[str, Any]:
+        """Arguments with which a study reports to this display, and asks whether to stop."""
+        return {**super().callbacks, "on_notice": self.notice}
+
     def notice(self, text: str) -> None:
         """Show a notice, also if nothing else is shown."""
         self.write(text, also_quiet=True)
@@ -247,8 +263,6 @@ def progress_text(progress: EnsembleProgress, columns: float = math.inf) -> str:
 def _estimate(progress: EnsembleProgress) -> str:
     if progress.estimate is None or not math.isfinite(progress.estimate.value):
         return ""
-    from wearsim.report.text import OBSERVABLES, with_interval
-
     name = progress.what.split(".", maxsplit=1)[0]
     if name not in OBSERVABLES:  # a life, "b10"
         return f"{progress.what.upper()} {progress.estimate.value:,.0f}"
@@ -256,12 +270,13 @@ def _estimate(progress: EnsembleProgress) -> str:
     return f"{progress.what} {with_interval(progress.estimate, unit)}"
 
 
+CHECKPOINT = "stopping at a checkpoint; repeat to stop at once"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
 def stop_on_signals(
-    message: str = "stopping at a checkpoint; repeat to stop at once",
+    message: str = CHECKPOINT,
 ) -> Iterator[threading.Event]:
     """Catch SIGINT and SIGTERM while the context is open.
 
@@ -291,3 +306,44 @@ def stop_on_signals(
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+Shown = TypeVar("Shown", bound=Display)
+BATCHES = "stopping after the next batch; repeat to stop at once"  # at a signal to an ensemble
+
+
+@contextmanager
+def watching(
+    display: type[Shown],
+    study: Any,
+    quiet: bool = False,
+    stopping: str = "",
+    *,
+    kind: Literal["test", "contacts", "contact"] = "test",
+    fields: bool = False,
+) -> Iterator[Shown]:
+    """Give a display of a study, whose kernels may have to be compiled.
+
+    Parameters
+    ----------
+    display : type of Display
+    study : Scenario or StudyResult
+        The scenario of the study, or an earlier result of it.
+    quiet : bool
+        Whether to show nothing.
+    stopping : str
+        Written to stderr at the first signal, which the study then obeys; without it, signals are
+        not caught.
+    kind, fields
+        As of `kernels_of`.
+    """
+    with ExitStack() as stack:
+        stop = stack.enter_context(stop_on_signals(stopping)) if stopping else None
+        watch = display(
+            quiet,
+            kernels=lambda: kernels_of(getattr(study, "scenario", study), kind, fields),
+            transient=display is Display,
+        )
+        stack.enter_context(watch)
+        watch.stop_requested = stop.is_set if stop else None
+        yield watch

@@ -21,7 +21,7 @@ def show_view(
     json: bool,
     files: Mapping[str, object] | None = None,
     known: Collection[str] = (),
-    more: dict[str, Any] | None = None,
+    more: Mapping[str, Any] | None = None,
     stored: bool = False,
 ) -> None:
     """Write a view to stdout, and its notes and warnings to stderr.
@@ -49,6 +49,20 @@ def show_view(
         write_notes([text for text in view.notes if text not in known], view.warnings)
     if view.failures:
         note(f"warning: {view.failures}")
+
+
+def show_with_figure(
+    view: View,
+    figure: Path | None,
+    *,
+    json: bool,
+    files: Mapping[str, object] | None = None,
+    more: Mapping[str, Any] | None = None,
+) -> None:
+    """Draw the figure of a view, if a name is given, and write the view as `show_view`."""
+    draw_figure(view.panels(), figure)
+    named = {"figure": figure}
+    show_view(view, json=json, files={**(files or {}), **named}, more={**(more or {}), **named})
 
 
 def _write_tables(view: View, files: Mapping[str, object], stored: bool) -> None:

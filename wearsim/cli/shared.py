@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from wearsim.errors import ResultsFileError
+from wearsim.errors import ArgumentError, ResultsFileError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -72,6 +72,30 @@ def write_notes(notes: Iterable[str], warnings: Iterable[str] = ()) -> None:
     """Write notes and warnings on a scenario or a study to stderr."""
     for text in (*(f"note: {text}" for text in notes), *(f"warning: {text}" for text in warnings)):
         note(text)
+
+
+def refuse(condition: object, text: str, option: str) -> None:
+    """Raise a usage error of an option or an argument if a condition holds.
+
+    Raises
+    ------
+    typer.BadParameter
+        With the text.
+    """
+    if condition:
+        raise typer.BadParameter(text, param_hint=option)
+
+
+def refuse_options(given: Mapping[str, object], text: str) -> None:
+    """Raise a usage error if one of several options is given, which are listed by name.
+
+    Raises
+    ------
+    typer.BadParameter
+        For the first one.
+    """
+    for option, value in given.items():
+        refuse(value not in (None, False), text, option)
 
 
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
@@ -203,23 +227,21 @@ def profile_choice(
     from wearsim.quantities import quantity
 
     pairs = {"--columns": columns, "--units": units}
-    found: list[tuple[str, str] | None] = []
+    chosen: list[tuple[str, str] | None] = []
     for option, text in pairs.items():
         names = [name.strip() for name in text.split(",")] if text is not None else []
-        if text is not None and (len(names) != 2 or not all(names)):
-            message = f"'{text}' is not two names, expected position and height such as y,z"
-            raise typer.BadParameter(message, param_hint=option)
-        found.append((names[0], names[1]) if names else None)
+        message = f"'{text}' is not two names, expected position and height such as y,z"
+        refuse(text is not None and (len(names) != 2 or not all(names)), message, option)
+        chosen.append((names[0], names[1]) if names else None)
     rows = None
     if mean_rows is not None:
         first, _, last = mean_rows.partition(":")
-        if not (first.isdigit() and last.isdigit()):
-            message = f"'{mean_rows}' is no range of rows, expected one such as 0:10"
-            raise typer.BadParameter(message, param_hint="--mean-rows")
+        message = f"'{mean_rows}' is no range of rows, expected one such as 0:10"
+        refuse(not (first.isdigit() and last.isdigit()), message, "--mean-rows")
         rows = int(first), int(last)
     with checking("--at"):
         position = quantity(at, "m") if at is not None else None
-    return ProfileChoice(found[0], found[1], row, rows, position)
+    return ProfileChoice(chosen[0], chosen[1], row, rows, position)
 
 
 def results_option(ending: str) -> Any:
@@ -240,18 +262,52 @@ def results_option(ending: str) -> Any:
 
 
 @contextmanager
-def checking(option: str) -> Iterator[None]:
-    """Turn a ValueError into a usage error of an option.
+def checking(option: str, text: str = "", kind: type[Exception] = ValueError) -> Iterator[None]:
+    """Turn a ValueError, or another kind of error, into a usage error of an option.
 
     Raises
     ------
     typer.BadParameter
-        With the message of the ValueError.
+        With the text, or the message of the error.
     """
     try:
         yield
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint=option) from error
+    except kind as error:
+        raise typer.BadParameter(text or str(error), param_hint=option) from error
+
+
+@contextmanager
+def checking_arguments(**options: str) -> Iterator[None]:
+    """Turn errors of arguments into usage errors of the options that stand for them.
+
+    Parameters
+    ----------
+    **options
+        Options by argument, where they have not its name.
+
+    Raises
+    ------
+    typer.BadParameter
+        With the message of the error.
+    """
+    try:
+        yield
+    except ArgumentError as error:
+        hint = options.get(error.argument, f"--{error.argument}")
+        raise typer.BadParameter(str(error), param_hint=hint) from error
+
+
+def settings_with(settings: list[str] | None, **values: object) -> list[str]:
+    """Return the settings of --set, and those of options that stand for a key, if they are given.
+
+    Parameters
+    ----------
+    settings : list of str, optional
+    **values
+        Values by key.
+    """
+    given = {key: value for key, value in values.items() if value is not None}
+    return [*(settings or []), *(f"{key}={value}" for key, value in given.items())]
 
 
 def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
@@ -292,10 +348,9 @@ def check_figure(path: Path | None, force: bool, option: str = "-o") -> None:
     """
     if path is None:
         return
-    if path.suffix.lower() not in {".png", ".pdf", ".svg"}:
-        raise typer.BadParameter(
-            f"'{path}' has no known figure format, expected .png, .pdf or .svg", param_hint=option
-        )
+    known = path.suffix.lower() in {".png", ".pdf", ".svg"}
+    text = f"'{path}' has no known figure format, expected .png, .pdf or .svg"
+    refuse(not known, text, option)
     check_new_file(path, force, option)
 
 
@@ -304,8 +359,7 @@ def check_new_file(path: Path, force: bool, option: str = "-o") -> None:
 
     Parameters and errors as of `check_figure`.
     """
-    if not path.parent.is_dir():
-        raise typer.BadParameter(f"folder {path.parent} does not exist", param_hint=option)
+    refuse(not path.parent.is_dir(), f"folder {path.parent} does not exist", option)
     refuse_existing(path, force, option)
 
 
@@ -331,11 +385,8 @@ def refuse_same_file(figure: Path | None, output: Path, inputs: Iterable[Path]) 
     from wearsim.atomic_write import refuse_inputs, same_file
 
     refuse_inputs(figure, inputs, option="--figure")
-    if same_file(figure, output):
-        raise typer.BadParameter(
-            f"{figure} is also the results file given by -o; give them different names",
-            param_hint="--figure",
-        )
+    text = f"{figure} is also the results file given by -o; give them different names"
+    refuse(same_file(figure, output), text, "--figure")
 
 
 def checked_scheduler(scheduler: str | None, workers: int | None) -> str:

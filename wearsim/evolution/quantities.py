@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from wearsim.mechanics.cam import Extreme, Stations, greatest
+from wearsim.mechanics.cam import Extreme, Stations, greatest, greatest_value
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.types import FloatArray, IntArray
 
@@ -193,6 +193,12 @@ class CamStations:
         unknown = np.full(angle.shape, np.nan)
         return Extreme(values.max(axis=0), angle, unknown, unknown)
 
+    def greatest_value(self, values: FloatArray) -> FloatArray:
+        """Return the value of `greatest` alone."""
+        if self.panels is None:
+            return np.asarray(values.max(axis=0))
+        return greatest_value(self.panels, values[self.places])
+
     def at_angle(self, values: FloatArray, angle: float) -> FloatArray:
         """Return values of the stations, first axis, interpolated to an angle [rad]."""
         if self.panels is None:
@@ -336,22 +342,24 @@ def width(y: FloatArray, worn: FloatArray, threshold: float) -> FloatArray:
 
     The crossing is interpolated linearly between strips, so that the width grows continuously.
     """
-    above = worn > threshold
-    first, last = above.argmax(axis=-1), len(y) - 1 - above[..., ::-1].argmax(axis=-1)
-    left, right = (_crossing(y, worn, threshold, *s) for s in ((first, -1), (last, 1)))
-    return np.where(above.any(axis=-1), right - left, 0.0)
+    rows, last = worn.reshape(-1, len(y)), len(y) - 1
+    above = rows > threshold
+    ends = above.argmax(axis=1), last - above[:, ::-1].argmax(axis=1)
+    left, right = (
+        _crossing(y, rows, threshold, inner, np.minimum(np.maximum(inner + side, 0), last))
+        for inner, side in zip(ends, (-1, 1), strict=True)
+    )
+    return np.where(above.any(axis=1), right - left, 0.0).reshape(worn.shape[:-1])
 
 
 def _crossing(
-    y: FloatArray, worn: FloatArray, threshold: float, strip: IntArray, side: int
+    y: FloatArray, rows: FloatArray, threshold: float, inner: IntArray, outer: IntArray
 ) -> FloatArray:
-    """Return where depths fall to a threshold between each strip and that beside it [m]."""
-    beside = np.clip(strip + side, 0, len(y) - 1)
-    inner, outer = (
-        np.take_along_axis(worn, place[..., None], axis=-1)[..., 0] for place in (strip, beside)
-    )
-    part = (inner - threshold) / np.where(inner > outer, inner - outer, np.inf)
-    return np.asarray(y[strip] + part * (y[beside] - y[strip]))
+    """Return where the depths of each row fall to a threshold between two strips [m]."""
+    row = np.arange(len(rows))
+    high, low = rows[row, inner], rows[row, outer]
+    part = (high - threshold) / np.where(high > low, high - low, np.inf)
+    return np.asarray(y[inner] + part * (y[outer] - y[inner]))
 
 
 def worn_volume(worn: FloatArray, spacing: float, radius: FloatArray | float) -> FloatArray:

@@ -15,7 +15,7 @@ from wearsim.report.text import PER_SI, count, pass_unit
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
-    from wearsim.report.measured import Measured
+    from wearsim.levelling import Measured
 
 BLUE, ORANGE, GREEN, RED, GREY = "#2066a8", "#d1701c", "#3a8a5c", "#b3282d", "#8a8a8a"
 BLACK = "black"
@@ -315,9 +315,9 @@ class Panel:
     figure_only: bool = False
 
 
-def look(**options: Any) -> dict[str, Any]:
-    """Return options of marks or panels, to be shared by several of them."""
-    return options
+def dots(x: Any, y: Any, marker: str = "o", **style: Any) -> Line:
+    """Return points without a curve."""
+    return Line(x, y, dash="", marker=marker, **style)
 
 
 def message(title: str, *lines: str) -> Panel:

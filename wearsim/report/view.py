@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -17,7 +18,7 @@ from wearsim.report.text import by_roller, shown, with_interval
 from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
-    from wearsim.report.measured import ComputedProfile, Measured
+    from wearsim.levelling import ComputedProfile, Measured
     from wearsim.report.panels import Sheet
 
 
@@ -115,6 +116,8 @@ class View(ABC):
 
     Attributes
     ----------
+    result : object
+        What is shown.
     title : str
     question : str
         What was asked, in a sentence.
@@ -125,7 +128,10 @@ class View(ABC):
     notes, warnings : sequence of str
     """
 
+    result: Any
     title: str
+    #: function of the result and of measured profiles, "module:name"; imported for figures only
+    sheet: str
     question: str = ""
     basis: str = ""
     heading: str = "results"
@@ -142,9 +148,10 @@ class View(ABC):
     def data(self) -> dict[str, Any]:
         """Return all numbers for JSON, in SI units."""
 
-    @abstractmethod
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over computed ones."""
+        sheet: Sheet = resolve_name(self.sheet)(self.result, measured)
+        return sheet
 
     def line(self) -> str:
         """Return method, numerical or sampling error and time on one line, or an empty text."""

@@ -376,5 +376,5 @@ class Stored:
     def __get__(self, result: Any, owner: type) -> Array:
         if result is None:
             return self  # type: ignore[return-value]  # for `help`
-        found: Array = result.values(self._name)
-        return found
+        values: Array = result.values(self._name)
+        return values

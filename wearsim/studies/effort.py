@@ -121,7 +121,7 @@ def _limits(
     scenario: Scenario, forecast: WearForecast, wear: Mapping[str, float]
 ) -> list[dict[str, Any]]:
     """Return the limits of [limit] with the values at the end, and when they are reached."""
-    total, found = float(scenario.total_passes), []
+    total, limits = float(scenario.total_passes), []
     for key, value in scenario.limit.given.items():
         reached = None
         if forecast.at(1.0)[key] >= value:
@@ -134,8 +134,8 @@ def _limits(
                 low, high = (low, middle) if worn else (middle, high)
             reached = high * total
         item = {"quantity": key, "unit": Limit(key.replace("_", " "), value, key).unit}
-        found.append({**item, "limit": value, "at_end": wear[key], "reached_at_passes": reached})
-    return found
+        limits.append({**item, "limit": value, "at_end": wear[key], "reached_at_passes": reached})
+    return limits
 
 
 def _check_strips(forecast: WearForecast, passes: float) -> None:
@@ -238,9 +238,9 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     restarts = restarts_of(problem, wear["clearance"])
     steps = max(min(steps + _STEPS_OF_RESTART * restarts, passes), 1.0)
     groove, solve = forecast.seconds_of_groove, forecast.seconds
-    each = _STAGES if stepper == "stabilised" else 1.0
+    stages = _STAGES if stepper == "stabilised" else 1.0
     if stepper == "stabilised":
-        per_step = each * max(_STAGE * groove, solve)
+        per_step = stages * max(_STAGE * groove, solve)
     elif stepper == "explicit":
         per_step = _EXPLICIT * groove + solve
     elif stepper == "per-pass":
@@ -258,7 +258,7 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     system = (contacts * strips) ** 2 if stepper == "implicit" else 0.0
     return Effort(
         steps=math.ceil(steps),
-        solves=math.ceil(steps * each) * problem.contacts_each,
+        solves=math.ceil(steps * stages) * problem.contacts_each,
         seconds=_START + steps * per_step + restarts * (_STATIONS + _SOLVES_OF_RESTART * groove),
         memory=_MEMORY + 5.0 * size + _SYSTEM * system,
         file_size=size,

@@ -11,7 +11,7 @@ from wearsim.results.kinds import kind_of, open_study
 from wearsim.results.viewed import Viewed, kind_of_result
 
 if TYPE_CHECKING:
-    from wearsim.report.measured import Measured
+    from wearsim.levelling import Measured
     from wearsim.report.view import View
     from wearsim.studies.dissipation.result import DissipationResult
     from wearsim.studies.ensemble.result import EnsembleResult
@@ -76,8 +76,8 @@ def open_ensemble(path: str | Path) -> EnsembleResult:
     from wearsim.studies.ensemble.file.parts import read_ensemble  # noqa: PLC0415
 
     data, kind = read_ensemble(path), kind_of(path)
-    found: EnsembleResult = kind.load("result")(data, Path(path))
-    return found
+    result: EnsembleResult = kind.load("result")(data, Path(path))
+    return result
 
 
 def comparison_of(

@@ -82,13 +82,13 @@ SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
 @cache
 def software() -> Mapping[str, str]:
     """Return the versions of the packages that results may depend on, by name."""
-    found = {}
+    versions = {}
     for name in SOFTWARE:
         try:  # a module that is loaded states its version without a search for its metadata
-            found[name] = getattr(sys.modules.get(name), "__version__", "") or version(name)
+            versions[name] = getattr(sys.modules.get(name), "__version__", "") or version(name)
         except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
+            versions[name] = "unknown"
+    return versions
 
 
 def plugins_in_use(scenario: Scenario) -> list[dict[str, str]]:
@@ -172,9 +172,9 @@ def changed_origins(data: StudyData, scenario: Scenario) -> list[str]:
 
 def _origins(versions: Mapping[str, str], plugins: list[dict[str, str]]) -> dict[str, str]:
     """Return the version of every package and the origin of every plugin in use, by name."""
-    found = dict(versions)
+    origins = dict(versions)
     for row in plugins:
         known = row["distribution"] in versions
         origin = row["distribution"] if known else f"{row['distribution']} {row['version']}"
-        found[f"the {row['kind']} '{row['name']}' of"] = origin
-    return found
+        origins[f"the {row['kind']} '{row['name']}' of"] = origin
+    return origins

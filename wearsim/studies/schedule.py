@@ -1,12 +1,21 @@
-"""Passes at which profiles and contacts are recorded."""
+"""Passes at which profiles and contacts are recorded, and the states there."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby, pairwise
+from operator import itemgetter
+from typing import TypeAlias
 
 import numpy as np
 
+from wearsim.evolution.integrate import Advance
+from wearsim.evolution.limits import take_side_step
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState, joined_states
+from wearsim.evolution.steppers.base import Stepper
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
 from wearsim.types import FloatArray
@@ -87,10 +96,10 @@ class RecordSchedule:
         pass_by_pass : bool
             Whether every step is one pass, so that records are at whole numbers of passes.
         """
-        found = [0.0]
-        while found[-1] < stop:
-            found.append(min(self.due_after(found[-1], pass_by_pass), stop))
-        return np.array(found)
+        records = [0.0]
+        while records[-1] < stop:
+            records.append(min(self.due_after(records[-1], pass_by_pass), stop))
+        return np.array(records)
 
     def due_between(
         self, first: float, last: float, stop: float, pass_by_pass: bool = False
@@ -111,13 +120,68 @@ class RecordSchedule:
         list of (float, bool)
             Passes, and whether the record is at the second state.
         """
-        found, passes = [], self.due_after(first, pass_by_pass)
+        records, passes = [], self.due_after(first, pass_by_pass)
         while passes < last:
-            found.append((passes, False))
+            records.append((passes, False))
             passes = self.due_after(passes, pass_by_pass)
-        return found + [(last, True)] * (passes == last or last >= stop)
+        return records + [(last, True)] * (passes == last or last >= stop)
 
     def due_after(self, passes: float, pass_by_pass: bool) -> float:
         """Return the passes of the first record after `passes`, whole if `pass_by_pass`."""
         due = self.next_record(passes)
         return float(math.ceil(due)) if pass_by_pass else due
+
+
+#: A record in or at the end of a step: the last state before or at it, by its number on the path;
+#: the place of its test; its passes.
+Due: TypeAlias = tuple[int, int, float]
+
+
+def due_records(
+    advance: Advance, schedule: RecordSchedule, stop: float, pass_by_pass: bool
+) -> list[Due]:
+    """Return the records of a step in order; `stop` is the end of the tests [passes]."""
+    return sorted(
+        (source + at_end, place, passes)
+        for source, (start, end) in enumerate(pairwise(advance.path))
+        for place, (first, last) in enumerate(
+            zip(start.passes.tolist(), end.passes.tolist(), strict=True)
+        )
+        for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
+    )
+
+
+def states_at(
+    stepper: Stepper, advance: Advance, due: Sequence[Due]
+) -> tuple[WearProblem, WearState]:
+    """Return problem and states at records of a step, by side steps where no state is.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    advance : Advance
+        The step.
+    due : sequence of Due
+        Some of its records in order; each becomes a realisation.
+    """
+    places, states = [], []
+    for source, group in groupby(due, key=itemgetter(0)):
+        places.append(np.array([place for _, place, _ in group]))
+        state = advance.path[source].replaced(
+            coarse_step_solution=None, half_quadrature_solution=None
+        )
+        states.append(state.at(places[-1]))
+    problem, state = advance.problem.at(np.concatenate(places)), joined_states(states)
+    return problem, state_at(stepper, problem, state, np.array([one[2] for one in due]))
+
+
+def state_at(
+    stepper: Stepper, problem: WearProblem, state: WearState, passes: FloatArray
+) -> WearState:
+    """Return the state at passes, shape (realisations,), by side steps where it is earlier."""
+    later = np.flatnonzero(passes > state.passes)
+    if not later.size:
+        return state
+    start, ends = state.at(later), passes[later]
+    end = take_side_step(stepper.side_step, problem.at(later), start, ends - start.passes)
+    return state.with_others(later, end.replaced(passes=ends))

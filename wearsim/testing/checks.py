@@ -108,9 +108,9 @@ def require(condition: object, message: str) -> None:
 
 def require_values(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> None:
     """Raise ConformanceError unless values have a shape and are finite."""
-    found = np.asarray(values)
-    require(found.shape == shape, f"{name} has the shape {found.shape}, not {shape}")
-    require(np.isfinite(found).all(), f"{name} is not finite")
+    array = np.asarray(values)
+    require(array.shape == shape, f"{name} has the shape {array.shape}, not {shape}")
+    require(np.isfinite(array).all(), f"{name} is not finite")
 
 
 def require_repeatable(

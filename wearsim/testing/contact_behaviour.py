@@ -227,9 +227,9 @@ def convergence_with_strips(fixture: ContactFixture) -> None:
 _SOLVE = "wearsim.plugins.ContactModel.solve"
 
 
-def _require_identical(one: ContactSolution, other: ContactSolution, message: str) -> None:
+def _require_identical(first: ContactSolution, other: ContactSolution, message: str) -> None:
     """Raise ConformanceError with the names of the fields that are not equal bit for bit."""
-    pairs = zip(asdict(one).items(), asdict(other).values(), strict=True)
+    pairs = zip(asdict(first).items(), asdict(other).values(), strict=True)
     changed = [name for (name, a), b in pairs if not np.array_equal(a, b)]
     require(not changed, f"{message} {', '.join(changed)}")
 

@@ -153,10 +153,10 @@ def random_input_tests(
 
     def build() -> RandomInputFixture:
         configured = ConfiguredSpec(resolved, options, kind, files)
-        own = None
+        spec = None
         if marginal is not None:
-            own = ConfiguredSpec(resolve(RandomInputSpec, marginal[0]), marginal[1], kind, files)
-        return RandomInputFixture(configured, own)
+            spec = ConfiguredSpec(resolve(RandomInputSpec, marginal[0]), marginal[1], kind, files)
+        return RandomInputFixture(configured, spec)
 
     return build_tests(random_inputs.BY_ROLE[resolved.role], build, without)
 

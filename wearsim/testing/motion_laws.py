@@ -78,8 +78,8 @@ def lift_is_elementwise(fixture: MotionLawFixture) -> None:
     values, kept = fixture.lift(angle), angle.copy()
     require_values("the lift", values, (3, 11))
     require(np.array_equal(angle, kept), "lift changes its argument")
-    one = np.concatenate([fixture.lift(angle[k : k + 1]) for k in range(11)], axis=1)
-    agree("the lift at one point, compared with that at several,", one, values, 1e-12)
+    singly = np.concatenate([fixture.lift(angle[k : k + 1]) for k in range(11)], axis=1)
+    agree("the lift at one point, compared with that at several,", singly, values, 1e-12)
 
 
 @MOTION_LAW.specified_in(_LIFT)

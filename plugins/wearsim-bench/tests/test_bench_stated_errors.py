@@ -39,6 +39,7 @@ from wearsim_bench.stated_errors.study import (
     Coverage,
     coverage,
     measured,
+    stated,
     worn_of_result,
 )
 from wearsim_bench.stated_errors.topic import requirements, stated_errors
@@ -119,6 +120,11 @@ def test_reference_has_the_stations_of_the_run_where_equal_ones_are_solved_once(
     own, stepped = worn_of_result(result), worn_of(problem, state)
     assert own.profiles.shape == stepped.profiles.shape
     assert np.abs(own.changes_from(stepped)).max() < 2e-2
+    last = {name: column[-1] for name, column in result.raw.history.items()}
+    assert stated(result)["depth"] == pytest.approx(
+        (last["depth_error_by_steps"] + last["depth_error_by_strips"]).item() / own.depth, rel=1e-3
+    )
+    assert last["depth_error_by_stations"].item() > 0.0
 
 
 def test_strips_of_a_reference_span_the_groove_and_resolve_the_fresh_patch():

@@ -12,7 +12,7 @@ from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.identify.traces import Trace, level
 from wearsim.studies.identify.trajectories import Grower, Trajectories
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.noise import Noise
 from wearsim.uq.hierarchy.pooled import Posterior
 
@@ -129,7 +129,9 @@ def test_next_life_lies_in_its_predictive_interval(tests: int):
     for _ in range(REPEATS):
         m, t = rng.normal(-25.0, 0.5), abs(rng.normal(0.0, 0.5))
         apparent = rng.normal(m, np.hypot(t, inputs), tests + 1)
-        kernels = [Kernel(np.ones(1), np.array([c]), np.array([inputs])) for c in apparent[:-1]]
+        kernels = [
+            LikelihoodMixture(np.ones(1), np.array([c]), np.array([inputs])) for c in apparent[:-1]
+        ]
         posterior = Posterior.of(kernels, 60)
         low, high = posterior.next(ENDS.tolist(), more=inputs)
         held += low < apparent[-1] < high

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from wearsim.errors import (
 from wearsim.evolution.steppers import implicit
 from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario, parse_scenario
+from wearsim.studies import schedule
 from wearsim.studies.opening import open_results
 from wearsim.studies.run import recorder
 from wearsim.studies.run import run as studies
@@ -52,7 +54,7 @@ class InterruptAtCall:
 
 PLACES = [
     (implicit, "implicit_step"),  # three in a step: two halves and the coarse solution
-    (recorder, "take_side_step"),
+    (schedule, "take_side_step"),
     (recorder, "record_row"),
     (recorder, "history_row"),
 ]
@@ -79,6 +81,7 @@ def test_interrupt_in_a_step_keeps_the_previous_step(
     scenario, unbroken = nine_records
     with monkeypatch.context() as patch:
         patch.setattr(module, name, InterruptAtCall(getattr(module, name), at, late))
+        patch.setattr(recorder, "MOST_WAITING", 0)  # every state is observed by itself
         with pytest.raises(Interrupted, match=r"stopped at pass \d+ of 6000; continue with"):
             studies.run(scenario, path)
     stopped = open_results(path)
@@ -208,14 +211,14 @@ def test_error_of_a_plugin_is_stored_with_the_last_step(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = iter(range(100))
-    record = recorder.history_row
+    record = recorder.due_records
 
-    def fail(*args: object) -> object:
-        if next(calls) == 3:
+    def fail(*args: Any) -> object:
+        if next(calls) == 2:
             raise ZeroDivisionError("by zero")
         return record(*args)
 
-    monkeypatch.setattr(recorder, "history_row", fail)
+    monkeypatch.setattr(recorder, "due_records", fail)
     with pytest.raises(ZeroDivisionError):
         studies.run(short(), path)
     left = open_results(path)

@@ -6,6 +6,9 @@ from typing import Annotated
 
 import typer
 
+import wearsim
+from wearsim.atomic_write import refuse_inputs
+from wearsim.cli.render import show_with_figure
 from wearsim.cli.shared import (
     Figure,
     Force,
@@ -17,20 +20,18 @@ from wearsim.cli.shared import (
     read_scenario,
 )
 
-AtAngles = Annotated[
-    str | None,
-    typer.Option(
-        "--at",
-        metavar="ANGLES",
-        help="Angles of the cam instead of the stations of a run: '10 deg,80 deg'.",
-        show_default=False,
-    ),
-]
-
 
 def cam(
     scenario: ScenarioFile,
-    at: AtAngles = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            "--at",
+            metavar="ANGLES",
+            help="Angles of the cam instead of the stations of a run: '10 deg,80 deg'.",
+            show_default=False,
+        ),
+    ] = None,
     settings: Settings = None,
     figure: Figure = None,
     json: Json = False,
@@ -39,23 +40,13 @@ def cam(
     """Show motion, loads and fresh contact of a cam along its angle."""
     check_figure(figure, force)
     loaded = read_scenario(scenario, settings)
-    import numpy as np
-
-    from wearsim.atomic_write import refuse_inputs
-    from wearsim.cli.progress import Display
+    from wearsim.cli.progress import Display, watching
     from wearsim.quantities import quantity
-    from wearsim.studies.cam.study import study_cam
-    from wearsim.studies.kernels import kernels_of
 
     if figure is not None:
         refuse_inputs(figure, loaded.paths)
-    angles = None
-    if at is not None:
-        with checking("--at"):
-            angles = np.array([quantity(text, "rad") for text in at.split(",")])
-    with Display(quiet=False, kernels=lambda: kernels_of(loaded, "contacts"), transient=True):
-        study = study_cam(loaded, angles)
-    from wearsim.cli.render import draw_figure, show_view
-
-    draw_figure(study.view.panels(), figure)
-    show_view(study.view, json=json, files={"figure": figure}, more={"figure": figure})
+    with checking("--at"):
+        angles = None if at is None else [quantity(text, "rad") for text in at.split(",")]
+    with watching(Display, loaded, kind="contacts"):
+        study = wearsim.study_cam(loaded, angles)
+    show_with_figure(study.view, figure, json=json)

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import wearsim
+from wearsim.atomic_write import refuse_inputs
+from wearsim.cli.render import show_with_figure
 from wearsim.cli.shared import (
     At,
     Columns,
@@ -27,56 +30,54 @@ from wearsim.cli.shared import (
     checking,
     profile_choice,
     read_scenario,
+    refuse,
     refuse_same_file,
     results_option,
+    settings_with,
 )
+from wearsim.errors import PluginError
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
 
 
-ProfileFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--profile",
-        metavar="FILE",
-        help="Profile of the cylinder: CSV with columns 'y [mm]' and 'height [um]', worn is"
-        " negative, or 'depth [um]'; or a surface, SDF or X3P.",
-        show_default=False,
-    ),
-]
-Cutoff = Annotated[
-    str | None,
-    typer.Option(
-        "--filter",
-        metavar="CUTOFF",
-        help="Cutoff wavelength of a Gaussian filter that removes roughness from the profile"
-        " (ISO 16610-21): '0.8 mm'.",
-        show_default=False,
-    ),
-]
-Against = Annotated[
-    str | None,
-    typer.Option(
-        metavar="MODEL",
-        help="Also solve the contact with this contact model, such as halfspace, and show the"
-        " difference.",
-        show_default=False,
-    ),
-]
-
-
 def contact(
     scenario: ScenarioFile,
-    profile: ProfileFile = None,
+    profile: Annotated[
+        Path | None,
+        typer.Option(
+            "--profile",
+            metavar="FILE",
+            help="Profile of the cylinder: CSV with columns 'y [mm]' and 'height [um]', worn is"
+            " negative, or 'depth [um]'; or a surface, SDF or X3P.",
+            show_default=False,
+        ),
+    ] = None,
     columns: Columns = None,
     units: Units = None,
     row: Row = None,
     mean_rows: MeanRows = None,
     at: At = None,
-    cutoff: Cutoff = None,
+    cutoff: Annotated[
+        str | None,
+        typer.Option(
+            "--filter",
+            metavar="CUTOFF",
+            help="Cutoff wavelength of a Gaussian filter that removes roughness from the profile"
+            " (ISO 16610-21): '0.8 mm'.",
+            show_default=False,
+        ),
+    ] = None,
     settings: Settings = None,
-    against: Against = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MODEL",
+            help="Also solve the contact with this contact model, such as halfspace, and show the"
+            " difference.",
+            show_default=False,
+        ),
+    ] = None,
     figure: Figure = None,
     json: Json = False,
     force: Force = False,
@@ -84,31 +85,24 @@ def contact(
     """Solve one contact: the first roller at the start of the load."""
     check_figure(figure, force)
     loaded = read_scenario(scenario, settings)
-    from wearsim.atomic_write import refuse_inputs
-    from wearsim.cli.progress import Display
-    from wearsim.cli.render import draw_figure, show_view
-    from wearsim.errors import PluginError
+    from wearsim.cli.progress import Display, watching
     from wearsim.input_files import read_input
     from wearsim.profiles import ProfileChoice, gaussian_filtered, load_profile, sign_note
     from wearsim.quantities import quantity
     from wearsim.studies.contact.comparison import reference_spec
-    from wearsim.studies.contact.single import study_contact
     from wearsim.studies.dry_run import profile_data
     from wearsim.studies.dry_run_table import profile_rows
-    from wearsim.studies.kernels import kernels_of
 
     if against is not None:
-        try:
+        with checking("--against", kind=PluginError):
             reference_spec(against)
-        except PluginError as error:
-            raise typer.BadParameter(str(error), param_hint="--against") from error
     if figure is not None:
         refuse_inputs(figure, loaded.paths)
         refuse_inputs(figure, [profile] if profile else [], "the profile")
     choice = profile_choice(columns, units, row, mean_rows, at)
-    if profile is None and (cutoff is not None or choice != ProfileChoice()):
-        message = "is needed for --columns, --units, --row, --mean-rows, --at and --filter"
-        raise typer.BadParameter(message, param_hint="--profile")
+    message = "is needed for --columns, --units, --row, --mean-rows, --at and --filter"
+    chosen = cutoff is not None or choice != ProfileChoice()
+    refuse(profile is None and chosen, message, "--profile")
     cylinder, files = loaded.cylinder, dict(loaded.files)
     if profile is not None:
         measured, wavelength = load_profile(profile, choice), None
@@ -124,22 +118,18 @@ def contact(
     automatic = loaded.contact.model == "auto"  # all models that it takes have fields
     has_fields = automatic or loaded.contact.spec.capabilities.fields
     with_fields = figure is not None and has_fields
-
-    def kernels() -> set[str]:
-        return kernels_of(loaded, "contact", with_fields)
-
-    with Display(quiet=False, kernels=kernels, transient=True):
-        study = study_contact(loaded, cylinder.profile, with_fields, True, against)
-    notes = [*study.notes, *_notes_on_means(loaded)]
-    if cylinder.profile and profile and (sign := sign_note(cylinder.profile, choice, str(profile))):
-        notes.append(sign)
-    if figure is not None and not has_fields:
-        notes.append(f"model '{study.model}' gives no fields; the figure shows its strips only")
+    with watching(Display, loaded, kind="contact", fields=with_fields):
+        study = wearsim.study_contact(loaded, cylinder.profile, with_fields, True, against)
     view = study.view
-    view.notes, view.start = notes, dict(profile_rows(start))
-    draw_figure(view.panels(), figure)
-    more = {"figure": figure, "profile": start}
-    show_view(view, json=json, files={"figure": figure}, more=more)
+    view.notes = [*study.notes, *_notes_on_means(loaded)]
+    if cylinder.profile and profile and (sign := sign_note(cylinder.profile, choice, str(profile))):
+        view.notes.append(sign)
+    if figure is not None and not has_fields:
+        view.notes.append(
+            f"model '{study.model}' gives no fields; the figure shows its strips only"
+        )
+    view.start = dict(profile_rows(start))
+    show_with_figure(view, figure, json=json, more={"figure": figure, "profile": start})
 
 
 def _notes_on_means(scenario: Scenario) -> list[str]:
@@ -152,16 +142,6 @@ def _notes_on_means(scenario: Scenario) -> list[str]:
     return notes
 
 
-Output = Annotated[Path | None, results_option("-dissipation.h5")]
-Plan = Annotated[
-    str | None,
-    typer.Option(
-        metavar="PLAN",
-        help="Sampling design: monte-carlo, latin-hypercube or sobol; default: that of the"
-        " scenario.",
-        show_default=False,
-    ),
-]
 _STOPPING = (
     "stopping after the current realisations, results are kept; repeat to stop at once and lose"
     " them"
@@ -171,9 +151,17 @@ _STOPPING = (
 def dissipation(
     scenario: ScenarioFile,
     realisations: Realisations = 1000,
-    output: Output = None,
+    output: Annotated[Path | None, results_option("-dissipation.h5")] = None,
     figure: FigureOption = None,
-    plan: Plan = None,
+    plan: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLAN",
+            help="Sampling design: monte-carlo, latin-hypercube or sobol; default: that of the"
+            " scenario.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,
@@ -182,27 +170,12 @@ def dissipation(
 ) -> None:
     """Solve one contact for many realisations of its random inputs."""
     check_figure(figure, force, "--figure")
-    given = {"sampling.plan": plan, "seed": seed}
-    options = [f"{key}={value}" for key, value in given.items() if value is not None]
-    loaded = read_scenario(scenario, [*(settings or []), *options])
+    options = settings_with(settings, **{"sampling.plan": plan, "seed": seed})
+    loaded = read_scenario(scenario, options)
     path = output if output is not None else Path(f"{scenario.stem}-dissipation.h5")
     refuse_same_file(figure, path, loaded.paths)
-    from wearsim.cli.progress import Counter, stop_on_signals
-    from wearsim.cli.render import draw_figure, show_view
-    from wearsim.studies.dissipation.monte_carlo import dissipation as study
-    from wearsim.studies.kernels import kernels_of
+    from wearsim.cli.progress import Counter, watching
 
-    watcher = Counter(quiet, kernels=lambda: kernels_of(loaded, "contacts"))
-    with stop_on_signals(_STOPPING) as stop, watcher as counter:
-        result = study(
-            loaded,
-            realisations,
-            path,
-            force=force,
-            on_progress=counter,
-            stop_requested=stop.is_set,
-        )
-    view = result.view
-    draw_figure(view.panels(), figure)
-    files = {"results file": result.path, "figure": figure}
-    show_view(view, json=json, files=files, more={"figure": figure})
+    with watching(Counter, loaded, quiet, _STOPPING, kind="contacts") as counter:
+        result = wearsim.dissipation(loaded, realisations, path, force=force, **counter.callbacks)
+    show_with_figure(result.view, figure, json=json, files={"results file": result.path})

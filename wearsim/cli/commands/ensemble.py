@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import wearsim
+from wearsim.cli.render import show_with_figure
 from wearsim.cli.shared import (
     FigureOption,
     Force,
@@ -24,59 +26,51 @@ from wearsim.cli.shared import (
     checking,
     note,
     read_scenario,
+    refuse,
     refuse_same_file,
     results_option,
+    settings_with,
 )
+from wearsim.errors import SolverError
 
 if TYPE_CHECKING:
     from wearsim.studies.ensemble.result import EnsembleResult
-
-Output = Annotated[Path | None, results_option("-ensemble.h5")]
-Precision = Annotated[
-    str | None,
-    typer.Option(
-        metavar="TARGET",
-        help="Stop when the relative half-width of a 95 % confidence interval is reached,"
-        " 'depth.mean 1%'. First checked after 64 realisations.",
-        show_default=False,
-    ),
-]
-Until = Annotated[str | None, typer.Option(metavar="TARGET", hidden=True)]
-Plan = Annotated[
-    str | None,
-    typer.Option(
-        metavar="PLAN",
-        help="Sampling design: monte-carlo, latin-hypercube, sobol, saltelli or control-variate;"
-        " default: that of the scenario.",
-        show_default=False,
-    ),
-]
-Sweep = Annotated[
-    str | None,
-    typer.Option(
-        metavar="KEY=V1,V2,...",
-        help="Run and compare one ensemble per value: load.normal_force=250N,300N.",
-        show_default=False,
-    ),
-]
-STOPPING = "stopping after the next batch; repeat to stop at once"
-_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
-_WITHOUT_SPACE = re.compile(rf"({_NUMBER})([A-Za-zµμ°].*)")
-_QUANTITY = re.compile(rf"({_NUMBER})\s*(\S.*)?")
-_EXAMPLE = "such as load.normal_force=250N,300N,350N"
 
 
 def ensemble(
     scenario: ScenarioFile,
     realisations: Realisations = 1000,
-    output: Output = None,
+    output: Annotated[Path | None, results_option("-ensemble.h5")] = None,
     figure: FigureOption = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    precision: Precision = None,
-    until: Until = None,
-    plan: Plan = None,
-    sweep: Sweep = None,
+    precision: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TARGET",
+            help="Stop when the relative half-width of a 95 % confidence interval is reached,"
+            " 'depth.mean 1%'. First checked after 64 realisations.",
+            show_default=False,
+        ),
+    ] = None,
+    until: Annotated[str | None, typer.Option(metavar="TARGET", hidden=True)] = None,
+    plan: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLAN",
+            help="Sampling design: monte-carlo, latin-hypercube, sobol, saltelli or"
+            " control-variate; default: that of the scenario.",
+            show_default=False,
+        ),
+    ] = None,
+    sweep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY=V1,V2,...",
+            help="Run and compare one ensemble per value: load.normal_force=250N,300N.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,
@@ -85,35 +79,32 @@ def ensemble(
 ) -> None:
     """Run a wear test for each realisation of the random inputs."""
     check_figure(figure, force, "--figure")
-    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
-    from wearsim.studies.ensemble import api
+    from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
+    from wearsim.studies.comparison.view import comparison_view
+    from wearsim.studies.ensemble.api import parse_target
     from wearsim.studies.ensemble.designs import parse_plan
     from wearsim.studies.ensemble.sweep import path_of, run_sweep
-    from wearsim.studies.kernels import kernels_of
 
-    options: dict[str, Any] = {"plan": plan, "workers": workers, "force": force}
     with checking("--plan"):
-        options["plan"] = plan if plan is None else parse_plan(plan)
+        chosen_plan = plan and parse_plan(plan)
     if until is not None:
-        if precision is not None:
-            raise typer.BadParameter("is the former name of --precision", param_hint="--until")
+        refuse(precision is not None, "is the former name of --precision", "--until")
         note("warning: --until of ensembles is now --precision; the old name will be removed")
         precision = until
-    with checking("--precision"):
-        options["precision"] = precision
-        if precision is not None:
-            api.parse_target(precision)
-    options["scheduler"] = checked_scheduler(scheduler, workers)
-    texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
+    if precision is not None:
+        with checking("--precision"):
+            parse_target(precision)
+    options: dict[str, Any] = {
+        "plan": chosen_plan,
+        "workers": workers,
+        "force": force,
+        "precision": precision,
+        "scheduler": checked_scheduler(scheduler, workers),
+    }
+    texts = settings_with(settings, seed=seed)
     path = output if output is not None else Path(f"{scenario.stem}-ensemble.h5")
-    if sweep is None:
-        key, files = "", {"": path}
-    else:
-        with checking("--sweep"):
-            key, values = parse_sweep(sweep)
-        if any(text.partition("=")[0].strip() == key for text in texts):
-            raise typer.BadParameter(f"{key} is also the key of --sweep", param_hint="--set")
-        files = {value: path_of(path, value) for value in values}
+    key, values = swept(sweep, texts)
+    files = {value: path_of(path, value) for value in values} if key else {"": path}
     scenarios = {
         value: read_scenario(scenario, [*texts, *([f"{key}={value}"] if key else [])])
         for value in files
@@ -121,39 +112,31 @@ def ensemble(
     for value, file in files.items():
         refuse_same_file(figure, file, scenarios[value].paths)
 
-    def announce(value: str, file: Path) -> None:
+    def announce(value: str, file: Path | None) -> None:
         if not quiet:
             note(f"{key} = {value}: {file}")
 
     first = scenarios[next(iter(files))]
-    watcher = EnsembleWatcher(quiet, kernels=lambda: kernels_of(first))
-    with stop_on_signals(STOPPING) as stop, watcher as watch:
-        options |= {
-            "on_progress": watch,
-            "stop_requested": stop.is_set,
-            "on_notice": watch.notice,
-        }
-        if key:
-            options["on_value"] = announce
-            results = run_sweep(
-                list(scenarios.values()), list(files), realisations, path, **options
-            )
+    with watching(EnsembleWatcher, first, quiet, BATCHES) as watch:
+        options |= watch.callbacks
+        if not key:
+            result = wearsim.ensemble(first, realisations, path, **options)
         else:
-            results = [api.ensemble(scenarios[""], realisations, path, **options)]
+            designs = list(scenarios.values())
+            results = run_sweep(
+                designs, list(files), realisations, path, on_value=announce, **options
+            )
     if not key:
-        report(results[0], json, figure, watch.workers)
+        show_ensemble(result, json, figure, watch.workers)
         return
-    for result in results:
-        _end(result)
-    from wearsim.cli.render import draw_figure, show_view
-    from wearsim.studies.comparison.view import comparison_view
-
-    view = comparison_view(results, list(files), "depth", key)
-    draw_figure(view.panels(), figure)
-    show_view(view, json=json, files={"figure": figure}, more={"figure": figure})
+    for item in results:
+        _refuse_failed(item)
+    show_with_figure(comparison_view(results, list(files), "depth", key), figure, json=json)
 
 
-def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str = "") -> None:
+def show_ensemble(
+    result: EnsembleResult, json: bool, figure: Path | None, workers: str = ""
+) -> None:
     """Write an ensemble or lives to stdout and failures to stderr, and draw the figure.
 
     Parameters
@@ -171,78 +154,35 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
     SolverError
         If all realisations failed.
     """
-    from wearsim.cli.render import draw_figure, show_view
     from wearsim.studies.execution.processes import InProcess
 
     if workers == InProcess.describe:
         workers = "this process, one realisation at a time"
-    view = result.view
-    draw_figure(view.panels(), figure)
-    files = {"workers": workers, "results file": result.path, "figure": figure}
-    show_view(view, json=json, files=files, more={"workers": workers or None, "figure": figure})
-    _end(result)
+    files, more = {"workers": workers, "results file": result.path}, {"workers": workers or None}
+    show_with_figure(result.view, figure, json=json, files=files, more=more)
+    _refuse_failed(result)
 
 
-def _end(result: EnsembleResult) -> None:
+def _refuse_failed(result: EnsembleResult) -> None:
     """Raise an error if all realisations failed."""
     if result.failed and not result.count:
-        from wearsim.errors import SolverError
-
         raise SolverError(f"{result.path}: all realisations failed")
 
 
-def parse_sweep(text: str) -> tuple[str, tuple[str, ...]]:
-    """Return the key and the values of a sweep.
-
-    Parameters
-    ----------
-    text : str
-        "load.normal_force=250N,300N"; the space before a unit may be left out.
-
-    Returns
-    -------
-    key : str
-        Dotted key.
-    values : tuple of str
-        Two or more different values, with a space before the unit.
+def swept(sweep: str | None, settings: Sequence[str]) -> tuple[str, tuple[str, ...]]:
+    """Return key and values of --sweep, which are empty without it.
 
     Raises
     ------
-    ValueError
-        If there is no key, an empty value, fewer than two values, or two equal ones.
+    typer.BadParameter
+        If it cannot be read, or its key is also the key of a setting.
     """
-    key, equals, listed = text.partition("=")
-    if not equals or not key.strip():
-        raise ValueError(f"'{text}' is not a key with values, expected one {_EXAMPLE}")
-    values = tuple(
-        _WITHOUT_SPACE.sub(r"\1 \2", value) if _WITHOUT_SPACE.fullmatch(value) else value
-        for value in map(str.strip, listed.split(","))
-    )
-    if not all(values):
-        raise ValueError(f"'{text}' has an empty value, expected values {_EXAMPLE}")
-    if len(values) < 2:
-        raise ValueError(f"'{text}' has one value, expected two or more {_EXAMPLE}")
-    for number, value in enumerate(values):
-        for before in values[:number]:
-            if _are_equal(before, value):
-                raise ValueError(f"'{before}' and '{value}' are the same value; remove one")
-    return key.strip(), values
+    if sweep is None:
+        return "", ()
+    from wearsim.studies.ensemble.sweep import parse_sweep
 
-
-def _are_equal(one: str, other: str) -> bool:
-    """Return whether two values are equal, also in different units."""
-    matches = [_QUANTITY.fullmatch(value) for value in (one, other)]
-    if matches[0] is None or matches[1] is None:
-        return one == other
-    (first, unit), (second, other_unit) = matches[0].groups(), matches[1].groups()
-    if not (unit and other_unit):
-        return not (unit or other_unit) and float(first) == float(second)
-    from wearsim.units import conversion
-
-    try:
-        factor = conversion(other_unit, unit)
-    except ValueError:  # reported when the scenario is read
-        return one == other
-    from fractions import Fraction
-
-    return Fraction(first) == Fraction(second) * factor
+    with checking("--sweep"):
+        key, values = parse_sweep(sweep)
+    given = any(text.partition("=")[0].strip() == key for text in settings)
+    refuse(given, f"{key} is also the key of --sweep", "--set")
+    return key, values

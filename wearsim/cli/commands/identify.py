@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import wearsim
+from wearsim.cli.render import draw_figure, show_with_figure
 from wearsim.cli.shared import (
     Columns,
     FigureOption,
@@ -23,8 +26,11 @@ from wearsim.cli.shared import (
     checking,
     profile_choice,
     read_scenario,
+    refuse,
     refuse_existing,
+    refuse_options,
     refuse_same_file,
+    settings_with,
     write_json,
     write_list,
 )
@@ -32,143 +38,138 @@ from wearsim.cli.shared import (
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
 
-Profiles = Annotated[
-    list[Path] | None,
-    typer.Argument(
-        metavar="T1.csv T2.csv...",
-        help="Measured profiles, one of each test: CSV with columns 'y [mm]' and 'height [um]',"
-        " worn is negative, or 'depth [um]'; or a surface, SDF or X3P, whose lines are averaged.",
-        show_default=False,
-    ),
-]
-Tests = Annotated[
-    Path | None,
-    typer.Option(
-        "--tests",
-        metavar="TESTS.toml",
-        help="Tests as [[test]] tables: profile, depth with depth_std, or lift of a cam; angle of a"
-        " cam, before, at, group, set, std, body, shoulders, curvature, runout, columns, units.",
-        show_default=False,
-    ),
-]
-Before = Annotated[
-    str | None,
-    typer.Option(
-        "--before",
-        metavar="B1.csv,...",
-        help="Profiles of the same places before the tests, in the order of the tests.",
-        show_default=False,
-    ),
-]
-Shoulders = Annotated[
-    str | None,
-    typer.Option(
-        "--shoulders",
-        metavar="DISTANCE",
-        help="Distance from the middle of the groove beyond which the surface is unworn: '9 mm';"
-        " default: beyond the predicted groove.",
-        show_default=False,
-    ),
-]
-Curvature = Annotated[
-    bool,
-    typer.Option(
-        "--curvature",
-        help="Fit a curvature of each trace, as of a bow of the instrument's guide, beside offset"
-        " and inclination; needs unworn shoulders.",
-    ),
-]
-Share = Annotated[
-    str | None,
-    typer.Option(
-        "--share",
-        metavar="k=cylinder,roller",
-        help="One unknown factor of K/H of both bodies, in the ratio of the scenario.",
-        show_default=False,
-    ),
-]
-Fix = Annotated[
-    str | None,
-    typer.Option(
-        "--fix",
-        metavar="INPUT=VALUE,...",
-        help="Inputs that are known and equal in all tests: friction=0.1,load=310 N.",
-        show_default=False,
-    ),
-]
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output", "-o", metavar="OUT.h5", help="Results file; default: none.", show_default=False
-    ),
-]
-PosteriorFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--posterior",
-        metavar="K.toml",
-        help="Distribution of K/H of the next specimen, as a table of a scenario; beside it K.csv,"
-        " with what is not known of its median and scatter, for `wearsim life --posterior`.",
-        show_default=False,
-    ),
-]
-PlanFlag = Annotated[
-    bool,
-    typer.Option("--plan", help="Power of planned tests instead of measured ones; needs -n."),
-]
-Numbers = Annotated[
-    str | None,
-    typer.Option(
-        "-n", metavar="3:60", help="Numbers of planned tests: 3:60 or 3,8,20.", show_default=False
-    ),
-]
-Measured = Annotated[
-    str | None,
-    typer.Option(
-        "--measured",
-        metavar="INPUT=SD,...",
-        help="Inputs that are measured in every planned test, with the standard deviation of the"
-        " logarithm: load=0.1,creepage=0.1.",
-        show_default=False,
-    ),
-]
-Draws = Annotated[
-    int | None,
-    typer.Option(
-        min=16,
-        metavar="M",
-        help="Draws of the inputs other than K/H; default: 256, 768 where traces leave few of them,"
-        " 128 where a wear test is needed for each of several K/H.",
-        show_default=False,
-    ),
-]
-Negligible = Annotated[
-    float,
-    typer.Option(min=0.0, metavar="SCATTER", help="Scatter of ln K/H that is negligible."),
-]
-
 
 def identify(
     scenario: ScenarioFile,
-    profiles: Profiles = None,
-    tests: Tests = None,
-    before: Before = None,
-    shoulders: Shoulders = None,
-    curvature: Curvature = False,
-    share: Share = None,
-    fix: Fix = None,
+    profiles: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="T1.csv T2.csv...",
+            help="Measured profiles, one of each test: CSV with columns 'y [mm]' and 'height [um]',"
+            " worn is negative, or 'depth [um]'; or a surface, SDF or X3P, whose lines are"
+            " averaged.",
+            show_default=False,
+        ),
+    ] = None,
+    tests: Annotated[
+        Path | None,
+        typer.Option(
+            "--tests",
+            metavar="TESTS.toml",
+            help="Tests as [[test]] tables: profile, depth with depth_std, or lift of a cam; angle"
+            " of a cam, before, at, group, set, std, body, shoulders, curvature, runout,"
+            " columns, units.",
+            show_default=False,
+        ),
+    ] = None,
+    before: Annotated[
+        str | None,
+        typer.Option(
+            "--before",
+            metavar="B1.csv,...",
+            help="Profiles of the same places before the tests, in the order of the tests.",
+            show_default=False,
+        ),
+    ] = None,
+    shoulders: Annotated[
+        str | None,
+        typer.Option(
+            "--shoulders",
+            metavar="DISTANCE",
+            help="Distance from the middle of the groove beyond which the surface is unworn: '9"
+            " mm'; default: beyond the predicted groove.",
+            show_default=False,
+        ),
+    ] = None,
+    curvature: Annotated[
+        bool,
+        typer.Option(
+            "--curvature",
+            help="Fit a curvature of each trace, as of a bow of the instrument's guide, beside"
+            " offset and inclination; needs unworn shoulders.",
+        ),
+    ] = False,
+    share: Annotated[
+        str | None,
+        typer.Option(
+            "--share",
+            metavar="k=cylinder,roller",
+            help="One unknown factor of K/H of both bodies, in the ratio of the scenario.",
+            show_default=False,
+        ),
+    ] = None,
+    fix: Annotated[
+        str | None,
+        typer.Option(
+            "--fix",
+            metavar="INPUT=VALUE,...",
+            help="Inputs that are known and equal in all tests: friction=0.1,load=310 N.",
+            show_default=False,
+        ),
+    ] = None,
     columns: Columns = None,
     units: Units = None,
     row: Row = None,
     mean_rows: MeanRows = None,
-    output: Output = None,
-    posterior: PosteriorFile = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="OUT.h5",
+            help="Results file; default: none.",
+            show_default=False,
+        ),
+    ] = None,
+    posterior: Annotated[
+        Path | None,
+        typer.Option(
+            "--posterior",
+            metavar="K.toml",
+            help="Distribution of K/H of the next specimen, as a table of a scenario; beside it"
+            " K.csv, with what is not known of its median and scatter, for `wearsim life"
+            " --posterior`.",
+            show_default=False,
+        ),
+    ] = None,
     figure: FigureOption = None,
-    plan: PlanFlag = False,
-    numbers: Numbers = None,
-    measured: Measured = None,
-    draws: Draws = None,
-    negligible: Negligible = 0.2,
+    plan: Annotated[
+        bool,
+        typer.Option("--plan", help="Power of planned tests instead of measured ones; needs -n."),
+    ] = False,
+    numbers: Annotated[
+        str | None,
+        typer.Option(
+            "-n",
+            metavar="3:60",
+            help="Numbers of planned tests: 3:60 or 3,8,20.",
+            show_default=False,
+        ),
+    ] = None,
+    measured: Annotated[
+        str | None,
+        typer.Option(
+            "--measured",
+            metavar="INPUT=SD,...",
+            help="Inputs that are measured in every planned test, with the standard deviation of"
+            " the logarithm: load=0.1,creepage=0.1.",
+            show_default=False,
+        ),
+    ] = None,
+    draws: Annotated[
+        int | None,
+        typer.Option(
+            min=16,
+            metavar="M",
+            help="Draws of the inputs other than K/H; default: 256, 768 where traces leave few of"
+            " them, 128 where a wear test is needed for each of several K/H.",
+            show_default=False,
+        ),
+    ] = None,
+    negligible: Annotated[
+        float,
+        typer.Option(min=0.0, metavar="SCATTER", help="Scatter of ln K/H that is negligible."),
+    ] = 0.2,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,
@@ -177,9 +178,7 @@ def identify(
 ) -> None:
     """Identify the wear factor from measured grooves, and whether it scatters."""
     check_figure(figure, force, "--figure")
-    given = {"seed": seed}
-    options = [f"{key}={value}" for key, value in given.items() if value is not None]
-    loaded = read_scenario(scenario, [*(settings or []), *options])
+    loaded = read_scenario(scenario, settings_with(settings, seed=seed))
     from wearsim.studies.identify.inputs import fixed
 
     overrides: dict[str, object] = {}
@@ -190,23 +189,15 @@ def identify(
     if plan:
         without = {"profiles": profiles, "--tests": tests, "-o": output, "--posterior": posterior}
         for name, value in without.items():
-            if value:
-                raise typer.BadParameter(f"takes no {name}", param_hint="--plan")
+            refuse(value, f"takes no {name}", "--plan")
         _plan(loaded, numbers, measured, draws, negligible, figure, json, quiet)
         return
-    for name, text in (("-n", numbers), ("--measured", measured)):
-        if text is not None:
-            raise typer.BadParameter("is for --plan", param_hint=name)
-    if (tests is None) == (not profiles):
-        raise typer.BadParameter(
-            "give the profiles of the tests, or --tests with a file of them; not both",
-            param_hint="T1.csv T2.csv...",
-        )
+    refuse_options({"-n": numbers, "--measured": measured}, "is for --plan")
+    text = "give the profiles of the tests, or --tests with a file of them; not both"
+    refuse((tests is None) == (not profiles), text, "T1.csv T2.csv...")
     choice = profile_choice(columns, units, row, mean_rows, None)
-    if tests is not None and (before or shoulders):
-        raise typer.BadParameter(
-            "give before and shoulders in the tests file", param_hint="--before or --shoulders"
-        )
+    text, both = "give before and shoulders in the tests file", "--before or --shoulders"
+    refuse(tests is not None and (before or shoulders), text, both)
     inputs = [*loaded.paths, *(profiles or []), *([tests] if tests else [])]
     levels = None if posterior is None else posterior.with_suffix(".csv")
     for path in (posterior, levels):
@@ -214,22 +205,16 @@ def identify(
             refuse_existing(path, force, "--posterior")
     for path in (figure, posterior, levels):
         refuse_same_file(path, output if output is not None else Path(), inputs)
-    distance = None
-    if shoulders is not None:
-        from wearsim.quantities import quantity
+    from wearsim.cli.progress import Counter, watching
+    from wearsim.quantities import quantity
+    from wearsim.report.page.page import save_text
 
-        with checking("--shoulders"):
-            distance = quantity(shoulders, "m")
+    with checking("--shoulders"):
+        distance = None if shoulders is None else quantity(shoulders, "m")
     bodies = _shared(share)
-    from wearsim.cli.progress import Counter
-    from wearsim.studies.identify.api import identify as study
-    from wearsim.studies.kernels import kernels_of
-
-    with (
-        checking("--before" if before else "T1.csv T2.csv..."),
-        Counter(quiet, kernels=lambda: kernels_of(loaded)) as counter,
-    ):
-        result = study(
+    place = "--before" if before else "T1.csv T2.csv..."
+    with checking(place), watching(Counter, loaded, quiet) as counter:
+        result = wearsim.identify(
             loaded,
             tests if tests is not None else list(profiles or []),
             output,
@@ -244,35 +229,23 @@ def identify(
             force=force,
             on_progress=counter,
         )
-    _finish(result, posterior, figure, json)
-
-
-def _finish(result: Any, posterior: Path | None, figure: Path | None, json: bool) -> None:
-    """Write posterior, figure, and the table or JSON."""
-    from wearsim.cli.render import draw_figure, show_view
-    from wearsim.report.page.page import save_text
-
-    files = {"results file": result.path, "posterior": posterior, "figure": figure}
     if posterior is not None:
         save_text(result.posterior_toml(), posterior)
-        files["both levels"] = posterior.with_suffix(".csv")
         save_text(result.posterior_csv(), posterior.with_suffix(".csv"))
-    draw_figure(result.view.panels(), figure)
-    more = {"posterior": posterior, "figure": figure}
-    show_view(result.view, json=json, files=files, more=more)
+    more = {"posterior": posterior, "both levels": levels}
+    files = {"results file": result.path, **more}
+    show_with_figure(result.view, figure, json=json, files=files, more=more)
 
 
 def _shared(text: str | None) -> tuple[str, ...]:
     """Return the bodies of --share."""
     if text is None:
         return ()
-    name, equals, bodies = text.partition("=")
-    found = tuple(body.strip() for body in bodies.split(","))
-    if name.strip() != "k" or not equals or sorted(found) != ["cylinder", "roller"]:
-        raise typer.BadParameter(
-            f"'{text}' is unknown, expected k=cylinder,roller", param_hint="--share"
-        )
-    return found
+    name, equals, listed = text.partition("=")
+    bodies = tuple(body.strip() for body in listed.split(","))
+    known = name.strip() == "k" and equals and sorted(bodies) == ["cylinder", "roller"]
+    refuse(not known, f"'{text}' is unknown, expected k=cylinder,roller", "--share")
+    return bodies
 
 
 def _plan(
@@ -286,46 +259,14 @@ def _plan(
     quiet: bool,
 ) -> None:
     """Write the power of planned tests."""
-    from wearsim.cli.progress import Counter
-    from wearsim.cli.render import draw_figure
+    from wearsim.cli.progress import Counter, watching
     from wearsim.studies.identify.panels import power_sheet
-    from wearsim.studies.identify.planning import plan_data, plan_tables, plan_tests, sizes
-    from wearsim.studies.kernels import kernels_of
+    from wearsim.studies.identify.planning import plan_data, plan_tables, plan_tests
 
-    if numbers is None:
-        raise typer.BadParameter("is needed for --plan: 3:60 or 3,8,20", param_hint="-n")
-    first, colon, last = numbers.partition(":")
-    try:
-        if colon:
-            counts = sizes(int(first), int(last))
-        else:
-            counts = sorted({int(part) for part in numbers.split(",")})
-    except (ValueError, OverflowError):
-        counts = []
-    if not counts or counts[0] < 2 or counts[-1] > 1000 or (colon and int(first) > int(last)):
-        raise typer.BadParameter(
-            f"'{numbers}' is no range of 2 to 1000 tests, expected 3:60 or 3,8,20", param_hint="-n"
-        )
-    stds: dict[str, float] = {}
-    for part in measured.split(",") if measured else []:
-        name, _, value = part.partition("=")
-        try:
-            stds[name.strip()] = float(value)
-        except ValueError:
-            stds[name.strip()] = 0.0
-        if stds[name.strip()] <= 0.0:
-            raise typer.BadParameter(
-                f"'{part}' is no input with a standard deviation above 0, such as load=0.1",
-                param_hint="--measured",
-            )
-    with Counter(quiet, kernels=lambda: kernels_of(scenario)) as counter:
+    counts, stds = _sizes(numbers), _measured(measured)
+    with watching(Counter, scenario, quiet) as counter:
         designs = plan_tests(
-            scenario,
-            counts,
-            stds,
-            negligible=negligible,
-            draws=draws,
-            on_progress=counter,
+            scenario, counts, stds, negligible=negligible, draws=draws, on_progress=counter
         )
     draw_figure(power_sheet(designs, scenario.title), figure)
     if json:
@@ -338,3 +279,33 @@ def _plan(
         typer.echo("\n".join(sentences))
     if figure is not None:
         typer.echo(f"figure: {figure}")
+
+
+def _sizes(numbers: str | None) -> list[int]:
+    """Return the numbers of planned tests of -n: "3:60" or "3,8,20"."""
+    from wearsim.studies.identify.planning import sizes
+
+    refuse(numbers is None, "is needed for --plan: 3:60 or 3,8,20", "-n")
+    first, colon, last = str(numbers).partition(":")
+    counts: list[int] = []
+    with suppress(ValueError, OverflowError):
+        listed = () if colon else str(numbers).split(",")
+        counts = sizes(int(first), int(last)) if colon else sorted(set(map(int, listed)))
+    wrong = not counts or counts[0] < 2 or counts[-1] > 1000 or (colon and int(first) > int(last))
+    text = f"'{numbers}' is no range of 2 to 1000 tests, expected 3:60 or 3,8,20"
+    refuse(wrong, text, "-n")
+    return counts
+
+
+def _measured(text: str | None) -> dict[str, float]:
+    """Return the inputs of --measured with the standard deviations of their logarithms."""
+    stds: dict[str, float] = {}
+    for part in text.split(",") if text else []:
+        name, _, value = part.partition("=")
+        std = 0.0
+        with suppress(ValueError):
+            std = float(value)
+        message = f"'{part}' is no input with a standard deviation above 0, such as load=0.1"
+        refuse(not std > 0.0, message, "--measured")
+        stds[name.strip()] = std
+    return stds

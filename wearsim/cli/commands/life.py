@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wearsim.cli.commands.ensemble import STOPPING, parse_sweep
+import wearsim
+from wearsim.cli.commands.ensemble import swept
+from wearsim.cli.render import draw_figure, show_view
 from wearsim.cli.shared import (
     FigureOption,
     Force,
@@ -24,124 +26,117 @@ from wearsim.cli.shared import (
     check_figure,
     checked_scheduler,
     checking,
+    checking_arguments,
     note,
     read_scenario,
+    refuse,
+    refuse_options,
     refuse_same_file,
     results_option,
+    settings_with,
 )
-from wearsim.errors import Interrupted, ResultsFileError
+from wearsim.errors import Interrupted, ResultsFileError, SolverError
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
     from wearsim.studies.life.result import LifeResult
 
-Designs = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="SCENARIO...",
-        help="Scenario, or two to compare with common draws; or files of earlier studies, .h5.",
-        show_default=False,
-    ),
-]
-Realisations = Annotated[
-    int, typer.Option("--realisations", "-n", min=1, metavar="N", help="Number of realisations.")
-]
-Limits = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--limit",
-        metavar="NAME=VALUE",
-        help="Limit that ends the life: depth=50um, roller_depth, lift_error, volume, width,"
-        " peak_pressure or clearance. May be repeated; the first that is reached counts.",
-        show_default=False,
-    ),
-]
 Life = "a number of passes, or turns of a cam, or a time such as '200 h'"
-Target = Annotated[
-    str | None,
-    typer.Option(
-        metavar="LIFE",
-        help=f"Life of which the probability is estimated: {Life}.",
-        show_default=False,
-    ),
-]
-Shares = Annotated[
-    str,
-    typer.Option("--b", metavar="P1,P2,...", help="Percentages failed of the lives shown."),
-]
-Most = Annotated[
-    str | None,
-    typer.Option(
-        "--max",
-        metavar="LIFE",
-        help="Life at which tests are censored, as --target; default: ten times the longer of"
-        " target and test.",
-        show_default=False,
-    ),
-]
-Precision = Annotated[
-    str | None,
-    typer.Option(
-        metavar="TARGET",
-        help="Stop when the relative half-width of a 95 % confidence interval is reached:"
-        " 'b10 3%'.",
-        show_default=False,
-    ),
-]
-Rare = Annotated[
-    int,
-    typer.Option(
-        min=0,
-        metavar="N",
-        help="Number of further tests for a small probability of a life before --target.",
-        show_default=False,
-    ),
-]
-RareMethod = Annotated[
-    str,
-    typer.Option(
-        metavar="METHOD",
-        help="Method of --rare: importance sampling, subset simulation, or auto, the second with"
-        " at most as many tests again where the first fails.",
-    ),
-]
-Sweep = Annotated[
-    str | None,
-    typer.Option(
-        metavar="KEY=V1,V2,...",
-        help="Life for each value of a key, with common draws: cam.base_radius=25mm,27mm.",
-        show_default=False,
-    ),
-]
-Posterior = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="K.csv",
-        help="K/H with what is not known of it, from `wearsim identify --posterior`, instead of the"
-        " wear factor of the scenario; of a results file without new tests.",
-        show_default=False,
-    ),
-]
-Output = Annotated[Path | None, results_option("-life.h5")]
 _FILES = {".h5", ".hdf5"}
 
 
 def life(
-    designs: Designs,
-    realisations: Realisations = 400,
-    limit: Limits = None,
-    target: Target = None,
-    b: Shares = "1,10,50",
-    most: Most = None,
-    precision: Precision = None,
-    rare: Rare = 0,
-    rare_method: RareMethod = "auto",
-    output: Output = None,
+    designs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="SCENARIO...",
+            help="Scenario, or two to compare with common draws; or files of earlier studies, .h5.",
+            show_default=False,
+        ),
+    ],
+    realisations: Annotated[
+        int,
+        typer.Option("--realisations", "-n", min=1, metavar="N", help="Number of realisations."),
+    ] = 400,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="NAME=VALUE",
+            help="Limit that ends the life: depth=50um, roller_depth, lift_error, volume, width,"
+            " peak_pressure or clearance. May be repeated; the first that is reached counts.",
+            show_default=False,
+        ),
+    ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LIFE",
+            help=f"Life of which the probability is estimated: {Life}.",
+            show_default=False,
+        ),
+    ] = None,
+    b: Annotated[
+        str,
+        typer.Option("--b", metavar="P1,P2,...", help="Percentages failed of the lives shown."),
+    ] = "1,10,50",
+    most: Annotated[
+        str | None,
+        typer.Option(
+            "--max",
+            metavar="LIFE",
+            help="Life at which tests are censored, as --target; default: ten times the longer of"
+            " target and test.",
+            show_default=False,
+        ),
+    ] = None,
+    precision: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TARGET",
+            help="Stop when the relative half-width of a 95 % confidence interval is reached:"
+            " 'b10 3%'.",
+            show_default=False,
+        ),
+    ] = None,
+    rare: Annotated[
+        int,
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Number of further tests for a small probability of a life before --target.",
+            show_default=False,
+        ),
+    ] = 0,
+    rare_method: Annotated[
+        str,
+        typer.Option(
+            metavar="METHOD",
+            help="Method of --rare: importance sampling, subset simulation, or auto, the second"
+            " with at most as many tests again where the first fails.",
+        ),
+    ] = "auto",
+    output: Annotated[Path | None, results_option("-life.h5")] = None,
     figure: FigureOption = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
-    posterior: Posterior = None,
-    sweep: Sweep = None,
+    sweep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY=V1,V2,...",
+            help="Life for each value of a key, with common draws: cam.base_radius=25mm,27mm.",
+            show_default=False,
+        ),
+    ] = None,
+    posterior: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="K.csv",
+            help="K/H with what is not known of it, from `wearsim identify --posterior`, instead of"
+            " the wear factor of the scenario; of a results file without new tests.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,
@@ -153,76 +148,76 @@ def life(
     with checking("--b"):
         shares = _shares(b)
     files = [path.suffix.lower() in _FILES for path in designs]
-    if len(designs) > 2 and not all(files):
-        raise typer.BadParameter("give one design, or two to compare", param_hint="SCENARIO")
-    if len({path.resolve() for path in designs}) < len(designs):
-        raise typer.BadParameter(f"{designs[0]} is given twice", param_hint="SCENARIO")
+    too_many, unique = len(designs) > 2 and not all(files), {path.resolve() for path in designs}
+    refuse(too_many, "give one design, or two to compare", "SCENARIO")
+    refuse(len(unique) < len(designs), f"{designs[0]} is given twice", "SCENARIO")
+    mixed = any(files) and not all(files)
+    refuse(mixed, "compare two scenarios or two results files, not one of each", "SCENARIO")
     if any(files):
-        if not all(files):
-            raise typer.BadParameter(
-                "compare two scenarios or two results files, not one of each",
-                param_hint="SCENARIO",
-            )
-        given = {
+        given: dict[str, object] = {
             "--limit": limit,
             "--max": most,
             "--precision": precision,
             "--sweep": sweep,
-            "--set": settings,
-            "--seed": seed,
-            "--output": output,
         }
-        for option, value in given.items():
-            if value is not None:
-                raise typer.BadParameter("has no meaning for results files", param_hint=option)
+        given |= {"--set": settings, "--seed": seed, "--output": output}
+        refuse_options(given, "has no meaning for results files")
+        results = [_opened(path, target, shares, posterior) for path in designs]
+        variables = [result.variable for result in results]
         from wearsim.studies.life.stored_settings import swept_variable
 
-        results = [_opened(path, target, shares, posterior) for path in designs]
-        labels = _labels(designs)
-        if swept_variable(results):
-            labels = [one.variable.text for one in results if one.variable]
-        report(results, labels, json, figure)
+        is_sweep = swept_variable(results)
+        labels = [item.text for item in variables if item] if is_sweep else _labels(designs)
+        show_lives(results, labels, json, figure)
         return
-    with checking("--precision"):
-        if precision is not None:
-            from wearsim.studies.life.stored_settings import LifeTarget
-
-            LifeTarget.parse(precision)
-    from wearsim.studies.life.factor import with_posterior
-
-    texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
-    labels, variants, key = _variants(designs, sweep, texts)
+    labels, scenarios, key = _variants(designs, sweep, settings_with(settings, seed=seed))
     if posterior is not None:
+        from wearsim.studies.life.factor import with_posterior
+
         with checking("--posterior"):
-            variants = [with_posterior(scenario, posterior) for scenario in variants]
-    options: dict[str, Any] = {
-        "limits": limit or [],
+            scenarios = [with_posterior(scenario, posterior) for scenario in scenarios]
+    arguments: dict[str, Any] = {
         "target": target,
         "b": shares,
         "most": most,
         "precision": precision,
-        "rare": rare,
-        "rare_method": rare_method,
-        "variable": key,
-        "workers": workers,
-        "scheduler": checked_scheduler(scheduler, workers),
-        "force": force,
     }
-    results = _run(labels, variants, realisations, output, figure, quiet, options)
-    report(results, labels, json, figure)
+    arguments |= {"rare": rare, "rare_method": rare_method}
+    from wearsim.studies.life.settings import checked_study
+
+    with checking_arguments(limits="--limit", most="--max"):
+        scenarios = [
+            checked_study(scenario, realisations, limits=limit or [], **arguments)[0]
+            for scenario in scenarios
+        ]
+    paths = _paths(scenarios, labels, output)
+    scheduler = checked_scheduler(scheduler, workers)
+    going_on = partial(_going_on, labels, scenarios, paths, key)
+    from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
+    from wearsim.results.io.outputs import check_output
+
+    for scenario, path in zip(scenarios, paths, strict=True):
+        refuse_same_file(figure, path, scenario.paths)
+        with going_on(path):
+            check_output(path, force, scenario.paths)
+    arguments |= {"variable": key, "workers": workers, "scheduler": scheduler, "force": force}
+    results = []
+    for label, scenario, path in zip(labels, scenarios, paths, strict=True):
+        if len(scenarios) > 1 and not quiet:
+            note(f"{label}: {path}")
+        with going_on(path), watching(EnsembleWatcher, scenario, quiet, BATCHES) as watch:
+            lives = wearsim.life(scenario, realisations, path, **arguments, **watch.callbacks)
+        results.append(lives)
+    show_lives(results, labels, json, figure)
 
 
 def _variants(
     designs: Sequence[Path], sweep: str | None, texts: list[str]
-) -> tuple[list[str], list[Any], str]:
+) -> tuple[list[str], list[Scenario], str]:
     """Return labels and scenarios of the designs, all with one seed, and the key of a sweep."""
-    if sweep is not None:
-        if len(designs) > 1:
-            raise typer.BadParameter("goes with one scenario", param_hint="--sweep")
-        with checking("--sweep"):
-            key, values = parse_sweep(sweep)
-        if any(text.partition("=")[0].strip() == key for text in texts):
-            raise typer.BadParameter(f"{key} is also the key of --sweep", param_hint="--set")
+    refuse(sweep is not None and len(designs) > 1, "goes with one scenario", "--sweep")
+    key, values = swept(sweep, texts)
+    if key:
         scenarios = [read_scenario(designs[0], [*texts, f"{key}={value}"]) for value in values]
         return list(values), scenarios, key
     scenarios = [read_scenario(path, texts) for path in designs]
@@ -232,70 +227,17 @@ def _variants(
     return _labels(designs), scenarios, ""
 
 
-def _run(
-    labels: Sequence[str],
-    scenarios: Sequence[Any],
-    realisations: int,
-    output: Path | None,
-    figure: Path | None,
-    quiet: bool,
-    options: dict[str, Any],
-) -> list[LifeResult]:
-    """Run the studies of all designs, and return their results."""
-    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
-    from wearsim.results.io.outputs import check_output
+def _paths(scenarios: Sequence[Scenario], labels: Sequence[str], output: Path | None) -> list[Path]:
+    """Return the results files of the designs."""
     from wearsim.studies.ensemble.sweep import path_of
-    from wearsim.studies.kernels import kernels_of
-    from wearsim.studies.life import api, settings
+    from wearsim.studies.life.settings import results_file
 
-    several = len(scenarios) > 1
-    base = output or settings.results_file(scenarios[0])
-    same = {settings.results_file(scenario) for scenario in scenarios}
-    if not several:
-        paths = [base]
-    elif output is None and len(same) == len(scenarios):
-        paths = [settings.results_file(scenario) for scenario in scenarios]
-    else:
-        paths = [path_of(base, label) for label in labels]
-    checked = []
-    for scenario in scenarios:
-        with checking("--limit"):
-            checked.append(settings.with_limits(scenario, options["limits"]))
-    for name, option in (("target", "--target"), ("most", "--max")):
-        with checking(option):
-            for scenario in checked:
-                aim = options["target"]
-                most = options["most"] if name == "most" else None
-                settings.settings_of(scenario, realisations, aim, (10.0,), most)
-    with checking("--rare"):
-        for scenario in checked:
-            chosen = settings.settings_of(
-                scenario, realisations, options["target"], (10.0,), options["most"]
-            )
-            rare = (options[name] for name in ("rare", "precision", "rare_method"))
-            settings.with_rare_events(scenario, chosen, *rare)
-    going_on = partial(_going_on, labels, checked, paths, options["variable"])
-    for scenario, path in zip(checked, paths, strict=True):
-        refuse_same_file(figure, path, scenario.paths)
-        with going_on(path):
-            check_output(path, options["force"], scenario.paths)
-    results = []
-    for label, scenario, path in zip(labels, checked, paths, strict=True):
-        if several and not quiet:
-            note(f"{label}: {path}")
-        watcher = EnsembleWatcher(quiet, kernels=partial(kernels_of, scenario))
-        with going_on(path), stop_on_signals(STOPPING) as stop, watcher as watch:
-            found = api.life(
-                scenario,
-                realisations,
-                path,
-                on_progress=watch,
-                stop_requested=stop.is_set,
-                on_notice=watch.notice,
-                **{**options, "limits": []},
-            )
-        results.append(found)
-    return results
+    paths = [results_file(scenario) for scenario in scenarios]
+    base = output or paths[0]
+    if len(scenarios) == 1:
+        return [base]
+    are_different = output is None and len(set(paths)) == len(paths)
+    return paths if are_different else [path_of(base, label) for label in labels]
 
 
 def _labels(paths: Sequence[Path]) -> list[str]:
@@ -318,31 +260,26 @@ def _opened(
     path: Path, target: str | None, shares: tuple[float, ...], posterior: Path | None
 ) -> LifeResult:
     """Return the result in a file, for another target, other percentages and another K/H."""
-    from wearsim.errors import ResultsFileError
-    from wearsim.studies.life.result import LifeResult
+    from wearsim.results.kinds import kind_of
     from wearsim.studies.life.settings import parse_life
-    from wearsim.studies.opening import open_results
 
-    result = open_results(path)
-    if not isinstance(result, LifeResult):
+    if kind_of(path).name != "life":
         raise ResultsFileError(f"{path}: holds no study of lives; wearsim life SCENARIO makes one")
+    result: LifeResult = wearsim.open_results(path)
     changed: dict[str, Any] = {"shares": list(shares)}
     if target is not None:
         with checking("--target"):
-            found = parse_life(target, result.unit, result.settings.rate, "target")
-            if found > result.most:
-                raise ValueError(
-                    f"{found:,.0f} {result.unit} is beyond the maximum of {path},"
-                    f" {result.most:,.0f} {result.unit}"
-                )
-        changed["target"] = found * result.settings.per_unit
+            life = parse_life(target, result.unit, result.settings.rate, "target")
+        text = f"{life:,.0f} {result.unit} is beyond the maximum of {path}"
+        refuse(life > result.most, f"{text}, {result.most:,.0f} {result.unit}", "--target")
+        changed["target"] = life * result.settings.per_unit
     if posterior is not None:
         with checking("--posterior"):
             result = result.with_posterior(posterior)
     return result.with_settings(**changed)
 
 
-def report(
+def show_lives(
     results: Sequence[LifeResult], labels: Sequence[str], json: bool, figure: Path | None
 ) -> None:
     """Write the lives of designs to stdout, and compare each with the first.
@@ -361,23 +298,21 @@ def report(
     ResultsFileError, SolverError
         If the units of lives differ, or all realisations of a design failed.
     """
-    from wearsim.cli.render import draw_figure, show_view
-    from wearsim.errors import SolverError
     from wearsim.studies.opening import comparison_of
 
     views = [result.view for result in results]
-    for result in results:
+    for result, view in zip(results, views, strict=True):
         if result.failed and not result.count:
-            note(f"warning: {result.view.failures}")
+            note(f"warning: {view.failures}")
             raise SolverError(f"{result.path}: all realisations failed")
-    compared = comparison_of(results, labels) if len(results) > 1 else views[0]
-    draw_figure(compared.panels(), figure)
-    if not json or compared is views[0]:
-        for result, view in zip(results, views, strict=True):
-            files = {"results file": result.path}
-            show_view(view, json=json, files=files, more={"figure": figure})
-    if compared is not views[0]:
-        show_view(compared, json=json, more={"figure": figure})
+    paths = [result.path for result in results]
+    if len(results) > 1:
+        views.append(comparison_of(results, labels))
+        paths.append(None)
+    draw_figure(views[-1].panels(), figure)
+    first = len(views) - 1 if json else 0
+    for view, path in zip(views[first:], paths[first:], strict=True):
+        show_view(view, json=json, files={"results file": path}, more={"figure": figure})
     if figure is not None and not json:
         note(f"figure: {figure}")
 

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wearsim.cli.render import show_with_figure
 from wearsim.cli.shared import (
     Figure,
     Force,
     Json,
     check_figure,
+    checking,
 )
 
 if TYPE_CHECKING:
@@ -20,32 +22,29 @@ if TYPE_CHECKING:
 _COLUMNS, _ROWS = 60, 8
 _BLOCKS = " ▁▂▃▄▅▆▇█"
 
-Support = Annotated[
-    tuple[str, str],
-    typer.Option(
-        "--support",
-        metavar="LOW HIGH",
-        help="Least and greatest possible value: 0 inf.",
-        show_default=False,
-    ),
-]
-Mean = Annotated[float | None, typer.Option("--mean", help="Mean.", show_default=False)]
-Std = Annotated[float | None, typer.Option("--std", help="Standard deviation.", show_default=False)]
-MeanLog = Annotated[
-    float | None,
-    typer.Option(
-        "--mean-log",
-        help="Mean of the natural logarithm, instead of --std: a gamma distribution.",
-        show_default=False,
-    ),
-]
-
 
 def maxent(
-    support: Support,
-    mean: Mean = None,
-    std: Std = None,
-    mean_log: MeanLog = None,
+    support: Annotated[
+        tuple[str, str],
+        typer.Option(
+            "--support",
+            metavar="LOW HIGH",
+            help="Least and greatest possible value: 0 inf.",
+            show_default=False,
+        ),
+    ],
+    mean: Annotated[float | None, typer.Option("--mean", help="Mean.", show_default=False)] = None,
+    std: Annotated[
+        float | None, typer.Option("--std", help="Standard deviation.", show_default=False)
+    ] = None,
+    mean_log: Annotated[
+        float | None,
+        typer.Option(
+            "--mean-log",
+            help="Mean of the natural logarithm, instead of --std: a gamma distribution.",
+            show_default=False,
+        ),
+    ] = None,
     figure: Figure = None,
     json: Json = False,
     force: Force = False,
@@ -60,24 +59,18 @@ def maxent(
         )
     except Infeasible as error:
         raise Infeasible(re.sub(r"\bmean_log\b", "--mean-log", str(error))) from error
-    from wearsim.cli.render import draw_figure, show_view
     from wearsim.report.maxent import MaxentView
 
     view = MaxentView(distribution)
-    draw_figure(view.panels(), figure)
-    show_view(view, json=json, files={"figure": figure}, more={"figure": figure})
+    show_with_figure(view, figure, json=json)
     if not json:
         typer.echo("\n".join(_plot(distribution)))
 
 
 def _limit(text: str) -> float:
     """Return an end of the support, which may be infinite."""
-    try:
+    with checking("--support", f"'{text}' is not a number, expected one such as 0, -2.5 or inf"):
         return float(text)
-    except ValueError as error:
-        raise typer.BadParameter(
-            f"'{text}' is not a number, expected one such as 0, -2.5 or inf", param_hint="--support"
-        ) from error
 
 
 def _plot(distribution: MaxentDistribution) -> list[str]:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+import wearsim
+from wearsim.atomic_write import refuse_inputs
 from wearsim.cli.commands.results import Angle, Level, MeasuredFiles, measured_profiles
 from wearsim.cli.shared import (
     At,
@@ -18,31 +20,29 @@ from wearsim.cli.shared import (
     check_new_file,
     note,
     profile_choice,
+    refuse,
 )
-
-Files = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="FILE.h5...",
-        help="Results files of any kind; several runs and ensembles are also compared.",
-        show_default=False,
-    ),
-]
-Page = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="PAGE",
-        help="Page to write, by default the name of the first file with .html.",
-        show_default=False,
-    ),
-]
 
 
 def report(
-    files: Files,
-    output: Page = None,
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE.h5...",
+            help="Results files of any kind; several runs and ensembles are also compared.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="PAGE",
+            help="Page to write, by default the name of the first file with .html.",
+            show_default=False,
+        ),
+    ] = None,
     measured: MeasuredFiles = None,
     angle: Angle = None,
     level: Level = False,
@@ -55,14 +55,13 @@ def report(
 ) -> None:
     """Write one page on results for a browser: answers, interactive figures, inputs."""
     path = output if output is not None else Path(f"{files[0].stem}.html")
-    if path.suffix.lower() not in {".html", ".htm"}:
-        raise typer.BadParameter(f"'{path}' does not end in .html", param_hint="-o")
-    from wearsim.atomic_write import refuse_inputs
-    from wearsim.studies.opening import open_results, save_report
+    is_page = path.suffix.lower() in {".html", ".htm"}
+    refuse(not is_page, f"'{path}' does not end in .html", "-o")
+    from wearsim.studies.opening import save_report
 
     refuse_inputs(path, files, "the page")
     refuse_inputs(path, measured or [], "a measured profile")
-    results = [open_results(file) for file in files]
+    results = [wearsim.open_results(file) for file in files]
     check_new_file(path, force)
     choice = profile_choice(columns, units, row, mean_rows, at)
     views = [result.view for result in results]

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+import wearsim
+from wearsim.atomic_write import refuse_inputs
+from wearsim.cli.render import draw_figure, show_view, show_with_figure
 from wearsim.cli.shared import (
     At,
     Columns,
@@ -22,16 +25,16 @@ from wearsim.cli.shared import (
     checking,
     note,
     profile_choice,
+    refuse,
+    refuse_options,
     write_notes,
 )
 
 if TYPE_CHECKING:
+    from wearsim.levelling import Measured
     from wearsim.profiles import ProfileChoice
-    from wearsim.report.measured import Measured
     from wearsim.report.view import View
 
-
-_MISALIGNED = 0.5  # ratio of residuals below which levelling is suggested
 
 MeasuredFiles = Annotated[
     list[Path] | None,
@@ -78,18 +81,12 @@ def plot(
 ) -> None:
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
-    from wearsim.atomic_write import refuse_inputs
-    from wearsim.cli.render import draw_figure
-    from wearsim.studies.opening import open_results
-
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
-    view = open_results(file).view
+    view = wearsim.open_results(file).view
     check_figure(path, force)
-    if measured and view.profile() is None:
-        raise typer.BadParameter(
-            f"requires wear tests; {file} holds none: {view.question}", param_hint="--measured"
-        )
+    text = f"requires wear tests; {file} holds none: {view.question}"
+    refuse(measured and view.profile() is None, text, "--measured")
     choice = profile_choice(columns, units, row, mean_rows, at)
     draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path)
     note(f"figure: {path}")
@@ -107,21 +104,16 @@ def measured_profiles(
     How signs were read and the residuals go to stderr.
     """
     if not files:
-        for name, given in (("--level", level), ("--angle", angle)):
-            if given:
-                raise typer.BadParameter("needs a measured profile, --measured", param_hint=name)
+        given = {"--level": level, "--angle": angle}
+        refuse_options(given, "needs a measured profile, --measured")
         return []
-    at = None
-    if angle is not None:
-        from wearsim.quantities import quantity
-
-        with checking("--angle"):
-            at = quantity(angle, "rad")
-    from wearsim.errors import ScenarioError
+    from wearsim.levelling import Measured, levelled
     from wearsim.profiles import load_profile, sign_note
-    from wearsim.report.measured import Measured, levelled, residual_text, rms
-    from wearsim.report.text import shown
+    from wearsim.quantities import quantity
+    from wearsim.report.measured import level_hint, residual_text
 
+    with checking("--angle"):
+        at = None if angle is None else quantity(angle, "rad")
     read = {file: load_profile(file, choice) for file in files}
     signs = (sign_note(profile, choice, str(file)) for file, profile in read.items())
     write_notes(filter(None, signs))
@@ -129,77 +121,54 @@ def measured_profiles(
         Measured(file.stem, profile.y, profile.height, at) for file, profile in read.items()
     ]
     test = next((view for view in views if view.profile() is not None), None)
-    if at is not None and not (test is not None and test.has_angles):
-        raise typer.BadParameter(
-            "is for the run of a cam; ensembles hold the deepest groove", param_hint="--angle"
-        )
+    text = "is for the run of a cam; ensembles hold the deepest groove"
+    refuse(at is not None and not (test is not None and test.has_angles), text, "--angle")
     computed = None if test is None else test.profile(at)
     if computed is None:
         return profiles
-    for place, profile in enumerate(profiles):
-        try:
-            corrected = levelled(profile, computed)
-        except ScenarioError:
-            if level:
-                raise
-            corrected = profile
-        text = f"{profile.label}: {residual_text(corrected if level else profile, computed)}"
-        if level:
-            profiles[place] = corrected
-        elif rms(corrected, computed) < _MISALIGNED * rms(profile, computed):
-            text += f"; rms {shown(rms(corrected, computed), 'um', 3)} with --level"
-        note(text)
+    if level:
+        profiles = [levelled(profile, computed) for profile in profiles]
+    for profile in profiles:
+        hint = "" if level else level_hint(profile, computed)
+        note(f"{profile.label}: {residual_text(profile, computed)}{hint}")
     return profiles
 
 
 def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
-    from wearsim.cli.render import show_view
-    from wearsim.studies.opening import open_results
-
-    show_view(open_results(file).view, json=json, stored=True)
-
-
-Files = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="FILE.h5 FILE.h5...",
-        help="Results files of runs and ensembles; all others are compared with the first.",
-        show_default=False,
-    ),
-]
-Observable = Annotated[
-    str,
-    typer.Option(
-        metavar="NAME",
-        help="Quantity to compare: depth, width, worn_volume, dissipated_energy...",
-    ),
-]
+    show_view(wearsim.open_results(file).view, json=json, stored=True)
 
 
 def compare(
-    files: Files,
-    observable: Observable = "depth",
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE.h5 FILE.h5...",
+            help="Results files of runs and ensembles; all others are compared with the first.",
+            show_default=False,
+        ),
+    ],
+    observable: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Quantity to compare: depth, width, worn_volume, dissipated_energy...",
+        ),
+    ] = "depth",
     figure: Figure = None,
     json: Json = False,
     force: Force = False,
 ) -> None:
     """Compare runs and ensembles, with confidence intervals."""
-    if len(files) < 2:
-        raise typer.BadParameter(
-            f"there is one file, {files[0]}; give another one to compare", param_hint="FILE.h5"
-        )
-    from wearsim.atomic_write import refuse_inputs
-    from wearsim.cli.render import draw_figure, show_view
-    from wearsim.studies.opening import comparison_of, open_results
-
+    text = f"there is one file, {files[0]}; give another one to compare"
+    refuse(len(files) < 2, text, "FILE.h5")
     if figure is not None:
         refuse_inputs(figure, files, "the comparison")
-    results = [open_results(file) for file in files]
+    from wearsim.studies.opening import comparison_of
+
+    results = [wearsim.open_results(file) for file in files]
     check_figure(figure, force)
-    view = comparison_of(results, _labels(files), observable)
-    draw_figure(view.panels(), figure)
-    show_view(view, json=json, files={"figure": figure}, more={"figure": figure})
+    show_with_figure(comparison_of(results, _labels(files), observable), figure, json=json)
 
 
 def _labels(files: list[Path]) -> list[str]:
@@ -209,40 +178,37 @@ def _labels(files: list[Path]) -> list[str]:
         return stems
     names = [str(file) for file in files]
     for name in names:
-        if names.count(name) > 1:
-            raise typer.BadParameter(f"{name} is given twice", param_hint="FILE.h5")
+        refuse(names.count(name) > 1, f"{name} is given twice", "FILE.h5")
     return names
 
 
-Folder = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="DIR",
-        help="Folder for the CSV files, by default the name of the results file.",
-        show_default=False,
-    ),
-]
-
-
-Decimal = Annotated[
-    str,
-    typer.Option(
-        "--decimal", metavar="SIGN", help="Decimal sign: '.', or ',' with semicolons between cells."
-    ),
-]
-
-
 def export(
-    file: ResultsFile, output: Folder = None, decimal: Decimal = ".", force: Force = False
+    file: ResultsFile,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="DIR",
+            help="Folder for the CSV files, by default the name of the results file.",
+            show_default=False,
+        ),
+    ] = None,
+    decimal: Annotated[
+        str,
+        typer.Option(
+            "--decimal",
+            metavar="SIGN",
+            help="Decimal sign: '.', or ',' with semicolons between cells.",
+        ),
+    ] = ".",
+    force: Force = False,
 ) -> None:
     """Write a results file as CSV, with units in the headers."""
-    if decimal not in {".", ","}:
-        raise typer.BadParameter(f"'{decimal}' is neither '.' nor ','", param_hint="--decimal")
-    from wearsim.studies.opening import export_csv, open_results
+    refuse(decimal not in {".", ","}, f"'{decimal}' is neither '.' nor ','", "--decimal")
+    from wearsim.studies.opening import export_csv
 
     sign: Literal[".", ","] = "," if decimal == "," else "."
     folder = output if output is not None else Path(file.stem)
-    for path in export_csv(open_results(file), folder, force=force, decimal=sign):
+    for path in export_csv(wearsim.open_results(file), folder, force=force, decimal=sign):
         typer.echo(str(path))

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import wearsim
+from wearsim.cli.commands.ensemble import show_ensemble
+from wearsim.cli.render import show_view
 from wearsim.cli.shared import (
     Force,
     Json,
@@ -21,6 +24,8 @@ from wearsim.cli.shared import (
     checking,
     note,
     read_scenario,
+    refuse,
+    refuse_options,
     results_option,
     write_notes,
 )
@@ -28,10 +33,6 @@ from wearsim.errors import ResultsFileError, SolverError, WearsimError
 
 if TYPE_CHECKING:
     from wearsim.studies.ensemble.result import EnsembleResult
-    from wearsim.studies.run.result import Result
-
-
-Output = Annotated[Path | None, results_option(".h5")]
 
 
 Until = Annotated[
@@ -48,7 +49,7 @@ Until = Annotated[
 
 def run(
     scenario: ScenarioFile,
-    output: Output = None,
+    output: Annotated[Path | None, results_option(".h5")] = None,
     until: Until = None,
     settings: Settings = None,
     force: Force = False,
@@ -59,112 +60,83 @@ def run(
     check_limit(until)
     loaded = read_scenario(scenario, settings)
     path = output if output is not None else Path(f"{scenario.stem}.h5")
-    from wearsim.cli.progress import RunWatcher, stop_on_signals
-    from wearsim.studies.kernels import kernels_of
-    from wearsim.studies.run import run as study
+    from wearsim.cli.progress import CHECKPOINT, RunWatcher, watching
 
     write_notes(loaded.notes)
-    watcher = RunWatcher(quiet, kernels=lambda: kernels_of(loaded))
     try:
-        with stop_on_signals() as stop, watcher as watch:
-            result = study.run(
-                loaded, path, until=until, force=force, on_event=watch, stop_requested=stop.is_set
-            )
+        with watching(RunWatcher, loaded, quiet, CHECKPOINT) as watch:
+            result = wearsim.run(loaded, path, until=until, force=force, **watch.callbacks)
     except SolverError as error:
-        from wearsim.studies.opening import open_results
-
         with suppress(WearsimError):  # a file that was there before may be of any kind
-            if getattr(open_results(path), "failure", ""):
+            if getattr(wearsim.open_results(path), "failure", ""):
                 error.add_note(f"the last accepted step is kept: wearsim show {path}")
         raise
-    from wearsim.cli.render import show_view
-
     files = {"results file": result.path}
     show_view(result.view, json=json, files=files, known=loaded.notes)
-
-
-More = Annotated[
-    int | None,
-    typer.Option(
-        "--realisations",
-        "-n",
-        min=1,
-        help="New number of realisations of an ensemble; extends it.",
-        show_default=False,
-    ),
-]
-AllowDeep = Annotated[
-    bool,
-    typer.Option(
-        "--allow-deep",
-        help="Continue a wear test beyond a depth of a tenth of the roller's radius.",
-    ),
-]
-Failed = Annotated[
-    bool, typer.Option("--failed", help="Repeat the failed realisations of an ensemble.")
-]
 
 
 def resume(
     file: ResultsFile,
     until: Until = None,
-    allow_deep: AllowDeep = False,
-    failed: Failed = False,
-    realisations: More = None,
+    allow_deep: Annotated[
+        bool,
+        typer.Option(
+            "--allow-deep",
+            help="Continue a wear test beyond a depth of a tenth of the roller's radius.",
+        ),
+    ] = False,
+    failed: Annotated[
+        bool, typer.Option("--failed", help="Repeat the failed realisations of an ensemble.")
+    ] = False,
+    realisations: Annotated[
+        int | None,
+        typer.Option(
+            "--realisations",
+            "-n",
+            min=1,
+            help="New number of realisations of an ensemble; extends it.",
+            show_default=False,
+        ),
+    ] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Continue a run or an ensemble from its results file."""
-    from wearsim.cli.render import show_view
+    from wearsim.cli.progress import BATCHES, CHECKPOINT, EnsembleWatcher, RunWatcher, watching
     from wearsim.results.kinds import kind_of, open_study
 
     kind = kind_of(file)
     if not kind.resume:
         raise ResultsFileError(f"{file}: holds {kind.holds}, which cannot be continued")
     if kind.name == "run":
-        given = {
-            "--failed": failed,
-            "--realisations": realisations is not None,
-            "--workers": workers is not None,
-            "--scheduler": scheduler is not None,
-        }
-        for option, is_given in given.items():
-            if is_given:
-                raise typer.BadParameter("is an option for ensembles only", param_hint=option)
+        given: dict[str, object] = {"--failed": failed, "--realisations": realisations}
+        given |= {"--workers": workers, "--scheduler": scheduler}
+        refuse_options(given, "is an option for ensembles only")
         check_limit(until)
-        result = _resumed_run(file, until, allow_deep, quiet)
-        show_view(result.view, json=json, files={"results file": result.path})
+        with watching(RunWatcher, open_study(file, kind), quiet, CHECKPOINT) as shown:
+            resumed = wearsim.resume(file, until, allow_deep=allow_deep, **shown.callbacks)
+        show_view(resumed.view, json=json, files={"results file": resumed.path})
         return
-    if until is not None:
-        raise typer.BadParameter("only wear tests can be extended", param_hint="--until")
-    if allow_deep:
-        raise typer.BadParameter("is an option for wear tests only", param_hint="--allow-deep")
-    if failed and realisations is not None:
-        raise typer.BadParameter("extend the ensemble first", param_hint="--failed")
+    refuse(until is not None, "only wear tests can be extended", "--until")
+    refuse(allow_deep, "is an option for wear tests only", "--allow-deep")
+    refuse(failed and realisations is not None, "extend the ensemble first", "--failed")
     chosen = checked_scheduler(scheduler, workers)
-    from wearsim.cli.commands.ensemble import STOPPING, report
-    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
-    from wearsim.studies.kernels import kernels_of
-
     before = open_study(file, kind)
     nothing = _nothing_to_do(before, kind.name, failed)
     if nothing and realisations is None:
         note(f"note: nothing to do: {nothing}")
-    watcher = EnsembleWatcher(quiet, kernels=lambda: kernels_of(before.scenario))
-    with stop_on_signals(STOPPING) as stop, watcher as watch:
+    with watching(EnsembleWatcher, before, quiet, BATCHES) as watch:
         result = kind.load("resume")(
             file,
             failed=failed,
             realisations=realisations,
             workers=workers,
             scheduler=chosen,
-            on_progress=watch,
-            stop_requested=stop.is_set,
-            on_notice=watch.notice,
+            **watch.callbacks,
         )
-    report(result, json, None, watch.workers)
+    show_ensemble(result, json, None, watch.workers)
 
 
 def check_limit(until: str | None) -> None:
@@ -180,19 +152,6 @@ def check_limit(until: str | None) -> None:
 
         with checking("--until"):
             Limit.parse(until)
-
-
-def _resumed_run(file: Path, until: str | None, allow_deep: bool, quiet: bool) -> Result:
-    from wearsim.cli.progress import RunWatcher, stop_on_signals
-    from wearsim.studies.kernels import kernels_of
-    from wearsim.studies.opening import open_results
-    from wearsim.studies.run import run as study
-
-    watcher = RunWatcher(quiet, kernels=lambda: kernels_of(open_results(file).scenario))
-    with stop_on_signals() as stop, watcher as watch:
-        return study.resume(
-            file, until, allow_deep=allow_deep, on_event=watch, stop_requested=stop.is_set
-        )
 
 
 def _nothing_to_do(before: EnsembleResult, kind: str, failed: bool) -> str:

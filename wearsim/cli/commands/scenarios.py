@@ -15,6 +15,7 @@ from wearsim.cli.shared import (
     checking,
     note,
     read_scenario,
+    refuse,
     refuse_existing,
     write_json,
     write_list,
@@ -26,15 +27,11 @@ from wearsim.cli.shared import (
 def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False) -> None:
     """Check a scenario: print all mistakes, or the inputs and a summary of the run."""
     loaded = read_scenario(scenario, settings)
-    from wearsim.cli.progress import Display
+    from wearsim.cli.progress import Display, watching
     from wearsim.studies.dry_run import dry_run
     from wearsim.studies.dry_run_table import plan, station_table
-    from wearsim.studies.kernels import kernels_of
 
-    def kernels() -> set[str]:
-        return kernels_of(loaded, "contacts" if loaded.wear else "contact")
-
-    with Display(quiet=False, kernels=kernels, transient=True):
+    with watching(Display, loaded, kind="contacts" if loaded.wear else "contact"):
         data = dry_run(loaded)
     if json:
         write_json(data)
@@ -59,31 +56,35 @@ new = typer.Typer(
     rich_markup_mode=None,
 )
 
-Name = Annotated[
-    str,
-    typer.Argument(
-        metavar="NAME", help="Name of the contact model of the plugin: sponge.", show_default=False
-    ),
-]
-Directory = Annotated[
-    Path,
-    typer.Option(
-        "--directory", "-d", metavar="DIR", help="Folder in which the plugin's folder is created."
-    ),
-]
 NewScenario = Annotated[Path, typer.Argument(metavar="[FILE]", help="Name of the new file.")]
 
 
 @new.command("plugin")
-def new_plugin(name: Name, directory: Directory = Path()) -> None:
+def new_plugin(
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME",
+            help="Name of the contact model of the plugin: sponge.",
+            show_default=False,
+        ),
+    ],
+    directory: Annotated[
+        Path,
+        typer.Option(
+            "--directory",
+            "-d",
+            metavar="DIR",
+            help="Folder in which the plugin's folder is created.",
+        ),
+    ] = Path(),
+) -> None:
     """Create a plugin with a contact model, tests and a README."""
     from wearsim.plugins import ContactModelSpec, registry
     from wearsim.plugins.template import write_plugin
 
-    if name in registry().names(ContactModelSpec):
-        raise typer.BadParameter(
-            f"a contact model named '{name}' is already installed", param_hint="NAME"
-        )
+    known = name in registry().names(ContactModelSpec)
+    refuse(known, f"a contact model named '{name}' is already installed", "NAME")
     try:
         with checking("NAME"):
             written = write_plugin(name, directory)
@@ -114,12 +115,10 @@ def _write_scenario(name: Literal["starter", "starter_cam"], file: Path, force: 
     from wearsim.scenario.examples import starter_scenario
 
     try:
-        if file.is_dir():
-            message = f"{file} is a folder; name a file in it: {file / 'scenario.toml'}"
-            raise typer.BadParameter(message, param_hint="FILE")
+        message = f"{file} is a folder; name a file in it: {file / 'scenario.toml'}"
+        refuse(file.is_dir(), message, "FILE")
         refuse_existing(file, force, "FILE")
-        if not file.parent.is_dir():
-            raise typer.BadParameter(f"folder {file.parent} does not exist", param_hint="FILE")
+        refuse(not file.parent.is_dir(), f"folder {file.parent} does not exist", "FILE")
         file.write_text(starter_scenario(name), encoding="utf-8")
     except OSError as error:
         raise _unwritable(error, file, "FILE") from error
@@ -139,7 +138,7 @@ def plugins(json: Json = False) -> None:
     """List contact models, wear laws, loads, random inputs and motion laws."""
     from wearsim.plugins import registry
 
-    found = registry()
+    installed = registry()
     entries: list[dict[str, Any]] = [
         {
             "name": item.spec.name,
@@ -152,11 +151,11 @@ def plugins(json: Json = False) -> None:
             "summary": item.spec.summary,
             "references": list(item.spec.references),
         }
-        for item in found.all()
+        for item in installed.all()
     ]
     if json:
         keys = ("entry_point", "distribution", "version", "cause")
-        broken = [{key: getattr(item, key) for key in keys} for item in found.broken]
+        broken = [{key: getattr(item, key) for key in keys} for item in installed.broken]
         write_json({"plugins": entries, "broken": broken})
         return
     for entry in entries:
@@ -164,7 +163,7 @@ def plugins(json: Json = False) -> None:
     write_list(_HEADS, [[str(entry[head]) for head in _HEADS] for entry in entries])
     for refusal in filter(None, (entry["refused"] for entry in entries)):
         note(f"refused: {refusal}")
-    for item in found.broken:
+    for item in installed.broken:
         note(
             f"broken: plugin '{item.entry_point}' of {item.distribution} {item.version}"
             f" failed to load: {item.cause}"

@@ -16,7 +16,7 @@ from pydantic.fields import FieldInfo
 from wearsim.plugins import Distribution, FrictionField, JointDistribution, Options, Process
 from wearsim.quantities import HostQuantity, Quantity
 from wearsim.types import FloatArray
-from wearsim.units import in_engineers_unit, shown
+from wearsim.units import as_written, in_engineers_unit
 from wearsim.uq.sampling.sampler import BELOW_ONE
 
 _LIMITS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
@@ -93,7 +93,7 @@ def _form(part: Any, quantity: Quantity | None = None) -> str | None:
                 return item.expected
         return _form(get_args(part)[0])
     if get_origin(part) is Literal:
-        return "one of " + ", ".join(shown(item) for item in get_args(part))
+        return "one of " + ", ".join(as_written(item) for item in get_args(part))
     if _is_model(part) or get_origin(part) is dict:
         return "a table"
     names = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
@@ -102,8 +102,8 @@ def _form(part: Any, quantity: Quantity | None = None) -> str | None:
 
 def _limits(marks: Iterable[Any]) -> dict[str, Any]:
     """Return the bounds of a number, by their names in pydantic."""
-    found = [(name, getattr(mark, name, None)) for mark in marks for name in _LIMITS]
-    return {name: bound for name, bound in found if bound is not None}
+    limits = [(name, getattr(mark, name, None)) for mark in marks for name in _LIMITS]
+    return {name: bound for name, bound in limits if bound is not None}
 
 
 def in_words(limits: Mapping[str, Any]) -> str:
@@ -147,7 +147,7 @@ class RandomTarget:
                 ends[k] = str(end)
             elif self.quantity:
                 ends[k] = self.quantity.write(end)
-        return shown(ends)
+        return as_written(ends)
 
 
 def target_of(field: FieldInfo) -> RandomTarget | None:
@@ -300,10 +300,10 @@ class RandomInput:
     @property
     def scalar(self) -> Distribution:
         """Distribution of one value; the marginal one for a field or a process."""
-        found = getattr(self.distribution, "marginal", self.distribution)
-        if not isinstance(found, Distribution):
+        distribution = getattr(self.distribution, "marginal", self.distribution)
+        if not isinstance(distribution, Distribution):
             raise TypeError(f"{self.name} sets several values")
-        return found
+        return distribution
 
     @property
     def extremes(self) -> tuple[float, float]:

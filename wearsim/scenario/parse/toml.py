@@ -63,7 +63,7 @@ from wearsim.scenario.tables.plugin import (
     read_wear,
 )
 from wearsim.types import Profile
-from wearsim.units import shown
+from wearsim.units import as_written
 
 #: Keys that exclude each other: an override of one removes the others.
 _ALTERNATIVES = {**ALTERNATIVES, "creepage": (("misalignment", "yaw"), ("misalignment", "tilt"))}
@@ -131,7 +131,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             mistakes.append(Mistake("", f"{dotted:.60}", *TOO_DEEP))
             continue
         try:
-            tables = [_descend(one, names, key) for one in (document, plain)]
+            tables = [_descend(whole, names, key) for whole in (document, plain)]
             unused = set()
             if dotted == PROFILE and isinstance(value, Profile):
                 unused = {name for name in tables[0] if name in _OF_PROFILE_FILES}
@@ -146,7 +146,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
         except ValueError as error:
             unfit = isinstance(error, tomlkit.exceptions.ConvertError)
             what = "has a value that TOML cannot hold" if unfit else str(error)
-            mistakes.append(Mistake("", dotted, what, shown(value)))
+            mistakes.append(Mistake("", dotted, what, as_written(value)))
     if mistakes:
         raise ScenarioError(file, mistakes)
     written = tomlkit.dumps(document)
@@ -323,7 +323,7 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
     match = re.fullmatch(r"(?P<what>.*) \(at (?P<place>.*)\)", message, re.DOTALL)
     if re.fullmatch(r".*\.toml", text.strip()):
         remedy = "TOML; load_scenario reads a file"
-        return Mistake("", "", "is the name of a file, not its text", shown(text), remedy)
+        return Mistake("", "", "is the name of a file, not its text", as_written(text), remedy)
     if match is None:
         return Mistake("", "", f"is not valid TOML: {message}")
     what = match["what"][:1].lower() + match["what"][1:]
@@ -348,14 +348,14 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
 
 def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
     """Return the keys above the tables; add a mistake for each unknown key and table."""
-    own = {key: data[key] for key in TopTable.model_fields if key in data}
-    for key in [key for key in data if key not in TABLES and key not in own]:
+    keys = {key: data[key] for key in TopTable.model_fields if key in data}
+    for key in [key for key in data if key not in TABLES and key not in keys]:
         if isinstance(data[key], dict):
             hint = nearest(key, TABLES) or f" (known: {', '.join(TABLES)})"
             mistakes.add(key, "", f"unknown table{hint}")
         else:
             mistakes.add("", key, f"unknown key{mistakes.hint(key, TopTable.model_fields)}")
-    return validate(mistakes, TopTable, own, "") or TopTable()
+    return validate(mistakes, TopTable, keys, "") or TopTable()
 
 
 def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> Any:
@@ -366,7 +366,7 @@ def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> A
     raw = data.get(table, {})
     if not isinstance(raw, dict):
         mistakes.add(
-            "", table, "is not a table", shown(raw), f"a line [{table}] and its keys below"
+            "", table, "is not a table", as_written(raw), f"a line [{table}] and its keys below"
         )
         return None
     check_alternatives(mistakes, raw, table)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.levelling import Measured
 from wearsim.mechanics.cam import Motion, Stations, surface_points
-from wearsim.report.measured import Measured
 from wearsim.report.panels import (
     BLACK,
     GREEN,
@@ -25,7 +25,7 @@ from wearsim.report.panels import (
     Sheet,
     Span,
     Text,
-    look,
+    dots,
     measured_marks,
     worn_limits,
 )
@@ -50,11 +50,12 @@ DEG = PER_SI["deg"]
 ANGLE = Axis(
     "angle", "deg", limits=(0.0, 2.0 * np.pi), ticks=[0.25 * np.pi * place for place in range(9)]
 )
+_PLANE = Axis("x", "mm"), Axis("y", "mm")
 _SAMPLES = 97  # of a panel of the turn between its stations
 _MAGNIFIED = 0.2  # greatest depth in the drawing of the worn cam, of the base radius
 
 
-def cam_sheet(study: CamStudy) -> Sheet:
+def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of a cam: its shape, motion, pressure angle, speeds, and loads."""
     turn = study.turn
     samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
@@ -66,8 +67,9 @@ def cam_sheet(study: CamStudy) -> Sheet:
 
     def over_angle(values: FloatArray, **style: Any) -> Line:
         """Return values over the angle, with gaps where the flank changes."""
-        dashed = look(dash="--", right=True, colour=ORANGE) if style.pop("right", 0) else {}
-        return Line(gapped, between_flanks(values, fine), **{**dashed, **style})
+        return Line(gapped, between_flanks(values, fine), **style)
+
+    right: dict[str, Any] = {"dash": "--", "right": True, "colour": ORANGE}
 
     motion = [
         Line(angle, found.lift, label=f"{lift} [{unit}]"),
@@ -75,16 +77,14 @@ def cam_sheet(study: CamStudy) -> Sheet:
         Line(angle, found.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
     ]
     pressures = peak_pressures(turn.scenario, fine)
-    dots = look(dash="", marker=".")
     load: list[Mark] = [
         Line(angle, fine.normal_force),
-        Line(point.angle, point.normal_force, **dots),
-        over_angle(pressures, right=True),
-        Line(point.angle, study.peak_pressure, colour=ORANGE, right=True, **dots),
+        dots(point.angle, point.normal_force, "."),
+        over_angle(pressures, **right),
+        dots(point.angle, study.peak_pressure, ".", colour=ORANGE, right=True),
     ]
     skids = [Span(skid.start, skid.stop, colour=RED, alpha=0.12) for skid in study.skids]
     names, edges = segment_marks(turn.cam.motion), segment_marks(turn.cam.motion, names=False)
-    speed = over_angle(turn.speed * found.travel)
     margin = (0.1, 0.0)  # the names of the segments lie below
     inner = Axis(limits=ANGLE.limits, ticks=ANGLE.ticks, unit="deg")
     panels = {
@@ -102,7 +102,7 @@ def cam_sheet(study: CamStudy) -> Sheet:
             "Pressure angle, and curvature of the cam",
             inner,
             Axis("pressure angle", "deg"),
-            [Line(angle, found.pressure_angle), over_angle(found.curvature, right=True), *edges],
+            [Line(angle, found.pressure_angle), over_angle(found.curvature, **right), *edges],
             "Pressure angle of the follower, and curvature of the surface of the cam.",
             right=_right("curvature", "1/mm", found.curvature, 1.0 / PER_SI["mm"]),
         ),
@@ -119,8 +119,8 @@ def cam_sheet(study: CamStudy) -> Sheet:
             ANGLE,
             Axis("rolling speed", "m/s"),
             [
-                speed,
-                over_angle(found.spin, right=True),
+                over_angle(turn.speed * found.travel),
+                over_angle(found.spin, **right),
                 *edges,
                 *skids,
             ],
@@ -130,8 +130,8 @@ def cam_sheet(study: CamStudy) -> Sheet:
     }
     rows = [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]]
     height = 8.6
-    if (measured := turn.cam.measured) is not None:
-        panels["residuals"] = _residuals(turn.cam.motion, measured)
+    if (points := turn.cam.measured) is not None:
+        panels["residuals"] = _residuals(turn.cam.motion, points)
         rows, height = [*rows, ["residuals", "residuals"]], 10.8
     return Sheet(
         turn.scenario.title, panels, rows, (12.0, height), widths=[1.0, 1.25], main="motion"
@@ -160,8 +160,8 @@ def segment_marks(motion: Motion, *, names: bool = True) -> list[Mark]:
     for part, start, stop in zip(motion.segments, motion.starts, motion.starts[1:], strict=False):
         marks.append(Span(stop, dash=":", width=0.6, colour=GREY))
         if names and stop - start > 0.15:
-            middle, style = 0.5 * (start + stop), look(parts="y", anchor="center", size=7.0)
-            marks.append(Text(middle, 0.02, part.name, colour=GREY, **style))
+            place = 0.5 * (start + stop), 0.02
+            marks.append(Text(*place, part.name, "y", anchor="center", size=7.0, colour=GREY))
     return marks
 
 
@@ -191,13 +191,12 @@ def _shape(turn: CamTurn, point: Point) -> Panel:
         ),
         _centre(),
     ]
-    style = look(legend="below", columns=4, equal=True)
     text = "The cam, the path of the roller's centre, and the roller at the start of a turn."
-    return Panel("Cam", Axis("x", "mm"), Axis("y", "mm"), marks, text, **style)
+    return Panel("Cam", *_PLANE, marks, text, legend="below", columns=4, equal=True)
 
 
 def _centre() -> Line:
-    return Line([0.0], [0.0], dash="", marker="+", size=8.0, colour=BLACK)
+    return dots([0.0], [0.0], "+", size=8.0, colour=BLACK)
 
 
 def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
@@ -270,13 +269,12 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
         _curve(between_flanks(fresh, point), width=0.9, colour=GREY, label="unworn"),
         _curve(between_flanks(cut, point), width=1.4, label=label),
     ]
-    for start in turn.cam.motion.starts[:-1]:
-        edge = fresh[:, np.argmin(np.abs(point.angle - start))]
-        marks.append(Line([0.0, edge[0]], [0.0, edge[1]], dash=":", width=0.6, colour=GREY))
+    starts = np.asarray(turn.cam.motion.starts[:-1])
+    edges = fresh[:, np.abs(point.angle - starts[:, None]).argmin(axis=1)]
+    marks += [Line([0.0, x], [0.0, y], dash=":", width=0.6, colour=GREY) for x, y in edges.T]
     text = f"The cam before wear, and at the end with its depth magnified {factor:g} times."
-    style = look(legend="below", columns=2, equal=True)
-    axes = Axis("x", "mm"), Axis("y", "mm")
-    return Panel("Worn cam", *axes, [*marks, _centre()], text, **style)
+    marks.append(_centre())
+    return Panel("Worn cam", *_PLANE, marks, text, legend="below", columns=2, equal=True)
 
 
 def _round(value: float) -> float:
@@ -290,14 +288,13 @@ def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
     between = [stations.values_at(curve, _SAMPLES) for curve in curves]
     angle, values = between[0][0], np.array([value for _, value in between])
     error = shown(float(np.max(result.final["lift_error_m"])), "um")
-    dots = look(dash="", marker=".", size=3.5, colour=BLACK, label="stations")
     return Panel(
         "Lift error against the unworn cam",
         ANGLE,
         Axis("lift error", "um"),
         [
             Records(angle, values, result.record_passes, most=8),
-            Line(stations.angle, curves[-1], **dots),
+            dots(stations.angle, curves[-1], ".", size=3.5, colour=BLACK, label="stations"),
             *segment_marks(turn.cam.motion, names=False),
         ],
         f"At the end it varies by {error} over a turn.",
@@ -325,10 +322,9 @@ def _residuals(motion: Motion, measured: MeasuredPoints) -> Panel:
     """Return the residuals of a table about its smoothing spline, along the angle."""
     unit = "um" if measured.unit == "m" else "mrad"
     noise = 2.0 * measured.noise
-    dots = look(dash="", marker=".", size=3.0)
     marks: list[Mark] = [
         Span(-noise, noise, across="y", colour=GREY, alpha=0.15),
-        Line(measured.angle, measured.residual, **dots),
+        dots(measured.angle, measured.residual, ".", size=3.0),
         *segment_marks(motion, names=False),
     ]
     title = f"Residuals of the {measured.quantity}, and twice its noise (shaded)"

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from wearsim.report.measured import Measured
 from wearsim.report.text import NOTHING, in_unit, shown
 from wearsim.report.view import Frame, Row, Rows, Table, View
 from wearsim.studies.cam.checks import harmonic_depth
 from wearsim.studies.cam.study import CamStudy
 from wearsim.types import FloatArray
-
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 
 
 class CamView(View):
@@ -24,15 +19,16 @@ class CamView(View):
     Panels: shape, motion, pressure angle, loads, speeds. The table of pandas has the stations.
     """
 
+    sheet = "wearsim.studies.cam.panels:cam_sheet"
     question = "Which motion, loads and contact does the cam have along its angle?"
 
     def __init__(self, study: CamStudy) -> None:
-        self.study, self.title = study, study.turn.scenario.title
+        self.result, self.title = study, study.turn.scenario.title
         self.notes, self.warnings = study.notes, study.warnings
 
     def rows(self) -> Rows:
         """Return the numbers of the turn."""
-        study, turn = self.study, self.study.turn
+        study, turn = self.result, self.result.turn
         angle, theta = study.max_pressure_angle
         least, greatest = turn.normal_range
         depth = shown(harmonic_depth(turn), "um", 2)
@@ -66,7 +62,7 @@ class CamView(View):
 
     def tables(self) -> list[Table]:
         """Return motion, loads and contact at the stations, in engineering units."""
-        study, point, turn = self.study, self.study.point, self.study.turn
+        study, point, turn = self.result, self.result.point, self.result.turn
         found, lift = point.kinematics, "deg" if turn.cam.follower.swings else "mm"
         columns = [
             ("angle [deg]", point.angle, "deg"),
@@ -91,15 +87,15 @@ class CamView(View):
 
     def _segments(self) -> list[int]:
         """Return the number of the segment of each station."""
-        study, turn = self.study, self.study.turn
+        study, turn = self.result, self.result.turn
         if study.weight is None:
             return [int(k) for k in turn.cam.motion.segment_at(study.point.angle)]
         return [turn.stations.panels[k].segment for k in turn.stations.panel.tolist()]
 
     def _columns(self) -> dict[str, tuple[str, Any]]:
         """Return the values at the stations by their keys: unit and numbers in SI."""
-        study, point, turn = self.study, self.study.point, self.study.turn
-        found, unit = point.kinematics, self.study.turn.cam.lift_unit
+        study, point, turn = self.result, self.result.point, self.result.turn
+        found, unit = point.kinematics, self.result.turn.cam.lift_unit
         columns: dict[str, tuple[str, Any]] = {
             "angle_rad": ("rad", point.angle),
             f"lift_{unit}": (unit, found.lift),
@@ -130,8 +126,8 @@ class CamView(View):
 
     def data(self) -> dict[str, Any]:
         """Return the study in SI units."""
-        study, motion = self.study, self.study.turn.cam.motion
-        measured, smoothing = self.study.turn.cam.measured, {}
+        study, motion = self.result, self.result.turn.cam.motion
+        measured, smoothing = self.result.turn.cam.measured, {}
         if measured is not None:
             unit = measured.unit
             smoothing["smoothing"] = {
@@ -170,16 +166,10 @@ class CamView(View):
             "notes": study.notes,
         }
 
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; there is no profile to measure."""
-        from wearsim.studies.cam.panels import cam_sheet  # noqa: PLC0415  (only of figures)
-
-        return cam_sheet(self.study)
-
     def frame(self) -> Frame:
         """Return the stations, one row each."""
         columns = [(name, unit, values) for name, (unit, values) in self._columns().items()]
-        return Frame(columns, "station", range(len(self.study.point.angle)))
+        return Frame(columns, "station", range(len(self.result.point.angle)))
 
 
 def _without_rounding(values: FloatArray) -> list[float]:

@@ -6,7 +6,7 @@ from textwrap import fill
 
 import numpy as np
 
-from wearsim.report.measured import ComputedProfile
+from wearsim.levelling import ComputedProfile
 from wearsim.report.panels import (
     BLACK,
     Axis,
@@ -18,8 +18,8 @@ from wearsim.report.panels import (
     Span,
     Text,
     Whiskers,
+    dots,
     evenly_spaced,
-    look,
     pass_axis,
     several_colours,
     worn_limits,
@@ -80,12 +80,20 @@ def comparison_sheet(
 
 def _courses(pairs: list[tuple[Compared, str]], named: Named) -> Panel:
     """Return the observable of each run against roller passes."""
-    marks = []
-    for row, colour in pairs:
-        assert row.course is not None
-        # the dot at the end shows a run that another one covers
-        style = look(marker="o", size=4.5, at_end=True, colour=colour)
-        marks.append(Line(*row.course, label=row.label, **style))
+    # the dot at the end shows a run that another one covers
+    marks = [
+        Line(
+            row.course[0],
+            row.course[1],
+            marker="o",
+            size=4.5,
+            at_end=True,
+            colour=colour,
+            label=row.label,
+        )
+        for row, colour in pairs
+        if row.course is not None
+    ]
     words = named.words[:1].upper() + named.words[1:]
     x = pass_axis(max(row.passes for row, _ in pairs))
     y, text = Axis(named.words, named.unit), "The course of each run."
@@ -114,13 +122,11 @@ def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
         if _has_range(row):
             marks.append(_interval(place, ends[0], ends[-1], colour, _THIN))
         if quantiles:
-            style = look(dash="", marker="|", size=13.0, colour=colour)
-            marks.append(Line([quantiles[0.5].value], [place], **style))
+            marks.append(dots([quantiles[0.5].value], [place], "|", size=13.0, colour=colour))
         if np.isfinite([row.value.low, row.value.high]).all():
             interval = _interval(place, row.value.low, row.value.high, colour, _THICK, 0.45)
             marks.append(interval)
-        style = look(dash="", marker="o", size=4.5, colour=colour)
-        marks.append(Line([row.value.value], [place], **style))
+        marks.append(dots([row.value.value], [place], size=4.5, colour=colour))
         marks += _labels(comparison, row, place, colour)
     title, legend = "Value and estimated error", ""
     if any(row.quantiles for row in rows):
@@ -139,8 +145,9 @@ def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
 def _interval(
     place: float, low: float, high: float, colour: str, width: float, alpha: float = 1.0
 ) -> Whiskers:
-    style = look(colour=colour, width=width, alpha=alpha)
-    return Whiskers([place], [low], [high], horizontal=True, **style)
+    return Whiskers(
+        [place], [low], [high], horizontal=True, colour=colour, width=width, alpha=alpha
+    )
 
 
 def _labels(comparison: Comparison, row: Compared, place: int, colour: str) -> list[Mark]:
@@ -175,7 +182,7 @@ def _has_range(row: Compared) -> bool:
 def _profiles(profiles: dict[str, ComputedProfile]) -> Panel:
     """Return the worn profiles of several results in one panel."""
     y = np.sort(np.concatenate([profile.y for profile in profiles.values()]))
-    worn = [np.interp(y, one.y, one.start - one.low) for one in profiles.values()]
+    worn = [np.interp(y, item.y, item.start - item.low) for item in profiles.values()]
     marks: list[Mark] = []
     for colour, (label, profile) in zip(
         several_colours(len(profiles)), profiles.items(), strict=True

@@ -1,4 +1,4 @@
-"""Outline of the contact on strips: the edges of the patch, and the strips of each patch."""
+"""Outline of the contact on strips: the edges of the patch, and strips and outline of each."""
 
 from __future__ import annotations
 
@@ -42,6 +42,31 @@ def patch_strips(half_length: FloatArray) -> list[slice]:
     touching = np.concatenate([[False], half_length > 0.0, [False]])
     ends = np.flatnonzero(np.diff(touching.astype(np.int8)))
     return [slice(int(i), int(j)) for i, j in zip(ends[::2], ends[1::2], strict=True)]
+
+
+def patch_outlines(y: FloatArray, half_length: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """Return the outline of each patch, across and along, up to its edges beyond the strips [m].
+
+    Parameters
+    ----------
+    y, half_length : ndarray, shape (strips,)
+        As of `patch_edges`.
+    """
+    outlines = []
+    for strips in patch_strips(half_length):
+        inside, a, patch = y[strips], half_length[strips], np.zeros_like(half_length)
+        patch[strips] = a
+        edges = patch_edges(y, patch)
+        assert edges is not None
+        part = np.linspace(0.0, 1.0, 12)
+        left = edges[0] + (inside[0] - edges[0]) * part
+        right = inside[-1] + (edges[1] - inside[-1]) * part
+        across, ends = np.concatenate([left, inside, right]), np.sqrt(part)
+        # the square of the half-length is linear there
+        height = np.concatenate([a[0] * ends, a, a[-1] * ends[::-1]])
+        there_and_back = np.concatenate([across, across[::-1]])
+        outlines.append((there_and_back, np.concatenate([height, -height[::-1]])))
+    return outlines
 
 
 def _beyond(half_length: FloatArray, strip: int, inwards: int) -> float:

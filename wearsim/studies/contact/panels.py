@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     BLUE,
@@ -17,10 +20,9 @@ from wearsim.report.panels import (
     Panel,
     Patch,
     Sheet,
-    look,
 )
 from wearsim.report.text import shown
-from wearsim.studies.contact.outline import patch_edges, patch_strips
+from wearsim.studies.contact.outline import patch_outlines
 from wearsim.studies.contact.single import ContactStudy
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray
 
@@ -28,7 +30,7 @@ STICK, SLIDE = "#7fb2d9", "#f2c9a1"
 Y = Axis("y", "mm")
 
 
-def contact_sheet(study: ContactStudy) -> Sheet:
+def contact_sheet(study: ContactStudy, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of a contact: fields if it has any, and always those over the strips."""
     title = (
         f"{study.title}\n{study.described_model}\n"
@@ -52,7 +54,7 @@ def _fields(fields: ContactFields, solution: ContactSolution) -> dict[str, Panel
     greatest = float(solution.half_length.max())
     along = Axis("x (rolling direction)", "mm", limits=(-1.35 * greatest, 1.2 * greatest))
     across = Axis("y", "mm", limits=(None, None))
-    outlines = _outlines(solution)
+    outlines = patch_outlines(solution.y, solution.half_length)
     ground = [Patch(*outline, colour=BLACK) for outline in outlines]
     edges = [Line(*outline, colour=BLACK, width=0.8) for outline in outlines]
 
@@ -119,30 +121,11 @@ def _spread_out(length: int, wanted: int) -> IntArray:
     return np.arange((length - 1) % step // 2 + step // 2, length, step)
 
 
-def _outlines(solution: ContactSolution) -> list[tuple[FloatArray, FloatArray]]:
-    """Return the outline of each patch, up to the edges beyond the centres of strips."""
-    found = []
-    for strips in patch_strips(solution.half_length):
-        y, a = solution.y[strips], solution.half_length[strips]
-        patch = np.zeros_like(solution.half_length)
-        patch[strips] = a
-        edges = patch_edges(solution.y, patch)
-        assert edges is not None
-        part = np.linspace(0.0, 1.0, 12)
-        left, right = edges[0] + (y[0] - edges[0]) * part, y[-1] + (edges[1] - y[-1]) * part
-        across = np.concatenate([left, y, right])
-        ends = np.sqrt(part)  # the square of the half-length is linear there
-        height = np.concatenate([a[0] * ends, a, a[-1] * ends[::-1]])
-        outline = np.concatenate([height, -height[::-1]])
-        found.append((np.concatenate([across, across[::-1]]), outline))
-    return found
-
-
 def _strips(study: ContactStudy) -> dict[str, Panel]:
     """Return line load and dissipated power per length, with those of a reference."""
     solution, reference, errors = study.solution, study.reference, study.errors
     inside = _touching(solution.line_load)
-    found = {}
+    panels = {}
     for name, key, unit, colour, title, label in (
         ("line load", "line_load", "N/mm", BLUE, "Line load", "q"),
         (
@@ -158,12 +141,12 @@ def _strips(study: ContactStudy) -> dict[str, Panel]:
             text = reference.model
             if key == "dissipation":
                 text += f"; difference {shown(errors.dissipation, '%', 2)} (L2)"
-            style = look(dash="--", width=1.0, colour=BLACK, label=text)
-            marks.append(Line(reference.y[near], theirs[near], **style))
+            curve = reference.y[near], theirs[near]
+            marks.append(Line(*curve, dash="--", width=1.0, colour=BLACK, label=text))
             top = 1.25 * 1.05 * max(float(values.max()), float(theirs.max()))
         y, caption = Axis(label, unit, limits=(0.0, top)), f"{title} across the track."
-        found[name] = Panel(title, Y, y, marks, caption, legend="upper center")
-    return found
+        panels[name] = Panel(title, Y, y, marks, caption, legend="upper center")
+    return panels
 
 
 def _touching(line_load: FloatArray) -> slice:

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from wearsim.report.measured import Measured
 from wearsim.report.text import NOTHING, brief, footer, lapse, percent, shown
 from wearsim.report.view import Frame, Row, Rows, Table, View
 from wearsim.studies.contact.outline import patch_edges
 from wearsim.studies.contact.single import ContactStudy
-
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 
 _DIGITS = 10  # after the point, of a fraction; beyond them is rounding
 _DIFFERENCES = {
@@ -34,17 +29,18 @@ class ContactView(View):
     and power density. The table of pandas has the strips.
     """
 
+    sheet = "wearsim.studies.contact.panels:contact_sheet"
     question = "Which load and which power does one contact have along the track?"
 
     def __init__(self, study: ContactStudy) -> None:
-        self.study, self.title = study, study.title
+        self.result, self.title = study, study.title
         self.notes, self.warnings = study.notes, study.warnings
         self.start: dict[str, str] = {}  # description of a measured profile
         self.edges = patch_edges(study.solution.y, study.solution.half_length)
 
     def rows(self) -> Rows:
         """Return the numbers of the contact."""
-        study, point, solution = self.study, self.study.point, self.study.solution
+        study, point, solution = self.result, self.result.point, self.result.solution
         rounding = 1e-12 * point.normal_force * study.grid.spacing * study.grid.strips
         moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
         spin = f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"
@@ -72,21 +68,21 @@ class ContactView(View):
 
     def tables(self) -> list[Table]:
         """Return the differences from a reference, each with the reference's own error."""
-        reference, errors = self.study.reference, self.study.errors
+        reference, errors = self.result.reference, self.result.errors
         if reference is None or errors is None:
             return []
-        own, rows = vars(reference.own), []
+        errors_of_reference, rows = vars(reference.own), []
         for name, error in vars(errors).items():
             sign = "" if name in {"dissipation", "greatest"} else "+" if error >= 0.0 else "-"
             text = f"{sign}{shown(abs(round(error, _DIGITS)), '%', 2)}"
-            theirs = shown(round(own[name], _DIGITS), "%", 2)
+            theirs = shown(round(errors_of_reference[name], _DIGITS), "%", 2)
             rows.append(Row(_DIFFERENCES[name], f"{text}, its own error {theirs}"))
         rows.append(Row("time of the reference", lapse(reference.seconds)))
         return [Table(f"difference from '{reference.model}'", rows)]
 
     def data(self) -> dict[str, Any]:
         """Return the contact and its strips in SI units."""
-        study, point, solution = self.study, self.study.point, self.study.solution
+        study, point, solution = self.result, self.result.point, self.result.solution
         return {
             "title": self.title,
             "model": study.model,
@@ -123,7 +119,7 @@ class ContactView(View):
 
     def _reference(self) -> dict[str, Any] | None:
         """Return the reference in SI units, the differences from it and its own errors."""
-        reference, errors = self.study.reference, self.study.errors
+        reference, errors = self.result.reference, self.result.errors
         if reference is None or errors is None:
             return None
         return {
@@ -144,22 +140,16 @@ class ContactView(View):
 
     def line(self) -> str:
         """Return the footer of the contact, with the error estimated from a grid half as fine."""
-        study, error = self.study, ""
+        study, error = self.result, ""
         if study.grid_error is not None:
             within = percent(study.grid_error)
             error = f"dissipated power within {within} (estimated numerical error of the grid)"
         time = NOTHING if study.seconds is None else brief(study.seconds)
         return footer([study.described_model, f"{study.grid.strips} strips"], error, time)
 
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; there is no profile to measure."""
-        from wearsim.studies.contact.panels import contact_sheet  # noqa: PLC0415  (only of figures)
-
-        return contact_sheet(self.study)
-
     def frame(self) -> Frame:
         """Return the strips, one row each."""
-        solution = self.study.solution
+        solution = self.result.solution
         units = {"y": "m", "half_length": "m", "line_load": "N/m", "dissipation": "W/m"}
         columns = [(name, unit, getattr(solution, name)) for name, unit in units.items()]
         return Frame(columns, "strip", range(len(solution.y)))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from wearsim.report.csv_files import drawn
-from wearsim.report.measured import Measured
 from wearsim.report.text import (
     NOTHING,
     Named,
@@ -34,9 +33,6 @@ from wearsim.studies.dissipation.result import DissipationResult
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import is_constant
 
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
-
 QUANTITIES = {
     "power": Named("dissipated power", "W"),
     "force_x": Named("longitudinal force", "N"),
@@ -58,7 +54,7 @@ class DissipationView(StudyView[DissipationResult]):
     realisations and strips; the table of pandas has the realisations.
     """
 
-    verb = "dissipation"
+    verb, sheet = "dissipation", "wearsim.studies.dissipation.panels:dissipation_sheet"
 
     def __init__(self, result: DissipationResult) -> None:
         super().__init__(result)
@@ -168,12 +164,6 @@ class DissipationView(StudyView[DissipationResult]):
         used.append(f"{count(result.count)} realisations")
         error = within("mean dissipated power", power.mean_interval.half_width, power.mean)
         return footer(used, f"{error} (95 % interval)", lapse(result.raw.wall_seconds))
-
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; there is no profile to measure."""
-        from wearsim.studies.dissipation.panels import dissipation_sheet  # noqa: PLC0415  (only of figures)
-
-        return dissipation_sheet(self.result)
 
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, drawn values first, and strips."""

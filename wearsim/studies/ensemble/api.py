@@ -342,7 +342,7 @@ def continue_work(
     path: Path,
     data: EnsembleData,
     runner: RealisationRunner,
-    target: Any,
+    target: Target | None,
     hands: Workers,
     finish: Callable[[EnsembleWork], None],
     storage: Storage,
@@ -356,7 +356,7 @@ def continue_work(
         The file and its content.
     runner : RealisationRunner
         Runs realisations; it has their new number.
-    target : Target or LifeTarget, optional
+    target : Target, optional
         Target that ends the ensemble early.
     hands : Workers
     finish : callable

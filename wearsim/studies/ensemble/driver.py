@@ -21,7 +21,6 @@ from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.execution.processes import Executor
-from wearsim.studies.life.stored_settings import LifeTarget
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Target
@@ -34,7 +33,7 @@ AHEAD = 3  # batches for each worker that may be beyond the next interim analysi
 BETWEEN_ESTIMATES = 0.5  # s
 BATCHES = 3  # finished batches from which the time left is estimated,
 RECENT = 8  # and the greatest number of them
-DEFAULT_TARGET = Target.parse("depth.mean 1%")
+DEFAULT_TARGET, DEFAULT_OF_LIVES = Target.parse("depth.mean 1%"), Target.parse("b10 3%")
 
 
 @dataclass(frozen=True)
@@ -67,9 +66,7 @@ class EnsembleProgress:
     workers: str
 
 
-def ensemble_warnings(
-    result: EnsembleResult, target: Target | LifeTarget | None, reached: bool
-) -> list[str]:
+def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bool) -> list[str]:
     """Return warnings about a finished ensemble.
 
     Parameters
@@ -132,8 +129,8 @@ def ensemble_warnings(
             f"{target} was not reached by {result.requested} realisations",
         ),
     )
-    found = [text for applies, text in warnings if applies]
-    return [*plausibility_warnings(result.scenario), *found]
+    texts = [text for applies, text in warnings if applies]
+    return [*plausibility_warnings(result.scenario), *texts]
 
 
 class EnsembleWork:
@@ -160,7 +157,7 @@ class EnsembleWork:
         self,
         file: EnsembleFile,
         runner: RealisationRunner,
-        target: Target | LifeTarget | None,
+        target: Target | None,
         pool: Executor,
         on_progress: Callable[[EnsembleProgress], None] | None,
         stop_requested: Callable[[], bool] | None,
@@ -360,7 +357,7 @@ class EnsembleWork:
         )
 
     def _report_progress(self) -> None:
-        default = LifeTarget(0.1, 0.03) if self.file.data.life else DEFAULT_TARGET
+        default = DEFAULT_OF_LIVES if self.file.data.life else DEFAULT_TARGET
         status, target, now = self.file.status, self.target or default, time.monotonic()
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
         if done and (now > self._next_estimate or self._is_complete()):

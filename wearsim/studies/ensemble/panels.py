@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     BLUE,
@@ -26,9 +25,9 @@ from wearsim.report.panels import (
     Whiskers,
     convergence,
     depth_axes,
+    dots,
     evenly_spaced,
     histogram,
-    look,
     measured_marks,
     message,
     worn_limits,
@@ -48,10 +47,9 @@ from wearsim.report.text import (
 from wearsim.studies.cam.panels import ANGLE, segment_marks
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.ensemble.file.data import Effect
-from wearsim.studies.ensemble.file.schema import PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.run.panels import HEIGHT, Y
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
@@ -100,12 +98,12 @@ def _caption(result: EnsembleResult) -> str:
     )
     if result.count == 0:
         return text
-    depth, found = result.estimate("depth", -1, NINETY_PERCENT), result.worn_profile()
+    depth, profile = result.estimate("depth", -1, NINETY_PERCENT), result.worn_profile()
     if result.count == 1:
         return f"{text}\ndepth {shown(depth.mean.value, 'um')}"
     text += f"\nmean depth {shown(depth.mean.value, 'um')}"
-    if found.start.any():
-        lowest = shown(-float(found.height.min()), "um")
+    if profile.start.any():
+        lowest = shown(-float(profile.height.min()), "um")
         text += f" worn since the start, mean profile {lowest} below nominal"
     if result.is_constant("depth"):
         return f"{text}, equal in all realisations"
@@ -146,10 +144,10 @@ def _density(result: EnsembleResult) -> Panel:
     if result.count == 1 or result.is_constant("depth"):
         where = "the only realisation" if result.count == 1 else f"all {count(result.count)}"
         return message(title, f"{shown(float(depth.mean()), 'um')} in {where}: no density to draw")
-    found = result.estimate("depth", -1, (0.05, 0.5, 0.95))
-    low, median, high = (found.quantile(p).value for p in (0.05, 0.5, 0.95))
+    estimate = result.estimate("depth", -1, (0.05, 0.5, 0.95))
+    low, median, high = (estimate.quantile(p).value for p in (0.05, 0.5, 0.95))
     lines: list[tuple[float, str, str, str]] = [
-        (found.mean.value, BLACK, "--", f"mean {shown(found.mean.value, 'um')}"),
+        (estimate.mean.value, BLACK, "--", f"mean {shown(estimate.mean.value, 'um')}"),
         (median, BLUE, "-", f"median {shown(median, 'um')}"),
     ]
     if sufficient_for(result.count, NINETY_PERCENT[0]):
@@ -171,80 +169,42 @@ def _density(result: EnsembleResult) -> Panel:
     )
 
 
-def convergence_of(
-    result: EnsembleResult, target: Target, points: int = 40
-) -> tuple[IntArray, list[Interval]]:
-    """Return the estimates from the first realisations of an ensemble, for rising numbers of them.
-
-    Parameters
-    ----------
-    result : EnsembleResult
-        With at least one completed realisation.
-    target : Target
-        Quantity to estimate.
-    points : int
-        Approximate number of sample sizes, evenly spaced in their logarithm.
-
-    Returns
-    -------
-    counts : ndarray of int
-        Numbers of completed realisations.
-    intervals : list of Interval
-    """
-    spaced = np.geomspace(1, result.count, min(points, result.count))
-    counts = np.unique(spaced.round().astype(np.int64))
-    raw, name = result.raw, target.observable
-    # kept in memory, since a file's arrays are read again at every access
-    held = {name: raw.column(name, -1)[:, None]}
-    held |= {"control": raw.variables["control"]} if raw.control else {}
-    numbers, intervals = np.arange(raw.requested), []
-    for last in result.numbers[counts - 1]:
-        status = np.where(numbers <= last, raw.status, PENDING)
-        part = replace(result, raw=replace(raw, variables=held, status=status))
-        intervals.append(target.interval(part.estimate_for(target)))
-    return counts, intervals
-
-
 def _convergence(result: EnsembleResult) -> Panel:
     """Return the convergence of the estimate of the target, by default of the mean depth."""
     target = Target.parse(result.until or _DEFAULT)
     named = OBSERVABLES[target.observable]
-    counts, found = convergence_of(result, target)
+    counts, intervals = result.convergence(target)
     value, low, high = (
-        np.array([getattr(item, end) for item in found]) for end in ("value", "low", "high")
+        np.array([getattr(item, end) for item in intervals]) for end in ("value", "low", "high")
     )
-    marks = []
-    if result.until:
-        style = look(across="y", dash="--", colour=GREEN)
-        label = f"target: ±{100 * target.width:g} %"
-        marks = [
-            Span(value[-1] * (1.0 - target.width), **style),
-            Span(value[-1] * (1.0 + target.width), **style, label=label),
-        ]
+    labels = {-target.width: "", target.width: f"target: ±{100 * target.width:g} %"}
+    marks = [
+        Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
+        for part, label in (labels.items() if result.until else ())
+    ]
     title = f"{statistic_in_words(target).capitalize()}, with 95 % interval"
     return convergence(title, named.words, named.unit, counts, value, low, high, marks)
 
 
 def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
     """Return the mean worn profile with its 95 % range, and measured profiles over it."""
-    found = result.worn_profile()
-    marks: list[Mark] = []
-    if found.label:
-        marks.append(Band(found.y, found.low, found.high, label=found.label))
-    marks.append(Line(found.y, found.height, colour=BLACK, label="mean"))
-    if found.start.any():
-        start = look(dash="--", width=1.0, colour=GREY, label="start of the tests")
-        marks.append(Line(found.y, found.start, **start))
-    limits = worn_limits(found.y, found.start - found.low, *(one.y for one in measured))
+    profile = result.worn_profile()
+    marks: list[Mark] = [Line(profile.y, profile.height, colour=BLACK, label="mean")]
+    if profile.label:
+        marks.insert(0, Band(profile.y, profile.low, profile.high, label=profile.label))
+    if profile.start.any():
+        label = "start of the tests"
+        marks.append(Line(profile.y, profile.start, dash="--", width=1.0, colour=GREY, label=label))
+    limits = worn_limits(profile.y, profile.start - profile.low, *(item.y for item in measured))
     title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
-    title += "" if found.kept == result.count else f", of the first {count(found.kept)}"
-    deepest = shown(float((found.start - found.height).max()), "um")
+    title += "" if profile.kept == result.count else f", of the first {count(profile.kept)}"
+    deepest = shown(float((profile.start - profile.height).max()), "um")
     return Panel(
         title,
         Axis(Y, "mm", limits=limits),
         HEIGHT,
         [*marks, *measured_marks(measured)],
-        f"Mean of {count(found.kept)} profiles, {deepest} deep, and the band of the tests.",
+        f"Mean of {count(profile.kept)} profiles, {deepest} deep, and the band of the tests.",
         legend="lower right",
     )
 
@@ -298,10 +258,9 @@ def effects_panel(title: str, of: str, effects: list[Effect]) -> Panel:
     bars = Bars(places - 0.3, places + 0.3, widths, horizontal=True, colour=colours, alpha=0.55)
     marks: list[Mark] = [bars, _intervals(places, first, BLACK)]
     if any(item.total for item in effects):
-        below = places + 0.38
+        below, values = places + 0.38, [index.value for index in total]
         marks.append(_intervals(below, total, ORANGE))
-        style = look(dash="", marker="D", colour=ORANGE, label="total, with interactions")
-        marks.append(Line([index.value for index in total], below, **style))
+        marks.append(dots(values, below, "D", colour=ORANGE, label="total, with interactions"))
     share = f"{100.0 * largest.first.value:.0f} % of the variance"
     return Panel(
         title,
@@ -323,10 +282,10 @@ def _label(item: Effect) -> str:
     return f"{item.name} (not significant)" if item.without_effect else item.name
 
 
-def _intervals(places: FloatArray, found: list[Interval], colour: str) -> Whiskers:
-    known = [np.isfinite(index.value) for index in found]
+def _intervals(places: FloatArray, intervals: list[Interval], colour: str) -> Whiskers:
+    known = [np.isfinite(index.value) for index in intervals]
     low, high = (
-        np.where(known, np.clip([getattr(index, end) for index in found], 0.0, 1.0), np.nan)
+        np.where(known, np.clip([getattr(index, end) for index in intervals], 0.0, 1.0), np.nan)
         for end in ("low", "high")
     )
     return Whiskers(places, low, high, horizontal=True, colour=colour)
@@ -355,8 +314,8 @@ def draws_panels(
     drawn = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1)
     finite = np.flatnonzero(np.isfinite(values))
     every = finite[evenly_spaced(len(finite), MOST_POINTS)]
-    style = look(dash="", marker="o", alpha=0.5)
-    points = Line(drawn[every], values[every], **style, more={"realisation": (every, "1")})
+    more = {"realisation": (every, "1")}
+    points = dots(drawn[every], values[every], alpha=0.5, more=more)
     title = f"{name.capitalize()} against {item['key']}"
     text = f"One point for each of {count(len(every))} tests."
     return {"draws": Panel(title, Axis(item["key"], unit, 1.0 / size), axis, [points], text)}

@@ -88,10 +88,10 @@ def closed_form_depths(
     rollers, speed = scenario.operation.rollers, scenario.rolling_speed
 
     def value(key: str, mean: float | tuple[float, ...]) -> FloatArray:
-        found = columns.get(key)
-        if found is None:
-            found = np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
-        return found[:, None] if found.ndim == 1 else found
+        drawn = columns.get(key)
+        if drawn is None:
+            drawn = np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
+        return drawn[:, None] if drawn.ndim == 1 else drawn
 
     creepage, load = scenario.creepage, scenario.load.build()
     law = None if scenario.wear is None else scenario.wear.build()

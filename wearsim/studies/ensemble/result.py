@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from wearsim.errors import WearsimError, unknown_name
-from wearsim.report.measured import ComputedProfile
+from wearsim.levelling import ComputedProfile
 from wearsim.report.text import sufficient_for
 from wearsim.studies.ensemble.file.data import Band, Course, Effect
-from wearsim.studies.ensemble.file.schema import DONE, KEPT, QUANTILES
+from wearsim.studies.ensemble.file.schema import DONE, KEPT, PENDING, QUANTILES
 from wearsim.studies.ensemble.values import EnsembleValues
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design, Estimate, Target, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import summarise
@@ -140,6 +140,43 @@ class EnsembleResult(EnsembleValues):
         """
         return self.estimate(target.observable, probabilities=target.probabilities)
 
+    def convergence(self, target: Target, points: int = 40) -> tuple[IntArray, list[Interval]]:
+        """Return the estimates from the first realisations, for rising numbers of them.
+
+        Parameters
+        ----------
+        target : Target
+            Quantity to estimate.
+        points : int
+            Approximate number of sample sizes, evenly spaced in their logarithm.
+
+        Returns
+        -------
+        counts : ndarray of int
+            Numbers of completed realisations.
+        intervals : list of Interval
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> from wearsim.uq.estimation.estimates import Target
+        >>> counts, intervals = tests.convergence(Target.parse("depth.mean 1%"))
+        >>> intervals[-1] == tests.estimate("depth").mean
+        True
+        """
+        spaced = np.geomspace(1, self.count, min(points, self.count))
+        counts = np.unique(spaced.round().astype(np.int64))
+        raw, name = self.raw, target.observable
+        # kept in memory, since a file's arrays are read again at every access
+        held = {name: raw.column(name, -1)[:, None]}
+        held |= {"control": raw.variables["control"]} if raw.control else {}
+        numbers, intervals = np.arange(raw.requested), []
+        for last in self.numbers[counts - 1]:
+            status = np.where(numbers <= last, raw.status, PENDING)
+            part = replace(self, raw=replace(raw, variables=held, status=status))
+            intervals.append(target.interval(part.estimate_for(target)))
+        return counts, intervals
+
     def final_estimates(self) -> dict[str, Any]:
         """Return the estimates at the end of the test by observable, as plain values.
 
@@ -171,15 +208,17 @@ class EnsembleResult(EnsembleValues):
         >>> course.mean.shape == course.passes.shape
         True
         """
-        found = [self._estimate(values, QUANTILES) for values in self._by_record(name)]
+        estimates = [self._estimate(values, QUANTILES) for values in self._by_record(name)]
         return Course(
             passes=self.record_passes,
             time=self.record_time,
-            mean=np.array([item.mean.value for item in found]),
-            mean_low=np.array([item.mean.low for item in found]),
-            mean_high=np.array([item.mean.high for item in found]),
-            std=np.array([item.std.value for item in found]),
-            quantiles={p: np.array([item.quantile(p).value for item in found]) for p in QUANTILES},
+            mean=np.array([item.mean.value for item in estimates]),
+            mean_low=np.array([item.mean.low for item in estimates]),
+            mean_high=np.array([item.mean.high for item in estimates]),
+            std=np.array([item.std.value for item in estimates]),
+            quantiles={
+                p: np.array([item.quantile(p).value for item in estimates]) for p in QUANTILES
+            },
         )
 
     def _by_record(self, name: str) -> Iterator[FloatArray]:
@@ -310,17 +349,17 @@ class EnsembleResult(EnsembleValues):
         >>> sorted(tests.statistics())[:2]
         ['depth_mean', 'depth_profile_high']
         """
-        found: dict[str, FloatArray] = {}
+        statistics: dict[str, FloatArray] = {}
         for name in self.observables:
             course = self.course(name)
-            found[f"{name}_mean"], found[f"{name}_std"] = course.mean, course.std
-            found[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
+            statistics[f"{name}_mean"], statistics[f"{name}_std"] = course.mean, course.std
+            statistics[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
         for name in KEPT:
             if name in self.raw.schema.variables:
                 band = self.band(name)
                 parts = ("mean", "std", "low", "high")
-                found |= {f"{name}_{part}": getattr(band, part) for part in parts}
-        return found
+                statistics |= {f"{name}_{part}": getattr(band, part) for part in parts}
+        return statistics
 
     def is_constant(self, name: str) -> bool:
         """Return whether an observable is equal in all realisations, within rounding.

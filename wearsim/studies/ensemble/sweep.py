@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,12 @@ from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.run.result import Result, read_results
 from wearsim.studies.run.run import resume, run
+from wearsim.units import conversion
+
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_WITHOUT_SPACE = re.compile(rf"({_NUMBER})([A-Za-zµμ°].*)")
+_QUANTITY = re.compile(rf"({_NUMBER})\s*(\S.*)?")
+_EXAMPLE = "such as load.normal_force=250N,300N,350N"
 
 
 def sweep(
@@ -105,9 +112,9 @@ def run_sweep(
         request: tuple[object, ...] = (scenario.sha256,)
         if realisations is not None:
             precision = named_precision(options.get("precision"), options.get("until"))
-            found = checked_request(scenario, realisations, options.get("plan"), precision)
-            until = "" if found.target is None else str(found.target)
-            request += (found.plan, found.realisations, until)
+            checked = checked_request(scenario, realisations, options.get("plan"), precision)
+            until = "" if checked.target is None else str(checked.target)
+            request += (checked.plan, checked.realisations, until)
         resumed.append(not force and path is not None and _requested(path) == request)
         if path is not None and not resumed[-1]:
             check_output(path, force, scenario.paths)
@@ -155,3 +162,56 @@ def path_of(output: str | Path, value: str) -> Path:
     plain = re.sub(r"\s+", "_", joined.replace("/", "_per_").replace("%", "percent"))
     plain = re.sub(r"[^\w.+-]+", "", plain)
     return path.with_name(f"{path.stem}-{plain}{path.suffix}")
+
+
+def parse_sweep(text: str) -> tuple[str, tuple[str, ...]]:
+    """Return the key and the values of a sweep.
+
+    Parameters
+    ----------
+    text : str
+        "load.normal_force=250N,300N"; the space before a unit may be left out.
+
+    Returns
+    -------
+    key : str
+        Dotted key.
+    values : tuple of str
+        Two or more different values, with a space before the unit.
+
+    Raises
+    ------
+    ValueError
+        If there is no key, an empty value, fewer than two values, or two equal ones.
+    """
+    key, equals, listed = text.partition("=")
+    if not equals or not key.strip():
+        raise ValueError(f"'{text}' is not a key with values, expected one {_EXAMPLE}")
+    values = tuple(
+        _WITHOUT_SPACE.sub(r"\1 \2", value) if _WITHOUT_SPACE.fullmatch(value) else value
+        for value in map(str.strip, listed.split(","))
+    )
+    if not all(values):
+        raise ValueError(f"'{text}' has an empty value, expected values {_EXAMPLE}")
+    if len(values) < 2:
+        raise ValueError(f"'{text}' has one value, expected two or more {_EXAMPLE}")
+    for number, value in enumerate(values):
+        for before in values[:number]:
+            if _are_equal(before, value):
+                raise ValueError(f"'{before}' and '{value}' are the same value; remove one")
+    return key.strip(), values
+
+
+def _are_equal(text: str, other: str) -> bool:
+    """Return whether two values are equal, also in different units."""
+    matches = [_QUANTITY.fullmatch(value) for value in (text, other)]
+    if matches[0] is None or matches[1] is None:
+        return text == other
+    (first, unit), (second, other_unit) = matches[0].groups(), matches[1].groups()
+    if not (unit and other_unit):
+        return not (unit or other_unit) and float(first) == float(second)
+    try:
+        factor = conversion(other_unit, unit)
+    except ValueError:  # reported when the scenario is read
+        return text == other
+    return Fraction(first) == Fraction(second) * factor

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from wearsim.levelling import ComputedProfile
 from wearsim.report.csv_files import computed, drawn
-from wearsim.report.measured import ComputedProfile, Measured
 from wearsim.report.text import (
     NINETY_PERCENT,
     NOTHING,
@@ -43,9 +43,6 @@ from wearsim.studies.ensemble.file.data import Band, Effect, EnsembleData
 from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, LIFE, PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.uq.estimation.estimates import Estimate, Target
-
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 
 QUANTILES = (0.05, 0.5, 0.95)
 INTERVAL = "  95 % interval"
@@ -105,12 +102,9 @@ class RealisationsView(StudyView[Shown]):
             band = result.band("lift_error_curve")
             tables["lift_error.csv"] = [_band("angle", "rad", "lift error", band)]
         if result.failed:
-            numbers, errors = zip(*result.errors.items(), strict=True)
-            failures = [
-                Column("realisation", list(map(str, numbers))),
-                Column("error", list(errors)),
-            ]
-            tables["failures.csv"] = [failures]
+            numbers, errors = map(str, result.errors), result.errors.values()
+            failures = {"realisation": list(numbers), "error": list(errors)}
+            tables["failures.csv"] = [[Column(*column) for column in failures.items()]]
         return tables
 
 
@@ -122,7 +116,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
     realisations.
     """
 
-    verb = "ensemble"
+    verb, sheet = "ensemble", "wearsim.studies.ensemble.panels:ensemble_sheet"
 
     def __init__(self, result: EnsembleResult) -> None:
         super().__init__(result)
@@ -182,8 +176,8 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         if not result.count:
             return rows
         if result.until:
-            reached = _target_met(result, Target.parse(result.until))
-            rows.append(Row(f"precision {result.until}", reached))
+            met = _target_met(result, Target.parse(result.until))
+            rows.append(Row(f"precision {result.until}", met))
         saved = result.estimate("depth", -1, ()).variance_saved
         if saved is not None:
             text = f"removes {shown(saved, '%', 3)} of the variance of the mean depth"
@@ -272,12 +266,6 @@ class EnsembleView(RealisationsView[EnsembleResult]):
             error = f"{', '.join(errors)} (95 % intervals)"
         return footer(used, error, lapse(raw.wall_seconds))
 
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; measured profiles are drawn over the mean profile."""
-        from wearsim.studies.ensemble.panels import ensemble_sheet  # noqa: PLC0415  (only of figures)
-
-        return ensemble_sheet(self.result, measured)
-
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the mean profile, with which measured ones are compared."""
         return self.result.worn_profile()
@@ -291,11 +279,11 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
 def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
     """Return the estimates of an observable, and below them their intervals."""
-    named, found = OBSERVABLES[name], result.estimate(name, -1, QUANTILES)
+    named, estimate = OBSERVABLES[name], result.estimate(name, -1, QUANTILES)
     if result.is_constant(name) and result.count > 1:
-        value, _ = cells(found.mean, named.unit)
+        value, _ = cells(estimate.mean, named.unit)
         return [(named.label, value, CONSTANT, *[NOTHING] * len(QUANTILES))]
-    items = [found.mean, found.std, *(interval for _, interval in found.quantiles)]
+    items = [estimate.mean, estimate.std, *(interval for _, interval in estimate.quantiles)]
     texts = [cells(item, named.unit) for item in items]
     if named.unit == "deg":  # the mean of 359 and 1 deg is not 180 deg
         texts[:2] = [(NOTHING, "")] * 2
@@ -322,9 +310,9 @@ def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
 
 def _target_met(result: EnsembleResult, target: Target) -> str:
     """Return whether a target is reached, and the half-width of the interval."""
-    found = result.estimate_for(target)
-    interval, achieved = target.interval(found), target.achieved(found)
-    is_reached, realisations = target.reached(found), f"{count(result.count)} realisations"
+    estimate = result.estimate_for(target)
+    interval, achieved = target.interval(estimate), target.achieved(estimate)
+    is_reached, realisations = target.reached(estimate), f"{count(result.count)} realisations"
     word = "reached" if is_reached else "not reached"
     if not math.isfinite(interval.half_width) or math.isnan(interval.value):
         return f"{word}: {TOO_FEW_REALISATIONS}"
@@ -339,9 +327,11 @@ def _target_met(result: EnsembleResult, target: Target) -> str:
     return f"{text}, but the sample is too small" if too_small else text
 
 
-def _estimate(found: Estimate) -> dict[str, Any]:
-    data = asdict(found)
-    data["quantiles"] = [{"probability": p, **asdict(interval)} for p, interval in found.quantiles]
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    data = asdict(estimate)
+    data["quantiles"] = [
+        {"probability": p, **asdict(interval)} for p, interval in estimate.quantiles
+    ]
     return data
 
 

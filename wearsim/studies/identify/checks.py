@@ -74,11 +74,11 @@ def check_width(trace: Trace, y: FloatArray, rows: FloatArray) -> list[str]:
     return [what]
 
 
-def check_covered(found: DrawLikelihood, grown: Grown, trace: Trace) -> None:
+def check_covered(likelihood: DrawLikelihood, grown: Grown, trace: Trace) -> None:
     """Refuse a trace whose best wear factor is at the end of those computed."""
-    best = int(found.chi2.argmin())
+    best = int(likelihood.chi2.argmin())
     top = grown.ln_k[best, -1]
-    if trace.depth is None and found.mean[best] + found.std[best] > top:
+    if trace.depth is None and likelihood.mean[best] + likelihood.std[best] > top:
         raise ScenarioError(
             trace.name,
             [
@@ -93,7 +93,7 @@ def check_covered(found: DrawLikelihood, grown: Grown, trace: Trace) -> None:
             ],
         )
     freedom = len(trace.y) - 4
-    ratio = float(found.chi2.min()) / freedom
+    ratio = float(likelihood.chi2.min()) / freedom
     if ratio > _FOREIGN:
         raise ScenarioError(
             trace.name,
@@ -137,20 +137,20 @@ def _micrometres(ends: tuple[float, float, float]) -> str:
     return f"{value:.2f} um ({low:.2f} to {high:.2f})"
 
 
-def other_form(model: TraceLikelihood, found: DrawLikelihood) -> list[str]:
+def other_form(model: TraceLikelihood, likelihood: DrawLikelihood) -> list[str]:
     """Return a warning if a curvature of the trace changes K/H by more than chance.
 
     Only the most probable draw of the inputs is considered.
     """
     if model.curvature:
         return []
-    best = [int(np.where(np.isfinite(found.log_evidence), found.log_evidence, -np.inf).argmax())]
+    best = [int(np.nanargmax(likelihood.log_evidence))]
     grown = model.grown
     depth = {model.body: grown.depth[model.body][best]}
     alone = replace(grown, ln_k=grown.ln_k[best], depth=depth, energy=grown.energy[best])
     curve = replace(model, grown=alone, curvature=True).integrated()
-    change = float(curve.mean[0] - found.mean[best[0]])
-    straight = float(found.std[best[0]] ** 2)
+    change = float(curve.mean[0] - likelihood.mean[best[0]])
+    straight = float(likelihood.std[best[0]] ** 2)
     more = max(float(curve.std[0] ** 2) - straight, _LEAST_PART * straight)
     if abs(change) < _OTHER_FORM * np.sqrt(more):
         return []

@@ -17,7 +17,7 @@ from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import amount, can_be_random
 from wearsim.scenario.parse.toml import flat
 from wearsim.studies.identify.measurements import Measurement, key_of
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 
 _SPAN = 6.0  # standard deviations of a measured value that are considered
 _POINTS = 801
@@ -64,21 +64,21 @@ def with_known(scenario: Scenario, test: Measurement) -> Scenario:
     if not test.values:
         return scenario
     before = {key: item for item in scenario.random for key in item.keys}
-    found = _changed(scenario, test.values, test, "set")
-    random = list(found.random)
+    known = _changed(scenario, test.values, test, "set")
+    random = list(known.random)
     for key, error in test.errors.items():
         item = before.get(key)
         if not can_be_random(key) or (item is not None and item.role == "joint"):
             by = "" if item is None else f" alone, since {item.name} sets it with others"
             what, expected = f"cannot be random{by}", "only a known value in set"
-            raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
+            raise test.refused(Mistake("", f"std.{key}", what, as_written(error), expected))
         if item is None:
-            changed = _changed(found, {key: _normal(key, test.values[key], error)}, test, "std")
-            random += [one for one in changed.random if one.name == key]
+            changed = _changed(known, {key: _normal(key, test.values[key], error)}, test, "std")
+            random += [random_input for random_input in changed.random if random_input.name == key]
         else:
             std = _std(item, error, key, test)
-            random.append(_measured(item, _number(found, key), std, test))
-    return replace(found, random=tuple(sorted(random, key=lambda one: one.name)))
+            random.append(_measured(item, _number(known, key), std, test))
+    return replace(known, random=tuple(sorted(random, key=lambda random_input: random_input.name)))
 
 
 def _changed(
@@ -122,15 +122,15 @@ def _number(scenario: Scenario, key: str) -> float:
 def _std(item: RandomInput, error: object, key: str, test: Measurement) -> float:
     """Return a standard deviation in SI."""
     kind = item.quantity.kind if item.quantity else None
-    found, what = 0.0, "must be above 0"
+    std, what = 0.0, "must be above 0"
     try:
-        found = quantity(str(error), kind.unit) if kind else float(str(error))
+        std = quantity(str(error), kind.unit) if kind else float(str(error))
     except ValueError as failure:
         what = failure.what if isinstance(failure, QuantityError) else "is not a number"
-    if 0.0 < found < math.inf:
-        return found
+    if 0.0 < std < math.inf:
+        return std
     expected = kind.expected("positive") if kind else "a number above 0"
-    raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
+    raise test.refused(Mistake("", f"std.{key}", what, as_written(error), expected))
 
 
 def _measured(item: RandomInput, value: float, std: float, test: Measurement) -> RandomInput:
@@ -160,16 +160,16 @@ def fixed(text: str) -> dict[str, object]:
     ValueError
         If a part is no key with a value.
     """
-    found: dict[str, object] = {}
+    values: dict[str, object] = {}
     for part in text.split(","):
         name, equals, value = part.partition("=")
         if not equals or not name.strip() or not value.strip():
             raise ValueError(f"'{part}' is not an input with a value, such as friction=0.1")
         try:
-            found[key_of(name.strip())] = float(value)
+            values[key_of(name.strip())] = float(value)
         except ValueError:
-            found[key_of(name.strip())] = value.strip()
-    return found
+            values[key_of(name.strip())] = value.strip()
+    return values
 
 
 def with_measured(scenario: Scenario, stds: Mapping[str, float]) -> Scenario:

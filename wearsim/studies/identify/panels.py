@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     BLUE,
@@ -25,8 +26,8 @@ from wearsim.report.panels import (
     Sheet,
     Span,
     Text,
+    dots,
     evenly_spaced,
-    look,
 )
 from wearsim.report.text import in_unit, shown
 from wearsim.studies.identify.planning import SCATTERS, PlannedDesign
@@ -35,10 +36,10 @@ from wearsim.studies.identify.result import IdentificationResult
 _IN_FIGURE, MOST_TRACES, MOST_POINTS = 6, 12, 1200
 _MASSES = (0.95, 0.9, 0.5)
 _SHADES = ("#d6e4f2", "#a9c7e4", "#6f9fce")
-_UNIT = look(unit="1e-12 1/Pa", per_si=1e12)  # of K/H
+_UNIT: dict[str, Any] = {"unit": "1e-12 1/Pa", "per_si": 1e12}  # of K/H
 
 
-def identification_sheet(result: IdentificationResult) -> Sheet:
+def identification_sheet(result: IdentificationResult, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of an identification.
 
     K/H of each specimen with the pooled distribution, and the density of m and t; traces with the
@@ -72,10 +73,10 @@ def _trace(result: IdentificationResult, place: int) -> tuple[Panel, Panel]:
     known = np.flatnonzero(np.isfinite(rows[0]))
     every = known[evenly_spaced(len(known), MOST_POINTS)]
     y, height, fitted, low, high, unworn = (row[every] for row in rows)
-    test, worn, dots = result.tests[place], unworn <= 0.5, look(dash="", marker=".", size=2.0)
+    test, free = result.tests[place], unworn > 0.5
     marks = [
-        Line(y, height, colour=GREY, label="measured", **dots),
-        Line(y[~worn], height[~worn], colour=GREEN, label="shoulders", **dots),
+        dots(y, height, ".", size=2.0, colour=GREY, label="measured"),
+        dots(y[free], height[free], ".", size=2.0, colour=GREEN, label="shoulders"),
         Band(y, low, high, colour=ORANGE, alpha=0.4, label="95 % band"),
         Line(y, fitted, width=1.0, label="best profile"),
     ]
@@ -105,13 +106,11 @@ def _factors(result: IdentificationResult) -> Panel:
     named.append(("next specimen", np.exp(-0.5 * ((result.ln_k - middle) / std) ** 2)))
     marks: list[Mark] = []
     for row, (name, density) in enumerate(named):
-        last = row == len(named) - 1
-        style = look(colour=ORANGE, alpha=0.5) if last else {"colour": BLUE, "alpha": 0.35}
-        curve = 0.8 * density / density.max()
-        text = look(parts="x", colour=BLACK)
+        colour, alpha = (BLUE, 0.35) if row < len(named) - 1 else (ORANGE, 0.5)
+        curve = row + 0.8 * density / density.max()
         marks += [
-            Band(k, np.full_like(k, row), row + curve, **style),
-            Text(0.01, row + 0.1, name.rpartition("/")[2], **text),
+            Band(k, np.full_like(k, row), curve, colour=colour, alpha=alpha),
+            Text(0.01, row + 0.1, name.rpartition("/")[2], parts="x", colour=BLACK),
         ]
     below = np.cumsum(result.test_density, axis=1)
     below /= below[:, -1:]
@@ -172,15 +171,21 @@ def power_sheet(designs: Sequence[PlannedDesign], title: str = "") -> Sheet:
     """Return the power of planned tests against their number."""
     panels = {}
     for number, design in enumerate(designs):
-        tests, marks = np.array(design.tests), list[Mark]()
-        for t, colour in zip((0.0, *SCATTERS), (GREY, *COLOURS), strict=False):
-            label = f"'random', t = {t:g}" if t else "'random' though t = 0"
-            style = look(marker="o", size=3.5, colour=colour)
-            marks.append(Line(tests, np.array(design.random[t]), label=label, **style))
-        style = look(marker="s", size=3.5, colour=RED, dash="--")
-        explained = np.array(design.explained[0.0])
-        marks.append(Line(tests, explained, label="'explained', t = 0", **style))
-        marks.append(Span(0.8, across="y", dash=":", width=0.8, colour=GREY))
+        rates = {
+            "'random' though t = 0" if t == 0.0 else f"'random', t = {t:g}": design.random[t]
+            for t in (0.0, *SCATTERS)
+        }
+        marks: list[Mark] = [
+            Line(design.tests, rate, marker="o", size=3.5, colour=colour, label=label)
+            for (label, rate), colour in zip(rates.items(), (GREY, *COLOURS), strict=False)
+        ]
+        marks += [
+            Line(
+                design.tests, design.explained[0.0], dash="--", marker="s", size=3.5, colour=RED,
+                label="'explained', t = 0",
+            ),
+            Span(0.8, across="y", dash=":", width=0.8, colour=GREY),
+        ]  # fmt: skip
         panels[design.name] = Panel(
             fill(f"Inputs {design.name}", 56),
             Axis("number of tests", log=True),

@@ -163,8 +163,8 @@ class IdentificationResult(StudyResult[IdentificationData]):
     @property
     def scatter_of_k(self) -> dict[str, float]:
         """Scatter of ln K/H with its 90 and 95 % intervals."""
-        found: dict[str, float] = self.raw.summary["scatter_of_k"]
-        return found
+        scatter: dict[str, float] = self.raw.summary["scatter_of_k"]
+        return scatter
 
     @property
     def bayes_factor(self) -> float:
@@ -232,7 +232,7 @@ class IdentificationResult(StudyResult[IdentificationData]):
         >>> print(wearsim.identify("rig.toml", depths).posterior_toml().splitlines()[3])
         [wear.cylinder.k_over_h]
         """
-        found, scatter = self.raw.summary["next_specimen"], self.scatter_of_k
+        following, scatter = self.raw.summary["next_specimen"], self.scatter_of_k
         return (
             f"# K/H of the next specimen by {len(self.raw.specimens)} specimens\n"
             f"# {self.verdict_words}\n"
@@ -240,8 +240,8 @@ class IdentificationResult(StudyResult[IdentificationData]):
             f" (95 %: {scatter['low']:.3g} to {scatter['high']:.3g})\n"
             "[wear.cylinder.k_over_h]\n"
             'distribution = "lognormal"\n'
-            f'median = "{found["median_per_Pa"]:.5g} 1/Pa"\n'
-            f"factor = {found['factor']:.5g}\n"
+            f'median = "{following["median_per_Pa"]:.5g} 1/Pa"\n'
+            f"factor = {following['factor']:.5g}\n"
         )
 
     @cached_property

@@ -34,17 +34,12 @@ from wearsim.studies.ensemble.sweep import path_of
 from wearsim.studies.life.rare import next_stages
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
 from wearsim.studies.life.result import LifeResult
-from wearsim.studies.life.settings import (
-    SHARES,
-    design_variable,
-    settings_of,
-    with_limits,
-    with_rare_events,
-)
-from wearsim.studies.life.stored_settings import LifeSettings, LifeTarget
+from wearsim.studies.life.settings import SHARES, checked_study, design_variable
+from wearsim.studies.life.stored_settings import LifeSettings, life_target
 from wearsim.studies.opening import open_ensemble
 from wearsim.studies.preparation import check_plugins
 from wearsim.types import FloatArray, Grid
+from wearsim.uq.estimation.estimates import Target
 
 
 def life(
@@ -125,12 +120,19 @@ def life(
     >>> print(f"B10 {lives.b(10).value:.3g} {lives.unit}")
     B10 8.51e+05 passes
     """
-    scenario = with_limits(with_chosen_model(as_scenario(scenario), test=True), limits)
-    aim = None if precision is None else LifeTarget.parse(precision)
-    settings = settings_of(scenario, realisations, target, b, most)
-    settings = with_rare_events(scenario, settings, rare, precision, rare_method)
-    if variable and (found := design_variable(scenario, variable)):
-        settings = replace(settings, variable=asdict(found))
+    scenario, settings, aim = checked_study(
+        with_chosen_model(as_scenario(scenario), test=True),
+        realisations,
+        limits=limits,
+        target=target,
+        b=b,
+        most=most,
+        precision=precision,
+        rare=rare,
+        rare_method=rare_method,
+    )
+    if variable and (value := design_variable(scenario, variable)):
+        settings = replace(settings, variable=asdict(value))
     if output is not None:
         check_output(output, force, scenario.paths)
     runner, content = _prepared(scenario, settings, aim)
@@ -160,11 +162,11 @@ def _results_path(output: str | Path | None) -> Iterator[Path]:
 
 def _opened(path: Path, in_memory: bool) -> LifeResult:
     """Open the result of a study; read all of it if it is to be kept in memory only."""
-    found = cast("LifeResult", open_ensemble(path))
+    result = cast("LifeResult", open_ensemble(path))
     if not in_memory:
-        return found
-    variables = {name: found.raw.variables[name] for name in found.raw.schema.variables}
-    return replace(found, raw=replace(found.raw, variables=variables), path=None)
+        return result
+    variables = {name: result.raw.variables[name] for name in result.raw.schema.variables}
+    return replace(result, raw=replace(result.raw, variables=variables), path=None)
 
 
 def resume_life(
@@ -227,7 +229,7 @@ def resume_life(
     settings = replace(settings, plain=total)
     grid = Grid(data.variables["y"], data.strip_width)
     runner = LifeRunner(scenario, total, grid, settings, data.life["base"])
-    aim = LifeTarget.parse(data.until) if data.until else None
+    aim = life_target(data.until) if data.until else None
     hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
     finish = EnsembleWork.run_failed_again if failed else partial(_finish_stages, runner=runner)
     grown = {"life": {**data.life, "plain": total}}
@@ -238,8 +240,11 @@ def resume_life(
 def _finish_stages(work: EnsembleWork, runner: LifeRunner) -> None:
     """Run all tests, also those for rare events stage by stage; raises as `EnsembleWork`."""
     work.run()
-    while found := next_stages(work.result()):
-        stages, total = (*runner.settings.stages, *found), found[-1]["first"] + found[-1]["count"]
+    while further := next_stages(work.result()):
+        stages, total = (
+            (*runner.settings.stages, *further),
+            further[-1]["first"] + further[-1]["count"],
+        )
         settings = replace(runner.settings, stages=stages)
         runner = LifeRunner(runner.scenario, total, runner.grid, settings, runner.base)
         work.extend(runner, total, life={**asdict(settings), "base": runner.base})
@@ -248,7 +253,7 @@ def _finish_stages(work: EnsembleWork, runner: LifeRunner) -> None:
 
 
 def _prepared(
-    scenario: Scenario, settings: LifeSettings, aim: LifeTarget | None
+    scenario: Scenario, settings: LifeSettings, aim: Target | None
 ) -> tuple[LifeRunner, tuple[EnsembleData, dict[str, FloatArray]]]:
     """Return the runner of a study, and the content of its file before the first realisation."""
     fixed = {settings.factor: settings.reference} if settings.factor else {}
@@ -332,11 +337,11 @@ def sweep_life(
     paths = [path_of(output, name) for name in names]
     if len(set(paths)) < len(paths):
         raise ValueError("two values have the same file; write them differently")
-    for one, path in zip(scenarios, paths, strict=True):
-        check_output(path, options.get("force", False), one.paths)
+    for design, path in zip(scenarios, paths, strict=True):
+        check_output(path, options.get("force", False), design.paths)
     results = []
-    for one, name, path in zip(scenarios, names, paths, strict=True):
+    for design, name, path in zip(scenarios, names, paths, strict=True):
         if on_value is not None:
             on_value(name, path)
-        results.append(life(one, realisations, path, variable=key, **options))
+        results.append(life(design, realisations, path, variable=key, **options))
     return results

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     DASHES,
@@ -21,8 +21,8 @@ from wearsim.report.panels import (
     Span,
     Text,
     Whiskers,
+    dots,
     evenly_spaced,
-    look,
     message,
     several_colours,
 )
@@ -34,7 +34,7 @@ from wearsim.studies.life.stored_settings import swept_variable
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.survival.fits import FAMILIES, Family
-from wearsim.uq.survival.lives import cumulative_incidence, median_positions, survival_curve
+from wearsim.uq.survival.lives import cumulative_incidence, median_positions
 
 _POINTS = 200  # of a curve
 _MOST_MARKS = 500
@@ -63,7 +63,12 @@ class _Design:
         return f"{self.label}: {words}" if self.several else words
 
 
-def life_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
+def life_sheet(result: LifeResult, measured: Sequence[Measured] = ()) -> Sheet:
+    """Return the panels of the lives of one design."""
+    return lives_sheet([result], [result.title])
+
+
+def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
     """Return the panels of the lives of designs.
 
     Parameters
@@ -108,20 +113,23 @@ def _against(designs: Sequence[_Design]) -> Panel:
     assert variable is not None
     unit, size = engineers_unit(variable.unit)
     by_value = sorted(
-        ((one.variable.value, one) for one in results if one.variable), key=lambda pair: pair[0]
+        ((result.variable.value, result) for result in results if result.variable),
+        key=lambda pair: pair[0],
     )
     shares, marks = results[0].settings.shares, list[Mark]()
     for share, colour in zip(shares, several_colours(len(shares)), strict=True):
-        found = [(value, one.b(share)) for value, one in by_value]
-        known = [(value, life) for value, life in found if np.isfinite(life.value)]
+        pairs = [(value, result.b(share)) for value, result in by_value]
+        known = [(value, life) for value, life in pairs if np.isfinite(life.value)]
         if not known:
             continue
         values, lives = zip(*known, strict=True)
-        low, high = ([_or_nan(getattr(life, end)) for life in lives] for end in ("low", "high"))
-        style: dict[str, Any] = {"colour": colour, "label": f"B{share:g}", "marker": "o"}
+        value, low, high = (
+            np.array([getattr(life, name) for life in lives]) for name in ("value", "low", "high")
+        )
+        low, high = (np.where(np.isfinite(end), end, np.nan) for end in (low, high))
         marks += [
             Whiskers(values, low, high, colour=colour),
-            Line(values, [life.value for life in lives], **style),
+            Line(values, value, marker="o", colour=colour, label=f"B{share:g}"),
         ]
     if not marks:
         return message("Life against the design", "all lives are censored")
@@ -134,10 +142,6 @@ def _against(designs: Sequence[_Design]) -> Panel:
     )
 
 
-def _or_nan(end: float) -> float:
-    return end if np.isfinite(end) else np.nan
-
-
 def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
     """Return the survival of designs with its 95 % band, censored lives and target."""
     if all(design.result.at_once == design.result.count for design in designs):
@@ -147,19 +151,16 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
     ]
     for design in designs:
         result, colour = design.result, design.colour
-        life, survival, low, high = survival_of(result)
-        steps = not result.is_exact
+        curve, steps = result.survival_curve(), not result.is_exact
         marks += [
-            Band(life, low, high, steps=steps, colour=colour, alpha=0.2),
-            Line(life, survival, steps=steps, colour=colour, label=design.named),
+            Band(curve.life, curve.low, curve.high, steps=steps, colour=colour, alpha=0.2),
+            Line(curve.life, curve.survival, steps=steps, colour=colour, label=design.named),
         ]
-        if result.censored and len(survival):
-            end, dash = float(survival[-1]), look(dash="", marker="|", size=12.0)
-            text = f"{result.censored} censored"
-            style = look(offset=(-4.0, 6.0), anchor="right")
+        if result.censored:
+            end, text = float(curve.survival[-1]), f"{result.censored} censored"
             marks += [
-                Line([result.most], [end], colour=colour, **dash),
-                Text(result.most, end, text, colour=colour, **style),
+                dots([result.most], [end], "|", size=12.0, colour=colour),
+                Text(result.most, end, text, "", (-4.0, 6.0), "right", colour=colour),
             ]
     text = "Share of the machines that outlast a life, with its 95 % band."
     for target in {design.result.target for design in designs}:
@@ -172,33 +173,6 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
     x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
     y = Axis("survival", "%", limits=_SHARE)
     return Panel("Survival, with 95 % band", x, y, marks, text)
-
-
-def survival_of(result: LifeResult) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return lives, and the survival with its band at each."""
-    if not result.is_exact:
-        curve = survival_curve(np.minimum(result.lives, result.most), result.observed)
-        start, one = np.zeros(1), np.ones(1)
-        end = curve.survival[-1:] if len(curve.life) else one
-        last = np.array([result.most]) if result.censored else curve.life[-1:]
-        return (
-            np.concatenate([start, curve.life, last]),
-            np.concatenate([one, curve.survival, end]),
-            np.concatenate([one, curve.low, curve.low[-1:] if len(curve.low) else one]),
-            np.concatenate([one, curve.high, curve.high[-1:] if len(curve.high) else one]),
-        )
-    distribution = result.distribution
-    end_of_life: float = min(distribution.quantile_of_mean(0.999), result.most)
-    life = np.linspace(0.0, end_of_life, _POINTS)[1:]
-    estimates = result.uncertain or distribution
-    found = [estimates.probability_before(float(n)) for n in life]
-    survival, low, high = (
-        np.array([1.0, *(1.0 - getattr(item, name) for item in found)])
-        for name in ("value", "high", "low")
-    )
-    # the survival falls, so that a bound at one life is one for those before or after it
-    low, high = np.maximum.accumulate(low[::-1])[::-1], np.minimum.accumulate(high)
-    return np.append(0.0, life), survival, low, high
 
 
 def _scale(family: Family) -> Callable[[FloatArray], FloatArray]:
@@ -220,18 +194,16 @@ def _probabilities(designs: Sequence[_Design], family: Family, axis: Axis) -> Pa
             continue
         part = median_positions(result.count)[result.at_once :][: len(lives)]
         picks = evenly_spaced(len(lives), _MOST_MARKS)
-        dots = look(dash="", marker=".", colour=colour, label=design.label)
-        marks.append(Line(lives[picks], scale(part[picks]), **dots))
+        marks.append(dots(lives[picks], scale(part[picks]), ".", colour=colour, label=design.label))
         ends += [float(lives[0]), float(lives[-1])]
         fit = next((item for item in result.fits if item.family == family), None)
         if fit is not None:
             across = np.geomspace(0.7 * lives[0], 1.3 * lives[-1], _POINTS)
             line = np.clip(fit.probability_before(across), 1e-4, 1.0 - 1e-4)
             inside = (line > 1e-4) & (line < 1.0 - 1e-4)
-            best = result.fits[0] is fit
-            style = look(colour=colour, dash="-" if best else "--", width=1.4)
-            label = f"fit{', lower AIC' if best else ''}"
-            marks.append(Line(across[inside], scale(line[inside]), label=label, **style))
+            dash, label = ("-", "fit, lower AIC") if result.fits[0] is fit else ("--", "fit")
+            curve = across[inside], scale(line[inside])
+            marks.append(Line(*curve, dash=dash, width=1.4, colour=colour, label=label))
         if result.is_exact:
             first, last = 0.7 * lives[0], 1.3 * lives[-1]
             if result.settings.alone:  # one test, which is a point of the distribution
@@ -239,8 +211,8 @@ def _probabilities(designs: Sequence[_Design], family: Family, axis: Axis) -> Pa
                 ends += [first, last]
             across = np.geomspace(first, last, _POINTS)
             mean = np.clip(result.distribution.failed(across).mean(axis=0), 1e-4, 1.0 - 1e-4)
-            style = look(colour=_DARK, dash=":", width=0.9, label="exact K/H")
-            marks.append(Line(across, scale(mean), **style))
+            curve = across, scale(mean)
+            marks.append(Line(*curve, dash=":", width=0.9, colour=_DARK, label="exact K/H"))
     if not ends:
         return message(title, "no life above 0 ended")
     low, high = (float(value) for value in scale(np.array([5e-4, 0.9995])))
@@ -260,7 +232,7 @@ def _tornado(designs: Sequence[_Design]) -> Panel:
     """Return how far each input moves the life from its median, and the 95 % intervals."""
     title, results = "What moves the life", [design.result for design in designs]
     effects = [{} if result.are_equal else result.tornado() for result in results]
-    names = list(dict.fromkeys(name for found in effects for name in found))
+    names = list(dict.fromkeys(name for by_input in effects for name in by_input))
     if not names:
         alone = {result.settings.factor for result in results if result.settings.alone}
         text = f"only {', '.join(alone)}" if alone else "too few realisations, or equal lives"
@@ -268,18 +240,17 @@ def _tornado(designs: Sequence[_Design]) -> Panel:
         lines = [line for obstacle in obstacles for line in obstacle.split("; ")]
         return message(title, *(lines or [text]))
     height, marks = 0.7 / len(designs), list[Mark]()
-    for number, (found, design) in enumerate(zip(effects, designs, strict=True)):
+    for number, (by_input, design) in enumerate(zip(effects, designs, strict=True)):
         middle = (number - 0.5 * (len(designs) - 1)) * height
-        places = np.array([names.index(name) for name in found], dtype=float) + middle
+        places = np.array([names.index(name) for name in by_input], dtype=float) + middle
         for end, alpha in enumerate((0.35, 0.8)):
-            ends = [effect.factors[end] for effect in found.values()]
+            ends = [effect.factors[end] for effect in by_input.values()]
             value = [factor.value for factor in ends]
             low, high = ([getattr(factor, side) for factor in ends] for side in ("low", "high"))
-            style = look(colour=design.colour, alpha=alpha)
             label = design.named if end else ""
             bars = (places - 0.5 * height, places + 0.5 * height, value, 1.0, True)
             marks += [
-                Bars(*bars, label=label, **style),
+                Bars(*bars, label=label, colour=design.colour, alpha=alpha),
                 Whiskers(places, low, high, horizontal=True, colour="0.2"),
             ]
     name = "factor of the life, input at its 10 % (pale) and 90 % quantile"
@@ -303,8 +274,8 @@ def _incidence(designs: Sequence[_Design], axis: Axis) -> Panel:
         for place, name in enumerate(result.limits):
             if len(ends) and incidence[place, -1] > 0.0:
                 curve = np.append(0.0, ends), np.append(0.0, incidence[place])
-                style = look(colour=design.colour, dash=DASHES[place % len(DASHES)])
-                marks.append(Line(*curve, steps=True, label=design.words(name), **style))
+                dash, label = DASHES[place % len(DASHES)], design.words(name)
+                marks.append(Line(*curve, dash, steps=True, colour=design.colour, label=label))
     if not marks:
         return message(title, "no limit was reached")
     x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
@@ -321,9 +292,9 @@ def _limits(designs: Sequence[_Design]) -> Panel:
         for design in designs:
             for number, (name, angles) in enumerate(design.result.angles.items()):
                 share = np.histogram(angles % (2.0 * np.pi), edges)[0] / design.result.count
-                style = look(colour=design.colour, alpha=0.8 - 0.4 * (number % 2))
-                words = design.words(name)
-                marks.append(Bars(edges[:-1], edges[1:], share, label=words, **style))
+                alpha, label = 0.8 - 0.4 * (number % 2), design.words(name)
+                places = edges[:-1], edges[1:], share
+                marks.append(Bars(*places, colour=design.colour, alpha=alpha, label=label))
         caption = "Share of the machines by the angle at which the limit was reached."
         return Panel("Angle at which the limit is reached", ANGLE, share_axis, marks, caption)
     if not any(design.result.observed.any() for design in designs):
@@ -333,8 +304,9 @@ def _limits(designs: Sequence[_Design]) -> Panel:
     for number, design in enumerate(designs):
         shares = [design.result.first_limits.get(name, 0.0) for name in names]
         left = np.arange(len(names)) + (number - 0.5 * len(designs)) * width
-        style = look(colour=design.colour, alpha=0.8, label=design.named)
-        bars.append(Bars(left, left + width, shares, **style))
+        bars.append(
+            Bars(left, left + width, shares, colour=design.colour, alpha=0.8, label=design.named)
+        )
     shown_names = [name.replace("_", " ") for name in names]
     return Panel(
         "Limit reached first",

@@ -46,8 +46,8 @@ def next_stages(result: LifeResult) -> list[dict[str, Any]]:
         return []
     importance = by_importance(result)
     if needs_subset(settings.rare_method, importance):
-        found = by_subset(result)
-        return [found] if isinstance(found, dict) else []
+        further = by_subset(result)
+        return [further] if isinstance(further, dict) else []
     if importance:
         return []
     if settings.factor:
@@ -96,7 +96,7 @@ def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:
     plain = {"first": 0, "count": settings.plain, "shift": {}}
     drawn = [_stage_scores(result, names, stage) for stage in (plain, *stages)]
     numbers = np.concatenate([places for places, _ in drawn])
-    scores = np.concatenate([found for _, found in drawn])
+    scores = np.concatenate([further for _, further in drawn])
     mixture = result.mixture_of(numbers)
     if not stages:
         names, points = _points(names, scores, mixture, target / settings.per_unit)
@@ -110,9 +110,9 @@ def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:
     done = sum(stage["count"] for stage in stages)
     parts = [DEFENSIVE, *((1.0 - DEFENSIVE) * part for part in parts)]
     sizes = _parts(settings.rare - done, parts)
-    found = _stages(settings.plain + done, sizes, names, [np.zeros(len(names)), *means])
-    mixed = [(stage["count"] / sum(sizes), stage["shift"]) for stage in found]
-    return [{**stage, "mixture": mixed} for stage in found]
+    further = _stages(settings.plain + done, sizes, names, [np.zeros(len(names)), *means])
+    mixed = [(stage["count"] / sum(sizes), stage["shift"]) for stage in further]
+    return [{**stage, "mixture": mixed} for stage in further]
 
 
 def _points(
@@ -126,7 +126,7 @@ def _points(
     effects = influence(scores[known], log)
     chosen = np.sort(np.argsort(-effects, kind="stable")[:MOST_INPUTS])
     points = design_points(
-        scores[known][:, chosen], log, lambda found: mixture.needed_score(found, life)
+        scores[known][:, chosen], log, lambda scores_found: mixture.needed_score(scores_found, life)
     )
     return [names[place] for place in chosen], points
 
@@ -154,9 +154,9 @@ def _parts(total: int, shares: Sequence[float]) -> list[int]:
 def _stages(
     first: int, sizes: Sequence[int], names: list[str], shifts: Sequence[FloatArray]
 ) -> list[dict[str, Any]]:
-    found = []
+    stages = []
     for size, shift in zip(sizes, shifts, strict=True):
         moved = dict(zip(names, map(float, shift), strict=True))
-        found.append({"first": first, "count": size, "shift": moved})
+        stages.append({"first": first, "count": size, "shift": moved})
         first += size
-    return [stage for stage in found if stage["count"]]
+    return [stage for stage in stages if stage["count"]]

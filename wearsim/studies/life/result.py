@@ -13,10 +13,10 @@ import numpy as np
 
 from wearsim.studies.life.factor import posterior_table
 from wearsim.studies.life.rare_estimates import rare_estimates
-from wearsim.studies.life.stored_settings import LifeComparison, LifeTarget
+from wearsim.studies.life.stored_settings import LifeComparison
 from wearsim.studies.life.values import LifeValues
 from wearsim.types import IntArray
-from wearsim.uq.estimation.estimates import Target
+from wearsim.uq.estimation.estimates import LIFE, Estimate, Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 from wearsim.uq.sensitivity.effects import TAIL, SignedEffect
 from wearsim.uq.survival.distributions import (
@@ -25,11 +25,18 @@ from wearsim.uq.survival.distributions import (
     LifeDistribution,
 )
 from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
-from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
+from wearsim.uq.survival.lives import (
+    SurvivalCurve,
+    life_quantile,
+    lower_bound,
+    probability_before,
+    survival_curve,
+)
 from wearsim.uq.survival.rare_events import RareProbability
 from wearsim.uq.survival.two_levels import UncertainLife
 
 _QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
+_POINTS = 200  # of a curve
 _FEWEST = 32  # realisations below which a target is not reached
 
 
@@ -219,13 +226,15 @@ class LifeResult(LifeValues):
             return life_quantile(np.minimum(lives, self.most), np.isfinite(lives), share)
         return self._within_censoring(self._distribution(name).quantile(share))
 
-    def _within_censoring(self, found: Interval) -> Interval:
+    def _within_censoring(self, quantile: Interval) -> Interval:
         """Return a life with its interval, unknown beyond the censoring."""
-        if found.value <= self.most:
+        if quantile.value <= self.most:
             return Interval(
-                found.value, found.low, found.high if found.high <= self.most else math.inf
+                quantile.value,
+                quantile.low,
+                quantile.high if quantile.high <= self.most else math.inf,
             )
-        return Interval(math.nan, min(found.low, self.most), math.inf)
+        return Interval(math.nan, min(quantile.low, self.most), math.inf)
 
     def lower_bound(self, percent: float) -> float:
         """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown.
@@ -267,8 +276,39 @@ class LifeResult(LifeValues):
         >>> print(f"{lives.survival(675_000).value:.2%}")
         96.64%
         """
-        found = self.probability_before(life)
-        return Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low)
+        failed_before = self.probability_before(life)
+        return Interval(
+            1.0 - failed_before.value, 1.0 - failed_before.high, 1.0 - failed_before.low
+        )
+
+    def survival_curve(self) -> SurvivalCurve:
+        """Return the survival with its band from 0 to the last life, or the maximum of the tests.
+
+        Examples
+        --------
+        >>> curve = wearsim.open_results("rig-life.h5").survival_curve()
+        >>> curve.life[0], curve.survival[0]
+        (0.0, 1.0)
+        """
+        if not self.is_exact:
+            curve = survival_curve(np.minimum(self.lives, self.most), self.observed)
+            last = [self.most] if self.censored else curve.life[-1:]
+            parts = [
+                np.concatenate([[1.0], part, part[-1:] if len(part) else [1.0]])
+                for part in (curve.survival, curve.low, curve.high)
+            ]
+            return SurvivalCurve(np.concatenate([[0.0], curve.life, last]), *parts)
+        end = min(self.distribution.quantile_of_mean(0.999), self.most)
+        life = np.linspace(0.0, end, _POINTS)
+        estimates = self.uncertain or self.distribution
+        ended = [estimates.probability_before(float(n)) for n in life[1:]]
+        survival, low, high = (
+            np.array([1.0, *(1.0 - getattr(item, name) for item in ended)])
+            for name in ("value", "high", "low")
+        )
+        # the survival falls, so that a bound at one life is one for those before or after it
+        low, high = np.maximum.accumulate(low[::-1])[::-1], np.minimum.accumulate(high)
+        return SurvivalCurve(life, survival, low, high)
 
     @cached_property
     def fits(self) -> list[LifeFit]:
@@ -277,8 +317,8 @@ class LifeResult(LifeValues):
         lives = np.minimum(self.lives[positive], self.most)
         if not len(lives):
             return []
-        found = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
-        return sorted((fit for fit in found if fit is not None), key=lambda fit: fit.aic)
+        fitted = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
+        return sorted((fit for fit in fitted if fit is not None), key=lambda fit: fit.aic)
 
     def _indices(
         self, name: str, groups: list[str]
@@ -290,8 +330,8 @@ class LifeResult(LifeValues):
             return dict.fromkeys(groups, (UNKNOWN, None))
         from wearsim.uq.sensitivity.sobol_indices import first_order  # noqa: PLC0415  (rarely needed)
 
-        found = first_order(self.log_lives, self.drawn_numbers(groups))
-        return {group: (index, None) for group, index in found.items()}
+        indices = first_order(self.log_lives, self.drawn_numbers(groups))
+        return {group: (index, None) for group, index in indices.items()}
 
     def tornado(self) -> dict[str, SignedEffect]:
         """Return the effect of each input on the logarithm of life, by its name, greatest first.
@@ -322,17 +362,21 @@ class LifeResult(LifeValues):
         if self.effects_obstacle:
             return {}
         drawn = self.drawn_numbers([item["name"] for item in self.raw.groups])
-        factor, logs, found = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
+        factor, logs, by_input = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
         if factor in drawn and self.is_known_throughout and not self.at_once:
             # life is kappa/K: kappa holds all that the other inputs change
             logs = np.log(self.values("life") * self.values(factor))
             low, middle, high = np.log((self.law or self._drawn_law).quantile(_QUANTILES)).tolist()
-            found[factor] = exact_effect(middle - low, middle - high)
+            by_input[factor] = exact_effect(middle - low, middle - high)
             del drawn[factor]
-        laws = {one.name: one.scalar for one in self.scenario.random if one.role == "scalar"}
+        laws = {
+            random_input.name: random_input.scalar
+            for random_input in self.scenario.random
+            if random_input.role == "scalar"
+        }
         scores = {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
-        found |= effects(logs, scores)
-        return dict(sorted(found.items(), key=lambda item: -item[1].size))
+        by_input |= effects(logs, scores)
+        return dict(sorted(by_input.items(), key=lambda item: -item[1].size))
 
     def compare(self, other: LifeResult) -> LifeComparison:
         """Compare the lives with those of another design.
@@ -378,7 +422,7 @@ class LifeResult(LifeValues):
         paired = self.raw.seed == other.raw.seed
         first, second = self.distribution, other.distribution
         name = "known_lives" if math.isinf(most) else "lives"
-        one, two = (getattr(item, name) for item in both)
+        lives, other_lives = (getattr(item, name) for item in both)
         common = np.intersect1d(self.numbers, other.numbers)
         if paired and not (first.exact and second.exact):
             places = [np.searchsorted(item.numbers, common) for item in both]
@@ -386,8 +430,12 @@ class LifeResult(LifeValues):
                 paired = False
             else:
                 first, second = _at(first, places[0]), _at(second, places[1])
-                one, two = one[places[0]], two[places[1]]
-        machine = same_machine(one, two, most) if paired and len(one) == len(two) else None
+                lives, other_lives = lives[places[0]], other_lives[places[1]]
+        machine = (
+            same_machine(lives, other_lives, most)
+            if paired and len(lives) == len(other_lives)
+            else None
+        )
         if machine and all(item.settings.alone for item in both):  # for any wear factor
             machine = Interval(machine.value, machine.value, machine.value)
         return LifeComparison(
@@ -397,20 +445,24 @@ class LifeResult(LifeValues):
             len(common),
         )
 
-    def estimate_for(self, target: Target | LifeTarget) -> Any:
+    def estimate_for(self, target: Target) -> Estimate:
         """Return the estimate to which a target applies.
 
         Examples
         --------
         >>> lives = wearsim.open_results("rig-life.h5")
-        >>> from wearsim.studies.life.stored_settings import LifeTarget
-        >>> lives.estimate_for(LifeTarget.parse("b10 3%")).value  # takes 32 realisations
+        >>> from wearsim.uq.estimation.estimates import Target
+        >>> lives.estimate_for(Target.parse("b10 3%")).quantile(0.1).value  # takes 32 realisations
         nan
         """
-        if isinstance(target, Target):
+        if target.observable != LIFE:
             return super().estimate_for(target)
+        share = float(target.statistic)
         # more realisations do not reduce what is not known of the wear factor
-        return self._b(100.0 * target.share, "life") if self.count >= _FEWEST else UNKNOWN
+        life = self._b(100.0 * share, "life") if self.count >= _FEWEST else UNKNOWN
+        return Estimate(
+            self.count, UNKNOWN, UNKNOWN, ((share, life),), math.nan, math.nan, self.method
+        )
 
     @property
     def rare(self) -> RareProbability | None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import ArgumentError, Mistake, ScenarioError, checking_argument
 from wearsim.evolution.limits import OF_LIFE, Limit
 from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import Scenario
@@ -19,13 +19,45 @@ from wearsim.studies.life.draws import shifted_inputs
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.rare import LEAST_TESTS
 from wearsim.studies.life.realisation import with_length
-from wearsim.studies.life.stored_settings import DesignVariable, LifeSettings
+from wearsim.studies.life.stored_settings import DesignVariable, LifeSettings, life_target
 from wearsim.units import QuantityError, kind_of
+from wearsim.uq.estimation.estimates import Target
 
 SHARES = (1.0, 10.0, 50.0)
 _LIMITS = f"{', '.join(name.replace(' ', '_') for name in OF_LIFE)}, as in depth=50um"
 RARE_METHODS = ("auto", "importance", "subset")
 LONGEST = 10.0  # default censoring over the target or the length of the test
+
+
+def checked_study(
+    scenario: Scenario,
+    realisations: int,
+    *,
+    limits: Sequence[str] = (),
+    target: float | str | None = None,
+    b: Sequence[float] = SHARES,
+    most: float | str | None = None,
+    precision: str | None = None,
+    rare: int = 0,
+    rare_method: str = "auto",
+) -> tuple[Scenario, LifeSettings, Target | None]:
+    """Return scenario, settings and target of a study, whose arguments are those of `life`.
+
+    Raises
+    ------
+    ArgumentError
+        If an argument is invalid.
+    ScenarioError
+        If there is no limit, or nothing is random.
+    """
+    with checking_argument("precision"):
+        aim = None if precision is None else life_target(precision)
+    with checking_argument("limits"):
+        scenario = with_limits(scenario, limits)
+    settings = settings_of(scenario, realisations, target, b, most)
+    with checking_argument("rare"):
+        settings = with_rare_events(scenario, settings, rare, precision, rare_method)
+    return scenario, settings, aim
 
 
 def with_rare_events(
@@ -82,7 +114,7 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
     ScenarioError
         If there is none, or one is of no meaning for the scenario.
     """
-    found: dict[str, str] = {}
+    changes: dict[str, str] = {}
     for text in limits:
         name = text.replace("_", " ").split("=")[0].strip().lower().removeprefix("worn ")
         if "=" in text and name not in OF_LIFE:
@@ -93,10 +125,10 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
                 f"'{text}' does not end a life, expected a limit of {', '.join(OF_LIFE)}; a time"
                 " after which lives are censored is the maximum"
             )
-        if f"limit.{limit.key}" in found:
+        if f"limit.{limit.key}" in changes:
             raise ValueError(f"'{text}': a limit of {limit.quantity} is given twice")
-        found[f"limit.{limit.key}"] = limit.text.removeprefix(limit.quantity).strip()
-    changed = scenario.changed(found) if found else scenario
+        changes[f"limit.{limit.key}"] = limit.text.removeprefix(limit.quantity).strip()
+    changed = scenario.changed(changes) if changes else scenario
     if not changed.limit.given:
         what, expected = "is needed for a life", 'one limit or more, such as depth = "50 um"'
         raise ScenarioError(scenario.file, [Mistake("limit", "", what, "none", expected)])
@@ -114,7 +146,7 @@ def settings_of(
 
     Raises
     ------
-    ValueError
+    ArgumentError
         If a life or a percentage is invalid.
     ScenarioError
         If nothing is random.
@@ -122,27 +154,32 @@ def settings_of(
     cam = scenario.cam is not None
     per_unit = float(scenario.operation.rollers) if cam else 1.0
     rate, unit = scenario.pass_rate / per_unit, "turns" if cam else "passes"
-    aim = None if target is None else per_unit * parse_life(target, unit, rate, "target")
+    with checking_argument("target"):
+        aim = None if target is None else per_unit * parse_life(target, unit, rate, "target")
     for share in shares:
         if not 0.0 < share < 100.0:
-            raise ValueError(f"B{share:g} is not a life, expected percentages between 0 and 100")
+            text = f"B{share:g} is not a life, expected percentages between 0 and 100"
+            raise ArgumentError("b", text)
     if most is not None:
-        longest = per_unit * parse_life(most, unit, rate, "max")
+        with checking_argument("most"):
+            longest = per_unit * parse_life(most, unit, rate, "max")
     else:
-        own = float(scenario.total_passes) if scenario.has_length else 0.0
-        longest = LONGEST * max(own, aim or 0.0)
+        length = float(scenario.total_passes) if scenario.has_length else 0.0
+        longest = LONGEST * max(length, aim or 0.0)
         if longest == 0.0:
-            raise ValueError(
+            raise ArgumentError(
+                "most",
                 "a maximum is needed at which lives are censored, such as 1e7, since the scenario"
-                " has no length"
+                " has no length",
             )
     span = scenario.load.build().span
     if span is not None:  # the log cannot be extended
         longest = min(longest, span[1] * scenario.pass_rate)
     if aim is not None and aim > longest:
-        raise ValueError(
+        raise ArgumentError(
+            "most",
             f"the target of {aim / per_unit:g} {unit} is beyond the maximum of"
-            f" {longest / per_unit:g} {unit}; give a greater maximum"
+            f" {longest / per_unit:g} {unit}; give a greater maximum",
         )
     if not scenario.has_length:
         scenario = with_length(scenario, longest)
@@ -198,15 +235,15 @@ def parse_life(value: float | str, unit: str, rate: float, what: str) -> float:
     """
     text = str(value).strip()
     try:
-        found = float(text.removesuffix(unit))
+        life = float(text.removesuffix(unit))
     except ValueError:
         try:
-            found = rate * quantity(text, "s")
+            life = rate * quantity(text, "s")
         except QuantityError as error:
             raise ValueError(
                 f"{what} '{text}' is not a life, expected a number of {unit} such as 675000, or a"
                 " time such as '200 h'"
             ) from error
-    if not 0.0 < found < np.inf:
+    if not 0.0 < life < np.inf:
         raise ValueError(f"{what} '{text}' must be above zero")
-    return found
+    return life

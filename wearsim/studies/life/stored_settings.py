@@ -2,78 +2,31 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+from wearsim.uq.estimation.estimates import LIFE, Target
 from wearsim.uq.estimation.intervals import Interval
 
-_FORM = re.compile(r"[bB](?P<percent>[0-9]*\.?[0-9]+)\s+(?P<width>[0-9]*\.?[0-9]+)\s*%")
 
+def life_target(text: str) -> Target:
+    """Return the target of a text such as "b10 3%".
 
-@dataclass(frozen=True)
-class LifeTarget:
-    """Target half-width of the interval of a life, relative to it.
-
-    Parameters
-    ----------
-    share : float
-        Share that fails before, 0.1 for B10.
-    width : float
+    Raises
+    ------
+    ValueError
+        If the text is not a target for a life.
     """
-
-    share: float
-    width: float
-
-    @classmethod
-    def parse(cls, text: str) -> LifeTarget:
-        """Return the target of a text such as "b10 3%".
-
-        Raises
-        ------
-        ValueError
-            If the text is not a target.
-        """
-        match = _FORM.fullmatch(text.strip())
-        share, width = (
-            (float(match[name]) / 100.0 for name in ("percent", "width"))
-            if match
-            else (
-                0.0,
-                0.0,
-            )
-        )
-        if not (0.0 < share < 1.0 and width > 0.0):
-            raise ValueError(
-                f'cannot read the target "{text}": expected a life and the relative half-width of'
-                ' its interval, as in "b10 3%"'
-            )
-        return cls(share, width)
-
-    @property
-    def what(self) -> str:
-        """Name of the life, "b10"."""
-        return f"b{100.0 * self.share:.12g}"
-
-    def __str__(self) -> str:
-        """Return the text that `parse` accepts."""
-        return f"{self.what} {100.0 * self.width:.12g}%"
-
-    def interval(self, estimate: Any) -> Interval:
-        """Return the estimate, which is an interval."""
-        found: Interval = estimate
-        return found
-
-    def achieved(self, estimate: Any) -> float:
-        """Return the half-width relative to the estimate; infinite if it is unknown."""
-        found: Interval = estimate
-        return found.half_width / found.value if found.value > 0.0 else math.inf
-
-    def reached(self, estimate: Any) -> bool:
-        """Return whether the half-width is at most that of the target."""
-        return self.achieved(estimate) <= self.width
+    with suppress(ValueError):
+        target = Target.parse(text)
+        if target.observable == LIFE:
+            return target
+    raise ValueError(
+        f'cannot read the target "{text}": expected a life and the relative half-width of its'
+        ' interval, as in "b10 3%"'
+    )
 
 
 @dataclass(frozen=True)
@@ -193,6 +146,6 @@ def swept_variable(results: Sequence[Any]) -> DesignVariable | None:
     DesignVariable or None
         That of the first; None unless all have the same variable with different values.
     """
-    found = [one.variable for one in results if one.variable]
-    keys, values = {(one.key, one.unit) for one in found}, {one.value for one in found}
-    return found[0] if len(keys) == 1 and len(values) == len(results) > 1 else None
+    variables = [result.variable for result in results if result.variable]
+    keys, values = {(item.key, item.unit) for item in variables}, {item.value for item in variables}
+    return variables[0] if len(keys) == 1 and len(values) == len(results) > 1 else None

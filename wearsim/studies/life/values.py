@@ -80,18 +80,18 @@ class LifeValues(EnsembleResult):
         return self.is_exact and bool(np.isfinite(self.known_lives).all())
 
     def _lives(self, name: str) -> FloatArray:
-        found = self._known_lives(name)
-        return np.asarray(np.where(found <= self.most, found, np.inf))
+        lives = self._known_lives(name)
+        return np.asarray(np.where(lives <= self.most, lives, np.inf))
 
     def _known_lives(self, name: str) -> FloatArray:
-        found = self.values(name) / self.settings.per_unit
+        lives = self.values(name) / self.settings.per_unit
         if self.law is not None:  # at the same quantile as the drawn factor
             from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
             drawn = self.values(self.settings.factor)
             chance = ndtr(self._drawn_score(drawn))
-            found = found * drawn / self.law.quantile(chance)
-        return found
+            lives = lives * drawn / self.law.quantile(chance)
+        return lives
 
     @cached_property
     def observed(self) -> BoolArray:
@@ -213,8 +213,8 @@ class LifeValues(EnsembleResult):
         """Angles of a cam at which each limit was reached [rad]; without those never first."""
         first, angle = self.values("first_limit"), self.values("limit_angle")
         known = self.observed & np.isfinite(angle)
-        found = {name: angle[known & (first == place)] for place, name in enumerate(self.limits)}
-        return {name: angles for name, angles in found.items() if len(angles)}
+        by_limit = {name: angle[known & (first == place)] for place, name in enumerate(self.limits)}
+        return {name: angles for name, angles in by_limit.items() if len(angles)}
 
     @property
     def are_equal(self) -> bool:
@@ -227,9 +227,9 @@ class LifeValues(EnsembleResult):
 
         Where the wear factor is integrated exactly, lives beyond the maximum are known too.
         """
-        found, has_log = self._lives_and_logs
-        ends = found[has_log].min(initial=self.most), found[has_log].max(initial=0.0)
-        return np.asarray(np.log(np.clip(found, ends[0], ends[1] or self.most)))
+        lives, has_log = self._lives_and_logs
+        ends = lives[has_log].min(initial=self.most), lives[has_log].max(initial=0.0)
+        return np.asarray(np.log(np.clip(lives, ends[0], ends[1] or self.most)))
 
     @property
     def effects_obstacle(self) -> str:
@@ -245,5 +245,5 @@ class LifeValues(EnsembleResult):
     @cached_property
     def _lives_and_logs(self) -> tuple[FloatArray, BoolArray]:
         """Lives, as far as they are known, and whether each has a logarithm."""
-        found = self.known_lives if self.is_exact else self.lives
-        return found, np.isfinite(found) & (found > 0.0)
+        lives = self.known_lives if self.is_exact else self.lives
+        return lives, np.isfinite(lives) & (lives > 0.0)

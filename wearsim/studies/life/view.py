@@ -7,11 +7,10 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from wearsim.report.measured import Measured
 from wearsim.report.text import (
     NOTHING,
     count,
@@ -26,7 +25,6 @@ from wearsim.studies.ensemble.view import RealisationsView
 from wearsim.studies.life.result import LifeResult
 from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.sensitivity.effects import SignedEffect
 from wearsim.uq.survival.lives import fewest_lives, least_survival
 from wearsim.uq.survival.rare_events import RareProbability
 
@@ -37,9 +35,8 @@ ERROR = (
     " error of the model."
 )
 
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 _LIMIT_UNITS = {"volume": "mm^3", "peak_pressure": "MPa"}
+_UNKNOWN = (NOTHING, NOTHING)
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
 
@@ -49,7 +46,7 @@ class LifeView(RealisationsView[LifeResult]):
     Panels: survival, probability plots, effects of the inputs, limits. Files: as of an ensemble.
     """
 
-    verb = "life"
+    verb, sheet = "life", "wearsim.studies.life.panels:life_sheet"
     basis = ERROR
 
     def __init__(self, result: LifeResult) -> None:
@@ -118,17 +115,17 @@ class LifeView(RealisationsView[LifeResult]):
         result = self.result
         if not result.count:
             return []
-        tables = [lives_table([""], [result])]
-        if result.uncertain is not None:
-            tables.insert(0, self._levels())
-        if len(result.fits) >= 2:
-            tables.append(self._fits())
         lines = [
             [name.replace("_", " "), shown(share, "%", 3), self._angle(name)]
             for name, share in result.first_limits.items()
         ]
-        tables.append(Table("", lines, ["first limit", "share", ""]))
-        return [*tables, self._effects()]
+        return [
+            *([self._levels()] if result.uncertain is not None else []),
+            lives_table([""], [result]),
+            *([self._fits()] if len(result.fits) >= 2 else []),
+            Table("", lines, ["first limit", "share", ""]),
+            self._effects(),
+        ]
 
     def _plug_in(self, share: float) -> str:
         """Return the life with median and scatter of K/H taken as known; empty if they are."""
@@ -164,8 +161,8 @@ class LifeView(RealisationsView[LifeResult]):
         for fit in result.fits:
             intervals = [fit.interval(share / 100.0) for share in shares]
             cells = [
-                "{1} ({0}..{2})".format(*rounded_lives(one.low, one.value, one.high))
-                for one in intervals
+                "{1} ({0}..{2})".format(*rounded_lives(interval.low, interval.value, interval.high))
+                for interval in intervals
             ]
             scale = f"{count(math.exp(fit.mu))} {result.unit}"
             parameters = (
@@ -198,7 +195,7 @@ class LifeView(RealisationsView[LifeResult]):
                 f"not significant, at most {shown(item.first.high, '%', 2)}"
                 if item.without_effect
                 else part_with_interval(item.first),
-                *(effect_cells(changes[item.name]) if item.name in changes else (NOTHING, NOTHING)),
+                *(map(_change, changes[item.name].factors) if item.name in changes else _UNKNOWN),
             ]
             for item in result.sensitivity("life")
         ]
@@ -260,7 +257,7 @@ class LifeView(RealisationsView[LifeResult]):
             "probability_before_target": probability,
             "rare": self._rare(),
             "first_limits": result.first_limits,
-            "angles_deg": {name: np.degrees(found) for name, found in result.angles.items()},
+            "angles_deg": {name: np.degrees(angles) for name, angles in result.angles.items()},
             "fits": [
                 {
                     "family": fit.family,
@@ -290,8 +287,7 @@ class LifeView(RealisationsView[LifeResult]):
             "interval_method": result.method,
             "seed": result.raw.seed,
             "wall_seconds": result.raw.wall_seconds,
-            "output": str(result.path) if result.path else None,
-            "notes": list(result.notes),
+            **self.ending(),
             "warnings": list(result.warnings),
         }
 
@@ -309,12 +305,6 @@ class LifeView(RealisationsView[LifeResult]):
             tried[method] = {**asdict(item), "probability": known, "refused": not item.is_reliable}
         method = next(reversed(tried))
         return {**tried[method], "method": method, "tried": tried}
-
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; there is no profile to measure."""
-        from wearsim.studies.life.panels import life_sheet  # noqa: PLC0415  (only of figures)
-
-        return life_sheet([self.result], [self.title])
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""
@@ -359,18 +349,18 @@ def life_text(result: LifeResult, share: float) -> str:
 
 def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
     """Return the life that a percentage does not reach, and its interval, which may be empty."""
-    found, most = result.b(share), count(result.most)
-    low, value, high = rounded_lives(found.low, found.value, found.high)
-    if math.isnan(found.value):
+    life, most = result.b(share), count(result.most)
+    low, value, high = rounded_lives(life.low, life.value, life.high)
+    if math.isnan(life.value):
         fewest = fewest_lives(0.01 * share)
         if result.count < fewest and not result.is_exact:
             return f"takes {fewest} lives", ""
-        return f"above {most}", f"from {low}" if math.isfinite(found.low) else NOTHING
-    if found.low == found.high:
+        return f"above {most}", f"from {low}" if math.isfinite(life.low) else NOTHING
+    if life.low == life.high:
         ends = result.b_error(share)
-        return rounded_lives(ends[0], found.value, ends[1])[1], ""
-    if math.isfinite(found.low):
-        return value, f"{low}..{high}" if math.isfinite(found.high) else f"from {low}"
+        return rounded_lives(ends[0], life.value, ends[1])[1], ""
+    if math.isfinite(life.low):
+        return value, f"{low}..{high}" if math.isfinite(life.high) else f"from {low}"
     bound = result.lower_bound(share)  # of a small sample
     return value, f"from {rounded_lives(bound)[0]} (one-sided)" if math.isfinite(
         bound
@@ -389,14 +379,9 @@ def rounded_lives(*lives: float) -> list[str]:
     return [count(round(life / unit) * unit) if math.isfinite(life) else NOTHING for life in lives]
 
 
-def effect_cells(effect: SignedEffect) -> tuple[str, str]:
-    """Return the change of life at the 10 % and the 90 % quantile of an input, with intervals."""
-    low, high = effect.factors
-    return _change(low), _change(high)
-
-
 def _change(factor: Interval) -> str:
-    change = [100.0 * (one - 1.0) for one in (factor.value, factor.low, factor.high)]
+    """Return a change of the life by an input, with its interval."""
+    change = [100.0 * (end - 1.0) for end in (factor.value, factor.low, factor.high)]
     if not math.isfinite(factor.half_width):
         return NOTHING
     if factor.half_width == 0.0:
@@ -435,22 +420,28 @@ def target_text(result: LifeResult) -> str:
     assert result.target is not None
     if obstacle := result.probability_obstacle(result.target):
         return f"not stated: {obstacle}"
-    found = result.probability_before(result.target)
-    if not 0.0 < found.value < _SMALL:
-        return part_with_interval(found)
-    interval = f" [{found.low:.2g}, {found.high:.2g}]" if found.low < found.high else ""
-    return f"{found.value:.3g}{interval}"
+    probability = result.probability_before(result.target)
+    if not 0.0 < probability.value < _SMALL:
+        return part_with_interval(probability)
+    interval = (
+        f" [{probability.low:.2g}, {probability.high:.2g}]"
+        if probability.low < probability.high
+        else ""
+    )
+    return f"{probability.value:.3g}{interval}"
 
 
-def rare_text(found: RareProbability) -> str:
+def rare_text(estimate: RareProbability) -> str:
     """Return the probability of a rare event, or why there is none."""
-    if not found.is_reliable:
-        return f"refused, {found.obstacle}"
-    chance = found.probability
-    text = f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(found.tests)} tests"
-    text += f", variation {shown(found.variation, '%', 2)}"
-    if found.effective_size is not None:
-        text += f", effective sample size {found.effective_size:.0f}"
+    if not estimate.is_reliable:
+        return f"refused, {estimate.obstacle}"
+    chance = estimate.probability
+    text = (
+        f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(estimate.tests)} tests"
+    )
+    text += f", variation {shown(estimate.variation, '%', 2)}"
+    if estimate.effective_size is not None:
+        text += f", effective sample size {estimate.effective_size:.0f}"
     return text
 
 

@@ -304,13 +304,13 @@ def start_of(draws: Draws, shared: Grid) -> Grid:
     They must cover the contacts of the unworn bodies, and resolve them nearly as well as its own.
     """
     scenario, extent = draws.scenario, extent_of(draws)
-    own = strips_of_run(draws, extent)
-    if scenario.contact.width is not None or ends_roller(scenario, *own.edges):
-        return shared if same_strips(own, shared) else own
+    strips = strips_of_run(draws, extent)
+    if scenario.contact.width is not None or ends_roller(scenario, *strips.edges):
+        return shared if same_strips(strips, shared) else strips
     reach = abs(extent.centre - 0.5 * (shared.edges[0] + shared.edges[1])) + extent.fresh
     covers = 2.0 * reach <= shared.strips * shared.spacing
-    resolves = scenario.contact.strips or shared.spacing <= COARSER * own.spacing
-    return shared if covers and resolves else own
+    resolves = scenario.contact.strips or shared.spacing <= COARSER * strips.spacing
+    return shared if covers and resolves else strips
 
 
 def start_of_run(scenario: Scenario, draws: Draws) -> Grid:

@@ -53,8 +53,8 @@ def hardest_patch(scenario: Scenario, load: float) -> tuple[HertzContact, float]
         return fresh_patch(scenario, load), load
     turn = turn_of(scenario)
     point = turn.at_stations(turn.stations)
-    each = zip(patches_at(scenario, point), point.normal_force.tolist(), strict=True)
-    return max(each, key=lambda pair: pair[0].peak_pressure)
+    pairs = zip(patches_at(scenario, point), point.normal_force.tolist(), strict=True)
+    return max(pairs, key=lambda pair: pair[0].peak_pressure)
 
 
 def widest_patch(scenario: Scenario, load: float) -> HertzContact:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from wearsim.errors import WearsimError
-from wearsim.report.measured import Measured
+from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
     COLOURS,
@@ -22,7 +23,6 @@ from wearsim.report.panels import (
     Records,
     Sheet,
     depth_axes,
-    look,
     measured_marks,
     worn_limits,
 )
@@ -88,8 +88,8 @@ def _profiles(result: Result, limits: tuple[float, float], measured: Sequence[Me
     for number in range(rollers.shape[1]):
         if rollers[-1, number].max() > 0.0:
             name = "roller" if rollers.shape[1] == 1 else f"roller {number + 1}"
-            style = look(dash="--", width=1.0, colour=BLACK)
-            marks.append(Line(result.y, -rollers[-1, number], label=f"{name}, at the end", **style))
+            curve, label = (result.y, -rollers[-1, number]), f"{name}, at the end"
+            marks.append(Line(*curve, dash="--", width=1.0, colour=BLACK, label=label))
     return Panel(
         "Worn profile of the cylinder (black: start of the run)",
         Axis(Y, "mm", limits=limits),
@@ -158,7 +158,7 @@ def _normal_force(result: Result) -> Panel:
     if base is not None:
         marks.append(Line(*base, width=0.8, colour=GREY, label="without feedback"))
     # between the steps, a line would contradict the load; at many of them, the dots are a line
-    style = look(dash="", marker="o") if base is not None else {}
+    style: dict[str, Any] = {} if base is None else {"dash": "", "marker": "o"}
     more = {"passes": (result.passes, "1")}
     for roller in range(rollers):
         label = "" if rollers == 1 and base is None else f"roller {roller + 1}"

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import groupby, pairwise
-from operator import itemgetter
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from wearsim.errors import ContactError, SolverError, StepError
 from wearsim.evolution.integrate import Advance
-from wearsim.evolution.limits import take_side_step
 from wearsim.evolution.observables import depth, groove_width, present_contacts, volume
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import worn_volume
@@ -22,7 +20,7 @@ from wearsim.evolution.steppers.single_step import present_problem
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
 from wearsim.studies.run.schema import ALL_VARIABLES, ESTIMATED
-from wearsim.studies.schedule import RecordSchedule
+from wearsim.studies.schedule import Due, RecordSchedule, due_records, state_at, states_at
 from wearsim.types import FloatArray, Grid
 
 
@@ -84,11 +82,7 @@ _WITHOUT_REALISATION = {n for n, item in ALL_VARIABLES.items() if "realisation" 
 
 
 def history_row(
-    stepper: Stepper,
-    problem: WearProblem,
-    state: WearState,
-    before: WearState | None,
-    threshold: float,
+    stepper: Stepper, problem: WearProblem, state: WearState, threshold: float
 ) -> Variables:
     """Return the observables of every realisation; `threshold` [m] bounds the groove's width."""
     problem, state, loads = present_contacts(stepper, problem, state)
@@ -105,7 +99,6 @@ def history_row(
     return {
         "passes": state.passes,
         "time": problem.time(state.passes),
-        "step_passes": state.passes - (state if before is None else before).passes,
         "depth": depth(problem, state),
         "width": groove_width(problem, state, threshold),
         "worn_volume": volume(problem, state),
@@ -130,6 +123,98 @@ def history_row(
     }
 
 
+class History:
+    """Observables of a single test at its start and after each of its steps.
+
+    Where the contacts of a state carry the present loads, nothing is solved for its observables.
+    They are then computed together with those of later states, as realisations of one problem.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    threshold : float
+        Depth that bounds the groove's width [m].
+    rows : iterable of mapping
+        Rows of an earlier part of the test.
+    """
+
+    def __init__(self, stepper: Stepper, threshold: float, rows: Iterable[Variables] = ()) -> None:
+        self._stepper, self._threshold = stepper, threshold
+        #: rows, and after them states that wait: problem, state and passes of the step
+        self._rows: list[Any] = [*rows]
+        self._computed = len(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def add(self, problem: WearProblem, state: WearState, before: WearState) -> None:
+        """Add a state after a step from the state `before`, at the start of the test itself."""
+        waiting = self._rows[self._computed :]
+        if waiting and (waiting[0][0] is not problem or _is_full(problem, len(waiting))):
+            self.compute()
+        step = state.passes - before.passes
+        if _carries_loads(self._stepper, problem, state):
+            self._rows.append((problem, state.replaced(**_NOT_OBSERVED), step))
+        else:
+            self.compute()
+            self._rows.append(_rows_of(self._stepper, problem, state, step, self._threshold)[0])
+            self._computed = len(self._rows)
+
+    def compute(self) -> list[Variables]:
+        """Return all rows, computed; an interrupt leaves them as they are or computed."""
+        waiting = self._rows[self._computed :]
+        if waiting:
+            problems, states, steps = zip(*waiting, strict=True)
+            several = problems[0].at(np.zeros(len(waiting), dtype=np.int64))
+            state, step = joined_states(states), np.concatenate(steps)
+            found = _rows_of(self._stepper, several, state, step, self._threshold)
+            self._rows[self._computed :] = found
+            self._computed = len(self._rows)
+        return self._rows
+
+    def shorten(self, count: int) -> None:
+        """Keep the first rows only."""
+        del self._rows[count:]
+        self._computed = min(self._computed, count)
+
+
+MOST_WAITING = 200_000  # strips of all contacts of the states that wait to be observed
+#: what observables do not depend on
+_NOT_OBSERVED = dict.fromkeys(
+    (
+        *("coarse_step_solution", "half_quadrature_solution", "wear_exponents", "past_wear"),
+        *("separation", "part", "whole_steps", "past_sums", "past_feedback", "stepping_error"),
+    )
+)
+
+
+def _carries_loads(stepper: Stepper, problem: WearProblem, state: WearState) -> bool:
+    """Return whether nothing is solved for the observables: the end of a step at constant load."""
+    constant = problem.constant_load is not None and not problem.varying
+    plain = not (problem.terms or problem.pauses or problem.has_nodes)
+    return constant and plain and state.past_spans is not None and not stepper.pass_by_pass
+
+
+def _is_full(problem: WearProblem, waiting: int) -> bool:
+    """Return whether as many states wait as are observed together."""
+    return (waiting + 1) * problem.contacts_each * problem.grid.strips > MOST_WAITING
+
+
+def _rows_of(
+    stepper: Stepper,
+    problem: WearProblem,
+    state: WearState,
+    step: FloatArray,
+    threshold: float,
+) -> list[Variables]:
+    """Return the row of each realisation of a state in the form of the results file."""
+    row = history_row(stepper, problem, state, threshold) | {"step_passes": step}
+    return [
+        {n: v[place] if n in _WITHOUT_REALISATION else v[..., place, None] for n, v in row.items()}
+        for place in range(len(step))
+    ]
+
+
 def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Variables:
     """Return the profiles of a state and the contacts at the present loads."""
     problem, state, _ = present_contacts(stepper, problem, state)
@@ -146,55 +231,6 @@ def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Vari
         },
         **cam_record(problem, state),
     }
-
-
-#: A record in or at the end of a step: the last state before or at it, by its number on the path;
-#: the place of its test; its passes.
-Due: TypeAlias = tuple[int, int, float]
-
-
-def due_records(
-    advance: Advance, schedule: RecordSchedule, stop: float, pass_by_pass: bool
-) -> list[Due]:
-    """Return the records of a step in order; `stop` is the end of the tests [passes]."""
-    return sorted(
-        (source + at_end, place, passes)
-        for source, (start, end) in enumerate(pairwise(advance.path))
-        for place, (first, last) in enumerate(
-            zip(start.passes.tolist(), end.passes.tolist(), strict=True)
-        )
-        for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
-    )
-
-
-def states_at(
-    stepper: Stepper, advance: Advance, due: Sequence[Due]
-) -> tuple[WearProblem, WearState]:
-    """Return problem and states at records of a step, by side steps where no state is.
-
-    Parameters
-    ----------
-    stepper : Stepper
-    advance : Advance
-        The step.
-    due : sequence of Due
-        Some of its records in order; each becomes a realisation.
-    """
-    places, states = [], []
-    for source, group in groupby(due, key=itemgetter(0)):
-        places.append(np.array([place for _, place, _ in group]))
-        state = advance.path[source].replaced(
-            coarse_step_solution=None, half_quadrature_solution=None
-        )
-        states.append(state.at(places[-1]))
-    problem, state = advance.problem.at(np.concatenate(places)), joined_states(states)
-    passes = np.array([one[2] for one in due])
-    later = np.flatnonzero(passes > state.passes)
-    if not later.size:
-        return problem, state
-    start, ends = state.at(later), passes[later]
-    end = take_side_step(stepper.side_step, problem.at(later), start, ends - start.passes)
-    return problem, state.with_others(later, end.replaced(passes=ends))
 
 
 class Recorder:
@@ -231,24 +267,24 @@ class Recorder:
         sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
         sums |= {f"{name}_error" for name in ESTIMATED}
         steps = {name: column for name, column in (history or {}).items() if name not in sums}
-        self._history = _rows(steps) or [
-            _single(history_row(stepper, problem, state, None, threshold))
-        ]
+        self._history = History(stepper, threshold, _rows(steps))
+        if not steps:
+            self._history.add(problem, state, state)
         #: errors of the finished test due to its strips, see `strip_errors.strip_errors`
         self.strip_errors: FloatArray | None = None
         #: errors of observables of the finished test, see `observed_errors`
         self.observed_errors: Mapping[str, FloatArray] = {}
         rows = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
-        self._records = [(problem.grid, row) for row in rows]
+        #: strips and row of each record, and after them those that wait: problem, state and passes
+        self._records: list[Any] = [(problem.grid, row) for row in rows]
         self._kept = len(self._history), len(self._records), state, problem.grid
 
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
         stepper, end = self.stepper, advance.end
         for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
-            self._record(advance, *states_at(stepper, advance, [one]))
-        row = history_row(stepper, advance.problem, end, advance.path[0], self.threshold)
-        self._history.append(_single(row))
+            self._record(advance, one)
+        self._history.add(advance.problem, end, advance.path[0])
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end, advance.problem.grid
         self._thin(float(end.passes[0]))
@@ -268,15 +304,53 @@ class Recorder:
         stepper, start = self.stepper, advance.path[0]
         for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
             if one[2] < state.passes[0]:
-                self._record(advance, *states_at(stepper, advance, [one]))
-        self._record(advance, advance.problem, state)
-        row = history_row(stepper, advance.problem, state, start, self.threshold)
-        self._history.append(_single(row))
+                self._record(advance, one)
+        self._compute_records()
+        self._records.append(self._row(advance.problem, advance.problem, state))
+        self._history.add(advance.problem, state, start)
         self._kept = len(self._history), len(self._records), start, advance.problem.grid
 
-    def _record(self, advance: Advance, problem: WearProblem, state: WearState) -> None:
-        row = _single(record_row(self.stepper, problem, state))
-        self._records.append((advance.problem.grid, row))
+    def _record(self, advance: Advance, due: Due) -> None:
+        """Add a record; several side steps at constant load are taken together."""
+        source, _, passes = due
+        problem, state = advance.problem, advance.path[source]
+        waiting = self._waiting
+        if waiting and (waiting[0][0] is not problem or _is_full(problem, len(waiting))):
+            self._compute_records()
+        if _carries_loads(self.stepper, problem, state):
+            own = state.replaced(coarse_step_solution=None, half_quadrature_solution=None)
+            self._records.append((problem, own, passes))
+        else:
+            self._compute_records()
+            there = states_at(self.stepper, advance, [due])
+            self._records.append(self._row(problem, *there))
+
+    @property
+    def _waiting(self) -> list[tuple[WearProblem, WearState, float]]:
+        return [record for record in self._records if len(record) > 2]
+
+    def _row(
+        self, problem: WearProblem, recorded: WearProblem, state: WearState
+    ) -> tuple[Grid, Variables]:
+        return problem.grid, _single(record_row(self.stepper, recorded, state))
+
+    def _compute_records(self) -> list[tuple[Grid, Variables]]:
+        """Return all records, computed; an interrupt leaves them as they are or computed."""
+        waiting = self._waiting
+        if waiting:
+            stepper, problem = self.stepper, waiting[0][0]
+            starts, passes = [one[1] for one in waiting], np.array([one[2] for one in waiting])
+            several = problem.at(np.zeros(len(waiting), dtype=np.int64))
+            each = np.arange(len(waiting))[:, None]
+            try:
+                state = state_at(stepper, several, joined_states(starts), passes)
+                states = [state.at(place) for place in each]
+            except (StepError, ContactError):  # a step that fails is halved for a single test
+                one_by_one = zip(starts, each, strict=True)
+                states = [state_at(stepper, problem, s, passes[k]) for s, k in one_by_one]
+            rows = [self._row(problem, problem, state) for state in states]
+            self._records[-len(waiting) :] = rows
+        return self._records
 
     def _thin(self, passes: float) -> None:
         """Drop the records that a prolonged test does not keep after some passes."""
@@ -284,15 +358,20 @@ class Recorder:
         if schedule.interval_at(passes) > schedule.interval:
             self._records = [
                 (grid, row)
-                for grid, row in self._records
+                for grid, row in self._compute_records()
                 if schedule.is_kept(float(row["record_passes"]), passes)
             ]
             # an interrupt before this leaves a number beyond the end, and no row is unfinished
             self._kept = (self._kept[0], len(self._records), *self._kept[2:])
 
     def drop_unfinished(self) -> None:
-        """Remove the rows of an interrupted `add`."""
-        del self._history[self._kept[0] :], self._records[self._kept[1] :]
+        """Remove the rows of an interrupted `add`, and records whose side steps fail."""
+        self._history.shorten(self._kept[0])
+        del self._records[self._kept[1] :]
+        try:
+            self._compute_records()
+        except SolverError:
+            del self._records[-len(self._waiting) :]
 
     @property
     def state(self) -> WearState:
@@ -311,7 +390,7 @@ class Recorder:
         Errors are sums of those due to steps, to the stations of a cam and, where they are known,
         to strips.
         """
-        columns = _columns(self._history)
+        columns = _columns(self._history.compute())
         for name, part in zip(ERRORS, self.errors_by_strips, strict=True):
             by_steps = columns[f"{name}_by_steps"]
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
@@ -341,16 +420,16 @@ class Recorder:
     @property
     def observed(self) -> dict[str, FloatArray]:
         """The observables that have an estimated error besides depth and volume."""
-        return {name: self.column(name) for name in ESTIMATED if name in self._history[0]}
+        return {name: self.column(name) for name in ESTIMATED if name in self._history.compute()[0]}
 
     def column(self, name: str) -> FloatArray:
         """Return a variable of the history except errors, first axis step."""
-        return np.array([row[name] for row in self._history])
+        return np.array([row[name] for row in self._history.compute()])
 
     @property
     def last_record(self) -> Variables:
         """The last record, on the present strips."""
-        grid, row = self._records[-1]
+        grid, row = self._compute_records()[-1]
         return _on_grid(row, grid, self.grid)
 
     @property
@@ -365,7 +444,7 @@ class Recorder:
 
         Those made before the strips have grown are averages over the present strips.
         """
-        return _columns([_on_grid(row, grid, self.grid) for grid, row in self._records])
+        return _columns([_on_grid(row, grid, self.grid) for grid, row in self._compute_records()])
 
 
 def _single(row: Variables) -> Variables:

@@ -9,8 +9,9 @@ from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from wearsim.errors import unknown_name
-from wearsim.report.measured import ComputedProfile
+from wearsim.errors import WearsimError, unknown_name
+from wearsim.evolution.limits import SAME_VALUE, Limit
+from wearsim.levelling import ComputedProfile
 from wearsim.results.content import (
     Array,
     Arrays,
@@ -314,6 +315,54 @@ class Result(StudyResult[RunData]):
         return self.raw.until if self.finished else ""
 
     @property
+    def passes_error(self) -> float | None:
+        """Error of the passes at which the run has reached its limit; None if not known.
+
+        It is the estimated error of the limited quantity, over its growth per pass in the last
+        step.
+        """
+        name = Limit.parse(self.until).variable if self.until else ""
+        if name not in self.errors or len(self.passes) < 2:
+            return None
+        before, last = self.values(name)[-2:].reshape(2, -1)
+        place = int(last.argmax())
+        growth = abs(float(last[place] - before[place]))
+        step = float(self.passes[-1] - self.passes[-2])
+        greatest = float(np.max(self.errors[name][-1]))
+        if not (np.isfinite(greatest) and growth > 0.0):
+            return None
+        return min(greatest * step / growth, float(self.passes[-1]))
+
+    @property
+    def limits(self) -> list[dict[str, Any]]:
+        """Limits of the scenario, and how far the run is from each, in SI."""
+        try:
+            given: Mapping[str, float] = self.scenario.limit.given
+        except WearsimError:  # a plugin of the scenario is not installed
+            return []
+        return [self._limit(key, value) for key, value in given.items()]
+
+    def _limit(self, key: str, value: float) -> dict[str, Any]:
+        limit = Limit(key.replace("_", " "), value, key)
+        history = np.asarray(self.values(limit.variable), dtype=float)
+        course, reached = history.reshape(len(history), -1).max(axis=1), None
+        above = np.flatnonzero(course >= value * (1.0 - SAME_VALUE))
+        if len(above):
+            first = slice(max(int(above[0]) - 1, 0), int(above[0]) + 1)
+            low, high = course[first][[0, -1]]
+            part = (value - low) / (high - low) if high > low else 1.0
+            reached = float(np.interp(part, [0.0, 1.0], self.passes[first][[0, -1]]))
+        return {
+            "quantity": key,
+            "unit": limit.unit,
+            "limit": value,
+            "at_end": float(course[-1]),
+            "reached": reached is not None,
+            "reached_at_passes": reached,
+            "excess": float(course[-1] / value - 1.0),
+        }
+
+    @property
     def stepper(self) -> str:
         """Name of the stepper."""
         return self.raw.stepper
@@ -388,14 +437,14 @@ class Result(StudyResult[RunData]):
     def _final_errors(self, last: Arrays) -> dict[str, Number]:
         """Return the estimated errors of the final state, the greatest one over the rollers."""
         variables = self.raw.schema.variables
-        found: dict[str, Number] = {}
+        errors: dict[str, Number] = {}
         for name in ESTIMATED:
             error = last.get(f"{name}_error")
             if error is not None:
                 over_rollers = "roller" in variables[name].dims
                 greatest = error.max(axis=0) if over_rollers else error
-                found[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
-        return found
+                errors[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
+        return errors
 
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
         """Return the final state of a cam, and depth and lift error per station."""

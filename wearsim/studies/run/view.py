@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from wearsim.errors import WearsimError
-from wearsim.evolution.limits import SAME_VALUE, Limit
+from wearsim.levelling import ComputedProfile
 from wearsim.report.csv_files import computed
-from wearsim.report.measured import ComputedProfile, Measured
 from wearsim.report.text import (
     ROUNDING,
     count,
@@ -37,8 +35,6 @@ _NOT_MODEL = (
     " model, of the wear law or of the inputs."
 )
 
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 _RECORDS = {
     "cylinder_depth_profiles.csv": "cylinder_depth_profile",
     "roller_depth_profiles.csv": "roller_depth_profile",
@@ -55,7 +51,7 @@ class RunView(StudyView[Result]):
     has the history.
     """
 
-    verb = "run"
+    verb, sheet = "run", "wearsim.studies.run.panels:run_sheet"
 
     def __init__(self, result: Result) -> None:
         super().__init__(result)
@@ -70,6 +66,8 @@ class RunView(StudyView[Result]):
         if result.failure:
             self.heading = "state before the failure"
         self.has_angles = result.is_cam
+        if result.is_cam:
+            self.sheet = "wearsim.studies.cam.panels:cam_run_sheet"
         self.basis = NO_STEPPING_ERROR if is_exact else _NOT_MODEL
 
     def standing(self) -> str:
@@ -78,7 +76,7 @@ class RunView(StudyView[Result]):
         passes, total = float(result.passes[-1]), float(result.raw.total_passes)
         time = simulated(float(result.time[-1]))
         if result.until:
-            reached, error = count(passes), passes_error(result)
+            reached, error = count(passes), result.passes_error
             if error is not None and error > ROUNDING * passes:
                 digits = max(math.floor(math.log10(error)), 0)  # those that the error leaves
                 reached = f"{count(round(passes, -digits))} ± {in_unit(error, '1', 2)}"
@@ -189,7 +187,7 @@ class RunView(StudyView[Result]):
             "strips": len(result.y),
             "finished": bool(result.finished),
             "until": result.until or None,
-            "passes_error": passes_error(result),
+            "passes_error": result.passes_error,
             "failure": result.failure or None,
             "failed_at": result.raw.failed_at or None,
             "steps": _last(result.steps),
@@ -200,14 +198,14 @@ class RunView(StudyView[Result]):
             "drawn": result.raw.drawn,
             "random": varying_inputs(result, result.raw.drawn),
             **self.ending(),
-            "limits": limits_json(result),
+            "limits": result.limits,
         }
 
     def origin(self) -> dict[str, Any]:
         """Return length, records, scenario, files, plugins and software for JSON."""
         result = self.result
-        own = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
-        return {**own, **super().origin()}
+        length = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
+        return {**length, **super().origin()}
 
     def line(self) -> str:
         """Return the footer of the run, with the estimated errors of its steps and strips."""
@@ -236,16 +234,6 @@ class RunView(StudyView[Result]):
                 " of model or inputs)"
             )
         return footer(used, error, lapse(result.raw.wall_seconds))
-
-    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
-        """Return the panels; measured profiles are drawn over the groove."""
-        from wearsim.studies.run.panels import run_sheet  # noqa: PLC0415  (only of figures)
-
-        if not self.result.is_cam:
-            return run_sheet(self.result, measured)
-        from wearsim.studies.cam.panels import cam_run_sheet  # noqa: PLC0415  (not of a cylinder)
-
-        return cam_run_sheet(self.result, measured)
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the worn profile with which measured ones are compared, of a cam at an angle."""
@@ -314,68 +302,13 @@ def _last(value: Any) -> int:
     return int(np.ravel(value)[-1])
 
 
-def passes_error(result: Result) -> float | None:
-    """Return the error of the passes at which a run has reached its limit; None if not known.
-
-    It is the estimated error of the limited quantity, over its growth per pass in the last step.
-    """
-    if not result.until or len(result.passes) < 2:
-        return None
-    name = Limit.parse(result.until).variable
-    error = result.errors.get(name)
-    if error is None:
-        return None
-    values = np.asarray(getattr(result, name)).reshape(len(result.passes), -1)
-    place = int(values[-1].argmax())
-    growth = abs(float(values[-1, place] - values[-2, place]))
-    step = float(result.passes[-1] - result.passes[-2])
-    greatest = float(np.max(error[-1]))
-    if not (math.isfinite(greatest) and growth > 0.0):
-        return None
-    return min(greatest * step / growth, float(result.passes[-1]))
-
-
 _UNITS = {"volume": "mm^3", "peak_pressure": "MPa", "width": "mm"}  # the others in um
-
-
-def limits_json(result: Result) -> list[dict[str, Any]]:
-    """Return the limits of a run's scenario and how far the run is from them, in SI units."""
-    try:
-        given: Mapping[str, float] = result.scenario.limit.given
-    except WearsimError:  # a plugin of the scenario is not installed
-        return []
-    return [_of(result, key, value) for key, value in given.items()]
-
-
-def _of(result: Result, key: str, value: float) -> dict[str, Any]:
-    limit = Limit(key.replace("_", " "), value, key)
-    history = np.asarray(result.values(limit.variable), dtype=float)
-    course = history.reshape(len(history), -1).max(axis=1)
-    passes = np.asarray(result.passes, dtype=float)
-    above = np.flatnonzero(course >= value * (1.0 - SAME_VALUE))
-    reached = None
-    if len(above):
-        place = int(above[0])
-        reached = float(passes[place])
-        if place:
-            low, high = course[place - 1 : place + 1]
-            part = (value - low) / (high - low) if high > low else 1.0
-            reached = float(np.interp(part, [0.0, 1.0], passes[place - 1 : place + 1]))
-    return {
-        "quantity": key,
-        "unit": limit.unit,
-        "limit": value,
-        "at_end": float(course[-1]),
-        "reached": reached is not None,
-        "reached_at_passes": reached,
-        "excess": float(course[-1] / value - 1.0),
-    }
 
 
 def limit_rows(result: Result) -> Rows:
     """Return a row for each limit of [limit]: passed or not, when, and by how much."""
     rows = list[Row]()
-    for item in limits_json(result):
+    for item in result.limits:
         unit = _UNITS.get(item["quantity"], "um")
         end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)}"
         name = item["quantity"].replace("_", " ")

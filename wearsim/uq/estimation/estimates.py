@@ -284,6 +284,8 @@ _STATISTICS: dict[str, Literal["mean", "std"] | float] = {
     "std": "std",
     "median": 0.5,
 }
+LIFE = "life"  # the observable of targets such as "b10 3%"
+_FORM_OF_LIFE = re.compile(r"[bB](?P<percent>\d*\.?\d+)\s+(?P<width>\d*\.?\d+)\s*%")
 _FORM = re.compile(
     r"(?P<observable>[a-z][a-z_]*)\.(?P<what>mean|std|median|q(?P<percent>\d+(\.\d+)?))"
     r"\s+(?P<width>\d+(\.\d*)?|\.\d+)\s*%"
@@ -297,9 +299,9 @@ class Target:
     Parameters
     ----------
     observable : str
-        Name of the observable: "depth".
+        Name of the observable: "depth", or "life".
     statistic : {"mean", "std"} or float
-        Estimated statistic; a number is the probability of a quantile.
+        Estimated statistic; a number is the probability of a quantile, 0.1 for B10.
     width : float
         Half-width of the 95 % interval, relative to the estimate.
     """
@@ -310,13 +312,17 @@ class Target:
 
     @classmethod
     def parse(cls, text: str) -> Target:
-        """Return the target of a text such as "depth.mean 1%" or "width.q97.5 5 %".
+        """Return the target of a text such as "depth.mean 1%", "width.q97.5 5 %" or "b10 3%".
 
         Raises
         ------
         ValueError
             If the text is not a target.
         """
+        if of_life := _FORM_OF_LIFE.fullmatch(text.strip()):
+            share, width = (float(of_life[name]) / 100.0 for name in ("percent", "width"))
+            if 0.0 < share < 1.0 and width > 0.0:
+                return cls(LIFE, share, width)
         match = _FORM.fullmatch(text.strip())
         if match is None:
             raise ValueError(
@@ -334,8 +340,10 @@ class Target:
 
     @property
     def what(self) -> str:
-        """Observable and statistic, "depth.mean"."""
+        """Observable and statistic, "depth.mean", or the life, "b10"."""
         name = self.statistic
+        if self.observable == LIFE:
+            return f"b{100.0 * float(name):.12g}"
         return f"{self.observable}.{name if isinstance(name, str) else f'q{100.0 * name:.12g}'}"
 
     def __str__(self) -> str:

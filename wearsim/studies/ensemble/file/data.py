@@ -84,11 +84,11 @@ class StoredRows(Mapping[str, "Array"]):
         ResultsFileError
             If the file or a part is damaged, or was changed since it was opened.
         """
-        found = self._read(lambda file: np.asarray(file[name][(slice(start, stop), *rest)]))
+        rows = self._read(lambda file: np.asarray(file[name][(slice(start, stop), *rest)]))
         if is_row(self._schema.variables[name]):
             for part in self.parts:
-                part.put_rows(found, name, start, *rest)
-        return found
+                part.put_rows(rows, name, start, *rest)
+        return rows
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -95,9 +95,9 @@ class Part:
         first, last = np.searchsorted(self.numbers, (start, start + len(rows))).tolist()
         if first < last:
             chosen = (slice(first, last), *rest)
-            found = read_file(self.path, lambda file: np.asarray(file[name][chosen]))
+            stored = read_file(self.path, lambda file: np.asarray(file[name][chosen]))
             # not all profiles are kept
-            rows[self.numbers[first : first + len(found)] - start] = found
+            rows[self.numbers[first : first + len(stored)] - start] = stored
 
 
 def part_numbers(path: Path) -> list[int]:

@@ -41,7 +41,7 @@ def observed_of(test: RandomTest, reference: Reference) -> dict[str, FloatArray]
     if problem.terms:  # the present load follows from the course of the power
         return {}
     state = _worn_state(problem, reference)
-    row = history_row(prepared.stepper, problem, state, None, scenario.outputs.width_threshold)
+    row = history_row(prepared.stepper, problem, state, scenario.outputs.width_threshold)
     return {name: np.ravel(row[name]) for name in OBSERVED if name in row}
 
 

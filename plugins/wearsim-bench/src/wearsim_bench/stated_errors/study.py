@@ -132,8 +132,19 @@ def worn_of_result(result: Result) -> Worn:
 
 
 def stated(result: Result) -> dict[str, float]:
-    """Return the stated relative errors at the end of a run, by quantity."""
-    return {name: float(np.max(result.final[f"relative_{name}_error"])) for name in QUANTITIES}
+    """Return the stated relative errors at the end of a run by quantity.
+
+    Those of a cam are due to steps and strips: a reference has the stations of the run.
+    """
+    last = {name: column[-1] for name, column in result.raw.history.items()}
+    found = {}
+    for name in QUANTITIES:
+        error = float(np.max(result.final[f"relative_{name}_error"]))
+        by_stations = last.get(f"{name}_error_by_stations")
+        if by_stations is not None:
+            error *= 1.0 - float(np.max(by_stations / last[f"{name}_error"]))
+        found[name] = error
+    return found
 
 
 def _without_stepping_error(

@@ -77,6 +77,7 @@ ABOUT = (
     " a run. Depth is the greatest depth, profile the L2 norm over all bodies. A test is"
     f" covered if the stated error is at least the true one, or the true one is below {SMALL:g}."
     f" Ratios, of stated to true errors, are those of tests with a true error above {SMALL:g}."
+    " The error of a cam between its stations is left out, as the reference has the same stations."
     " Power, forces, pressure, width, descent, approach and the lift error of a cam are compared"
     " with those of the contacts on the worn profiles of the reference, of a cam at the stations of"
     " the test; errors of angles are in radians."

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wearsim.errors import ScenarioError
-from wearsim.report.measured import ComputedProfile, Measured, levelled, rms
+from wearsim.levelling import ComputedProfile, Measured, levelled, rms
 
 Y = np.linspace(-8e-3, 8e-3, 401)
 GROOVE = -np.maximum(2e-5 * (1.0 - (Y / 5e-3) ** 2), 0.0)
