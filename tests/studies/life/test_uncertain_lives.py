@@ -63,8 +63,14 @@ def test_life_states_predictive_and_plug_in_lives(folder: Path):
 
 
 def test_lives_with_other_inputs_name_what_would_help(folder: Path):
-    lives = wearsim.life(scenario(folder, friction__coefficient=FRICTION), 16, scheduler="serial")
+    path = folder / "continued.h5"
+    wearsim.life(scenario(folder, friction__coefficient=FRICTION), 10, path, scheduler="serial")
+    lives = wearsim.resume_life(path, realisations=16, scheduler="serial")
+    unbroken = wearsim.life(
+        scenario(folder, friction__coefficient=FRICTION), 16, scheduler="serial"
+    )
     found = lives.uncertain_life(10)
+    assert found == unbroken.uncertain_life(10)
     assert found is not None
     assert 0.0 < found.by_realisations < found.by_tests
     table = lives.view.details()[0]
