@@ -12,6 +12,7 @@ import numpy as np
 from wearsim.types import ContactSolution, Creepage, FloatArray, IntArray, OperatingPoint
 
 T = TypeVar("T")
+NO_BODY = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ class ContactBatch:
         Raises
         ------
         ValueError
-            If the points are not of one kind, or their number is not that of the gaps.
+            If the points are not of one kind, or are not as many as the gaps.
         """
         creepages, first = [point.creepage for point in points], points[0]
         if len(points) > 1 and len({_kind(point) for point in points}) > 1:
@@ -292,9 +293,6 @@ class ContactBatchSolution:
 _OUTPUTS = tuple(
     item.name for item in fields(ContactBatchSolution) if item.name not in {"y", "separation"}
 )
-
-
-NO_BODY = -1
 
 
 @dataclass(frozen=True)

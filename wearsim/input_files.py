@@ -67,7 +67,7 @@ def _as_csv(header: str, *columns: Any) -> str:
 def _log_of_tdms(content: bytes, file: str) -> str:
     """Return the log of a LabVIEW file as CSV.
 
-    The time is that of a channel "time", or of the waveform properties of the channel "load".
+    The time is taken from a channel "time", or from the waveform properties of the channel "load".
     """
 
     def error(what: str, got: str | None = None, expected: str | None = None) -> ScenarioError:

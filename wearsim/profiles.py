@@ -40,6 +40,7 @@ _UNITS = (
 )
 _CLEARLY = 3.0  # heights above the ends of a profile over those below
 _INSTALL = "pip install 'wearsim[surfaces]'"
+_ALPHA = math.sqrt(math.log(2.0) / math.pi)
 
 
 @dataclass(frozen=True)
@@ -335,9 +336,6 @@ def _chosen_row(surface: _Surface, file: str, choice: ProfileChoice) -> Profile:
     return _profile_of(y[measured], total / known.sum(axis=0)[measured], file)
 
 
-_ALPHA = math.sqrt(math.log(2.0) / math.pi)
-
-
 def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
     """Return a profile without roughness, by the Gaussian filter of ISO 16610-21.
 
@@ -355,7 +353,7 @@ def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
     Returns
     -------
     Profile
-        At equally spaced points, at most as far apart as those of the input.
+        At equally spaced points, at most as far apart as in the input.
 
     Raises
     ------

@@ -46,6 +46,7 @@ NOT_FINITE = re.compile(r"[+-]?(?:nan|inf(?:inity)?)(?![a-z])", re.IGNORECASE)
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 
 _PATTERN = r"^\s*[+-]?[0-9.]+([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])([A-Za-zµμ°(/]|1\s*/).*$"
+V = TypeVar("V")
 
 
 def _split(value: object, expected: str) -> tuple[str, str]:
@@ -311,8 +312,6 @@ class _OneOrList:
             serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
         )
 
-
-V = TypeVar("V")
 
 #: A value for all rollers, or a list with one value per roller: ``PerRoller[Length]``.
 PerRoller: TypeAlias = Annotated[V | tuple[V, ...], _OneOrList()]

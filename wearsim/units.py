@@ -44,6 +44,12 @@ _SPELLINGS = str.maketrans(
 _UNIT_TEXT = re.compile(r"(?:[A-Za-z]+(?:\^[+-]?[0-9])?|1|[*/() ])+")
 
 MAX_CHARACTERS = 100  # of a quantity or unit
+_FACTOR = re.compile(
+    r"(?P<operator>\s*[*/]\s*|\s+|^)"
+    r"(?:(?P<number>[0-9.]+)|\[(?P<base>[a-z]+)\]|(?P<name>[A-Za-z]+)(?:\^(?P<power>[+-]?[0-9]))?)"
+)
+#: Time from which texts state hours instead of minutes [s].
+LONG = 3.6e5
 
 
 class QuantityError(ValueError):
@@ -174,12 +180,6 @@ def _unknown_name(name: str) -> str:
 Dimensions: TypeAlias = frozenset[tuple[str, str]]
 
 
-_FACTOR = re.compile(
-    r"(?P<operator>\s*[*/]\s*|\s+|^)"
-    r"(?:(?P<number>[0-9.]+)|\[(?P<base>[a-z]+)\]|(?P<name>[A-Za-z]+)(?:\^(?P<power>[+-]?[0-9]))?)"
-)
-
-
 @cache
 def _product(text: str) -> tuple[Fraction, dict[str, int]] | None:
     """Return the size in SI of a product or quotient of units, and its powers of the dimensions.
@@ -280,10 +280,6 @@ def conversion(
         got = f"{written or unit} ({kind_of(unit).name})"
         raise QuantityError("wrong dimension", got, expected)
     return size / measure(target)[0]
-
-
-#: Time from which texts state hours instead of minutes [s].
-LONG = 3.6e5
 
 
 def engineers_unit(unit: str) -> tuple[str, float]:

@@ -298,7 +298,7 @@ def checking_arguments(**options: str) -> Iterator[None]:
 
 
 def settings_with(settings: list[str] | None, **values: object) -> list[str]:
-    """Return the settings of --set, and those of options that stand for a key, if they are given.
+    """Return the settings of --set, and of options that stand for a key, if they are given.
 
     Parameters
     ----------

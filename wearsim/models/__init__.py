@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from wearsim.models import loads, motion, wear
-from wearsim.models.contact import hertz as hertz_model
-from wearsim.models.contact import hertz_fastsim, slender, strip_model
+from wearsim.models.contact import hertz as hertz_model, hertz_fastsim, slender, strip_model
 from wearsim.models.random import distributions, posterior, varying
 from wearsim.plugins import (
     ContactModelSpec,

@@ -77,7 +77,7 @@ def figure_style() -> Iterator[None]:
 
 
 class _Figure(Figure):
-    """Figure that notebooks show; those of pyplot are shown without this."""
+    """Figure that notebooks show; figures of pyplot are shown without this."""
 
     def _repr_png_(self) -> bytes:
         return png_of(self, DPI)

@@ -34,6 +34,16 @@ PER_SI = {
     "rpm": 30.0 / math.pi,
 }
 NOTHING = "-"
+#: SI units in names of JSON by the unit shown
+_SI = {"um": "m", "mm": "m", "mm^3": "m3", "MPa": "Pa", "deg": "rad", "J": "J", "W": "W", "N": "N"}
+TOO_FEW = "too few"
+TOO_FEW_REALISATIONS = "too few realisations"
+NINETY_PERCENT = (0.05, 0.95)
+_HALF_WIDTH_DIGITS = 2  # significant digits of the half-width, which set the decimals
+_MIN_DIGITS, _MAX_DIGITS = 3, 8  # significant digits of an estimate
+_WITHOUT_EXPONENT = (1e-4, 1e7)
+_ONE = 1.0 - 1e-9  # with a margin for rounding: 1 - 0.95 is slightly more than 0.05
+ROUNDING = 1e-9  # relative error that is not printed
 
 
 def shown(value: float | None, unit: str, digits: int = 4) -> str:
@@ -148,7 +158,7 @@ class Named(NamedTuple):
         return PER_SI[self.unit]
 
 
-#: observables of an ensemble by name; the last four are those of cams
+#: observables of an ensemble by name; the last four are of cams
 OBSERVABLES: Mapping[str, Named] = {
     "depth": Named("depth", "um"),
     "width": Named("width", "mm"),
@@ -165,10 +175,6 @@ OBSERVABLES: Mapping[str, Named] = {
     "depth_angle": Named("angle of the depth", "deg"),
     "peak_pressure_angle": Named("angle of the peak pressure", "deg"),
 }
-
-
-#: SI units in names of JSON by the unit shown
-_SI = {"um": "m", "mm": "m", "mm^3": "m3", "MPa": "Pa", "deg": "rad", "J": "J", "W": "W", "N": "N"}
 
 
 def si_unit(name: str) -> str:
@@ -189,15 +195,6 @@ def statistic_in_words(target: Target) -> str:
     elif not isinstance(statistic, str):
         statistic = f"{100.0 * statistic:g} % quantile"
     return f"{statistic} of {OBSERVABLES[target.observable].words}"
-
-
-TOO_FEW = "too few"
-TOO_FEW_REALISATIONS = "too few realisations"
-NINETY_PERCENT = (0.05, 0.95)
-_HALF_WIDTH_DIGITS = 2  # significant digits of the half-width, which set the decimals
-_MIN_DIGITS, _MAX_DIGITS = 3, 8  # significant digits of an estimate
-_WITHOUT_EXPONENT = (1e-4, 1e7)
-_ONE = 1.0 - 1e-9  # with a margin for rounding: 1 - 0.95 is slightly more than 0.05
 
 
 def cells(estimate: Interval, unit: str) -> tuple[str, str]:
@@ -317,9 +314,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-ROUNDING = 1e-9  # relative error that is not printed
 
 
 def by_roller(values: Any, unit: str) -> str:

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from wearsim.levelling import ComputedProfile, Measured
     from wearsim.report.panels import Sheet
 
+STUDY = "Study"  # title of the table on the computation, which stands first
+ORIGIN = "Origin"  # title of the table on scenario, files and software
+
 
 class Row(NamedTuple):
     """A quantity with its label.
@@ -77,10 +80,6 @@ class Table(NamedTuple):
     title: str
     rows: Sequence[Any]
     heads: Sequence[str] = ()
-
-
-STUDY = "Study"  # title of the table on the computation, which stands first
-ORIGIN = "Origin"  # title of the table on scenario, files and software
 
 
 class Column(NamedTuple):

@@ -55,7 +55,7 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     """Return a scenario with the contact model that `contact.model = "auto"` takes.
 
     The cheapest installed model is taken whose estimated error of P_l(y) is at most
-    `contact.tolerance` in every contact that is looked at: that of the first roller at the start of
+    `contact.tolerance` in every contact that is looked at: of the first roller at the start of
     the load; in a test all contacts at the start, after a tenth of the passes and at the end, with
     random inputs at their means, as stepped by `slender`. Models that cost less than `CHEAP` count
     as equally cheap, and the one with the least estimated error is taken. If none suffices, it is
@@ -142,7 +142,7 @@ def _refusal(scenario: Scenario, reason: str, *remedies: str) -> CapabilityError
 
 
 def _choice(scenario: Scenario, model: str, options: dict[str, object]) -> ContactChoice:
-    """Return a model instead of that of a scenario, or `auto` if it is not installed."""
+    """Return a model instead of the scenario's, or `auto` if it is not installed."""
     if model not in registry().names(ContactModelSpec):
         return scenario.contact
     chosen_options = registry().get(ContactModelSpec, model).options.model_validate(options)

@@ -10,6 +10,9 @@ from wearsim.studies.dry_run import Data
 from wearsim.units import in_engineers_unit
 
 TableRows = list[tuple[str, str]]
+_RADII = ("radius_m", "crown_radius_m", "width_m", "edge_radius_m", "chamfer_m")
+_UNITS = {"_m": ("mm", 1e-3), "_Pa": ("GPa", 1e9), "_rad": ("mrad", 1e-3)}  # by ends of keys
+_LIMIT_UNITS = {"volume": ("mm^3", 1e-9), "peak_pressure": ("MPa", 1e6), "width": ("mm", 1e-3)}
 
 
 def plan(data: Data) -> TableRows:
@@ -36,10 +39,6 @@ def plan(data: Data) -> TableRows:
         ("initial patch (Hertz)", size),
         *_test_rows(data),
     ]
-
-
-_RADII = ("radius_m", "crown_radius_m", "width_m", "edge_radius_m", "chamfer_m")
-_UNITS = {"_m": ("mm", 1e-3), "_Pa": ("GPa", 1e9), "_rad": ("mrad", 1e-3)}  # by ends of keys
 
 
 def _fields(data: Data, *keys: str, digits: int = 4) -> list[str]:
@@ -219,9 +218,6 @@ def _forecast_rows(forecast: Data) -> TableRows:
         f" {_rounded(forecast['file_bytes'] / 1e6)} MB (within a factor of 3)"
     )
     return [("forecast", wear), ("takes about", effort)]
-
-
-_LIMIT_UNITS = {"volume": ("mm^3", 1e-9), "peak_pressure": ("MPa", 1e6), "width": ("mm", 1e-3)}
 
 
 def _limit_rows(data: Data) -> TableRows:

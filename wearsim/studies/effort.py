@@ -30,15 +30,15 @@ LONG = 600.0  # s, a time of which it warns
 _STEPS, _STEPS_POWER = 20.0, 0.42  # at the default tolerance, of 1 + depth over elastic rise
 _TOLERANCE_POWER = -0.33
 _STAGES = 12.0  # solves of a stabilised step
-_STAGE = 0.35  # time of such a solve, over that of a groove
+_STAGE = 0.35  # time of such a solve, over a solve of a groove
 _STEP = 1.3  # time of an implicit step
 _EXPLICIT = 0.7  # time of an explicit step
 _WHOLE = 0.95  # of the width of a roller
 _CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
 _HALVINGS = 20  # for the passes at which a limit is reached
 _BISECTIONS = 5  # for the pass of a failure
-_OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn contacts
-_PASS = 0.06  # time of a pass in compiled code, over that of a solve
+_OF_REFERENCE = 6.0  # time of a step by exact theory, over a solve of its unworn contacts
+_PASS = 0.06  # time of a pass in compiled code, over a solve
 _STABLE = 0.03  # wear of the longest stable step, over the line load through pi E*
 _STEPS_OF_RESTART = 2.0  # of the stepper, where skids of a cam's roller have moved
 _SOLVES_OF_RESTART = 6.0
@@ -86,7 +86,7 @@ def forecast_data(
     Raises
     ------
     SolverError
-        If the contacts of the unworn bodies have no solution, or those of the predicted groove.
+        If the contacts of the unworn bodies or of the predicted groove have no solution.
     """
     scenario = draws.scenario
     passes = float(scenario.total_passes)

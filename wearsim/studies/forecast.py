@@ -298,7 +298,7 @@ class WearForecast:
 
 
 def _seconds_of_all(problem: WearProblem) -> float:
-    """Return the time that all contacts of the unworn bodies take by that of one [s]."""
+    """Return the time that all contacts of the unworn bodies take, from the time of one [s]."""
     batch = unworn_contacts(problem.at_time(np.zeros(1), np.zeros(1)))
     hardest, seconds = batch.at(np.array([batch.normal_force.argmax()])), 0.0
     for _ in range(2):  # the first reads kernels from the disk, unless it takes far longer anyway

@@ -26,6 +26,7 @@ MOST_BYTES = 4_000_000_000
 
 # measured while the file is written: numbers per realisation, and per random input of a realisation
 _NUMBERS, _NUMBERS_OF_A_DRAW = 17, 2
+SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
 
 
 def checked_count(scenario: Scenario, realisations: int) -> int:
@@ -74,9 +75,6 @@ def nothing_random(what: str) -> Mistake:
         ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}'
     )
     return Mistake("", "", what, None, expected)
-
-
-SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
 
 
 @cache
@@ -151,7 +149,7 @@ def check_plugins(path: Path, data: StudyData) -> None:
 
 
 def changed_origins(data: StudyData, scenario: Scenario) -> list[str]:
-    """Return a warning for every software version that differs from that of a file.
+    """Return a warning for every software version that differs from a file's.
 
     Parameters
     ----------

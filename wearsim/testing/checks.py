@@ -29,6 +29,7 @@ from wearsim.types import FloatArray
 from wearsim.units import Kind
 
 F = TypeVar("F")
+S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec)
 
 
 class ConformanceError(AssertionError):
@@ -179,9 +180,6 @@ def agree(
         f" {difference.flat[worst] / size if size else np.inf:.2e} of {size:.3g}, and"
         f" {tolerance:.0e} is allowed"
     )
-
-
-S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ BEHAVIOUR: Checks[ContactFixture] = Checks()
 _SOLUTION = "wearsim.types.ContactSolution"
 _MODEL = "wearsim.plugins.ContactModel"
 _SATURATION_ERROR = 0.02  # relative deviation from mu N allowed in gross sliding
+_SOLVE = "wearsim.plugins.ContactModel.solve"
 
 
 def _gross_sliding(fixture: ContactFixture) -> ContactSolution:
@@ -222,9 +223,6 @@ def convergence_with_strips(fixture: ContactFixture) -> None:
             f"{name} is {coarse:.6g}, {middle:.6g} and {fine:.6g} with {case.strips},"
             f" {2 * case.strips} and {4 * case.strips} strips: it does not converge",
         )
-
-
-_SOLVE = "wearsim.plugins.ContactModel.solve"
 
 
 def _require_identical(first: ContactSolution, other: ContactSolution, message: str) -> None:

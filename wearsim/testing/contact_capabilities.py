@@ -18,6 +18,12 @@ CAPABILITIES: Checks[ContactFixture] = Checks()
 _CAPABILITIES = "wearsim.plugins.Capabilities"
 _PASSES = 12
 _LOAD_ITERATIONS = 10  # each divides the change of a spring force by ten or more
+_SLIPS = {
+    "almost no slip": Creepage(1e-7, 2e-7),
+    "partial slip": Creepage(4e-4, 1e-4),
+    "all creepages": Creepage(3e-4, 4e-4, 0.3),
+    "gross sliding": Creepage(2e-2, -1e-2),
+}
 
 
 def _is_refused(fixture: ContactFixture, capability: str, call: Callable[[], Any]) -> bool:
@@ -79,7 +85,7 @@ def _uneven_compliance(fixture: ContactFixture) -> FloatArray:
 
 @CAPABILITIES.specified_in(_CAPABILITIES)
 def wear_compliance(fixture: ContactFixture) -> None:
-    """With a wear compliance c the solution is that of the gap plus c q."""
+    """With a wear compliance c the solution equals a solution for the gap plus c q."""
     compliance = _uneven_compliance(fixture)
     if _is_refused(fixture, "wear_compliance", lambda: fixture.solve(wear_compliance=compliance)):
         return
@@ -375,14 +381,6 @@ def _run_single_solves(fixture: ContactFixture, loop: PassLoop) -> None:
         loop.terms[:, g] += rate * (gain * solution.power - loop.terms[:, g])
         loop.energy[g] += solution.power
         loop.line_load[g], loop.approach[g] = solution.line_load, solution.approach
-
-
-_SLIPS = {
-    "almost no slip": Creepage(1e-7, 2e-7),
-    "partial slip": Creepage(4e-4, 1e-4),
-    "all creepages": Creepage(3e-4, 4e-4, 0.3),
-    "gross sliding": Creepage(2e-2, -1e-2),
-}
 
 
 @CAPABILITIES.specified_in(_CAPABILITIES)

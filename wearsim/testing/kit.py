@@ -90,7 +90,7 @@ def contact_model_tests(
     options : mapping of str to object
         Its options as written in a scenario, quantities with their units.
     case : ContactCase, optional
-        The base contact; by default that of the test rig.
+        The base contact; by default of the test rig.
     without : mapping of str to str
         Names of checks to skip, with the reason.
 

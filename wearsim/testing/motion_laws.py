@@ -20,6 +20,8 @@ from wearsim.testing.checks import (
 from wearsim.types import FloatArray
 
 _POINTS = 2001
+MOTION_LAW: Checks[MotionLawFixture] = spec_checks()
+_LIFT = "wearsim.plugins.MotionLaw.lift"
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,6 @@ class MotionLawFixture(Fixture[MotionLawSpec]):
         """Angles between the breaks, with both ends of every part."""
         edges = [0.0, *self.instance.breaks, self.angle]
         return [np.linspace(*pair, _POINTS) for pair in itertools.pairwise(edges)]
-
-
-MOTION_LAW: Checks[MotionLawFixture] = spec_checks()
-_LIFT = "wearsim.plugins.MotionLaw.lift"
 
 
 @MOTION_LAW.specified_in("wearsim.plugins.MotionLawSpec")
@@ -95,7 +93,7 @@ def lift_spans_the_rise(fixture: MotionLawFixture) -> None:
 
 @MOTION_LAW.specified_in(_LIFT)
 def derivatives_match_the_lift(fixture: MotionLawFixture) -> None:
-    """The derivatives are those of the lift, and are continuous within the segment."""
+    """The derivatives belong to the lift, and are continuous within the segment."""
     scale = fixture.rise / fixture.angle
     last = None
     for angle in fixture.parts:

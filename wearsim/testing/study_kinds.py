@@ -29,6 +29,7 @@ from wearsim.testing.checks import Checks, require
 _TIMES = {"wall_seconds", "solve_seconds"}
 _PNG = b"\x89PNG"
 _VIEW, _KIND = "wearsim.report.view.View", "wearsim.plugins.StudyKind"
+STUDY_KIND: Checks[StudyKindFixture] = Checks()
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,6 @@ class StudyKindFixture:
     def sheet(self) -> Sheet:
         """Panels of the view."""
         return self.view.panels()
-
-
-STUDY_KIND: Checks[StudyKindFixture] = Checks()
 
 
 @STUDY_KIND.specified_in(_KIND)

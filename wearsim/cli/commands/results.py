@@ -164,22 +164,13 @@ def compare(
     refuse(len(files) < 2, text, "FILE.h5")
     if figure is not None:
         refuse_inputs(figure, files, "the comparison")
-    from wearsim.studies.opening import comparison_of
+    for file in files:
+        refuse(files.count(file) > 1, f"{file} is given twice", "FILE.h5")
+    from wearsim.studies.opening import comparison_of, labels_of
 
     results = [wearsim.open_results(file) for file in files]
     check_figure(figure, force)
-    show_with_figure(comparison_of(results, _labels(files), observable), figure, json=json)
-
-
-def _labels(files: list[Path]) -> list[str]:
-    """Return the names of the files, with their folders where the names are not unique."""
-    stems = [file.stem for file in files]
-    if len(set(stems)) == len(stems):
-        return stems
-    names = [str(file) for file in files]
-    for name in names:
-        refuse(names.count(name) > 1, f"{name} is given twice", "FILE.h5")
-    return names
+    show_with_figure(comparison_of(results, labels_of(results), observable), figure, json=json)
 
 
 def export(

@@ -23,6 +23,8 @@ from wearsim.cli.shared import (
     write_table,
 )
 
+_HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities", "summary")
+
 
 def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False) -> None:
     """Check a scenario: print all mistakes, or the inputs and a summary of the run."""
@@ -129,9 +131,6 @@ def _write_scenario(name: Literal["starter", "starter_cam"], file: Path, force: 
 def _unwritable(error: OSError, path: Path, option: str) -> typer.BadParameter:
     message = f"cannot write to {path} ({error.strerror}); choose another name or folder"
     return typer.BadParameter(message, param_hint=option)
-
-
-_HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities", "summary")
 
 
 def plugins(json: Json = False) -> None:

@@ -15,8 +15,6 @@ from wearsim.errors import ContactError, StepError
 from wearsim.evolution.contacts import at_least
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
-)
-from wearsim.evolution.error_estimates import (
     DEPTH_EXPONENT,
     VOLUME_EXPONENT,
     greatest_depth,

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.models.annotations import BoxAnnotation, ColorBar, Label
-from bokeh.models.annotations import Span as Rule
+from bokeh.models.annotations import BoxAnnotation, ColorBar, Label, Span as Rule
 from bokeh.models.axes import LinearAxis
 from bokeh.models.formatters import BasicTickFormatter, NumeralTickFormatter
 from bokeh.models.mappers import LinearColorMapper
@@ -79,7 +78,7 @@ def draw(panel: Panel) -> Any:
     _set_axis(plot, "x", panel.x)
     _set_axis(plot, "y", panel.y)
     if panel.right is not None:
-        # a plain range, since one that follows the data would follow those of both axes
+        # a plain range, since one that follows the data would follow both axes
         values = [np.ravel(mark.y) for mark in panel.marks if isinstance(mark, Line) and mark.right]
         data = np.concatenate(values) * panel.right.scale
         least, greatest = float(np.nanmin(data)), float(np.nanmax(data))
@@ -235,7 +234,7 @@ def _draw_line(
     line = {"source": source, "line_width": width, "line_dash": _DASHES.get(mark.dash, "solid")}
     if mark.dash and mark.steps:
         plot.step("x", "y", mode="after", **line, **style, **named)
-        # values under the pointer are those of a line, which steps do not have
+        # values under the pointer need a line, which steps do not have
         pointed = plot.line("x", "y", source=source, line_alpha=0.0)
     elif mark.dash:
         pointed = plot.line("x", "y", **line, **style, **named)
@@ -270,7 +269,7 @@ def _draw_band(
         places = np.repeat(places, 2)[1:]
     source = _source({"x": places, "low": low, "high": high})
     plot.varea("x", "low", "high", source=source, **style, **named)
-    # values under the pointer are those of a line, which areas do not have
+    # values under the pointer need a line, which areas do not have
     line = plot.line("x", "high", source=source, line_alpha=0.0)
     unit = "" if y.unit == "1" else f" {_plain(y.unit)}"
     ends = f"@low{{%.5g}} to @high{{%.5g}}{unit}"

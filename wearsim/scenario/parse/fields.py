@@ -20,6 +20,33 @@ from wearsim.units import as_written, in_engineers_unit
 from wearsim.uq.sampling.sampler import BELOW_ONE
 
 _LIMITS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
+LEAST = 1.0 - BELOW_ONE  # least uniform number of a draw
+MISALIGNMENT = "creepage.misalignment"
+FRICTION = "friction.coefficient"
+#: random values of one contact: field name in the contact solution, by scenario key
+CONTACT_FIELDS = {
+    "load.normal_force": "normal_force_offset",
+    FRICTION: "friction",
+    "creepage.longitudinal": "longitudinal",
+    "creepage.bearing_torque": "bearing_torque",
+    "creepage.yaw": "yaw",
+    "creepage.tilt": "tilt",
+}
+#: keys of the values that may vary from pass to pass
+OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
+#: keys of the values that may differ from roller to roller
+OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
+#: roles of the distributions that need a marginal distribution
+WITH_MARGINAL = ("field", "process")
+#: last parts of keys in these tables whose values cannot be random
+_FIXED = ("creep_factor", "specific_wear_rate", "measured_friction")
+RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
+_ROLES: dict[Role, type] = {
+    "scalar": Distribution,
+    "joint": JointDistribution,
+    "field": FrictionField,
+    "process": Process,
+}
 
 
 def _parts(annotation: Any) -> list[Any]:
@@ -170,28 +197,6 @@ def target_of(field: FieldInfo) -> RandomTarget | None:
 Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass", "per-turn"]
 Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
 
-LEAST = 1.0 - BELOW_ONE  # least uniform number of a draw
-MISALIGNMENT = "creepage.misalignment"
-FRICTION = "friction.coefficient"
-#: random values of one contact: field name in the contact solution, by scenario key
-CONTACT_FIELDS = {
-    "load.normal_force": "normal_force_offset",
-    FRICTION: "friction",
-    "creepage.longitudinal": "longitudinal",
-    "creepage.bearing_torque": "bearing_torque",
-    "creepage.yaw": "yaw",
-    "creepage.tilt": "tilt",
-}
-#: keys of the values that may vary from pass to pass
-OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
-#: keys of the values that may differ from roller to roller
-OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
-#: roles of the distributions that need a marginal distribution
-WITH_MARGINAL = ("field", "process")
-#: last parts of keys in these tables whose values cannot be random
-_FIXED = ("creep_factor", "specific_wear_rate", "measured_friction")
-RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
-
 
 class RandomInputTable(Options):
     """Random input given for a value; the other keys are options of the distribution."""
@@ -218,14 +223,6 @@ def can_be_random(name: str) -> bool:
 def amount(value: float, quantity: Quantity | None) -> str:
     """Return the text of an SI value in the engineering unit of its quantity."""
     return in_engineers_unit(value, quantity.kind.unit if quantity else "1")
-
-
-_ROLES: dict[Role, type] = {
-    "scalar": Distribution,
-    "joint": JointDistribution,
-    "field": FrictionField,
-    "process": Process,
-}
 
 
 @dataclass(frozen=True, eq=False)

@@ -193,7 +193,7 @@ def replace_numbers(
     model : BaseModel
         A model of a table.
     values : mapping of str to object
-        Numbers in SI by key; a mapping has those of a model within it.
+        Numbers in SI by key; a mapping has the numbers of a model within it.
     table : str
         The table's name.
     """

@@ -58,7 +58,7 @@ def validate(
     """Return a table, which may have random inputs, as a model, or None after adding mistakes.
 
     The random inputs are added to `mistakes.random`, and the model has their means. The parameters
-    are those of `validate_options`.
+    as of `validate_options`.
     """
     values, refused = _with_means(mistakes, model, raw, table)
     return validate_options(mistakes, model, values, table, other_keys, refused=refused)

@@ -73,6 +73,38 @@ PROFILE = "cylinder.profile"
 PROFILE_FILE = "profile-from-python.csv"
 #: Keys that say how the file of a profile is read.
 _OF_PROFILE_FILES = ("profile_columns", "profile_units", *(f"profile_{key}" for key in ROW_CHOICES))
+MAX_NESTING = 20  # a scenario has at most five levels
+TOO_DEEP = "is nested too deeply", None, f"at most {MAX_NESTING} levels of tables and lists"
+TABLES: dict[str, type[Options]] = {
+    "roller": RollerTable,
+    "cylinder": CylinderTable,
+    "cam": CamTable,
+    "follower": FollowerTable,
+    "lubricant": LubricantTable,
+    "operation": OperationTable,
+    "load": LoadTable,
+    "friction": FrictionTable,
+    "creepage": CreepageTable,
+    "contact": ContactTable,
+    "wear": WearTable,
+    "evolution": EvolutionTable,
+    "outputs": OutputsTable,
+    "limit": LimitTable,
+    "sampling": SamplingTable,
+}
+#: [cam] replaces [cylinder]
+REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
+_ABSENT = {*REQUIRED, "wear", "cam", "follower", "lubricant"}  # tables without defaults
+#: functions that read the tables with more checks than their models have
+READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
+    "roller": read_roller,
+    "cylinder": read_cylinder,
+    "load": read_load,
+    "creepage": read_creepage,
+    "contact": read_contact,
+    "wear": read_wear,
+    "outputs": read_outputs,
+}
 
 
 def parse_override(text: str) -> tuple[str, object]:
@@ -157,10 +189,6 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
     return tomlkit.dumps(plain)
 
 
-MAX_NESTING = 20  # a scenario has at most five levels
-TOO_DEEP = "is nested too deeply", None, f"at most {MAX_NESTING} levels of tables and lists"
-
-
 def is_deep(value: object) -> bool:
     """Return whether tables and lists are nested in more than `MAX_NESTING` levels."""
     layer = [value]
@@ -195,39 +223,6 @@ def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, 
         if not isinstance(table, MutableMapping):
             raise ValueError(f"cannot be set, since '{name}' is not a table")
     return table  # type: ignore[no-any-return]
-
-
-TABLES: dict[str, type[Options]] = {
-    "roller": RollerTable,
-    "cylinder": CylinderTable,
-    "cam": CamTable,
-    "follower": FollowerTable,
-    "lubricant": LubricantTable,
-    "operation": OperationTable,
-    "load": LoadTable,
-    "friction": FrictionTable,
-    "creepage": CreepageTable,
-    "contact": ContactTable,
-    "wear": WearTable,
-    "evolution": EvolutionTable,
-    "outputs": OutputsTable,
-    "limit": LimitTable,
-    "sampling": SamplingTable,
-}
-#: [cam] replaces [cylinder]
-REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
-_ABSENT = {*REQUIRED, "wear", "cam", "follower", "lubricant"}  # tables without defaults
-
-#: functions that read the tables with more checks than those of their models
-READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
-    "roller": read_roller,
-    "cylinder": read_cylinder,
-    "load": read_load,
-    "creepage": read_creepage,
-    "contact": read_contact,
-    "wear": read_wear,
-    "outputs": read_outputs,
-}
 
 
 def flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:

@@ -26,6 +26,16 @@ from wearsim.units import ANGLE, VOLUME, QuantityError, as_written
 from wearsim.uq.sampling.sampler import GaussianCopula
 
 DEFAULT_TOLERANCE = 1e-3
+DEFAULT_RECORDS = 20
+LARGEST_ANGLE = 0.1  # rad; slip and shift are linear in the angles
+CADENCES = ("records", "every_passes", "every")
+#: keys of which at most one may be given; exactly one of a radius and a diameter
+ALTERNATIVES = {
+    "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
+    "cylinder": (("radius", "diameter"),),
+    "operation": (("duration", "passes", "turns"),),
+    "outputs": (CADENCES,),
+}
 
 
 class TopTable(Options):
@@ -239,19 +249,6 @@ class SamplingTable(Options):
         default=(),
         description="Rank correlations, each with the names of two random inputs and a number.",
     )
-
-
-DEFAULT_RECORDS = 20
-LARGEST_ANGLE = 0.1  # rad; slip and shift are linear in the angles
-CADENCES = ("records", "every_passes", "every")
-
-#: keys of which at most one may be given; exactly one of a radius and a diameter
-ALTERNATIVES = {
-    "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
-    "cylinder": (("radius", "diameter"),),
-    "operation": (("duration", "passes", "turns"),),
-    "outputs": (CADENCES,),
-}
 
 
 def check_alternatives(mistakes: Mistakes, raw: Mapping[str, object], table: str) -> None:

@@ -30,6 +30,12 @@ from wearsim.types import Grid, Material
 from wearsim.units import as_written
 from wearsim.uq.distributions.two_levels import TwoLevels
 
+AUTO = "auto"
+#: a volume or an area per force: mm^3/(N m), mm^2/N, also with kN or MN
+_PER_LOAD = re.compile(
+    r"m(?:\^|\*\*)?[23²³]\s*/\s*\(?\s*[kM]?N(?![A-Za-z])|m[23²³^*]*\s*/\s*\(?[kM]?Nm\b"
+)
+
 
 class ContactTable(Options):
     """Contact model; the keys of the chosen model are its options."""
@@ -47,9 +53,6 @@ class ContactTable(Options):
         default=None,
         description="Axial position of the strip grid's centre; chosen automatically by default.",
     )
-
-
-AUTO = "auto"
 
 
 class ChosenTable(Options):
@@ -176,11 +179,6 @@ class WearChoice:
         """Return a new wear law."""
         return self.spec.factory(self.options)
 
-
-#: a volume or an area per force: mm^3/(N m), mm^2/N, also with kN or MN
-_PER_LOAD = re.compile(
-    r"m(?:\^|\*\*)?[23²³]\s*/\s*\(?\s*[kM]?N(?![A-Za-z])|m[23²³^*]*\s*/\s*\(?[kM]?Nm\b"
-)
 
 #: model of the table's own keys, key with the name of the plugin, kind of plugin
 PLUGIN_TABLES: dict[str, tuple[type[Options], str, type[Spec]]] = {

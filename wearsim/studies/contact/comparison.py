@@ -22,6 +22,8 @@ INSTALL = {"halfspace": "pip install ./plugins/wearsim-halfspace"}
 
 #: Builds a model with some options for strips.
 Build = Callable[[Options, Grid], ContactModel]
+_SOLUTIONS = 2  # of a reference
+_SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class ContactErrors:
     Parameters
     ----------
     dissipation : float
-        L2 norm over the strips of the difference of P_l(y), over that of the reference.
+        L2 norm over the strips of the difference of P_l(y), over the norm of the reference.
     greatest : float
         Greatest difference of P_l(y), over the greatest value of the reference.
     power, peak_pressure, half_length : float
@@ -57,7 +59,7 @@ class ContactReference:
     model : str
         Name of the model.
     y : ndarray, shape (strips,)
-        Axial position of its strips [m], which may extend beyond those of the contact.
+        Axial position of its strips [m], which may extend beyond the contact's.
     dissipation : ndarray, shape (strips,)
         P_l(y) [W/m].
     line_load : ndarray, shape (strips,)
@@ -258,10 +260,6 @@ def error_above_tolerance(
     )
 
 
-_SOLUTIONS = 2  # of a reference
-_SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
-
-
 def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:
     """Return scalars, q(y) and P_l(y) of a solution in one array, with zeros for strips beyond."""
     scalars = solution.power, solution.peak_pressure, float(solution.half_length.max())
@@ -270,7 +268,7 @@ def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:
 
 
 def _differences(values: FloatArray, reference: FloatArray) -> ContactErrors:
-    """Return the differences of values from those of a reference, ordered as by `_values`."""
+    """Return the differences of values from a reference, ordered as by `_values`."""
     count = len(_SCALARS)
     power, pressure, length = (
         values[: count - 1] / _nonzero(reference[: count - 1]) - 1.0

@@ -43,7 +43,7 @@ class ErrorModel:
     options : dict of str to Any
         Options with other than default values.
     cost : float
-        Measured time of one contact, over that of the cheapest.
+        Measured time of one contact, over the cheapest model.
     coefficients : ndarray, shape (36,)
         Of the quadratic polynomial of the scaled indicators that gives ln(error).
     factor : float

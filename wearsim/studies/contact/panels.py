@@ -122,7 +122,7 @@ def _spread_out(length: int, wanted: int) -> IntArray:
 
 
 def _strips(study: ContactStudy) -> dict[str, Panel]:
-    """Return line load and dissipated power per length, with those of a reference."""
+    """Return line load and dissipated power per length, also of a reference."""
     solution, reference, errors = study.solution, study.reference, study.errors
     inside = _touching(solution.line_load)
     panels = {}

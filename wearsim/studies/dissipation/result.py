@@ -82,6 +82,11 @@ DISSIPATION = Schema(
     ),
     VARIABLES,
 )
+#: Probabilities that bound 95 % of the realisations.
+BAND = (0.025, 0.975)
+#: Probabilities of eq. 21 of Chevalier et al. (2005), where the labels P+ and P- are swapped.
+PAPER_BAND = (0.05, 0.95)
+SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "peak_pressure")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -143,14 +148,6 @@ def read_dissipation(path: str | Path) -> DissipationData:
     """Read the file of a dissipation study; errors as of `read_study`."""
     data: DissipationData = read_study(path, DissipationData)
     return data
-
-
-#: Probabilities that bound 95 % of the realisations.
-BAND = (0.025, 0.975)
-#: Probabilities of eq. 21 of Chevalier et al. (2005), where the labels P+ and P- are swapped.
-PAPER_BAND = (0.05, 0.95)
-
-SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "peak_pressure")
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,6 +38,9 @@ from wearsim.types import FloatArray, Grid, IntArray
 
 _RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
 _ARRAYS = ("from_apex", "roller", "weight", "slip_profile")
+MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
+MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
+SCALARS = ("depth_error", "volume_error", "steps", "solves")
 
 
 def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
@@ -81,7 +84,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
 
 
 def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
-    """Return one problem whose realisations are those of the given problems, all compatible."""
+    """Return one problem with the realisations of the given problems, all compatible."""
     columns = (
         np.concatenate([getattr(problem.inputs, item.name) for problem in problems], axis=1)
         for item in fields(ContactInputs)
@@ -106,12 +109,7 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
     )
 
 
-MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
-
-MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
-
 Observables = dict[str, float]
-SCALARS = ("depth_error", "volume_error", "steps", "solves")
 
 
 @dataclass(frozen=True)
@@ -320,7 +318,7 @@ def add_strip_errors(
     results: Mapping[int, RunObservations | Exception],
     observe: Observe | None = None,
 ) -> dict[int, tuple[FloatArray, dict[str, FloatArray]]]:
-    """Add the errors due to the strips to those of the results, by the same tests on coarse ones.
+    """Add the errors due to the strips to the results, by the same tests on coarse strips.
 
     Parameters
     ----------

@@ -37,6 +37,8 @@ DRAWS = 1_000_000  # draws from which the mean of the control variate is compute
 _BLOCK = 65536
 _FIRST_DRAW = 2**31  # number of the first of these draws, beyond any realisation
 _NEWTON_TOLERANCE = 1e-14
+AXIS_REALISATIONS = 64  # realisations that determine the axis, whatever the ensemble's size
+WIDTH_MARGIN = 1.05  # width of the axis over the widest of these realisations
 
 
 def control_of(drawer: Drawer, draws: int = DRAWS) -> dict[str, float] | None:
@@ -157,10 +159,6 @@ def _inverse(t: FloatArray) -> FloatArray:
     return np.asarray(x)
 
 
-AXIS_REALISATIONS = 64  # realisations that determine the axis, whatever the ensemble's size
-WIDTH_MARGIN = 1.05  # width of the axis over that of the widest of these realisations
-
-
 def profile_axis(scenario: Scenario) -> Grid:
     """Return the strips on which the final profiles of an ensemble are stored.
 
@@ -175,7 +173,7 @@ def profile_axis(scenario: Scenario) -> Grid:
     Raises
     ------
     WearsimError
-        If no strips fit any of the first realisations; the error is that of the first one.
+        If no strips fit any of the first realisations, with the error of the first one.
     """
     drawer, reach, error = Drawer(scenario, "monte-carlo"), [], None
     for number in range(AXIS_REALISATIONS):

@@ -67,7 +67,7 @@ def sweep(
     Raises
     ------
     ResultsFileError
-        If a file exists, or is that of two values.
+        If a file exists, or belongs to two values.
     ScenarioError, CapabilityError, TypeError, ValueError
         As in `run` or `ensemble`; those known from the arguments before the first one runs.
     Interrupted
@@ -99,7 +99,7 @@ def run_sweep(
     on_value: Callable[[str, Path | None], None] | None = None,
     **options: Any,
 ) -> list[Any]:
-    """Run the scenarios of a sweep, one per value; the other parameters are those of `sweep`."""
+    """Run the scenarios of a sweep, one per value; the other parameters as of `sweep`."""
     paths = [None if output is None else path_of(output, value) for value in values]
     same = [path for path in paths if path is not None and paths.count(path) > 1]
     if same:

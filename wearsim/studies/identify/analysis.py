@@ -32,7 +32,7 @@ from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.noise import Noise, fit_noise
 
 _FIRST_NOISE = Noise(1e-6, 0.2e-3, 0.1e-6)  # of a trace without shoulders, before its own is fitted
-_NOISE_OF_LIFT = Noise(1e-6, 0.05, 1e-6)  # before that of the residuals is fitted; lengths in rad
+_NOISE_OF_LIFT = Noise(1e-6, 0.05, 1e-6)  # before noise is fitted to the residuals; lengths in rad
 _BAND = 100  # draws of the band of fitted profiles
 _SUSPECT = 1.6
 _CONFOUNDED = Mistake(
@@ -56,7 +56,7 @@ class Fit:
     ratio, probability, correlation : float, optional
         Mean square of the residuals whitened by the noise of the shoulders, 1 where model and noise
         are right; probability of a greater one; autocorrelation of neighbouring whitened residuals.
-        None without shoulders, where the noise is that of the residuals themselves.
+        None without shoulders, where the residuals themselves give the noise.
     suspects : tuple of str
         Warnings on depth and form of the groove.
     """
@@ -306,7 +306,7 @@ def exponent(rows: Sequence[Identified]) -> tuple[float, float, float] | None:
     Parameters
     ----------
     rows : sequence of Identified
-        Traces of one test; those of the same place as the first are used.
+        Traces of one test; traces of the same place as the first are used.
     """
     rows = [row for row in rows if row.item.surface == rows[0].item.surface]
     if len(rows) < 2:

@@ -14,7 +14,7 @@ from wearsim.types import FloatArray
 
 _EDGE = 0.01  # of the depth, where a groove ends
 _WIDTH_WARNED, _WIDTH_REFUSED = 0.08, 0.25  # relative difference of measured and predicted width
-_FOREIGN = 100.0  # mean square of the residuals over that of the noise
+_FOREIGN = 100.0  # mean square of the residuals over the variance of the noise
 _LEAST_PART = 0.1  # of a variance, that a difference of two estimates has at least
 _OTHER_DEPTH = 2.58  # standard deviations: 2 to 3 sound grooves of a hundred are warned of
 _OTHER_FORM = 1.645  # the same: 6 straight traces of a hundred, since a curvature is seen late
@@ -23,7 +23,7 @@ _OTHER_FORM = 1.645  # the same: 6 straight traces of a hundred, since a curvatu
 def profiles_of_depth(grown: Grown, body: str, depth: float) -> FloatArray:
     """Return the worn profile of each draw at a depth, shape (draws, strips) [m].
 
-    It is that of the nearest record, scaled as a groove that grows.
+    The profile of the nearest record is scaled as a groove that grows.
     """
     rows = grown.depth[body]
     record = np.abs(np.log(np.maximum(rows.max(axis=2), 1e-12) / depth)).argmin(axis=1)

@@ -84,7 +84,7 @@ def with_known(scenario: Scenario, test: Measurement) -> Scenario:
 def _changed(
     scenario: Scenario, values: Mapping[str, object], test: Measurement, table: str
 ) -> Scenario:
-    """Return a scenario with other values, whose mistakes are those of a table of the test."""
+    """Return a scenario with other values, whose mistakes are reported of a table of the test."""
     try:
         return scenario.changed(values)
     except ScenarioError as error:

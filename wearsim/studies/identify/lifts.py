@@ -27,7 +27,7 @@ from wearsim.uq.hierarchy.noise import MOST_POINTS
 
 
 def read_change(item: Measurement, follower: Follower) -> Trace:
-    """Return the lift of a worn cam less that of the unworn one, as a trace along the angle.
+    """Return the lift of a worn cam less the lift before wear, as a trace along the angle.
 
     Parameters
     ----------

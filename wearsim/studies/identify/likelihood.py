@@ -28,7 +28,7 @@ _FIRST = 4.0  # variance of the first lattice over that at the maximum, which ha
 _COARSE = 0.05  # part of its variance by which a lattice is wider than the moments on it
 _UNFIT, _OFF = 0.35, 0.3  # of ln variance and of the mean, in standard deviations
 _VALUES = 3_000_000  # of an array
-_DROPPED = 80.0  # of chi2 above that of the best draw
+_DROPPED = 80.0  # of chi2 above the best draw
 _LONGEST = np.array([0.4, 1e-3])  # greatest change of ln K and shift in one iteration
 
 

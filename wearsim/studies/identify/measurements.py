@@ -65,7 +65,7 @@ class Measurement:
     angle : float, optional
         Angle of the cam at which the groove was measured [rad].
     lift : Path, optional
-        File of the lift of the worn cam, instead of a profile; `before` is that of the unworn cam.
+        File of the lift of the worn cam, instead of a profile; `before` is of the unworn cam.
     runout : bool
         Whether the lifts differ by an unknown run-out too, since the cam was mounted again.
     file, place : str

@@ -25,6 +25,7 @@ MEASURED = 0.1  # standard deviation of ln K/H if the inputs are measured
 FEW_DRAWS = 25.0
 _CURVE = 601  # values of ln K/H of a stored density
 _NODES = 81  # parts of the likelihood of a specimen that joins several tests
+_FIVE = (0.025, 0.05, 0.5, 0.95, 0.975)
 
 
 @dataclass(frozen=True)
@@ -178,9 +179,6 @@ def _three(quantiles: Sequence[float]) -> dict[str, float]:
     """Return a value with its 95 and 90 % intervals from five quantiles."""
     low, low_90, value, high_90, high = map(float, quantiles)
     return {"value": value, "low": low, "high": high, "low_90": low_90, "high_90": high_90}
-
-
-_FIVE = (0.025, 0.05, 0.5, 0.95, 0.975)
 
 
 def _test(row: Identified, specimen: Specimen) -> dict[str, Any]:

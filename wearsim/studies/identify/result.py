@@ -168,7 +168,7 @@ class IdentificationResult(StudyResult[IdentificationData]):
 
     @property
     def bayes_factor(self) -> float:
-        """Evidence of equal wear factors over that of scattered ones."""
+        """Evidence of equal wear factors over the evidence of scattered ones."""
         return float(self.raw.summary["bayes_factor"])
 
     @property

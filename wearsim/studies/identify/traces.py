@@ -216,7 +216,7 @@ def level(
         Crown radius of the roller [m].
     extents : tuple of float, optional
         Predicted extents of the groove to the left and right of its middle [m]; shoulders begin
-        beyond them and a margin. By default those of a conforming groove of the measured depth.
+        beyond them and a margin. By default the extents of a conforming groove as deep as measured.
 
     Raises
     ------
@@ -306,7 +306,7 @@ def measured_depth(
 ) -> tuple[float, float]:
     """Return the greatest depth of a groove below its shoulders, and its standard deviation [m].
 
-    It is that of a parabola through the bottom of the groove, fitted together with offset,
+    It is taken from a parabola through the bottom of the groove, fitted together with offset,
     inclination and perhaps curvature of the shoulders under correlated noise; no wear model is
     used. The deepest point, even of a smoothed trace, is too deep on average.
 
@@ -315,7 +315,7 @@ def measured_depth(
     trace : Trace
         With shoulders.
     crown_radius : float
-        Crown radius of the roller, which is nearly that of the bottom [m].
+        Crown radius of the roller, which is nearly the radius of the bottom [m].
     curvature : bool
         Whether the trace has an unknown curvature.
     """

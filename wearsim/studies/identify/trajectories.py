@@ -280,7 +280,7 @@ class Grower:
         return self._grown_at(times, start, float(high.max() / low.min()))
 
     def _pilot(self, wanted: Sequence[Wanted], passes: float) -> tuple[float, FloatArray]:
-        """Return a wear factor near that of the first draw, and the sizes that it wears [m]."""
+        """Return a wear factor near the first draw, and the sizes that it wears [m]."""
         k = factors(self.scenario)[0]
         high = np.array([item.high for item in wanted])
         for number in range(_PILOTS):
@@ -320,7 +320,7 @@ class Grower:
             flat = [item for state in states for item in state]
             ln_tau = np.log(start[kept])[:, None] + np.log(records)
             grown = self._grown(ln_tau, flat, ln_tau.shape)
-            # the energy is that of the passes of a record, and grows as they do
+            # the energy belongs to the passes of a record, and grows as they do
             by_passes = {
                 item: replace(
                     grown, ln_k=ln_tau - np.log(item), energy=grown.energy * (item / records)

@@ -75,7 +75,7 @@ def life(
     output : path, optional
         Results file; without it the result is kept in memory only.
     limits : sequence of str
-        Limits in addition to those of the scenario, or instead of equal ones: "depth 50 um",
+        Limits in addition to the scenario's, or instead of equal ones: "depth 50 um",
         "lift_error=30um".
     target : float or str, optional
         Life of which the probability is estimated, a number of passes or turns, or "200 h".
@@ -182,7 +182,7 @@ def resume_life(
     on_notice: Callable[[str], None] | None = None,
     storage: Storage = DISK,
 ) -> LifeResult:
-    """Continue a study of lives from its file; the result is that of an unbroken one.
+    """Continue a study of lives from its file; the result equals an unbroken one.
 
     Parameters
     ----------

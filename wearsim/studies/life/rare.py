@@ -25,6 +25,7 @@ from wearsim.uq.survival.rare_events import log_weights, next_shift
 
 LEAST_TESTS = 200
 _ADAPTED = 2  # stages that choose the shift, each with a quarter of the tests
+_IMPROVING = 4  # one test of so many improves the shifts
 
 
 def next_stages(result: LifeResult) -> list[dict[str, Any]]:
@@ -72,9 +73,6 @@ def next_stages(result: LifeResult) -> list[dict[str, Any]]:
     shift = next_shift(scores[good], response[good], weights[good])
     moved = dict(zip(names, map(float, shift), strict=True))
     return [{"first": first, "count": count, "shift": moved}]
-
-
-_IMPROVING = 4  # one test of so many improves the shifts
 
 
 def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:

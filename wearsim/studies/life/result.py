@@ -49,7 +49,7 @@ class LifeResult(LifeValues):
     raw : EnsembleData
     path : Path, optional
     law : Distribution, optional
-        Distribution of the wear factor, instead of that of the scenario.
+        Distribution of the wear factor, instead of the scenario's.
 
     Examples
     --------
@@ -239,7 +239,7 @@ class LifeResult(LifeValues):
     def lower_bound(self, percent: float) -> float:
         """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown.
 
-        It is that of the lives as counted.
+        It applies to the lives as counted.
 
         Examples
         --------
@@ -323,7 +323,7 @@ class LifeResult(LifeValues):
     def _indices(
         self, name: str, groups: list[str]
     ) -> Mapping[str, tuple[Interval, Interval | None]]:
-        """Return first-order indices; those of "life" are of its logarithm, or unknown."""
+        """Return first-order indices, of "life" for its logarithm, or unknown."""
         if name != "life":
             return super()._indices(name, groups)
         if self.effects_obstacle:
@@ -379,7 +379,7 @@ class LifeResult(LifeValues):
         return dict(sorted(by_input.items(), key=lambda item: -item[1].size))
 
     def compare(self, other: LifeResult) -> LifeComparison:
-        """Compare the lives with those of another design.
+        """Compare the lives with another design's.
 
         Parameters
         ----------
@@ -468,7 +468,7 @@ class LifeResult(LifeValues):
     def rare(self) -> RareProbability | None:
         """Probability of a life before the target from tests for rare events, if requested.
 
-        It is that of the last method in `rare_estimates`.
+        It is given by the last method in `rare_estimates`.
         """
         return next(reversed(self.rare_estimates.values()), None)
 

@@ -41,7 +41,7 @@ def checked_study(
     rare: int = 0,
     rare_method: str = "auto",
 ) -> tuple[Scenario, LifeSettings, Target | None]:
-    """Return scenario, settings and target of a study, whose arguments are those of `life`.
+    """Return scenario, settings and target of a study; arguments as of `life`.
 
     Raises
     ------

@@ -45,7 +45,7 @@ class LifeValues(EnsembleResult):
 
     @property
     def variable(self) -> DesignVariable | None:
-        """Design variable whose value differs from that of other results of a sweep."""
+        """Design variable whose value differs from other results of a sweep."""
         return DesignVariable(**self.settings.variable) if self.settings.variable else None
 
     @property

@@ -390,7 +390,7 @@ def _change(factor: Interval) -> str:
 
 
 def study_options(result: LifeResult) -> list[str]:
-    """Return the options of a study of lives without those of its precision and rare events."""
+    """Return the options of a study of lives but for precision and rare events."""
     shares = ",".join(f"{share:g}" for share in result.settings.shares)
     options = ["-n", str(result.settings.plain), "--seed", str(result.raw.seed), "--b", shares]
     options += ["--max", f"{result.most:.17g}"]

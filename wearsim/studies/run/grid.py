@@ -35,7 +35,7 @@ MOST_STRIPS = 801
 STRIPS_AT_START = 241  # at most, unless the contacts of the unworn bodies require more
 STRIPS_BEFORE_JOINING = 401  # of a growing groove
 STRIPS_OF_MANY_CONTACTS = 141  # the same where the contacts of a turn are solved together
-COARSER = 1.3  # width of strips that realisations share over that of the strips of one
+COARSER = 1.3  # width of strips that realisations share over the strips of one
 LEAST_CHOSEN = 2.5  # strips per half-width of a patch; with fewer chosen ones, strips grow
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
@@ -62,7 +62,7 @@ def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> F
 
 
 def contact_centre(scenario: Scenario, rollers: Sequence[int]) -> float:
-    """Return the middle of the strips [m]: the scenario's, or that of the contacts of rollers."""
+    """Return the middle of the strips [m]: the scenario's, or between the rollers' contacts."""
     if scenario.contact.centre is not None:
         return scenario.contact.centre
     positions = contact_positions(scenario, contact_inputs(scenario, rollers))
@@ -72,7 +72,7 @@ def contact_centre(scenario: Scenario, rollers: Sequence[int]) -> float:
 def contact_grid(scenario: Scenario, load: float) -> Grid:
     """Return the strips of the first roller's contact under `load` [N].
 
-    They are those of the scenario, those of the profile's whole width, or the choice of the model.
+    The scenario gives them, the whole width of the profile, or the choice of the model.
     """
     choice, profile = scenario.contact, scenario.cylinder.profile
     centre, half_width = contact_centre(scenario, [0]), widest_patch(scenario, load).b

@@ -19,10 +19,10 @@ from wearsim.types import ContactSolution, FloatArray
 
 
 def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None) -> HertzContact:
-    """Return the patch of the unworn bodies under `load` [N], that of Hertz.
+    """Return the patch of the unworn bodies under `load` [N] after Hertz.
 
-    Where a roller ends within it, the patch is that of a line contact as wide as the roller. The
-    relative curvature along rolling [1/m] is that of cylinder and roller unless it is given.
+    Where a roller ends within it, the patch is a line contact as wide as the roller. The
+    relative curvature along rolling [1/m] is taken from cylinder and roller unless it is given.
     """
     modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
     if curvature is None:

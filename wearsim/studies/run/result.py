@@ -25,6 +25,7 @@ from wearsim.studies.run.schema import CAM_RUN, ESTIMATED, RUN
 from wearsim.types import FloatArray
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
+_DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -114,8 +115,6 @@ def read_results(path: str | Path) -> RunData:
 
 
 Number: TypeAlias = float | list[float]
-
-_DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,7 +253,7 @@ class Result(StudyResult[RunData]):
         """Estimated numerical errors after each step, by the name of the quantity [SI].
 
         They are due to steps, strips and the stations of a cam; not a number where they are not
-        estimated. That of the depth applies to either body, and that of the worn volume to both.
+        estimated. The error of the depth applies to either body, of the worn volume to both.
 
         Examples
         --------

@@ -41,6 +41,7 @@ _RECORDS = {
     "line_load.csv": "line_load",
     "dissipation.csv": "dissipation",
 }
+_UNITS = {"volume": "mm^3", "peak_pressure": "MPa", "width": "mm"}  # the others in um
 
 
 class RunView(StudyView[Result]):
@@ -300,9 +301,6 @@ def _columns(name: str, array: FloatArray, dims: Sequence[str], title: str) -> I
 def _last(value: Any) -> int:
     """Return the last value of a history, or the number itself."""
     return int(np.ravel(value)[-1])
-
-
-_UNITS = {"volume": "mm^3", "peak_pressure": "MPa", "width": "mm"}  # the others in um
 
 
 def limit_rows(result: Result) -> Rows:

@@ -123,7 +123,7 @@ def read_parts(path: Path, data: EnsembleData) -> list[Part]:
     Raises
     ------
     ResultsFileError
-        If parts are missing, damaged, or those of another ensemble.
+        If parts are missing, damaged, or of another ensemble.
     """
     folder = parts_folder(path)
     if not data.finished and not folder.is_dir():
