@@ -128,6 +128,15 @@ def life(
             show_default=False,
         ),
     ] = None,
+    posterior: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="K.csv",
+            help="K/H with what is not known of it, from `wearsim identify --posterior`, instead of"
+            " the wear factor of the scenario; of a results file without new tests.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,
@@ -155,13 +164,18 @@ def life(
             "--output": output,
         }
         refuse_options(given, "has no meaning for results files")
-        show_lives(*_reopened(designs, target, shares), json, figure)
+        show_lives(*_reopened(designs, target, shares, posterior), json, figure)
         return
     from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
     from wearsim.results.io.outputs import check_output
     from wearsim.studies.life.settings import checked_study
 
     labels, scenarios, key = _variants(designs, sweep, settings_with(settings, seed=seed))
+    if posterior is not None:
+        from wearsim.studies.life.factor import with_posterior
+
+        with checking("--posterior"):
+            scenarios = [with_posterior(scenario, posterior) for scenario in scenarios]
     arguments: dict[str, Any] = {
         "target": target,
         "b": shares,
@@ -239,19 +253,21 @@ def _shares(text: str) -> tuple[float, ...]:
 
 
 def _reopened(
-    designs: Sequence[Path], target: str | None, shares: tuple[float, ...]
+    designs: Sequence[Path], target: str | None, shares: tuple[float, ...], posterior: Path | None
 ) -> tuple[list[LifeResult], list[str]]:
     """Return the results in files, and their labels: of a sweep the values of its key."""
     from wearsim.studies.life.stored_settings import swept_variable
 
-    results = [_opened(path, target, shares) for path in designs]
+    results = [_opened(path, target, shares, posterior) for path in designs]
     if swept_variable(results) is None:
         return results, _labels(designs)
     return results, [result.variable.text for result in results if result.variable]
 
 
-def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeResult:
-    """Return the result in a file, for another target and other percentages."""
+def _opened(
+    path: Path, target: str | None, shares: tuple[float, ...], posterior: Path | None
+) -> LifeResult:
+    """Return the result in a file, for another target, other percentages and another K/H."""
     from wearsim.results.kinds import kind_of
     from wearsim.studies.life.settings import parse_life
 
@@ -265,6 +281,9 @@ def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeRe
         text = f"{life:,.0f} {result.unit} is beyond the maximum of {path}"
         refuse(life > result.most, f"{text}, {result.most:,.0f} {result.unit}", "--target")
         changed["target"] = life * result.settings.per_unit
+    if posterior is not None:
+        with checking("--posterior"):
+            result = result.with_posterior(posterior)
     return result.with_settings(**changed)
 
 

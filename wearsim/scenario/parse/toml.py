@@ -57,6 +57,7 @@ from wearsim.scenario.tables.plugin import (
     ContactTable,
     LoadTable,
     WearTable,
+    check_contained,
     read_contact,
     read_load,
     read_wear,
@@ -278,6 +279,7 @@ def parse_fields(
     assemble_cam(mistakes, sections, "cam" in tables)
     check_lists(mistakes, data, sections["limit"])
     check_correlation(mistakes, sections["sampling"])
+    check_contained(mistakes)
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)
     notes = (

@@ -28,6 +28,7 @@ from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, sp
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.types import Grid, Material
 from wearsim.units import as_written
+from wearsim.uq.distributions.two_levels import TwoLevels
 
 AUTO = "auto"
 #: a volume or an area per force: mm^3/(N m), mm^2/N, also with kN or MN
@@ -262,6 +263,24 @@ def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | Non
         )
         mistakes.add("wear", "factor", what, None, remedy)
     return WearChoice(keys.law, options) if keys and options is not None else None
+
+
+def check_contained(mistakes: Mistakes) -> None:
+    """Add the mistakes of random inputs whose scatter a posterior of K/H contains already."""
+    for factor in mistakes.random_inputs:
+        if not isinstance(factor.distribution, TwoLevels):
+            continue
+        for item in mistakes.random_inputs:
+            for key in set(item.keys) & set(factor.distribution.contained):
+                mistakes.add(
+                    item.name,
+                    "",
+                    f"is random, and the posterior of {factor.name} contains the scatter of {key},"
+                    " which was neither random nor known in the identification: it counts twice",
+                    item.describe(),
+                    f"a fixed value; or identify K/H again with {key} random, or with --fix if it"
+                    " was equal in all tests",
+                )
 
 
 def _rate_notes(raw: Mapping[str, object]) -> list[str]:

@@ -19,7 +19,7 @@ from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.cam_wear import Wanted, size_of
 from wearsim.studies.identify.analysis import Identified, identified
-from wearsim.studies.identify.inputs import with_known
+from wearsim.studies.identify.inputs import contained_inputs, with_known
 from wearsim.studies.identify.lifts import read_change
 from wearsim.studies.identify.measurements import (
     Measurement,
@@ -138,7 +138,13 @@ def identify(
         rows = study.rows(watch)
     specimens = specimens_of(rows)
     seconds = time.monotonic() - started
-    given = {"measured": tables_of(items), "draws": draws, "shared": shared}
+    fixed = [key_of(key) for key in fix or ()]
+    given = {
+        "measured": tables_of(items),
+        "draws": draws,
+        "shared": shared,
+        "contained": contained_inputs(study.scenario, items, fixed),
+    }
     data = content(study.scenario, specimens, negligible, study.notes, created, seconds, **given)
     data.warnings.extend(study.left_out)
     if output is not None:

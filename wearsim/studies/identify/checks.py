@@ -144,22 +144,15 @@ def other_form(model: TraceLikelihood, likelihood: DrawLikelihood) -> list[str]:
     """
     if model.curvature:
         return []
-    best = [
-        int(
-            np.where(
-                np.isfinite(likelihood.log_evidence), likelihood.log_evidence, -np.inf
-            ).argmax()
-        )
-    ]
+    best = [int(np.nanargmax(likelihood.log_evidence))]
     grown = model.grown
     depth = {model.body: grown.depth[model.body][best]}
     alone = replace(grown, ln_k=grown.ln_k[best], depth=depth, energy=grown.energy[best])
-    line, curve = (
-        replace(model, grown=alone, curvature=curved).integrated() for curved in (False, True)
-    )
-    change = float(curve.mean[0] - line.mean[0])
-    scale = np.sqrt(max(float(curve.std[0] ** 2), (1.0 + _LEAST_PART) * float(line.std[0] ** 2)))
-    if abs(change) < _OTHER_FORM * np.sqrt(scale**2 - float(line.std[0] ** 2)):
+    curve = replace(model, grown=alone, curvature=True).integrated()
+    change = float(curve.mean[0] - likelihood.mean[best[0]])
+    straight = float(likelihood.std[best[0]] ** 2)
+    more = max(float(curve.std[0] ** 2) - straight, _LEAST_PART * straight)
+    if abs(change) < _OTHER_FORM * np.sqrt(more):
         return []
     what = (
         "the residuals may follow a curvature of the trace; with it K/H changes by"

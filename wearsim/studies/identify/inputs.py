@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,16 +12,43 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.models.random.distributions import TableDistribution
-from wearsim.quantities import quantity
+from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import amount, can_be_random
+from wearsim.scenario.parse.toml import flat
 from wearsim.studies.identify.measurements import Measurement, key_of
 from wearsim.units import QuantityError, as_written
 
 _SPAN = 6.0  # standard deviations of a measured value that are considered
 _POINTS = 801
 _EITHER_SIGN = {"creepage.yaw", "creepage.tilt", "roller.offset"}
+_ALWAYS = {"creepage.yaw", "creepage.tilt"}  # inputs of any rig, zero by default
 _LEAST = 1e-9  # probability of the values within that span by the scenario
+
+
+def contained_inputs(
+    scenario: Scenario, tests: Sequence[Measurement], fixed: Sequence[str]
+) -> list[str]:
+    """Return the inputs that are neither drawn nor known in all tests, by dotted key.
+
+    Where they differ between the tests, the difference is taken for one of K/H.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    tests : sequence of Measurement
+    fixed : sequence of str
+        Keys that the user has fixed as known and equal in all tests.
+    """
+    drawn = {key for item in scenario.random for key in item.keys}
+    known = {*fixed, *set.intersection(*(set(test.values) for test in tests))}
+    given = {
+        key
+        for key, value in flat(tomllib.loads(scenario.text))
+        if can_be_random(key) and NUMBER.match(str(value)) and not key.startswith("wear.")
+    }
+    options = {key for key in given for item in scenario.random if key.startswith(f"{item.name}.")}
+    return sorted((given | _ALWAYS) - options - drawn - known)
 
 
 def with_known(scenario: Scenario, test: Measurement) -> Scenario:

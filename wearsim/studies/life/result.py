@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from wearsim.studies.life.factor import posterior_table
 from wearsim.studies.life.rare_estimates import rare_estimates
 from wearsim.studies.life.stored_settings import LifeComparison
 from wearsim.studies.life.values import LifeValues
@@ -31,6 +33,7 @@ from wearsim.uq.survival.lives import (
     survival_curve,
 )
 from wearsim.uq.survival.rare_events import RareProbability
+from wearsim.uq.survival.two_levels import UncertainLife
 
 _QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
 _POINTS = 200  # of a curve
@@ -76,9 +79,13 @@ class LifeResult(LifeValues):
     def method(self) -> str:
         """Method of the intervals of lives, in words."""
         if self.settings.alone:
-            return "none: the wear factor is integrated exactly, and nothing else is random"
+            exact = "the wear factor is integrated exactly, and nothing else is random"
+            return (
+                f"credible, by the posterior of K/H: {exact}" if self.levels else f"none: {exact}"
+            )
         if self.is_exact:
-            return "Student's t of the probability of failure on the logit scale, inverted"
+            method = "Student's t of the probability of failure on the logit scale, inverted"
+            return f"credible, by the posterior of K/H, with {method}" if self.levels else method
         if self.censored:
             return "exact, between order statistics; lives beyond the maximum are censored"
         return "exact, between order statistics"
@@ -117,6 +124,28 @@ class LifeResult(LifeValues):
         inputs = {item.name: item for item in changed.random}
         return replace(self, law=inputs[settings.factor].scalar)
 
+    def with_posterior(self, file: str | Path) -> LifeResult:
+        """Return the lives with the posterior of K/H of an identification, without new tests.
+
+        Parameters
+        ----------
+        file : path
+            CSV of `wearsim identify --posterior`.
+
+        Raises
+        ------
+        ScenarioError
+            If the file cannot be used, or contains the scatter of an input that is random.
+        ValueError
+            As `with_wear_factor`.
+        """
+        key, table = posterior_table(self.scenario, file)
+        if self.settings.factor and key != self.settings.factor:
+            raise ValueError(
+                f"the posterior is of {key}, and the lives are of {self.settings.factor}"
+            )
+        return self.with_wear_factor(table)
+
     def b(self, percent: float) -> Interval:
         """Return the life that a percentage of the specimens does not reach, as B10.
 
@@ -130,7 +159,8 @@ class LifeResult(LifeValues):
         Interval
             Sampling interval; the value is nan beyond the censoring and with too few counted lives
             (69 for B1, 7 for B10), and -inf an end for which there are too few. See `b_error` for
-            the numerical error.
+            the numerical error. With a posterior of the wear factor the value is the predictive
+            one, and the interval is credible, see `uncertain_life`.
 
         Examples
         --------
@@ -139,7 +169,40 @@ class LifeResult(LifeValues):
         >>> print(f"{found.value:.3g}, 95 % interval {found.low:.3g} to {found.high:.3g}")
         8.5e+05, 95 % interval 7.98e+05 to 9.08e+05
         """
-        return self._b(percent, "life")
+        uncertain = self.uncertain_life(percent)
+        if uncertain is None:
+            return self._b(percent, "life")
+        return self._within_censoring(uncertain.interval)
+
+    def uncertain_life(self, percent: float) -> UncertainLife | None:
+        """Return the life of a percentage with what is not known of the wear factor.
+
+        Parameters
+        ----------
+        percent : float
+            10 for B10.
+
+        Returns
+        -------
+        UncertainLife or None
+            Predictive and plug-in life, credible interval, and the variance due to the wear tests
+            and to the realisations; None unless the wear factor has the distribution "posterior".
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.uncertain_life(10) is None
+        True
+        """
+        if self.uncertain is None:
+            return None
+        if percent not in self._uncertain_lives:
+            self._uncertain_lives[percent] = self.uncertain.quantile(percent / 100.0)
+        return self._uncertain_lives[percent]
+
+    @cached_property
+    def _uncertain_lives(self) -> dict[float, UncertainLife]:
+        return {}
 
     def b_error(self, percent: float) -> tuple[float, float]:
         """Return the life of a percentage if all lives are in error by their numerical bounds.
@@ -161,7 +224,10 @@ class LifeResult(LifeValues):
         if not self.is_exact:
             lives = self._lives(name)
             return life_quantile(np.minimum(lives, self.most), np.isfinite(lives), share)
-        quantile = self._distribution(name).quantile(share)
+        return self._within_censoring(self._distribution(name).quantile(share))
+
+    def _within_censoring(self, quantile: Interval) -> Interval:
+        """Return a life with its interval, unknown beyond the censoring."""
         if quantile.value <= self.most:
             return Interval(
                 quantile.value,
@@ -197,8 +263,8 @@ class LifeResult(LifeValues):
         if not self.count or life > self.most:
             return UNKNOWN
         if self.is_exact:
-            obstacle = self.probability_obstacle(life)
-            return UNKNOWN if obstacle else self.distribution.probability_before(life)
+            lives = self.uncertain or self.distribution
+            return UNKNOWN if self.probability_obstacle(life) else lives.probability_before(life)
         return probability_before(np.minimum(self.lives, self.most), self.observed, life)
 
     def survival(self, life: float) -> Interval:
@@ -234,7 +300,8 @@ class LifeResult(LifeValues):
             return SurvivalCurve(np.concatenate([[0.0], curve.life, last]), *parts)
         end = min(self.distribution.quantile_of_mean(0.999), self.most)
         life = np.linspace(0.0, end, _POINTS)
-        ended = [self.distribution.probability_before(float(n)) for n in life[1:]]
+        estimates = self.uncertain or self.distribution
+        ended = [estimates.probability_before(float(n)) for n in life[1:]]
         survival, low, high = (
             np.array([1.0, *(1.0 - getattr(item, name) for item in ended)])
             for name in ("value", "high", "low")
@@ -391,7 +458,8 @@ class LifeResult(LifeValues):
         if target.observable != LIFE:
             return super().estimate_for(target)
         share = float(target.statistic)
-        life = self.b(100.0 * share) if self.count >= _FEWEST else UNKNOWN
+        # more realisations do not reduce what is not known of the wear factor
+        life = self._b(100.0 * share, "life") if self.count >= _FEWEST else UNKNOWN
         return Estimate(
             self.count, UNKNOWN, UNKNOWN, ((share, life),), math.nan, math.nan, self.method
         )

@@ -11,6 +11,7 @@ from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.life.stored_settings import DesignVariable, LifeSettings
 from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim.uq.distributions.base import Distribution
+from wearsim.uq.distributions.two_levels import TwoLevels
 from wearsim.uq.survival.distributions import (
     CountedLives,
     FactorMixture,
@@ -18,6 +19,7 @@ from wearsim.uq.survival.distributions import (
 )
 from wearsim.uq.survival.effective import LEAST_NUMBER
 from wearsim.uq.survival.scores import ScoreFunction, score_function
+from wearsim.uq.survival.two_levels import UncertainLives
 
 _MOST_UNKNOWN = 0.02  # share of lives at an end of the range up to which effects are stated
 
@@ -172,6 +174,19 @@ class LifeValues(EnsembleResult):
         """Distribution of the wear factor in the scenario."""
         inputs = {item.name: item for item in self.scenario.random}
         return inputs[self.settings.factor].scalar
+
+    @property
+    def levels(self) -> TwoLevels | None:
+        """Posterior of the wear factor that is integrated exactly, if its distribution is one."""
+        law = self.law or (self._drawn_law if self.is_exact else None)
+        return law if isinstance(law, TwoLevels) else None
+
+    @cached_property
+    def uncertain(self) -> UncertainLives | None:
+        """Lives for all medians and scatters of a wear factor with a posterior."""
+        levels, lives = self.levels, self.distribution
+        known = levels is not None and isinstance(lives, FactorMixture) and lives.is_finite.any()
+        return UncertainLives(lives, levels) if known else None  # type: ignore[arg-type]
 
     @cached_property
     def _drawn_score(self) -> ScoreFunction:

@@ -64,7 +64,9 @@ class LifeView(RealisationsView[LifeResult]):
         if result.count == 0:
             return [Row("life", "no test is completed")]
         shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
-        rows = [Row(f"B{share:g}", life_text(result, share)) for share in shares]
+        rows = [
+            Row(f"B{share:g}", life_text(result, share) + self._plug_in(share)) for share in shares
+        ]
         if result.target is not None:
             name = f"P(life < {count(result.target)} {result.unit})"
             rows.append(Row(name, target_text(result)))
@@ -91,6 +93,8 @@ class LifeView(RealisationsView[LifeResult]):
         factor = f"lives are counted: {settings.reason}"
         if settings.factor:
             factor = f"{settings.factor} is integrated exactly"
+            if result.levels is not None:
+                factor += f", with its posterior given {_tests_of(result)}"
             alone = "; nothing else is random, so that one test is sufficient"
             factor += alone if settings.alone else ""
         ends = f"{count(int(result.observed.sum()))} ended by a limit"
@@ -117,11 +121,40 @@ class LifeView(RealisationsView[LifeResult]):
             for name, share in result.first_limits.items()
         ]
         return [
+            *([self._levels()] if result.uncertain is not None else []),
             lives_table([""], [result]),
             *([self._fits()] if len(result.fits) >= 2 else []),
             Table("", lines, ["first limit", "share", ""]),
             self._effects(),
         ]
+
+    def _plug_in(self, share: float) -> str:
+        """Return the life with median and scatter of K/H taken as known; empty if they are."""
+        found = self.result.uncertain_life(share)
+        if found is None:
+            return ""
+        plug_in = rounded_lives(found.low, found.plug_in, found.high)[1]
+        return f" given {_tests_of(self.result)}; plug-in {plug_in}"
+
+    def _levels(self) -> Table:
+        """Return predictive and plug-in lives, and what would reduce their uncertainty."""
+        result, lines = self.result, []
+        for share in result.settings.shares:
+            found = result.uncertain_life(share)
+            assert found is not None
+            known = math.isfinite(found.low) and math.isfinite(found.high)
+            low, predictive, plug_in, high = rounded_lives(
+                found.low, found.predictive, found.plug_in, found.high
+            )
+            total = found.by_tests + found.by_realisations
+            parts = (found.by_tests, found.by_realisations)
+            of_total = [shown(part / total, "%", 2) if total else NOTHING for part in parts]
+            deviation = f"{math.sqrt(total):.2g}" if known else NOTHING
+            cells = (predictive, plug_in, f"{low}..{high}", deviation)
+            lines.append([f"B{share:g}", *cells, *(of_total if known else [NOTHING, NOTHING])])
+        head = f"life [{result.unit}], given {_tests_of(result)}"
+        parts_of = ["sd of ln life", "by more tests", "by more realisations"]
+        return Table("", lines, [head, "predictive", "plug-in", "95 % credible", *parts_of])
 
     def _fits(self) -> Table:
         """Return the fitted distributions, best first."""
@@ -207,6 +240,7 @@ class LifeView(RealisationsView[LifeResult]):
                 "lower_bound": result.lower_bound(share) if not result.is_exact else None,
                 "numerical_low": low,
                 "numerical_high": high,
+                **self._uncertain(share),
             }
         return {
             "title": result.title,
@@ -257,6 +291,11 @@ class LifeView(RealisationsView[LifeResult]):
             **self.ending(),
             "warnings": list(result.warnings),
         }
+
+    def _uncertain(self, share: float) -> dict[str, Any]:
+        """Return predictive and plug-in life and their uncertainty; nothing without a posterior."""
+        found = self.result.uncertain_life(share)
+        return {} if found is None else {"given_tests": asdict(found)}
 
     def _rare(self) -> dict[str, Any] | None:
         if self.result.rare is None:
@@ -334,6 +373,12 @@ def _three_digits(result: LifeResult, share: float) -> str:
     if found.low == found.high:
         return f"{value} {result.unit}"
     return f"{value} {result.unit}, 95 %: {low} to {high}"
+
+
+def _tests_of(result: LifeResult) -> str:
+    """Return the wear tests of a posterior in words, "these 8 tests"."""
+    count_ = result.levels.specimens if result.levels else 0
+    return f"these {count_} specimens" if count_ else "these specimens"
 
 
 def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
