@@ -350,7 +350,6 @@ def build_problem(
         free=creepage.drive == "free",
         slip_profile=slip,
         iteration_tolerance=float(tolerance),
-        resolve_edges=scenario.evolution.resolve_edges,
     )
 
 
