@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +58,21 @@ def dataset_of(
     return dataset
 
 
+def concatenated(
+    datasets: Sequence[xarray.Dataset], name: str, values: Sequence[Any], unit: str
+) -> xarray.Dataset:
+    """Return datasets along a new coordinate with one value for each, in a unit.
+
+    Attributes are kept where they are equal.
+    """
+    library = _library("xarray")
+    coordinate = library.IndexVariable(name, list(values), {"units": unit} if unit else {})
+    dataset: xarray.Dataset = library.concat(
+        list(datasets), coordinate, join="outer", data_vars="all", combine_attrs="drop_conflicts"
+    )
+    return dataset
+
+
 def as_frame(
     columns: Iterable[tuple[str, str, Any]], axis: str, numbers: Iterable[int]
 ) -> pandas.DataFrame:
@@ -73,17 +88,17 @@ def as_frame(
     numbers : iterable of int
         Number of each row.
     """
-    found: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     for name, unit, values in columns:
         parts = {name: values}
         if values.ndim > 1:
             parts = {f"{name}.{number}": part for number, part in enumerate(values.T, 1)}
-        found |= parts
+        arrays |= parts
         units |= dict.fromkeys(parts, unit)
     library = _library("pandas")
     frame: pandas.DataFrame = library.DataFrame(
-        found, index=library.Index(list(numbers), name=axis)
+        arrays, index=library.Index(list(numbers), name=axis)
     )
     frame.attrs["units"] = units
     return frame

@@ -10,18 +10,24 @@ import typer
 
 import wearsim
 from wearsim.atomic_write import refuse_inputs
-from wearsim.cli.render import draw_figure, show_view, show_with_figure
+from wearsim.cli.render import draw_figure, show_view, show_with_figure, write_surface
 from wearsim.cli.shared import (
     At,
+    Chord,
     Columns,
     Figure,
     Force,
     Json,
     MeanRows,
+    Points,
     ResultsFile,
     Row,
+    Spline,
+    SurfaceFile,
     Units,
+    check_ending,
     check_figure,
+    check_surface,
     checking,
     note,
     profile_choice,
@@ -29,15 +35,12 @@ from wearsim.cli.shared import (
     refuse_options,
     write_notes,
 )
-from wearsim.errors import ScenarioError
 
 if TYPE_CHECKING:
     from wearsim.levelling import Measured
     from wearsim.profiles import ProfileChoice
     from wearsim.report.view import View
 
-
-_MISALIGNED = 0.5  # ratio of residuals below which levelling is suggested
 
 MeasuredFiles = Annotated[
     list[Path] | None,
@@ -68,10 +71,22 @@ Level = Annotated[
     ),
 ]
 
+Animate = Annotated[
+    Path | None,
+    typer.Option(
+        "--animate",
+        metavar="FILE",
+        help="Animation of a worn cam instead of the figure: .gif, or .mp4 where ffmpeg is"
+        " installed.",
+        show_default=False,
+    ),
+]
+
 
 def plot(
     file: ResultsFile,
     figure: Figure = None,
+    animate: Animate = None,
     measured: MeasuredFiles = None,
     angle: Angle = None,
     level: Level = False,
@@ -83,6 +98,10 @@ def plot(
     force: Force = False,
 ) -> None:
     """Draw the figure of a results file of any kind."""
+    if animate is not None:
+        _animate(file, animate, force)
+        if figure is None and not measured:
+            return
     path = figure if figure is not None else Path(f"{file.stem}.png")
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
@@ -93,6 +112,19 @@ def plot(
     choice = profile_choice(columns, units, row, mean_rows, at)
     draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path)
     note(f"figure: {path}")
+
+
+def _animate(file: Path, path: Path, force: bool) -> None:
+    """Write the animation of a results file."""
+    from wearsim.report.animation import ENDINGS, check_animation, save_animation
+
+    check_ending(path, force, "--animate", ENDINGS, "format of an animation")
+    check_animation(path)
+    refuse_inputs(path, [file], "the animation", option="--animate")
+    animation = wearsim.open_results(file).view.animation()
+    refuse(animation is None, f"requires the run of a cam, not {file}", "--animate")
+    save_animation(animation, path)
+    note(f"animation: {path}, {path.stat().st_size / 1e6:.1f} MB")
 
 
 def measured_profiles(
@@ -110,11 +142,10 @@ def measured_profiles(
         given = {"--level": level, "--angle": angle}
         refuse_options(given, "needs a measured profile, --measured")
         return []
-    from wearsim.levelling import Measured, levelled, rms
+    from wearsim.levelling import Measured, levelled
     from wearsim.profiles import load_profile, sign_note
     from wearsim.quantities import quantity
-    from wearsim.report.measured import residual_text
-    from wearsim.report.text import shown
+    from wearsim.report.measured import level_hint, residual_text
 
     with checking("--angle"):
         at = None if angle is None else quantity(angle, "rad")
@@ -130,19 +161,11 @@ def measured_profiles(
     computed = None if test is None else test.profile(at)
     if computed is None:
         return profiles
-    for place, profile in enumerate(profiles):
-        try:
-            corrected = levelled(profile, computed)
-        except ScenarioError:
-            if level:
-                raise
-            corrected = profile
-        text = f"{profile.label}: {residual_text(corrected if level else profile, computed)}"
-        if level:
-            profiles[place] = corrected
-        elif rms(corrected, computed) < _MISALIGNED * rms(profile, computed):
-            text += f"; rms {shown(rms(corrected, computed), 'um', 3)} with --level"
-        note(text)
+    if level:
+        profiles = [levelled(profile, computed) for profile in profiles]
+    for profile in profiles:
+        hint = "" if level else level_hint(profile, computed)
+        note(f"{profile.label}: {residual_text(profile, computed)}{hint}")
     return profiles
 
 
@@ -176,22 +199,13 @@ def compare(
     refuse(len(files) < 2, text, "FILE.h5")
     if figure is not None:
         refuse_inputs(figure, files, "the comparison")
-    from wearsim.studies.opening import comparison_of
+    for file in files:
+        refuse(files.count(file) > 1, f"{file} is given twice", "FILE.h5")
+    from wearsim.studies.opening import comparison_of, labels_of
 
     results = [wearsim.open_results(file) for file in files]
     check_figure(figure, force)
-    show_with_figure(comparison_of(results, _labels(files), observable), figure, json=json)
-
-
-def _labels(files: list[Path]) -> list[str]:
-    """Return the names of the files, with their folders where the names are not unique."""
-    stems = [file.stem for file in files]
-    if len(set(stems)) == len(stems):
-        return stems
-    names = [str(file) for file in files]
-    for name in names:
-        refuse(names.count(name) > 1, f"{name} is given twice", "FILE.h5")
-    return names
+    show_with_figure(comparison_of(results, labels_of(results), observable), figure, json=json)
 
 
 def export(
@@ -214,12 +228,36 @@ def export(
             help="Decimal sign: '.', or ',' with semicolons between cells.",
         ),
     ] = ".",
+    surface: SurfaceFile = None,
+    chord: Chord = None,
+    points: Points = None,
+    position: Annotated[
+        str | None,
+        typer.Option(
+            "--position",
+            metavar="Y",
+            help="Position across the track of --surface: '2 mm'; default: where it is worn"
+            " deepest.",
+            show_default=False,
+        ),
+    ] = None,
+    spline: Spline = False,
     force: Force = False,
 ) -> None:
-    """Write a results file as CSV, with units in the headers."""
+    """Write a results file as CSV with units in the headers, or the surface of a cam alone."""
     refuse(decimal not in {".", ","}, f"'{decimal}' is neither '.' nor ','", "--decimal")
+    sampling = check_surface(
+        surface, force, chord=chord, points=points, position=position, spline=spline
+    )
     from wearsim.studies.opening import export_csv
 
+    if surface is not None and sampling is not None:
+        refuse_inputs(surface, [file], "the surface", option="--surface")
+        found = wearsim.open_results(file).view.surface(sampling)
+        refuse(found is None, f"requires the run of a cam, not {file}", "--surface")
+        write_surface(found, surface, spline=spline)
+        if output is None:
+            return
     sign: Literal[".", ","] = "," if decimal == "," else "."
     folder = output if output is not None else Path(file.stem)
     for path in export_csv(wearsim.open_results(file), folder, force=force, decimal=sign):

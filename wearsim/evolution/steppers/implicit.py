@@ -13,8 +13,6 @@ import numpy as np
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
-)
-from wearsim.evolution.error_estimates import (
     DEPTH_EXPONENT,
     VOLUME_EXPONENT,
     greatest_depth,
@@ -45,7 +43,8 @@ from wearsim.mechanics.numerics.multistep import (
 )
 from wearsim.types import BoolArray, FloatArray, IntArray
 
-SHARE = 0.5  # part of the tolerance that a step may add to the profiles
+# part of the tolerance that a step may add to the profiles, by differences and by step doubling
+SHARE, DOUBLED_SHARE = 0.35, 0.9
 COVER = np.array([[4.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
 # least errors of depth and profile, over that of the volume, all relative and with their factors: a
 # groove of wrong volume has the wrong depth and width, which further wear does not correct
@@ -93,10 +92,24 @@ class ImplicitStepper(StepDoublingStepper):
     to the profiles, estimated by the next divided difference. The sum of these errors, as far as
     later wear has not reduced them, is the error estimate of the test. Where load or inputs vary,
     and with fixed steps, step doubling estimates it.
+
+    Parameters
+    ----------
+    tolerance, forced_step
+        As of `Stepper`.
+    by_doubling : bool
+        Whether step doubling estimates the error of all tests: the wear of a contact model may not
+        be smooth enough for differences.
     """
 
     taper = 4.0
     follows_trends = True
+
+    def __init__(
+        self, tolerance: float, forced_step: float | None = None, by_doubling: bool = False
+    ) -> None:
+        super().__init__(tolerance, forced_step)
+        self.by_doubling = by_doubling
 
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state with the rates and differences that the formulas need."""
@@ -138,7 +151,8 @@ class ImplicitStepper(StepDoublingStepper):
     ) -> Attempt:
         """Take a step in tests that all resolve edges or all do not."""
         varies = problem.constant_load is None or len(problem.varying) > 0
-        if varies or self.forced_step is not None:  # local errors miss peaks of a load
+        # local errors miss peaks of a load
+        if varies or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
         end = scheme(problem, state, step)
         if end.part is not None and edges.unresolved(end).all():
@@ -194,7 +208,7 @@ class ImplicitStepper(StepDoublingStepper):
         if not problem.varying:  # many rows of a log average out within a step
             left = np.where(doubled.varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
         part = (end.passes / stop) ** PART_EXPONENT / left
-        scale = part / self.tolerance
+        scale = part / (DOUBLED_SHARE * self.tolerance)
         over, ratio = next_steps(
             *(
                 past.wear,

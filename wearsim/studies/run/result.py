@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -24,7 +24,11 @@ from wearsim.results.io.files import read_study
 from wearsim.studies.run.schema import CAM_RUN, ESTIMATED, RUN
 from wearsim.types import FloatArray
 
+if TYPE_CHECKING:
+    import xarray
+
 _ARRAYS = ("static", "history", "records", "checkpoint")
+_DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -114,8 +118,6 @@ def read_results(path: str | Path) -> RunData:
 
 
 Number: TypeAlias = float | list[float]
-
-_DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,12 +251,25 @@ class Result(StudyResult[RunData]):
         height = start - worn
         return ComputedProfile(self.y, height, height, height, start)
 
+    def to_xarray(self) -> xarray.Dataset:
+        """Return all variables of the file; of a cam also depth and lift error along "angle".
+
+        Examples
+        --------
+        >>> wearsim.run("rig.toml").to_xarray()["cylinder_depth_profile"].dims
+        ('record', 'station', 'realisation', 'y')
+        """
+        from wearsim.studies.cam.grooves import with_angles  # noqa: PLC0415  (of a cam)
+
+        dataset = super().to_xarray()
+        return with_angles(dataset, self) if self.is_cam else dataset
+
     @property
     def errors(self) -> dict[str, FloatArray]:
         """Estimated numerical errors after each step, by the name of the quantity [SI].
 
         They are due to steps, strips and the stations of a cam; not a number where they are not
-        estimated. That of the depth applies to either body, and that of the worn volume to both.
+        estimated. The error of the depth applies to either body, of the worn volume to both.
 
         Examples
         --------
@@ -437,14 +452,14 @@ class Result(StudyResult[RunData]):
     def _final_errors(self, last: Arrays) -> dict[str, Number]:
         """Return the estimated errors of the final state, the greatest one over the rollers."""
         variables = self.raw.schema.variables
-        found: dict[str, Number] = {}
+        errors: dict[str, Number] = {}
         for name in ESTIMATED:
             error = last.get(f"{name}_error")
             if error is not None:
                 over_rollers = "roller" in variables[name].dims
                 greatest = error.max(axis=0) if over_rollers else error
-                found[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
-        return found
+                errors[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
+        return errors
 
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
         """Return the final state of a cam, and depth and lift error per station."""
