@@ -22,7 +22,7 @@ from wearsim.levelling import Measured
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.comparison.compare import compare
 from wearsim.studies.identify.measurements import Measurement
-from wearsim.studies.opening import save_report
+from wearsim.studies.opening import comparison_of, save_report
 
 SHORT = {"operation.duration": "3 min", "outputs.records": 4}
 MEASURED = Measured("trace", np.array([-1e-3, 0.0, 1e-3]), np.array([0.0, -2e-6, 0.0]))
@@ -123,6 +123,37 @@ def test_cam_has_a_map_and_its_lift_error(cam):
     assert "How deep does the cam wear in 20,000 turns" in page_of([cam])
 
 
+def first_screen(page):
+    """Return the text of the first screen of a page, without marks."""
+    screen = page[page.index('<div class="overview">') : page.index('<p class="excluded">')]
+    return " ".join(unescape(re.sub(r"<[^>]+>", " ", screen)).split())
+
+
+def test_first_screen_of_a_cam_has_picture_loads_and_limits(cam):
+    limits = {"depth": "1 nm", "lift_error": "1 m"}
+    limited = replace(cam, raw=replace(cam.raw, scenario_text=with_limits(cam, limits)))
+    page = page_of([limited])
+    assert '<figure class="picture"><img src="data:image/png;base64,' in page
+    text = first_screen(page)
+    for part in ("Loads", "peak pressure, new", "drive torque", "Limits", "1000 rpm"):
+        assert part in text
+    assert "depth failed after about" in text
+    assert "lift error passed: 0.06" in text
+    assert "Not included:" in page
+    assert "fatigue (pitting)" in page
+
+
+def test_first_screen_of_a_comparison_has_the_limits_of_each(cam):
+    text = first_screen(page_of([cam, cam]))
+    assert "Loads" not in text  # they would be those of one cam
+    assert re.search(r"Limits of 1: .* Limits of 2: ", text)
+
+
+def with_limits(result, limits):
+    text = re.sub(r"(?ms)^\[limit\].*?(?=^\[|\Z)", "", result.raw.scenario_text)
+    return text + "\n[limit]\n" + "".join(f'{key} = "{value}"\n' for key, value in limits.items())
+
+
 def test_ensemble_shows_its_estimates():
     result = made_up()
     found = result.estimate("depth").mean
@@ -163,7 +194,12 @@ def test_one_contact_is_not_compared_with_tests(result):
     study = wearsim.dissipation(shipped_scenario("paper-monte-carlo"), 40)
     assert "mean dissipated power" in page_of([study])
     with pytest.raises(WearsimError, match="only runs and ensembles can be compared"):
-        page_of([result, study])
+        comparison_of([result, study], ["run", "contact"])
+    # a page has them one after the other
+    both = unescape(page_of([result, study]))
+    assert "How deep does the cylinder wear" in both
+    assert "mean dissipated power" in both
+    assert "at the end of these tests" not in both
 
 
 @pytest.fixture(scope="module")
@@ -181,6 +217,11 @@ def test_life_shows_its_quantiles_and_survival(life):
     assert f"{value} passes [{low}..{high}]" in page
     assert "what moves the life: Sobol indices of its logarithm" in page
     assert "P(life < 20,000 passes)" in page
+    text = first_screen(page_of([life]))
+    digits = [f"{float(f'{end:.3g}'):,.0f}" for end in (found.value, found.low, found.high)]
+    assert "{} passes, 95 %: {} to {}".format(*digits) in text
+    assert "What moves the life" in text
+    assert re.search(r"% of the scatter; life \+\d+ %, -\d+ %", text)
     plots = plots_of(life)
     (curve,) = data_of(titled(plots, "Survival"), "y")
     places = np.searchsorted(-curve.data["y"], -90.0)

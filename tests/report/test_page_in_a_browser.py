@@ -77,6 +77,17 @@ def test_page_is_accessible(browser, pages, name, scheme):
     page.close()
 
 
+def test_first_screen_fits_the_screen_and_one_printed_page(browser, pages):
+    page, _ = opened(browser, pages / "cam.html")
+    bottom = page.locator(".excluded").bounding_box()
+    assert bottom["y"] + bottom["height"] < 800
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": 688, "height": 1017})  # A4 within margins of 14 mm
+    bottom = page.locator(".excluded").bounding_box()
+    assert bottom["y"] + bottom["height"] < 1017
+    page.close()
+
+
 SHOWN = """() => {
   const named = Bokeh.documents[0].get_model_by_name("record height above nominal");
   return Array.from(named.data.shown);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from wearsim.mechanics.cam.smoothing import estimated_noise, smoothed
 from wearsim.models.motion import LiftSpline
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import noise_warnings
+from wearsim.studies.cam.study import study_cam
 from wearsim.studies.cam.turn import turn_of
 
 DEGREES = np.arange(0.0, 360.0)
@@ -240,6 +242,17 @@ def test_lift_of_an_arm_is_in_degrees_radians_or_along_its_arc(tmp_path, unit):
     text = "\n".join(line for line in text.splitlines() if not line.startswith("eccentricity"))
     found = read(text, tmp_path).cam.motion
     assert found.lift(FINE)[0] == pytest.approx(shape.motion.lift(FINE)[0], abs=1e-9)
+
+
+def test_residuals_of_a_noisy_arm_are_angles(tmp_path):
+    lift = read(SWINGING).cam.motion.lift(np.radians(DEGREES))[0]
+    noisy = lift + 2e-5 * np.random.default_rng(3).standard_normal(len(lift))
+    rows = np.stack([DEGREES, np.degrees(noisy)], axis=1)
+    (tmp_path / "points.csv").write_text(points("angle [deg], lift [deg]", rows))
+    text = SWINGING.replace('shape = "eccentric"', 'lift = "points.csv"')
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("eccentricity"))
+    shown = {row.label: row.text for row in study_cam(read(text, tmp_path)).view.rows()}
+    assert re.search(r"noise 0\.0[12]\d+ mrad", shown["residuals of the lift"])
 
 
 def test_message_names_the_columns_that_were_found(tmp_path):

@@ -12,7 +12,8 @@ from wearsim.cli.shared import note, write_json, write_list, write_notes, write_
 
 if TYPE_CHECKING:
     from wearsim.report.panels import Sheet
-    from wearsim.report.view import View
+    from wearsim.report.surfaces import Surface
+    from wearsim.report.view import Columns, View
 
 
 def show_view(
@@ -23,6 +24,7 @@ def show_view(
     known: Collection[str] = (),
     more: Mapping[str, Any] | None = None,
     stored: bool = False,
+    brief: bool = False,
 ) -> None:
     """Write a view to stdout, and its notes and warnings to stderr.
 
@@ -39,11 +41,14 @@ def show_view(
         Further fields of the JSON.
     stored : bool
         Whether the result was read from a file, whose origin is then shown too.
+    brief : bool
+        Whether the rows are shown without further tables.
     """
     if json:
         write_json({**view.data(), **(view.origin() if stored else {}), **(more or {})})
     else:
-        _write_tables(view, {name: path for name, path in (files or {}).items() if path}, stored)
+        written = {name: path for name, path in (files or {}).items() if path}
+        _write_tables(view, written, stored, brief)
         if not stored and (line := view.line()):
             typer.echo(line)
         write_notes([text for text in view.notes if text not in known], view.warnings)
@@ -65,10 +70,10 @@ def show_with_figure(
     show_view(view, json=json, files={**(files or {}), **named}, more={**(more or {}), **named})
 
 
-def _write_tables(view: View, files: Mapping[str, object], stored: bool) -> None:
+def _write_tables(view: View, files: Mapping[str, object], stored: bool, brief: bool) -> None:
     from wearsim.report.view import ORIGIN, STUDY, Row, Table
 
-    tables = [table for table in view.tables() if stored or table.title != ORIGIN]
+    tables = [] if brief else [table for table in view.tables() if stored or table.title != ORIGIN]
     written = [Row(name, str(item)) for name, item in files.items()]
     results = Table(view.heading, [*view.rows(), *written])
     first = [tables.pop(0)] if tables and tables[0].title == STUDY else []
@@ -89,3 +94,22 @@ def draw_figure(sheet: Sheet, path: Path | None) -> None:
     from wearsim.report.figures import figure_of, save_figure
 
     save_figure(figure_of(sheet), path)
+
+
+def write_table_file(columns: Columns, path: Path) -> None:
+    """Write columns as a CSV file."""
+    from wearsim.atomic_write import replacement
+    from wearsim.report.csv_files import table_text
+
+    with replacement(path) as file:
+        file.writelines(text.encode("utf-8") for text in table_text(columns))
+
+
+def write_surface(surface: Surface, path: Path, *, spline: bool) -> None:
+    """Write a surface, and note the number of its points and their distance from it."""
+    from wearsim.report.text import count, shown
+
+    surface.save(path, spline=spline)
+    away = shown(surface.deviation, "um", 2)
+    form = "chords" if not spline else "chords between the points of the spline"
+    note(f"surface: {path}, {count(surface.count)} points, {form} within {away}")

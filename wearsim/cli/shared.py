@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from wearsim.errors import ArgumentError, ResultsFileError
+from wearsim.arguments import ArgumentError
+from wearsim.errors import ResultsFileError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from wearsim.profiles import ProfileChoice
+    from wearsim.report.surfaces import Sampling
     from wearsim.scenario import Scenario
 
 
@@ -141,6 +143,37 @@ Figure: TypeAlias = Annotated[
 FigureOption: TypeAlias = Annotated[
     Path | None,
     typer.Option("--figure", metavar="FIG", help="Figure: .png, .pdf or .svg.", show_default=False),
+]
+SurfaceFile: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--surface",
+        metavar="FILE",
+        help="Surface of the cam as closed curves for CAD and CAM: .csv or .dxf.",
+        show_default=False,
+    ),
+]
+Chord: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--chord",
+        metavar="LENGTH",
+        help="Greatest distance of the chords of --surface from it; default: '1 um'.",
+        show_default=False,
+    ),
+]
+Points: TypeAlias = Annotated[
+    int | None,
+    typer.Option(
+        "--points",
+        min=3,
+        metavar="N",
+        help="Number of points of --surface, equally spaced along it, instead of --chord.",
+        show_default=False,
+    ),
+]
+Spline: TypeAlias = Annotated[
+    bool, typer.Option("--spline", help="Cubic splines instead of polylines in a .dxf.")
 ]
 Realisations: TypeAlias = Annotated[
     int, typer.Option("--realisations", "-n", min=1, metavar="N", help="Number of realisations.")
@@ -346,12 +379,72 @@ def check_figure(path: Path | None, force: bool, option: str = "-o") -> None:
     ResultsFileError
         If the file exists and `force` is false.
     """
+    check_ending(path, force, option, (".png", ".pdf", ".svg"), "figure format")
+
+
+def check_ending(
+    path: Path | None, force: bool, option: str, endings: Sequence[str], what: str
+) -> None:
+    """Check the ending and the folder of a file to be written, if one is named.
+
+    Parameters
+    ----------
+    path, force, option
+        As of `check_figure`.
+    endings : sequence of str
+        Known endings, such as ".csv".
+    what : str
+        What the ending stands for, "figure format".
+    """
     if path is None:
         return
-    known = path.suffix.lower() in {".png", ".pdf", ".svg"}
-    text = f"'{path}' has no known figure format, expected .png, .pdf or .svg"
-    refuse(not known, text, option)
+    known = " or ".join(filter(None, [", ".join(endings[:-1]), endings[-1]]))
+    text = f"'{path}' has no known {what}, expected {known}"
+    refuse(path.suffix.lower() not in endings, text, option)
     check_new_file(path, force, option)
+
+
+def check_surface(
+    path: Path | None,
+    force: bool,
+    *,
+    chord: str | None,
+    points: int | None,
+    position: str | None = None,
+    spline: bool,
+) -> Sampling | None:
+    """Check the name of a surface and its options, and return how it is represented by points.
+
+    Raises
+    ------
+    typer.BadParameter
+        If an option has not its form, or is given without --surface.
+    PluginError
+        If ezdxf is needed and not installed.
+    ResultsFileError
+        If the file exists and `force` is false.
+    """
+    given = {"--chord": chord, "--points": points, "--position": position, "--spline": spline}
+    if path is None:
+        refuse_options(given, "needs a file, --surface")
+        return None
+    from wearsim.quantities import quantity
+    from wearsim.report.surfaces import CHORD, ENDINGS, Sampling, dxf_library
+
+    check_ending(path, force, "--surface", ENDINGS, "format of a surface")
+    if path.suffix.lower() == ".dxf":
+        dxf_library()
+    elsewhere = spline and path.suffix.lower() != ".dxf"
+    refuse(elsewhere, f"is for a .dxf, and the surface is {path}", "--spline")
+    twice = chord is not None and points is not None
+    refuse(twice, "is given beside --chord; delete one of them", "--points")
+    with checking("--chord"):
+        length = CHORD if chord is None else quantity(chord, "m")
+        if length <= 0.0:
+            raise ValueError(f"'{chord}' is not above 0")
+    with checking("--position"):
+        place = None if position is None else quantity(position, "m")
+    return Sampling(length, points, place)
 
 
 def check_new_file(path: Path, force: bool, option: str = "-o") -> None:

@@ -88,8 +88,6 @@ class WearProblem:
         known before the test.
     growth : tuple of Growth
         How the strips of each realisation grow with its groove; none where they do not.
-    resolve_edges : bool
-        Whether implicit steps resolve the edges of contacts within a strip where they can.
     """
 
     grid: Grid
@@ -111,7 +109,6 @@ class WearProblem:
     passes_per_draw: float = 1.0
     quadrature_error: float = 0.0
     growth: tuple[Growth, ...] = ()
-    resolve_edges: bool = False
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:

@@ -42,8 +42,8 @@ def drawn(title: str, values: Any, unit: str) -> Column:
     return Column(title, values, *(_UNITS[unit] if unit == "Pa" else engineers_unit(unit)))
 
 
-def _text(columns: Columns) -> Iterator[str]:
-    """Yield the text of a table, block by block."""
+def table_text(columns: Columns) -> Iterator[str]:
+    """Yield the text of a CSV file, block by block."""
     for number, block in enumerate(columns):
         if number == 0:
             yield _csv([[c.name if c.unit == "1" else f"{c.name} [{c.unit}]" for c in block]])
@@ -91,7 +91,7 @@ def write_csv(
             shell="name one with -o",
         )
     contents: dict[str, Iterable[str]] = {
-        name: _with_decimal_comma(_text(columns)) if decimal == "," else _text(columns)
+        name: _with_decimal_comma(table_text(columns)) if decimal == "," else table_text(columns)
         for name, columns in view.columns().items()
     }
     scenario, *files = view.stored_files()

@@ -146,9 +146,9 @@ def _arranged(figure: Figure, sheet: Sheet) -> Iterator[tuple[str, Axes]]:
         yield from subfigure.subplot_mosaic(mosaic, height_ratios=ratios_of).items()
 
 
-def png_of_panel(panel: Panel, dpi: int = 100) -> bytes:
+def png_of_panel(panel: Panel, dpi: int = 100, height: float = 3.1) -> bytes:
     """Return one panel as the content of a small PNG file."""
-    with titled_figure(5.2, 3.1) as figure:  # as wide as the longest title
+    with titled_figure(5.2, height) as figure:  # as wide as the longest title
         draw(figure.subplots(), panel)
         return png_of(figure, dpi)
 

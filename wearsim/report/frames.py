@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -55,6 +55,21 @@ def dataset_of(
 ) -> xarray.Dataset:
     """Return arrays with the names of their axes as a dataset of xarray."""
     dataset: xarray.Dataset = _library("xarray").Dataset(dict(variables), coords=dict(axes))
+    return dataset
+
+
+def concatenated(
+    datasets: Sequence[xarray.Dataset], name: str, values: Sequence[Any], unit: str
+) -> xarray.Dataset:
+    """Return datasets along a new coordinate with one value for each, in a unit.
+
+    Attributes are kept where they are equal.
+    """
+    library = _library("xarray")
+    coordinate = library.IndexVariable(name, list(values), {"units": unit} if unit else {})
+    dataset: xarray.Dataset = library.concat(
+        list(datasets), coordinate, join="outer", data_vars="all", combine_attrs="drop_conflicts"
+    )
     return dataset
 
 

@@ -19,10 +19,13 @@ from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
     from wearsim.levelling import ComputedProfile, Measured
-    from wearsim.report.panels import Sheet
+    from wearsim.report.animation import Animation
+    from wearsim.report.panels import Panel, Sheet
+    from wearsim.report.surfaces import Sampling, Surface
 
 STUDY = "Study"  # title of the table on the computation, which stands first
 ORIGIN = "Origin"  # title of the table on scenario, files and software
+_FIRST = 9  # answers that a page shows first, by default
 
 
 class Row(NamedTuple):
@@ -102,6 +105,27 @@ class Frame(NamedTuple):
     numbers: Iterable[int]
 
 
+class Overview(NamedTuple):
+    """What a page shows first, for the person who decides.
+
+    Parameters
+    ----------
+    picture : Panel, optional
+        What was studied.
+    groups : mapping of str to list of Row
+        Short answers by title, such as "Loads" and "Limits".
+    excluded : sequence of str
+        What the results do not contain.
+    alone : bool
+        Whether the overviews of further views on the page do not belong to it.
+    """
+
+    picture: Panel | None
+    groups: Mapping[str, Rows]
+    excluded: Sequence[str] = ()
+    alone: bool = False
+
+
 class Repetition(NamedTuple):
     """How a study is repeated: command, files by name, and a remark."""
 
@@ -152,6 +176,12 @@ class View(ABC):
         sheet: Sheet = resolve_name(self.sheet)(self.result, measured)
         return sheet
 
+    def overview(self) -> Overview:
+        """Return what a page shows first; by default the main panel and the first answers."""
+        sheet = self.panels()
+        main = sheet.first if sheet.panels else None
+        return Overview(main, {"Results": self.rows()[1:_FIRST]})
+
     def line(self) -> str:
         """Return method, numerical or sampling error and time on one line, or an empty text."""
         return ""
@@ -185,6 +215,20 @@ class View(ABC):
     def origin(self) -> dict[str, Any]:
         """Return scenario, files, plugins and software for JSON, if they are stored."""
         return {}
+
+    def surface(self, sampling: Sampling) -> Surface | None:
+        """Return the surface of a body as closed curves, for CAD and CAM, if there is one.
+
+        Parameters
+        ----------
+        sampling : Sampling
+            Chord tolerance or number of points, and position across the track.
+        """
+        return None
+
+    def animation(self) -> Animation | None:
+        """Return the animation of what moves, if anything does."""
+        return None
 
     def profile(self, angle: float | None = None) -> ComputedProfile | None:
         """Return the worn profile with which measured ones are compared, if there is one.

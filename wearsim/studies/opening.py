@@ -121,9 +121,15 @@ def labels_of(results: Sequence[Any]) -> list[str]:
 
 
 def views_of(results: Sequence[Any]) -> list[View]:
-    """Return the views of results, after the view that compares several of them."""
+    """Return the views of results, after the view that compares several of them.
+
+    Results that cannot be compared, such as a run and lives of the same design, have none.
+    """
     views = [result.view for result in results]
-    return views if len(views) == 1 else [comparison_of(results, labels_of(results)), *views]
+    comparable = len({kind_of_result(result).compare for result in results}) == 1
+    if len(views) == 1 or not comparable:
+        return views
+    return [comparison_of(results, labels_of(results)), *views]
 
 
 def save_report(results: Sequence[Any], path: Path, measured: Sequence[Measured] = ()) -> None:

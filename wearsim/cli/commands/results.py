@@ -10,18 +10,24 @@ import typer
 
 import wearsim
 from wearsim.atomic_write import refuse_inputs
-from wearsim.cli.render import draw_figure, show_view, show_with_figure
+from wearsim.cli.render import draw_figure, show_view, show_with_figure, write_surface
 from wearsim.cli.shared import (
     At,
+    Chord,
     Columns,
     Figure,
     Force,
     Json,
     MeanRows,
+    Points,
     ResultsFile,
     Row,
+    Spline,
+    SurfaceFile,
     Units,
+    check_ending,
     check_figure,
+    check_surface,
     checking,
     note,
     profile_choice,
@@ -65,10 +71,22 @@ Level = Annotated[
     ),
 ]
 
+Animate = Annotated[
+    Path | None,
+    typer.Option(
+        "--animate",
+        metavar="FILE",
+        help="Animation of a worn cam instead of the figure: .gif, or .mp4 where ffmpeg is"
+        " installed.",
+        show_default=False,
+    ),
+]
+
 
 def plot(
     file: ResultsFile,
     figure: Figure = None,
+    animate: Animate = None,
     measured: MeasuredFiles = None,
     angle: Angle = None,
     level: Level = False,
@@ -80,6 +98,10 @@ def plot(
     force: Force = False,
 ) -> None:
     """Draw the figure of a results file of any kind."""
+    if animate is not None:
+        _animate(file, animate, force)
+        if figure is None and not measured:
+            return
     path = figure if figure is not None else Path(f"{file.stem}.png")
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
@@ -90,6 +112,19 @@ def plot(
     choice = profile_choice(columns, units, row, mean_rows, at)
     draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path)
     note(f"figure: {path}")
+
+
+def _animate(file: Path, path: Path, force: bool) -> None:
+    """Write the animation of a results file."""
+    from wearsim.report.animation import ENDINGS, check_animation, save_animation
+
+    check_ending(path, force, "--animate", ENDINGS, "format of an animation")
+    check_animation(path)
+    refuse_inputs(path, [file], "the animation", option="--animate")
+    animation = wearsim.open_results(file).view.animation()
+    refuse(animation is None, f"requires the run of a cam, not {file}", "--animate")
+    save_animation(animation, path)
+    note(f"animation: {path}, {path.stat().st_size / 1e6:.1f} MB")
 
 
 def measured_profiles(
@@ -193,12 +228,36 @@ def export(
             help="Decimal sign: '.', or ',' with semicolons between cells.",
         ),
     ] = ".",
+    surface: SurfaceFile = None,
+    chord: Chord = None,
+    points: Points = None,
+    position: Annotated[
+        str | None,
+        typer.Option(
+            "--position",
+            metavar="Y",
+            help="Position across the track of --surface: '2 mm'; default: where it is worn"
+            " deepest.",
+            show_default=False,
+        ),
+    ] = None,
+    spline: Spline = False,
     force: Force = False,
 ) -> None:
-    """Write a results file as CSV, with units in the headers."""
+    """Write a results file as CSV with units in the headers, or the surface of a cam alone."""
     refuse(decimal not in {".", ","}, f"'{decimal}' is neither '.' nor ','", "--decimal")
+    sampling = check_surface(
+        surface, force, chord=chord, points=points, position=position, spline=spline
+    )
     from wearsim.studies.opening import export_csv
 
+    if surface is not None and sampling is not None:
+        refuse_inputs(surface, [file], "the surface", option="--surface")
+        found = wearsim.open_results(file).view.surface(sampling)
+        refuse(found is None, f"requires the run of a cam, not {file}", "--surface")
+        write_surface(found, surface, spline=spline)
+        if output is None:
+            return
     sign: Literal[".", ","] = "," if decimal == "," else "."
     folder = output if output is not None else Path(file.stem)
     for path in export_csv(wearsim.open_results(file), folder, force=force, decimal=sign):

@@ -3,6 +3,7 @@
 from wearsim.mechanics.cam.extremes import Extreme, greatest, greatest_value, integral_error
 from wearsim.mechanics.cam.follower import Follower, RollerKinematics
 from wearsim.mechanics.cam.motion import Motion, Panel, Segment, motion_mistakes
+from wearsim.mechanics.cam.outline import angles_by_chord, angles_by_number
 from wearsim.mechanics.cam.shapes import (
     Arc,
     Line,
@@ -27,6 +28,8 @@ __all__ = [
     "Segment",
     "SkidArc",
     "Stations",
+    "angles_by_chord",
+    "angles_by_number",
     "choose_stations",
     "eccentric_cam",
     "extreme",

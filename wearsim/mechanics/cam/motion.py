@@ -18,6 +18,7 @@ Lift: TypeAlias = Callable[[FloatArray], FloatArray]
 
 _CLOSURE = 1e-9  # of the lift and of a turn
 _KINK = 1e-6  # jump of s', of its greatest value
+_FIVE, _JERK_STEP = np.arange(-2.0, 3.0), 2e-3  # nodes of the jerk, and their distance [rad]
 
 
 class Panel(NamedTuple):
@@ -133,6 +134,28 @@ class Motion:
         for number in np.unique(places):
             chosen = places == number
             found[:, chosen] = self.lift_in(int(number), theta[chosen])
+        return found
+
+    def jerk(self, theta: FloatArray) -> FloatArray:
+        """Return the third derivative of the lift at any angles [rad], shape (points,).
+
+        It is that of a polynomial through five values of the second one, within a smooth part; at
+        a boundary of parts that of the following one.
+        """
+        turned = np.mod(np.atleast_1d(np.asarray(theta, dtype=np.float64)), math.tau)
+        starts = np.array([panel.start for panel in self.panels])
+        places = np.searchsorted(starts, turned + 1e-13, side="right") - 1
+        found = np.empty(len(turned))
+        for number in np.unique(places):
+            panel, chosen = self.panels[number], places == number
+            step = min(_JERK_STEP, 0.125 * (panel.stop - panel.start))
+            middle = np.clip(turned[chosen], panel.start + 2.0 * step, panel.stop - 2.0 * step)
+            nodes = (middle[:, None] + step * _FIVE).ravel()
+            values = self.lift_in(panel.segment, nodes)[2].reshape(-1, len(_FIVE))
+            polynomial = values @ np.linalg.inv(np.vander(_FIVE, increasing=True)).T
+            away = (turned[chosen] - middle) / step
+            powers = np.vander(away, len(_FIVE) - 1, increasing=True)
+            found[chosen] = (polynomial[:, 1:] * np.arange(1.0, 5.0) * powers).sum(axis=1) / step
         return found
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +42,49 @@ class PagePart:
     remarks: list[str]
     panels: list[tuple[Panel, Any]]
     steps: list[str]
+
+
+@dataclass(frozen=True)
+class First:
+    """First screen of a page, for the person who decides.
+
+    Parameters
+    ----------
+    groups : mapping of str to list of Row
+        Short answers by title.
+    excluded : list of str
+        What the results do not contain.
+    picture : str
+        A PNG file in base64, or empty.
+    caption : str
+        What it shows.
+    """
+
+    groups: Mapping[str, list[Row]]
+    excluded: list[str]
+    picture: str
+    caption: str
+
+
+def first_of(views: Sequence[View]) -> First:
+    """Return the first screen of views: of each group that of the first view that has it."""
+    from wearsim.report.figures import png_of_panel  # noqa: PLC0415  (imports matplotlib)
+
+    overviews = [views[0].overview()]
+    if not overviews[0].alone:
+        overviews += [view.overview() for view in views[1:]]
+    groups: dict[str, list[Row]] = {}
+    for overview in overviews:
+        groups = {**overview.groups, **groups}
+    # what one of the results contains is included
+    lists = [one.excluded for one in overviews if one.excluded]
+    excluded = [text for text in lists[0] if all(text in one for one in lists)] if lists else []
+    panel = next((one.picture for one in overviews if one.picture is not None), None)
+    if panel is None:
+        return First(groups, excluded, "", "")
+    picture = png_of_panel(panel, 130, 5.4 if panel.equal else 3.8)
+    caption = f"{panel.title}. {panel.caption}"
+    return First(groups, excluded, b64encode(picture).decode(), caption)
 
 
 def save_page(views: Sequence[View], path: Path, measured: Sequence[Measured] = ()) -> None:
@@ -104,6 +148,7 @@ def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
     resources = Resources(mode="inline", components=["bokeh"], log_level="fatal")
     return template.render(
         title=parts[0].view.title,
+        first=first_of(views),
         parts=with_divisions,
         script=script,
         resources=resources.render(),

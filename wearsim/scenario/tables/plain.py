@@ -170,11 +170,6 @@ class EvolutionTable(Options):
         " automatically by default.",
     )
     max_steps: int = Field(default=1_000_000, gt=0, description="Maximum number of steps.")
-    resolve_edges: bool = Field(
-        default=False,
-        description="Resolve the edge of a contact within a strip: the pressure at the edge of a"
-        " growing groove then converges. Implicit steps under constant load only.",
-    )
     strip_error: bool = Field(
         default=True,
         description="Estimate the error due to the strips, by a second test on strips of twice the"

@@ -31,6 +31,13 @@ from wearsim.report.panels import (
 )
 from wearsim.report.text import PER_SI, shown, with_error
 from wearsim.scenario.tables.cam_points import MeasuredPoints
+from wearsim.studies.cam.drawing import (
+    axis_mark,
+    circle,
+    factor_for,
+    follower_marks,
+    rotation_marks,
+)
 from wearsim.studies.cam.grooves import grooves_at
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
@@ -52,14 +59,12 @@ ANGLE = Axis(
 )
 _PLANE = Axis("x", "mm"), Axis("y", "mm")
 _SAMPLES = 97  # of a panel of the turn between its stations
-_MAGNIFIED = 0.2  # greatest depth in the drawing of the worn cam, of the base radius
 
 
 def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of a cam: its shape, motion, pressure angle, speeds, and loads."""
     turn = study.turn
-    samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
-    fine = turn.at_stations(Stations(turn.panels, samples))
+    fine = _fine(turn)
     lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
     found, angle, point = fine.kinematics, fine.angle, study.point
     shaded = " (skids shaded)" if study.skids else ""
@@ -88,7 +93,7 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     margin = (0.1, 0.0)  # the names of the segments lie below
     inner = Axis(limits=ANGLE.limits, ticks=ANGLE.ticks, unit="deg")
     panels = {
-        "shape": _shape(turn, fine),
+        "shape": shape_panel(turn),
         "motion": Panel(
             "Motion of the follower",
             inner,
@@ -138,6 +143,12 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     )
 
 
+def _fine(turn: CamTurn) -> Point:
+    """Return the state at many angles of every smooth part of the turn."""
+    samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
+    return turn.at_stations(Stations(turn.panels, samples))
+
+
 def _right(
     name: str,
     unit: str,
@@ -176,27 +187,23 @@ def _curve(places: FloatArray, **options: Any) -> Line:
     return Line(places[0], places[1], **options)
 
 
-def _shape(turn: CamTurn, point: Point) -> Panel:
-    """Return the cam, its pitch curve and the roller at the start of the turn."""
-    centre, surface = surface_points(turn.cam.follower, point.kinematics, point.angle)
-    around = np.linspace(0.0, 2.0 * np.pi, 181)
-    circle = np.stack([np.cos(around), np.sin(around)])
-    roller = centre[:, :1] + turn.scenario.roller.radius * circle
+def shape_panel(turn: CamTurn) -> Panel:
+    """Return the cam, its pitch curve and the follower at the start of the turn."""
+    point, follower, base = _fine(turn), turn.cam.follower, turn.cam.base_radius
+    centre, surface = surface_points(follower, point.kinematics, point.angle)
+    reach = 1.25 * float(np.hypot(*centre).max())
+    start = float(turn.at_angles(np.zeros(1)).kinematics.lift[0])
     marks = [
         _curve(between_flanks(surface, point), width=1.6, label="cam"),
         _curve(centre, width=0.8, dash="--", colour=GREY, label="pitch curve"),
-        _curve(roller, width=1.2, colour=ORANGE, label="roller at 0 deg"),
-        _curve(
-            turn.cam.base_radius * circle, width=0.6, dash=":", colour=GREY, label="base circle"
-        ),
-        _centre(),
+        Line(*circle(base), width=0.6, dash=":", colour=GREY, label="base circle"),
+        *follower_marks(follower, start, turn.scenario.roller.radius, reach, "roller at 0 deg"),
+        axis_mark(),
+        *rotation_marks(0.5 * base),
     ]
-    text = "The cam, the path of the roller's centre, and the roller at the start of a turn."
-    return Panel("Cam", *_PLANE, marks, text, legend="below", columns=4, equal=True)
-
-
-def _centre() -> Line:
-    return dots([0.0], [0.0], "+", size=8.0, colour=BLACK)
+    text = "The cam, the path of the roller's centre, and the follower at the start of a turn."
+    title = "Cam, turning clockwise"
+    return Panel(title, *_PLANE, marks, text, legend="below", columns=3, equal=True)
 
 
 def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
@@ -259,7 +266,7 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     deepest = depth.max(axis=1)
     worn = stations.values_between(deepest, places)
     point = turn.at_stations(fine)
-    factor = _round(_MAGNIFIED * turn.cam.base_radius / max(float(deepest.max()), 1e-12))
+    factor = factor_for(turn, float(deepest.max()))
     follower, found = turn.cam.follower, point.kinematics
     fresh = surface_points(follower, found, point.angle)[1]
     cut = surface_points(follower, found, point.angle, factor * worn)[1]
@@ -273,14 +280,8 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     edges = fresh[:, np.abs(point.angle - starts[:, None]).argmin(axis=1)]
     marks += [Line([0.0, x], [0.0, y], dash=":", width=0.6, colour=GREY) for x, y in edges.T]
     text = f"The cam before wear, and at the end with its depth magnified {factor:g} times."
-    marks.append(_centre())
+    marks.append(axis_mark())
     return Panel("Worn cam", *_PLANE, marks, text, legend="below", columns=2, equal=True)
-
-
-def _round(value: float) -> float:
-    """Return a value rounded down to one digit."""
-    scale = 10.0 ** np.floor(np.log10(value))
-    return float(np.floor(value / scale) * scale)
 
 
 def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:

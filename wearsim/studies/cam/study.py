@@ -60,6 +60,10 @@ class CamStudy(Viewed):
         Integral of N ds over a turn [N m].
     max_pressure_angle : tuple of float
         Greatest pressure angle, and the angle of the cam there [rad].
+    max_radius : tuple of float
+        Greatest distance of the cam's surface from its axis [m], and the angle there [rad].
+    max_peak_pressure : tuple of float
+        Greatest peak pressure of the fresh contact [Pa], and the angle there [rad].
     min_radius_of_curvature : float, optional
         Least radius of the convex parts of the cam [m]; None without any.
     harmonic_limit : float, optional
@@ -97,6 +101,8 @@ class CamStudy(Viewed):
     perimeter: float
     load_integral: float
     max_pressure_angle: tuple[float, float]
+    max_radius: tuple[float, float]
+    max_peak_pressure: tuple[float, float]
     min_radius_of_curvature: float | None
     harmonic_limit: float | None
     jump_speed: float | None
@@ -177,6 +183,8 @@ def study_cam(
         perimeter,
         turn.integral("load"),
         steepest,
+        extreme(panels, turn.radius),
+        extreme(panels, lambda p, x: peak_pressures(scenario, turn.at(p, x))),
         1.0 / sharpest if sharpest > 0.0 else None,
         harmonic_limit(turn, harmonic_depth(turn)),
         _jump_speed(turn),

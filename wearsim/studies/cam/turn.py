@@ -119,14 +119,14 @@ class CamTurn:
 
     def at(self, panel: Panel, theta: FloatArray) -> Point:
         """Return the state at angles within a panel [rad]."""
-        inner = np.full(len(theta), self._is_inner(panel))
-        return self._loaded(self._rolling(panel, theta), theta, inner)
+        inner = np.full(len(theta), self.is_inner(panel))
+        return self._loaded(self.rolling(panel, theta), theta, inner)
 
-    def _rolling(self, panel: Panel, theta: FloatArray) -> RollerKinematics:
+    def rolling(self, panel: Panel, theta: FloatArray) -> RollerKinematics:
         """Return the motion of the roller at angles within a panel [rad]."""
-        return self._path.at(panel.segment, theta, self._is_inner(panel))
+        return self._path.at(panel.segment, theta, self.is_inner(panel))
 
-    def _is_inner(self, panel: Panel) -> bool:
+    def is_inner(self, panel: Panel) -> bool:
         """Return whether the roller touches the inner flank of a groove in a panel."""
         if self.load is None or not self.cam.groove:
             return False
@@ -265,8 +265,8 @@ class CamTurn:
     @cached_property
     def curvatures(self) -> tuple[float, float]:
         """Least and greatest relative curvature along rolling [1/m]."""
-        greatest, _ = extreme(self.panels, lambda p, x: self._rolling(p, x).relative_curvature)
-        least, _ = extreme(self.panels, lambda p, x: -self._rolling(p, x).relative_curvature)
+        greatest, _ = extreme(self.panels, lambda p, x: self.rolling(p, x).relative_curvature)
+        least, _ = extreme(self.panels, lambda p, x: -self.rolling(p, x).relative_curvature)
         return -least, greatest
 
     @cached_property
@@ -350,7 +350,7 @@ class CamTurn:
     def at_stations(self, stations: Stations) -> Point:
         """Return the state at stations, at both sides of a boundary between segments."""
         segments = np.array([panel.segment for panel in stations.panels])[stations.panel]
-        flanks = np.array([self._is_inner(panel) for panel in stations.panels])
+        flanks = np.array([self.is_inner(panel) for panel in stations.panels])
         lift = np.empty((3, stations.count))
         for number in np.unique(segments):
             chosen = segments == number
@@ -401,12 +401,7 @@ class CamTurn:
         follower = self.cam.follower
         if not follower.swings or self.cam.groove:
             return []
-
-        def radius(panel: Panel, theta: FloatArray) -> FloatArray:
-            x, y = surface_points(follower, self._rolling(panel, theta), theta)[1]
-            return np.asarray(np.hypot(x, y))
-
-        greatest, theta = extreme(self.panels, radius)
+        greatest, theta = extreme(self.panels, self.radius)
         if greatest < follower.centre_distance:
             return []
         got = f"{1e3 * greatest:.6g} mm at {self.place(theta)}"
@@ -414,10 +409,15 @@ class CamTurn:
         expected = f"less than {1e3 * follower.centre_distance:.6g} mm, follower.centre_distance"
         return [Mistake("cam", "base_radius", what, got, expected)]
 
+    def radius(self, panel: Panel, theta: FloatArray) -> FloatArray:
+        """Return the distance of the cam's surface from its axis at angles within a panel [m]."""
+        x, y = surface_points(self.cam.follower, self.rolling(panel, theta), theta)[1]
+        return np.asarray(np.hypot(x, y))
+
     def _undercut(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the curvature of the pitch curve times the roller's radius, 1 at a cusp."""
-        side = -1.0 if self._is_inner(panel) else 1.0
-        curvature = self._rolling(panel, theta).pitch_curvature
+        side = -1.0 if self.is_inner(panel) else 1.0
+        curvature = self.rolling(panel, theta).pitch_curvature
         return np.asarray(side * curvature * self.scenario.roller.radius)
 
     def place(self, theta: float) -> str:

@@ -2,15 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.report.text import NOTHING, in_unit, shown
-from wearsim.report.view import Frame, Row, Rows, Table, View
+from wearsim.mechanics.cam import surface_points
+from wearsim.report.text import NOTHING, PER_SI, in_unit, shown
+from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.studies.cam.checks import harmonic_depth
 from wearsim.studies.cam.study import CamStudy
 from wearsim.types import FloatArray
+
+if TYPE_CHECKING:
+    from wearsim.report.surfaces import Sampling, Surface
+
+
+# titles of the columns of the motion table, names of their values, and units
+_MOTION = (
+    ("angle", "angle_rad", "deg"),
+    ("lift", "roller_lift_m", "mm"),
+    ("velocity", "velocity_m_per_s", "m/s"),
+    ("acceleration", "acceleration_m_per_s2", "m/s^2"),
+    ("jerk", "jerk_m_per_s3", "m/s^3"),
+    ("pressure angle", "pressure_angle_rad", "deg"),
+    ("radius of curvature", "radius_of_curvature_m", "mm"),
+    ("normal force", "normal_force_N", "N"),
+    ("drive torque", "drive_torque_N_m", "N m"),
+    ("rolling speed", "rolling_speed_m_per_s", "m/s"),
+    ("peak pressure", "peak_pressure_Pa", "MPa"),
+    ("x", "x_m", "mm"),
+    ("y", "y_m", "mm"),
+)
 
 
 class CamView(View):
@@ -29,7 +52,10 @@ class CamView(View):
     def rows(self) -> Rows:
         """Return the numbers of the turn."""
         study, turn = self.result, self.result.turn
-        angle, theta = study.max_pressure_angle
+
+        def place(unit: str, value: float, theta: float) -> str:
+            return f"{shown(value, unit)} at {turn.place(theta)}"
+
         least, greatest = turn.normal_range
         depth = shown(harmonic_depth(turn), "um", 2)
         p, q = study.winding_ratio
@@ -38,7 +64,9 @@ class CamView(View):
             Row("perimeter", shown(study.perimeter, "mm", 6)),
             Row("integral of N ds", shown(study.load_integral, "N m", 6)),
             Row("normal force", f"{shown(least, 'N')} to {shown(greatest, 'N')}"),
-            Row("greatest pressure angle", f"{shown(angle, 'deg')} at {turn.place(theta)}"),
+            Row("greatest pressure", place("MPa", *study.max_peak_pressure)),
+            Row("greatest pressure angle", place("deg", *study.max_pressure_angle)),
+            Row("outer radius", place("mm", *study.max_radius)),
             Row("least radius of curvature", shown(study.min_radius_of_curvature, "mm")),
             Row("speed at which the follower jumps", shown(study.jump_speed, "rpm")),
             Row(f"harmonic limit at {depth} of wear", shown(study.harmonic_limit, "1", 3)),
@@ -55,8 +83,8 @@ class CamView(View):
             away, unit = np.abs(measured.residual), "um" if measured.unit == "m" else "mrad"
             rms = shown(float(np.sqrt((away**2).mean())), unit, 3)
             most, noise = shown(float(away.max()), unit, 3), shown(measured.noise, unit, 3)
-            place = shown(float(measured.angle[away.argmax()]), "deg")
-            words = f"rms {rms}, at most {most} at {place}; noise {noise}"
+            where = shown(float(measured.angle[away.argmax()]), "deg")
+            words = f"rms {rms}, at most {most} at {where}; noise {noise}"
             rows.append(Row(f"residuals of the {measured.quantity}", words))
         return rows
 
@@ -81,28 +109,46 @@ class CamView(View):
             [in_unit(value, unit) for value in _without_rounding(values)]
             for _, values, unit in columns
         ]
-        names = [turn.cam.motion.segments[number].name for number in self._segments()]
+        names = self._segment_names()
         heads = [*(head for head, *_ in columns), "segment"]
         return [Table("", [list(row) for row in zip(*cells, names, strict=True)], heads)]
 
-    def _segments(self) -> list[int]:
-        """Return the number of the segment of each station."""
-        study, turn = self.result, self.result.turn
-        if study.weight is None:
-            return [int(k) for k in turn.cam.motion.segment_at(study.point.angle)]
-        return [turn.stations.panels[k].segment for k in turn.stations.panel.tolist()]
+    def _segment_names(self) -> list[str]:
+        """Return the name of the segment of each station."""
+        study, motion = self.result, self.result.turn.cam.motion
+        numbers = motion.segment_at(study.point.angle).tolist()
+        if study.weight is not None:
+            stations = study.turn.stations
+            numbers = [stations.panels[k].segment for k in stations.panel.tolist()]
+        return [motion.segments[number].name for number in numbers]
 
     def _columns(self) -> dict[str, tuple[str, Any]]:
         """Return the values at the stations by their keys: unit and numbers in SI."""
         study, point, turn = self.result, self.result.point, self.result.turn
-        found, unit = point.kinematics, self.result.turn.cam.lift_unit
+        found, unit = point.kinematics, turn.cam.lift_unit
+        x, y = surface_points(turn.cam.follower, found, point.angle)[1]
+        jerk = turn.cam.motion.jerk(point.angle)
+        # of the roller's centre along its path
+        travel = turn.cam.follower.lever * np.stack(
+            [found.lift, found.lift_per_rad, found.lift_per_rad2, jerk]
+        )
+        with np.errstate(divide="ignore"):
+            radius = 1.0 / found.curvature
         columns: dict[str, tuple[str, Any]] = {
             "angle_rad": ("rad", point.angle),
             f"lift_{unit}": (unit, found.lift),
             f"lift_per_rad_{unit}": (unit, found.lift_per_rad),
             f"lift_per_rad2_{unit}": (unit, found.lift_per_rad2),
+            f"lift_per_rad3_{unit}": (unit, jerk),
+            "roller_lift_m": ("m", travel[0]),
+            "velocity_m_per_s": ("m/s", turn.speed * travel[1]),
+            "acceleration_m_per_s2": ("m/s^2", turn.speed**2 * travel[2]),
+            "jerk_m_per_s3": ("m/s^3", turn.speed**3 * travel[3]),
             "pressure_angle_rad": ("rad", found.pressure_angle),
             "curvature_per_m": ("1/m", found.curvature),
+            "radius_of_curvature_m": ("m", radius),
+            "x_m": ("m", x),
+            "y_m": ("m", y),
             "rolling_speed_m_per_s": ("m/s", turn.speed * found.travel),
             "roller_speed_ratio": ("1", found.spin),
             "normal_force_N": ("N", point.normal_force),
@@ -143,6 +189,10 @@ class CamView(View):
             "title": self.title,
             "perimeter_m": study.perimeter,
             "load_integral_N_m": study.load_integral,
+            "max_radius_m": study.max_radius[0],
+            "max_radius_at_rad": study.max_radius[1],
+            "max_peak_pressure_Pa": study.max_peak_pressure[0],
+            "max_peak_pressure_at_rad": study.max_peak_pressure[1],
             "max_pressure_angle_rad": study.max_pressure_angle[0],
             "max_pressure_angle_at_rad": study.max_pressure_angle[1],
             "min_radius_of_curvature_m": study.min_radius_of_curvature,
@@ -165,6 +215,27 @@ class CamView(View):
             "warnings": study.warnings,
             "notes": study.notes,
         }
+
+    def columns(self) -> Mapping[str, Columns]:
+        """Return the motion table, one row for each station."""
+        values = {name: found for name, (_, found) in self._columns().items()}
+        swings, film = self.result.turn.cam.follower.swings, "film_thickness_m" in values
+        chosen = [
+            *_MOTION[:1],
+            *([("lift of the arm", "lift_rad", "deg")] if swings else []),
+            *_MOTION[1:],
+            *([("film", "film_thickness_m", "um")] if film else []),
+        ]
+        table = [
+            Column(title, values[key], unit, 1.0 / PER_SI[unit]) for title, key, unit in chosen
+        ]
+        return {"motion.csv": [[*table, Column("segment", self._segment_names())]]}
+
+    def surface(self, sampling: Sampling) -> Surface:
+        """Return the surface of the cam before wear."""
+        from wearsim.studies.cam.surface import unworn_surface  # noqa: PLC0415  (only of files)
+
+        return unworn_surface(self.result.turn, sampling)
 
     def frame(self) -> Frame:
         """Return the stations, one row each."""

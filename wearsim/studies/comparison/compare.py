@@ -22,7 +22,6 @@ from wearsim.uq.sampling.sampler import REPLICATES
 
 QUANTILES = (0.05, 0.5, 0.95)
 _ROUND_OFF = 1e-9  # relative difference of the ends of tests of equal length
-_ERRORS = {"depth": "depth_error", "worn_volume": "volume_error"}
 
 Comparable: TypeAlias = Result | EnsembleResult
 
@@ -185,7 +184,10 @@ def observables_of(result: Comparable) -> tuple[str, ...]:
     """Return the observables of a run or an ensemble that can be compared."""
     if is_ensemble(result):
         return result.observables
-    names = ("depth", "width", "worn_volume", "roller_depth", "dissipated_energy", "power")
+    names = (
+        *("depth", "width", "worn_volume", "roller_depth", "dissipated_energy", "power"),
+        "peak_pressure",
+    )
     return (*names, "lift_error") if "lift_error" in getattr(result.raw, "history", ()) else names
 
 
@@ -288,8 +290,8 @@ def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -
 
 def _of_run(result: Result, observable: str) -> Interval:
     """Return a run's value with its estimated error, or with zero width if there is none."""
-    value, name = float(_values(result, observable)[1][0]), _ERRORS.get(observable)
-    error = 0.0 if name is None else float(np.max(result.values(name)[-1]))
+    value, errors = float(_values(result, observable)[1][0]), result.errors.get(observable)
+    error = 0.0 if errors is None else float(np.nan_to_num(np.max(errors[-1])))
     return Interval(value, value - error, value + error)
 
 

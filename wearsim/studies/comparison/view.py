@@ -11,7 +11,7 @@ import numpy as np
 from wearsim.errors import ResultsFileError
 from wearsim.levelling import Measured
 from wearsim.report.text import NOTHING, OBSERVABLES, cells, count, si_key, si_unit, with_interval
-from wearsim.report.view import STUDY, Frame, Row, Rows, Table, View
+from wearsim.report.view import STUDY, Frame, Overview, Row, Rows, Table, View
 from wearsim.studies.comparison.compare import (
     Comparable,
     Compared,
@@ -51,6 +51,7 @@ class ComparisonView(View):
         words = OBSERVABLES[comparison.observable].words
         self.title = f"{', '.join(labels[:-1])} and {labels[-1]}"
         self.question = f"How do the {words}s at the end of these tests differ?"
+        self._views: list[View] = [result.view for result in self.results]
         self.files = [str(result.path) for result in self.results]
         self.warnings = _warnings(comparison)
 
@@ -73,7 +74,26 @@ class ComparisonView(View):
         quantiles = (f"{100 * probability:g} %" for probability, _ in estimated)
         heads = ["[" + named.unit + "]", "mean", "std", *quantiles]
         lines = [line for row in comparison.rows for line in _lines(row, named.unit, len(heads))]
-        return [Table(STUDY, [Row("compared", what), *described]), Table("", lines, heads)]
+        study = Table(STUDY, [Row("compared", what), *described])
+        return [study, Table("", lines, heads), self._side_by_side()]
+
+    def _side_by_side(self) -> Table:
+        """Return all answers of the results, one column for each of them."""
+        answers = [{row.label: row.text for row in view.rows()} for view in self._views]
+        labels = list(dict.fromkeys(label for texts in answers for label in texts))
+        lines = [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels]
+        return Table("", lines, ["at the end", *(row.label for row in self.comparison.rows)])
+
+    def overview(self) -> Overview:
+        """Return the comparison, and the limits of each of the results."""
+        own = super().overview()
+        labels = [row.label for row in self.comparison.rows]
+        groups, excluded = dict(own.groups), list[str]()
+        for label, view in zip(labels, self._views, strict=True):
+            found = view.overview()
+            groups[f"Limits of {label}"] = found.groups.get("Limits", [])
+            excluded += [text for text in found.excluded if text not in excluded]
+        return Overview(own.picture, groups, excluded, alone=True)
 
     def data(self) -> dict[str, Any]:
         """Return the comparison in SI units; all results are compared with the first."""
@@ -82,7 +102,8 @@ class ComparisonView(View):
             "observable": si_key(comparison.observable),
             "same_length": comparison.equally_long,
             "compared": [
-                _data(row, file) for row, file in zip(comparison.rows, self.files, strict=True)
+                {**_data(row, file), "at_end": view.data()}
+                for row, file, view in zip(comparison.rows, self.files, self._views, strict=True)
             ],
             "title": self.key or None,
         }

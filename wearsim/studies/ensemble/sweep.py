@@ -6,9 +6,11 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from wearsim.errors import Interrupted, ResultsFileError
+from wearsim.quantities import NUMBER, quantity
+from wearsim.report.frames import concatenated
 from wearsim.results.io.outputs import check_output
 from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario, as_scenario
@@ -18,12 +20,82 @@ from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.run.result import Result, read_results
 from wearsim.studies.run.run import resume, run
-from wearsim.units import conversion
+from wearsim.units import QuantityError, conversion, kind_of as quantity_kind
+
+if TYPE_CHECKING:
+    import xarray
 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _WITHOUT_SPACE = re.compile(rf"({_NUMBER})([A-Za-zµμ°].*)")
 _QUANTITY = re.compile(rf"({_NUMBER})\s*(\S.*)?")
 _EXAMPLE = "such as load.normal_force=250N,300N,350N"
+
+
+class Sweep(list[Any]):
+    """Results for several values of one key, in the order of the values.
+
+    Parameters
+    ----------
+    results : sequence of Result or EnsembleResult
+    key : str
+        Dotted key of the scenario.
+    values : sequence of str
+        As in a scenario.
+
+    Examples
+    --------
+    >>> results = wearsim.sweep("rig.toml", "load.normal_force", ["250 N", "300 N"])
+    >>> ends = results.to_xarray()
+    >>> [f"{depth * 1e6:.1f} um" for depth in ends["depth"].squeeze().values]
+    ['42.6 um', '48.1 um']
+    >>> ends["load.normal_force"].values.tolist(), ends["load.normal_force"].attrs["units"]
+    ([250.0, 300.0], 'N')
+    """
+
+    def __init__(self, results: Iterable[Any], key: str, values: Sequence[str]) -> None:
+        super().__init__(results)
+        self.key, self.values = key, list(values)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the ends of all tests as one dataset, along the key of the sweep.
+
+        It has the variables that do not depend on strips or stations, whose number differs between
+        tests; of cams also depth and lift error along the angle.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If xarray is not installed, which is part of the extra ``wearsim[data]``.
+        """
+        ends = [_end(result.to_xarray()) for result in self]
+        numbers, unit = _numbers(self.values)
+        return concatenated(ends, self.key, numbers, unit)
+
+
+def _end(dataset: xarray.Dataset) -> xarray.Dataset:
+    """Return the last step and the last record, without variables along strips and stations."""
+    dropped = [
+        name for name, item in dataset.variables.items() if {"y", "station"} & set(item.dims)
+    ]
+    last = {name: -1 for name in ("step", "record") if name in dataset.dims}
+    return dataset.drop_vars(dropped).isel(last, drop=True)
+
+
+def _numbers(values: Sequence[str]) -> tuple[list[Any], str]:
+    """Return the values of a key in SI with their unit, or as given where they are no numbers."""
+    found, units = [], set()
+    for value in values:
+        number = NUMBER.match(value.strip())
+        unit = value.strip()[number.end() :].strip() if number else ""
+        if number is None:
+            return list(values), ""
+        try:
+            si = quantity_kind(unit).unit if unit else "1"
+            found.append(quantity(value, si) if unit else float(number[0]))
+        except QuantityError:
+            return list(values), ""
+        units.add(si)
+    return (found, units.pop()) if len(units) == 1 else (list(values), "")
 
 
 def sweep(
@@ -35,7 +107,7 @@ def sweep(
     realisations: int | None = None,
     on_value: Callable[[str, Path | None], None] | None = None,
     **options: Any,
-) -> list[Any]:
+) -> Sweep:
     """Run a wear test, or an ensemble, for each of several values of one key.
 
     The random numbers of an ensemble are addressed by the names of the inputs, so that a
@@ -61,8 +133,8 @@ def sweep(
 
     Returns
     -------
-    list of Result or EnsembleResult
-        In the order of the values.
+    Sweep
+        A list of results in the order of the values, with ``to_xarray()`` along the key.
 
     Raises
     ------
@@ -87,7 +159,8 @@ def sweep(
     if realisations is not None and output is None:
         raise TypeError("ensembles are written to files: name one with output")
     scenarios = [base.changed({key: value}) for value in values]
-    return run_sweep(scenarios, names, realisations, output, on_value=on_value, **options)
+    results = run_sweep(scenarios, names, realisations, output, on_value=on_value, **options)
+    return Sweep(results, key, names)
 
 
 def run_sweep(

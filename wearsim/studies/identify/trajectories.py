@@ -302,7 +302,9 @@ class Grower:
         """Return the wear up to a factor for each draw, and down to the part 1/span of it."""
         count = int(np.ceil(np.log(span) / np.log(RATIO))) + 1
         if self.reasons:
-            count = int(np.ceil(np.log(span) / np.log(RATIO_OF_TESTS))) + 1
+            # interpolation between many tests is hidden by their scatter
+            ratio = RATIO if self.count <= _FEW else RATIO_OF_TESTS
+            count = int(np.ceil(np.log(span) / np.log(ratio))) + 1
             scale = span ** (np.arange(count) / (count - 1) - 1.0)
             tests = [(d, start[d] * s) for d in range(self.count) for s in scale]
             kept, states = self._run(tests, times)

@@ -288,8 +288,8 @@ class LifeResult(LifeValues):
         Examples
         --------
         >>> curve = wearsim.open_results("rig-life.h5").survival_curve()
-        >>> float(curve.life[0]), float(curve.survival[0])
-        (0.0, 1.0)
+        >>> print(curve.life[0], curve.survival[0])
+        0.0 1.0
         """
         if not self.is_exact:
             curve = survival_curve(np.minimum(self.lives, self.most), self.observed)

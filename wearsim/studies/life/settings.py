@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import ArgumentError, Mistake, ScenarioError, checking_argument
+from wearsim.arguments import ArgumentError, checking_argument
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.limits import OF_LIFE, Limit
 from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import Scenario

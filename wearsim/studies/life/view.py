@@ -16,13 +16,16 @@ from wearsim.report.text import (
     count,
     lapse,
     part_with_interval,
+    rounded_lives,
     shown,
     too_few,
 )
-from wearsim.report.view import Row, Rows, Table
+from wearsim.report.view import Overview, Row, Rows, Table
 from wearsim.results.study_view import SAMPLING
 from wearsim.studies.ensemble.view import RealisationsView
 from wearsim.studies.life.result import LifeResult
+from wearsim.studies.life.values import remarks
+from wearsim.studies.run.view import EXCLUDED
 from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.lives import fewest_lives, least_survival
@@ -306,6 +309,50 @@ class LifeView(RealisationsView[LifeResult]):
         method = next(reversed(tried))
         return {**tried[method], "method": method, "tried": tried}
 
+    def overview(self) -> Overview:
+        """Return the design with its loads, the lives with intervals, and what moves them."""
+        result, scenario = self.result, self.result.scenario
+        groups: dict[str, Rows] = {}
+        excluded, main = list(EXCLUDED), None
+        if scenario.cam is not None:
+            from wearsim.studies.cam.overview import (  # noqa: PLC0415  (not of a cylinder)
+                CAM_EXCLUDED,
+                loads,
+                picture,
+            )
+
+            groups["Loads"], main = loads(scenario), picture(scenario)
+            excluded += CAM_EXCLUDED
+        if result.count:
+            texts = limit_texts(scenario.limit.given)
+            first = (result.first_limits.get(name, 0.0) for name in scenario.limit.given)
+            groups["First limit"] = [
+                Row(text, f"the first in {shown(share, '%', 3)} of the tests")
+                for text, share in zip(texts, first, strict=True)
+            ]
+            groups["Life"] = [
+                Row(f"B{share:g}", _three_digits(result, share)) for share in result.settings.shares
+            ]
+            groups["What moves the life (with the input at its 10 % and 90 % quantile)"] = (
+                self._movers()
+            )
+        return Overview(main or self.panels().first, groups, excluded)
+
+    def _movers(self) -> Rows:
+        """Return the inputs with the greatest effects on the life, at most three."""
+        if why := self._no_effects():
+            return [Row("inputs", why.replace("\n", ": "))]
+        effects = [item for item in self.result.sensitivity("life") if not item.without_effect]
+        effects.sort(key=lambda item: -item.first.value)
+        changes, rows = self.result.tornado(), list[Row]()
+        for item in effects[:3]:
+            text = f"{shown(item.first.value, '%', 2)} of the scatter"
+            if item.name in changes:
+                low, high = (one.value - 1.0 for one in changes[item.name].factors)
+                text += f"; life {100.0 * low:+.0f} %, {100.0 * high:+.0f} %"
+            rows.append(Row(item.name, text))
+        return rows or [Row("inputs", "none significantly")]
+
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""
         settings, options = self.result.settings, study_options(self.result)
@@ -314,6 +361,20 @@ class LifeView(RealisationsView[LifeResult]):
         if settings.rare:
             options += ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
         return options
+
+
+def _three_digits(result: LifeResult, share: float) -> str:
+    """Return a life and its interval with three digits, or why it is not stated."""
+    found = result.b(share)
+    if not math.isfinite(found.value):
+        return life_text(result, share)
+    value, low, high = (
+        count(float(f"{end:.3g}")) if math.isfinite(end) else NOTHING
+        for end in (found.value, found.low, found.high)
+    )
+    if found.low == found.high:
+        return f"{value} {result.unit}"
+    return f"{value} {result.unit}, 95 %: {low} to {high}"
 
 
 def _tests_of(result: LifeResult) -> str:
@@ -365,18 +426,6 @@ def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
     return value, f"from {rounded_lives(bound)[0]} (one-sided)" if math.isfinite(
         bound
     ) else "too few lives"
-
-
-def rounded_lives(*lives: float) -> list[str]:
-    """Return lives with the digits that the range between them supports: its first two.
-
-    Lives have six digits at most.
-    """
-    known = [abs(life) for life in lives if math.isfinite(life)]
-    least = max(known, default=0.0) * 1e-4
-    width = max(max(known) - min(known), least) if len(known) > 1 else least
-    unit = 10.0 ** max(math.floor(math.log10(width)) - 1, 0) if width > 0.0 else 1.0
-    return [count(round(life / unit) * unit) if math.isfinite(life) else NOTHING for life in lives]
 
 
 def _change(factor: Interval) -> str:
@@ -443,30 +492,3 @@ def rare_text(estimate: RareProbability) -> str:
     if estimate.effective_size is not None:
         text += f", effective sample size {estimate.effective_size:.0f}"
     return text
-
-
-def remarks(result: LifeResult) -> list[str]:
-    """Return what a user should know of the lives."""
-    remarks = []
-    if result.count and result.at_once == result.count:
-        remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
-    elif result.at_once:
-        remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
-    if result.count and not result.observed.any():
-        greatest, known = [], result.known_lives[np.isfinite(result.known_lives)]
-        # tests with an exact wear factor are run up to its greatest value, and further than `most`
-        if result.is_exact and len(known):
-            greatest.append(f"the shortest drawn life is {rounded_lives(known.min())[0]}")
-        elif result.is_exact:
-            greatest.append("with the greatest wear factor")
-        for name, limit in () if len(known) else result.scenario.limit.given.items():
-            stored = {"volume": "worn_volume"}.get(name, name)
-            if stored in result.observables:
-                part = float(result.at_end(stored).max()) / limit
-                greatest.append(f"{name.replace('_', ' ')} up to {100.0 * part:.3g} % of its limit")
-        reached = f" ({', '.join(greatest)})" if greatest else ""
-        remarks.append(
-            f"no realisation reaches a limit within {result.most:,.0f} {result.unit}{reached};"
-            " give a greater --max or other limits"
-        )
-    return remarks

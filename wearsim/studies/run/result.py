@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from wearsim.results.content import (
 from wearsim.results.io.files import read_study
 from wearsim.studies.run.schema import CAM_RUN, ESTIMATED, RUN
 from wearsim.types import FloatArray
+
+if TYPE_CHECKING:
+    import xarray
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
 _DROPPED = {"station", "roller", "realisation"}
@@ -247,6 +250,19 @@ class Result(StudyResult[RunData]):
             worn = grooves_at(self, angle)[0][-1]
         height = start - worn
         return ComputedProfile(self.y, height, height, height, start)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return all variables of the file; of a cam also depth and lift error along "angle".
+
+        Examples
+        --------
+        >>> wearsim.run("rig.toml").to_xarray()["cylinder_depth_profile"].dims
+        ('record', 'station', 'realisation', 'y')
+        """
+        from wearsim.studies.cam.grooves import with_angles  # noqa: PLC0415  (of a cam)
+
+        dataset = super().to_xarray()
+        return with_angles(dataset, self) if self.is_cam else dataset
 
     @property
     def errors(self) -> dict[str, FloatArray]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wearsim.errors import WearsimError
 from wearsim.levelling import ComputedProfile
 from wearsim.report.csv_files import computed
+from wearsim.report.surfaces import Sampling, Surface
 from wearsim.report.text import (
     ROUNDING,
     count,
@@ -22,7 +24,7 @@ from wearsim.report.text import (
     with_error,
     within,
 )
-from wearsim.report.view import Column, Columns, Frame, Row, Rows, width_row
+from wearsim.report.view import Column, Columns, Frame, Overview, Row, Rows, width_row
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.schema import ALL_VARIABLES, AXES
@@ -35,6 +37,12 @@ _NOT_MODEL = (
     " model, of the wear law or of the inputs."
 )
 
+if TYPE_CHECKING:
+    from wearsim.report.animation import Animation
+
+_IN_OVERVIEW = {"roller depth", "width", "lift error, peak to peak"}
+#: what wear tests do not contain
+EXCLUDED = ("fatigue (pitting)", "heating", "plastic flow", "load carried by a lubricant film")
 _RECORDS = {
     "cylinder_depth_profiles.csv": "cylinder_depth_profile",
     "roller_depth_profiles.csv": "roller_depth_profile",
@@ -137,11 +145,13 @@ class RunView(StudyView[Result]):
             error = final[f"{name}_error_{key}"]
             return with_error(np.asarray(final[f"{name}_{key}"]), float(np.max(error)), unit)
 
+        arm, greatest = self._arm_length(), float(np.max(final["lift_error_m"]))
+        of_arm = f", {shown(greatest / arm, 'deg', 3)} of the arm" if arm else ""
         return [
             Row("turns of the cam", count(float(np.max(final["turns"])))),
             Row("angle of the depth", stated("depth_angle", "deg", "rad")),
             Row("angle of the peak pressure", stated("peak_pressure_angle", "deg", "rad")),
-            Row("lift error, peak to peak", stated("lift_error", "um", "m")),
+            Row("lift error, peak to peak", stated("lift_error", "um", "m") + of_arm),
             Row("least wear of the lift", f"at {stated('least_wear_angle', 'deg', 'rad')}"),
             Row("greatest wear of the lift", f"at {stated('greatest_wear_angle', 'deg', 'rad')}"),
         ]
@@ -181,6 +191,7 @@ class RunView(StudyView[Result]):
         result = self.result
         return {
             **result.final,
+            **self._of_arm(),
             "title": result.title,
             "model": result.model,
             "stepper": result.stepper,
@@ -201,6 +212,14 @@ class RunView(StudyView[Result]):
             **self.ending(),
             "limits": result.limits,
         }
+
+    def _of_arm(self) -> dict[str, Any]:
+        """Return the lift error of an arm as an angle [rad]; nothing of another follower."""
+        final, arm = self.result.final, self._arm_length()
+        if not arm or "lift_error_m" not in final:
+            return {}
+        names = ("lift_error", "station_lift_error", "station_lift_error_from_dwell")
+        return {f"{name}_rad": (np.asarray(final[f"{name}_m"]) / arm).tolist() for name in names}
 
     def origin(self) -> dict[str, Any]:
         """Return length, records, scenario, files, plugins and software for JSON."""
@@ -236,6 +255,25 @@ class RunView(StudyView[Result]):
             )
         return footer(used, error, lapse(result.raw.wall_seconds))
 
+    def overview(self) -> Overview:
+        """Return the worn body, its loads, and limits that are passed or not."""
+        result, excluded = self.result, [*EXCLUDED, "scatter of the inputs"]
+        sheet = self.panels()
+        if result.is_cam:
+            from wearsim.studies.cam.overview import CAM_EXCLUDED, loads  # noqa: PLC0415
+
+            found, main = loads(result.scenario), sheet.panels["shape"]
+            excluded += CAM_EXCLUDED
+        else:
+            named = {row.label: row for row in self.rows()}
+            found = [named[name] for name in ("normal force", "peak pressure")]
+            main = sheet.first
+        limits = limit_rows(result, brief=True)
+        limits = limits or [Row("limits", "none in the scenario, table [limit]")]
+        shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
+        groups = {"Loads": found, "Limits": limits, "Wear": shown_rows}
+        return Overview(main, groups, excluded)
+
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the worn profile with which measured ones are compared, of a cam at an angle."""
         return self.result.worn_profile(angle)
@@ -247,28 +285,80 @@ class RunView(StudyView[Result]):
             column
             for name, variable in raw.schema.variables.items()
             if variable.kind == "history"
-            for column in _columns(name, raw.history[name], variable.dims, name)
+            for column in _columns(name, raw.history[name], variable.dims, name, self._angles())
         ]
         tables: dict[str, Columns] = {"history.csv": [history]}
         for file, name in _RECORDS.items():
             if name != "roller_depth_profile" or raw.records[name].any():
                 tables[file] = [list(self._records(name))]
-        if self.result.is_cam:
-            from wearsim.studies.cam.export import worn_cam  # noqa: PLC0415
-
-            worn = worn_cam(self.result)
-            tables["worn_cam.csv"] = [[Column(name, values) for name, values in worn.items()]]
+        surface = self.surface(Sampling())
+        if surface is not None:
+            tables["worn_cam.csv"] = [surface.columns]
+            tables["along_angle.csv"] = [list(self._along_angle())]
         return tables
+
+    def _angles(self) -> Sequence[str]:
+        """Return the angles of the stations of a cam in words; none of a cylinder.
+
+        Where a part of the turn ends, another begins at the same angle.
+        """
+        if not self.result.is_cam:
+            return ()
+        degrees = [f"{angle:.6g} deg" for angle in np.degrees(self.result.values("station_angle"))]
+        following = [*degrees[1:], ""]
+        return [
+            f"before {one}" if one == other else f"at {one}"
+            for one, other in zip(degrees, following, strict=True)
+        ]
+
+    def _along_angle(self) -> Iterator[Column]:
+        """Yield angle, depth and lift error of a cam at every record, of an arm also its angle."""
+        from wearsim.studies.cam.grooves import along_angle  # noqa: PLC0415  (not of a cylinder)
+        from wearsim.studies.cam.observables import CURVE_ANGLES  # noqa: PLC0415
+
+        depth, lift_error = along_angle(self.result)
+        yield computed("angle", CURVE_ANGLES, "rad")
+        quantities = {"depth": (depth, "m"), "lift error": (lift_error, "m")}
+        if lever := self._arm_length():
+            quantities["lift error of the arm"] = lift_error / lever, "rad"
+        for name, (values, unit) in quantities.items():
+            for passes, column in zip(self.result.record_passes, values.T, strict=True):
+                yield computed(f"{name} at {passes:.12g} passes", column, unit)
+
+    def _arm_length(self) -> float | None:
+        """Return the length of a cam's arm [m]; None of another follower."""
+        try:
+            cam = self.result.scenario.cam
+        except WearsimError:  # a plugin of the scenario is not installed
+            return None
+        return cam.follower.arm_length if cam is not None and cam.follower.swings else None
+
+    def surface(self, sampling: Sampling) -> Surface | None:
+        """Return the surface of a cam, unworn and worn; None for a cylinder."""
+        if not self.result.is_cam:
+            return None
+        from wearsim.studies.cam.surface import worn_surface  # noqa: PLC0415  (not of a cylinder)
+
+        return worn_surface(self.result, sampling)
+
+    def animation(self) -> Animation | None:
+        """Return the turn of a worn cam with its follower; None for a cylinder."""
+        if not self.result.is_cam:
+            return None
+        from wearsim.studies.cam.drawing import turning  # noqa: PLC0415  (not of a cylinder)
+
+        return turning(self.result)
 
     def _records(self, name: str) -> Iterator[Column]:
         """Yield y, and a column for every record and contact."""
         raw = self.result.raw
         yield from _columns("y", raw.static["y"], ("y",), "y")
         dims = ("y", *ALL_VARIABLES[name].dims[1:-1])
+        angles = self._angles()
         quantity = "depth" if name.endswith("depth_profile") else name
         for passes, array in zip(raw.records["record_passes"], raw.records[name], strict=True):
             title = f"{quantity} at {passes:.12g} passes"
-            yield from _columns(name, np.moveaxis(array, -1, 0), dims, title)
+            yield from _columns(name, np.moveaxis(array, -1, 0), dims, title, angles)
 
     def frame(self) -> Frame:
         """Return the history, one row for each step."""
@@ -286,11 +376,13 @@ class RunView(StudyView[Result]):
         return ("--until", until) if until else ()
 
 
-def _columns(name: str, array: FloatArray, dims: Sequence[str], title: str) -> Iterator[Column]:
+def _columns(
+    name: str, array: FloatArray, dims: Sequence[str], title: str, angles: Sequence[str] = ()
+) -> Iterator[Column]:
     """Yield the columns of an array with rows along the first axis, the others in the titles."""
     for index in np.ndindex(array.shape[1:]):
         labels = [
-            f"{dim} {number + AXES[dim].first}"
+            angles[number] if dim == "station" and angles else f"{dim} {number + AXES[dim].first}"
             for dim, number, length in zip(dims[1:], index, array.shape[1:], strict=True)
             if length > 1
         ]
@@ -303,27 +395,29 @@ def _last(value: Any) -> int:
     return int(np.ravel(value)[-1])
 
 
-def limit_rows(result: Result) -> Rows:
-    """Return a row for each limit of [limit]: passed or not, when, and by how much."""
+def limit_rows(result: Result, *, brief: bool = False) -> Rows:
+    """Return a row for each limit of [limit]: reached or not, when, and by how much.
+
+    Parameters
+    ----------
+    result : Result
+    brief : bool
+        Whether the rows say that limits are passed or failed, and leave out by how much.
+    """
     rows = list[Row]()
     for item in result.limits:
-        unit = _UNITS.get(item["quantity"], "um")
-        end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)}"
-        name = item["quantity"].replace("_", " ")
-        by = f"{abs(100.0 * item['excess']):.3g} %"
-        if not item["reached"]:
-            rows.append(Row(f"limit of {name}", f"not reached: {end} at the end, {by} below"))
-            continue
-        passes = item["reached_at_passes"]
-        when = f"{count(round(passes))} passes"
-        if result.is_cam:
-            when = f"{count(round(passes / result.raw.kinematics['physical_rollers']))} turns"
-        time = simulated(passes / result.raw.kinematics["pass_rate"])
+        unit, name = _UNITS.get(item["quantity"], "um"), item["quantity"].replace("_", " ")
         side = "above" if item["excess"] >= 0.0 else "below"
-        rows.append(
-            Row(
-                f"limit of {name}",
-                f"reached after about {when}, {time}: {end} at the end, {by} {side}",
-            )
-        )
+        by = "" if brief else f", {abs(100.0 * item['excess']):.3g} % {side}"
+        end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)} at the end{by}"
+        words = ("failed", "passed") if brief else ("reached", "not reached")
+        text = words[1]
+        if item["reached"]:
+            passes = item["reached_at_passes"]
+            when = f"{count(round(passes))} passes"
+            if result.is_cam:
+                when = f"{count(round(passes / result.raw.kinematics['physical_rollers']))} turns"
+            time = simulated(passes / result.raw.kinematics["pass_rate"])
+            text = f"{words[0]} after about {when}, {time}"
+        rows.append(Row(name if brief else f"limit of {name}", f"{text}: {end}"))
     return rows
