@@ -2,8 +2,7 @@
 
 import pytest
 
-from wearsim.report.text import simulated
-from wearsim.studies.life.view import rounded_lives
+from wearsim.report.text import rounded_lives, simulated
 from wearsim.units import in_engineers_unit
 
 

@@ -345,3 +345,15 @@ def with_error(values: FloatArray, error: float | None, unit: str) -> str:
     texts = [in_unit(float(value), unit, min(max(digits, 1), 4)) for value in np.ravel(values)]
     text = texts[0] if len(set(texts)) == 1 else " / ".join(texts)
     return f"{text} ± {shown(error, unit, 2)}"
+
+
+def rounded_lives(*lives: float) -> list[str]:
+    """Return lives with the digits that the range between them supports: its first two.
+
+    Lives have six digits at most.
+    """
+    known = [abs(life) for life in lives if math.isfinite(life)]
+    least = max(known, default=0.0) * 1e-4
+    width = max(max(known) - min(known), least) if len(known) > 1 else least
+    unit = 10.0 ** max(math.floor(math.log10(width)) - 1, 0) if width > 0.0 else 1.0
+    return [count(round(life / unit) * unit) if math.isfinite(life) else NOTHING for life in lives]

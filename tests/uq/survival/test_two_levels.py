@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 from wearsim.uq.distributions.two_levels import TwoLevels, weighted_quantiles
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import Posterior
 from wearsim.uq.survival.distributions import FactorMixture
 from wearsim.uq.survival.scores import score_function
@@ -102,7 +102,9 @@ def held(rng: np.random.Generator, m: float, t: float, kappa: np.ndarray) -> boo
     """Return whether the B10 of a campaign of tests holds the truth."""
     inputs = 0.2  # scatter of the other inputs of the wear tests
     apparent = rng.normal(m, np.hypot(t, inputs), TESTS)
-    kernels = [Kernel(np.ones(1), np.array([one]), np.array([inputs])) for one in apparent]
+    kernels = [
+        LikelihoodMixture(np.ones(1), np.array([one]), np.array([inputs])) for one in apparent
+    ]
     posterior = Posterior.of(kernels, 40)
     levels = TwoLevels.on_grid(posterior.t, posterior.m, posterior.density(), TESTS)
     found = uncertain(kappa, levels).quantile(0.1)

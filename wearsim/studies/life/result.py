@@ -125,7 +125,7 @@ class LifeResult(LifeValues):
         return replace(self, law=inputs[settings.factor].scalar)
 
     def with_posterior(self, file: str | Path) -> LifeResult:
-        """Return the lives with the posterior of K/H of an identification, without new tests.
+        r"""Return the lives with the posterior of K/H of an identification, without new tests.
 
         Parameters
         ----------
@@ -138,6 +138,15 @@ class LifeResult(LifeValues):
             If the file cannot be used, or contains the scatter of an input that is random.
         ValueError
             As `with_wear_factor`.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> rows = ["median [1/Pa],scatter,weight", "1.0e-11,0.3,2", "1.3e-11,0.5,1"]
+        >>> _ = Path("K.csv").write_text("\n".join(rows))
+        >>> found = wearsim.open_results("rig-life.h5").with_posterior("K.csv").uncertain_life(10)
+        >>> found.low < found.predictive < found.high
+        True
         """
         key, table = posterior_table(self.scenario, file)
         if self.settings.factor and key != self.settings.factor:
@@ -194,15 +203,7 @@ class LifeResult(LifeValues):
         >>> lives.uncertain_life(10) is None
         True
         """
-        if self.uncertain is None:
-            return None
-        if percent not in self._uncertain_lives:
-            self._uncertain_lives[percent] = self.uncertain.quantile(percent / 100.0)
-        return self._uncertain_lives[percent]
-
-    @cached_property
-    def _uncertain_lives(self) -> dict[float, UncertainLife]:
-        return {}
+        return None if self.uncertain is None else self.uncertain.quantile(percent / 100.0)
 
     def b_error(self, percent: float) -> tuple[float, float]:
         """Return the life of a percentage if all lives are in error by their numerical bounds.

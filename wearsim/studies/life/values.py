@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from wearsim.report.text import rounded_lives
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.life.stored_settings import DesignVariable, LifeSettings
 from wearsim.types import BoolArray, FloatArray, IntArray
@@ -247,3 +248,30 @@ class LifeValues(EnsembleResult):
         """Lives, as far as they are known, and whether each has a logarithm."""
         lives = self.known_lives if self.is_exact else self.lives
         return lives, np.isfinite(lives) & (lives > 0.0)
+
+
+def remarks(result: LifeValues) -> list[str]:
+    """Return what a user should know of the lives."""
+    remarks = []
+    if result.count and result.at_once == result.count:
+        remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
+    elif result.at_once:
+        remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
+    if result.count and not result.observed.any():
+        greatest, known = [], result.known_lives[np.isfinite(result.known_lives)]
+        # tests with an exact wear factor are run up to its greatest value, and further than `most`
+        if result.is_exact and len(known):
+            greatest.append(f"the shortest drawn life is {rounded_lives(known.min())[0]}")
+        elif result.is_exact:
+            greatest.append("with the greatest wear factor")
+        for name, limit in () if len(known) else result.scenario.limit.given.items():
+            stored = {"volume": "worn_volume"}.get(name, name)
+            if stored in result.observables:
+                part = float(result.at_end(stored).max()) / limit
+                greatest.append(f"{name.replace('_', ' ')} up to {100.0 * part:.3g} % of its limit")
+        reached = f" ({', '.join(greatest)})" if greatest else ""
+        remarks.append(
+            f"no realisation reaches a limit within {result.most:,.0f} {result.unit}{reached};"
+            " give a greater --max or other limits"
+        )
+    return remarks

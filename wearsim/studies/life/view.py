@@ -16,6 +16,7 @@ from wearsim.report.text import (
     count,
     lapse,
     part_with_interval,
+    rounded_lives,
     shown,
     too_few,
 )
@@ -23,6 +24,7 @@ from wearsim.report.view import Overview, Row, Rows, Table
 from wearsim.results.study_view import SAMPLING
 from wearsim.studies.ensemble.view import RealisationsView
 from wearsim.studies.life.result import LifeResult
+from wearsim.studies.life.values import remarks
 from wearsim.studies.run.view import EXCLUDED
 from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
@@ -426,18 +428,6 @@ def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
     ) else "too few lives"
 
 
-def rounded_lives(*lives: float) -> list[str]:
-    """Return lives with the digits that the range between them supports: its first two.
-
-    Lives have six digits at most.
-    """
-    known = [abs(life) for life in lives if math.isfinite(life)]
-    least = max(known, default=0.0) * 1e-4
-    width = max(max(known) - min(known), least) if len(known) > 1 else least
-    unit = 10.0 ** max(math.floor(math.log10(width)) - 1, 0) if width > 0.0 else 1.0
-    return [count(round(life / unit) * unit) if math.isfinite(life) else NOTHING for life in lives]
-
-
 def _change(factor: Interval) -> str:
     """Return a change of the life by an input, with its interval."""
     change = [100.0 * (end - 1.0) for end in (factor.value, factor.low, factor.high)]
@@ -502,30 +492,3 @@ def rare_text(estimate: RareProbability) -> str:
     if estimate.effective_size is not None:
         text += f", effective sample size {estimate.effective_size:.0f}"
     return text
-
-
-def remarks(result: LifeResult) -> list[str]:
-    """Return what a user should know of the lives."""
-    remarks = []
-    if result.count and result.at_once == result.count:
-        remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
-    elif result.at_once:
-        remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
-    if result.count and not result.observed.any():
-        greatest, known = [], result.known_lives[np.isfinite(result.known_lives)]
-        # tests with an exact wear factor are run up to its greatest value, and further than `most`
-        if result.is_exact and len(known):
-            greatest.append(f"the shortest drawn life is {rounded_lives(known.min())[0]}")
-        elif result.is_exact:
-            greatest.append("with the greatest wear factor")
-        for name, limit in () if len(known) else result.scenario.limit.given.items():
-            stored = {"volume": "worn_volume"}.get(name, name)
-            if stored in result.observables:
-                part = float(result.at_end(stored).max()) / limit
-                greatest.append(f"{name.replace('_', ' ')} up to {100.0 * part:.3g} % of its limit")
-        reached = f" ({', '.join(greatest)})" if greatest else ""
-        remarks.append(
-            f"no realisation reaches a limit within {result.most:,.0f} {result.unit}{reached};"
-            " give a greater --max or other limits"
-        )
-    return remarks

@@ -74,6 +74,7 @@ class UncertainLives:
     def __init__(self, mixture: FactorMixture, levels: TwoLevels) -> None:
         self.mixture, self.levels = mixture, levels
         self.scatters, self._owner = np.unique(levels.t, return_inverse=True)
+        self._found: dict[float, UncertainLife] = {}
 
     def given(self, m: float, t: float) -> FactorMixture:
         """Return the lives for one median and scatter of the wear factor."""
@@ -83,6 +84,11 @@ class UncertainLives:
 
     def quantile(self, share: float) -> UncertainLife:
         """Return the life that a share of the machines does not reach."""
+        if share not in self._found:
+            self._found[share] = self._quantile(share)
+        return self._found[share]
+
+    def _quantile(self, share: float) -> UncertainLife:
         value, low, high = self._quantiles(share)
         errors = ((high - low) / (2.0 * _NORMAL))[self._owner]
         logs, weight = value[self._owner] - self.levels.m, self.levels.weight
