@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from wearsim import load_scenario, run
-from wearsim.report.text import OBSERVABLES as LABELS
-from wearsim.report.text import si_key
+from wearsim.report.text import OBSERVABLES as LABELS, si_key
 from wearsim.scenario.examples import scenario_schema
 from wearsim.studies.dissipation.result import VARIABLES as DISSIPATION
 from wearsim.studies.ensemble.file.schema import ANGLE, CAM_OBSERVABLES, ENSEMBLE, LIFE, STATISTICS

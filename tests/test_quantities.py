@@ -9,8 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from wearsim import units
@@ -33,7 +32,7 @@ from wearsim.quantities import (
     WearFactor,
     quantity,
 )
-from wearsim.units import QuantityError, conversion, in_engineers_unit, shown
+from wearsim.units import QuantityError, as_written, conversion, in_engineers_unit
 
 LENGTH = 'expected a length such as "20 mm"'
 
@@ -262,8 +261,8 @@ def test_unreadable_file_is_reported() -> None:
 
 
 def test_long_values_are_abbreviated_in_messages() -> None:
-    assert shown("x" * 100) == f'"{"x" * 56}...'
-    assert shown([True, "a", 1.5]) == '[true, "a", 1.5]'
+    assert as_written("x" * 100) == f'"{"x" * 56}...'
+    assert as_written([True, "a", 1.5]) == '[true, "a", 1.5]'
 
 
 _NAMES = st.sampled_from(sorted(units._UNITS))

@@ -84,35 +84,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from wearsim.errors import (
         CapabilityError as CapabilityError,
-    )
-    from wearsim.errors import (
         ContactError as ContactError,
-    )
-    from wearsim.errors import (
         Interrupted as Interrupted,
-    )
-    from wearsim.errors import (
         PluginError as PluginError,
-    )
-    from wearsim.errors import (
         ResultsFileError as ResultsFileError,
-    )
-    from wearsim.errors import (
         ScenarioError as ScenarioError,
-    )
-    from wearsim.errors import (
         SolverError as SolverError,
-    )
-    from wearsim.errors import (
         StepError as StepError,
-    )
-    from wearsim.errors import (
         UnknownNameError as UnknownNameError,
-    )
-    from wearsim.errors import (
         WearsimError as WearsimError,
-    )
-    from wearsim.errors import (
         WorkerError as WorkerError,
     )
     from wearsim.scenario import Scenario, load_scenario

@@ -212,12 +212,12 @@ def refuse_inputs(
             )
 
 
-def same_file(one: str | Path, other: str | Path) -> bool:
+def same_file(first: str | Path, other: str | Path) -> bool:
     """Return whether two paths refer to the same file.
 
     Parameters
     ----------
-    one, other : str or Path
+    first, other : str or Path
         The paths; the files need not exist.
 
     Returns
@@ -225,6 +225,6 @@ def same_file(one: str | Path, other: str | Path) -> bool:
     bool
     """
     try:
-        return os.path.samefile(one, other)
+        return os.path.samefile(first, other)
     except OSError:  # one of them does not exist
-        return Path(one).resolve() == Path(other).resolve()
+        return Path(first).resolve() == Path(other).resolve()

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 
 from wearsim.types import ContactSolution, Creepage, FloatArray, IntArray, OperatingPoint
+
+T = TypeVar("T")
+NO_BODY = -1
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +93,7 @@ class ContactBatch:
         Raises
         ------
         ValueError
-            If the points are not of one kind, or their number is not that of the gaps.
+            If the points are not of one kind, or are not as many as the gaps.
         """
         creepages, first = [point.creepage for point in points], points[0]
         if len(points) > 1 and len({_kind(point) for point in points}) > 1:
@@ -126,6 +130,13 @@ class ContactBatch:
     def __len__(self) -> int:
         return len(self.gap)
 
+    def replaced(self, **others: Any) -> ContactBatch:
+        """Return the contacts with arrays of the same length, in a tenth of the time of `replace`.
+
+        The arrays are not checked.
+        """
+        return _unchecked(ContactBatch, self.__dict__ | others)
+
     def at(self, numbers: IntArray) -> ContactBatch:
         """Return some of the contacts, by number and in that order."""
         arrays = {name: getattr(self, name) for name in _INPUTS}
@@ -156,8 +167,15 @@ class ContactBatch:
         shape = self.shape or (len(self),)
         axes = ("station", "contact", "realisation") if self.shape else ("contact",)
         indices = [int(i) for i in np.unravel_index(number, shape)]
-        each = zip(axes[-len(shape) :], indices, shape, strict=True)
-        return indices, ", ".join(f"{axis} {i}" for axis, i, length in each if length > 1)
+        axis_places = zip(axes[-len(shape) :], indices, shape, strict=True)
+        return indices, ", ".join(f"{axis} {i}" for axis, i, length in axis_places if length > 1)
+
+
+def _unchecked(kind: type[T], values: Mapping[str, Any]) -> T:
+    """Return an object with given attributes, without the assignments of a frozen dataclass."""
+    found = object.__new__(kind)
+    found.__dict__.update(values)
+    return found
 
 
 def _kind(point: OperatingPoint) -> tuple[object, ...]:
@@ -220,12 +238,17 @@ class ContactBatchSolution:
     separation: FloatArray | None = None
 
     @classmethod
+    def of_columns(cls, values: Mapping[str, Any]) -> ContactBatchSolution:
+        """Return solutions with all fields given, in a fifth of the time of the constructor."""
+        return _unchecked(cls, values)
+
+    @classmethod
     def of(cls, solutions: Sequence[ContactSolution]) -> ContactBatchSolution:
         """Return single solutions on the same strips as a batch."""
         if len(solutions) == 1:  # in a third of the time, without copies
             values = vars(solutions[0])
             return cls(values["y"], *(np.asarray(values[name])[None] for name in _OUTPUTS))
-        columns = {n: np.array([getattr(one, n) for one in solutions]) for n in _OUTPUTS}
+        columns = {n: np.array([getattr(solution, n) for solution in solutions]) for n in _OUTPUTS}
         return cls(y=solutions[0].y, **columns)
 
     def __len__(self) -> int:
@@ -270,9 +293,6 @@ class ContactBatchSolution:
 _OUTPUTS = tuple(
     item.name for item in fields(ContactBatchSolution) if item.name not in {"y", "separation"}
 )
-
-
-NO_BODY = -1
 
 
 @dataclass(frozen=True)
@@ -321,8 +341,8 @@ class SharedWear:
             numbers: list[int] = self.bodies[:, side].tolist()
             depth: dict[int, FloatArray] = {}
             for contact, number in enumerate(numbers):
-                own = worn[..., contact, :]
-                depth[number] = depth[number] + own if number in depth else own
+                of_contact = worn[..., contact, :]
+                depth[number] = depth[number] + of_contact if number in depth else of_contact
             for contact, number in enumerate(numbers):
                 gap[..., contact, :] += depth[number]
         return gap
@@ -360,13 +380,13 @@ class SharedWear:
             numbers = np.array([number for number, other in enumerate(kinds) if other == kind])
             part = wear if len(numbers) == len(wear) else wear[numbers]
             members = _membership(bodies, contacts, kind)
-            own, shared = np.zeros((len(part), contacts, part.shape[-1])), part.copy()
+            separate, shared = np.zeros((len(part), contacts, part.shape[-1])), part.copy()
             for side in (0, 1):
                 alone = members[:, side] == NO_BODY
                 if not kind[side] and np.count_nonzero(alone):  # an idle body's wear is zero
-                    own[:, alone] += part[:, alone, side]
+                    separate[:, alone] += part[:, alone, side]
                     shared[:, alone, side] = 0.0
-            groups.append((numbers, own, members, shared))
+            groups.append((numbers, separate, members, shared))
         return groups
 
 

@@ -134,26 +134,26 @@ def read_columns(
     if below is not None:
         start = sample.pop(0).line
     wanted = {name: (unit, (units or {}).get(name)) for name, unit in columns.items()}
-    found = _find_columns(header, below, sample, separator, wanted, names, mistakes)
+    chosen = _find_columns(header, below, sample, separator, wanted, names, mistakes)
     body = lines[start:]
     missing = [k for k, mistake in enumerate(mistakes) if mistake.what.startswith("column")]
-    if choice and missing and len(found) < len(columns):
+    if choice and missing and len(chosen) < len(columns):
         last = mistakes[missing[-1]]
         mistakes[missing[-1]] = replace(last, expected=f"{last.expected}; {choice}")
     numbers: Sequence[int] = range(start + 1, start + 1 + len(body))
-    table = None if mistakes else _regular_numbers(body, header, found, separator)
+    table = None if mistakes else _regular_numbers(body, header, chosen, separator)
     if table is None and not mistakes:  # perhaps there are comments between the rows
         numbers = [number for number, line in zip(numbers, body, strict=True) if _has_cells(line)]
-        table = _regular_numbers(list(filter(_has_cells, body)), header, found, separator)
+        table = _regular_numbers(list(filter(_has_cells, body)), header, chosen, separator)
     if table is None:
         rows = list(_rows(body, start, separator))
-        numbers, values = _numbers(rows, header, found, separator, mistakes)
-        table = np.array(values).reshape(len(values), len(found)).T
+        numbers, values = _numbers(rows, header, chosen, separator, mistakes)
+        table = np.array(values).reshape(len(values), len(chosen)).T
         if len(rows) < 2:
             got = str(len(rows))
             mistakes.append(Mistake("", "", "too few rows of numbers", got, "at least 2"))
     data = {}
-    for column, cells in zip(found, table, strict=True) if table.size else ():
+    for column, cells in zip(chosen, table, strict=True) if table.size else ():
         data[column.name] = in_order(cells, column.conversion)
         if column.name == rising:
             _check_order(numbers, data[column.name], rising, either_way, mistakes)
@@ -164,7 +164,7 @@ def read_columns(
         raise ScenarioError(file, mistakes)
     falls = rising is not None and data[rising][0] > data[rising][1]
     order = slice(None, None, -1 if falls else 1)
-    return {column.name: data[column.name][order] * column.factor for column in found}
+    return {column.name: data[column.name][order] * column.factor for column in chosen}
 
 
 def column_names(text: str) -> list[str]:
@@ -190,13 +190,13 @@ def units_of_columns(text: str, names: Mapping[str, Sequence[str]]) -> dict[str,
         return {}
     rows = list(_rows(lines[header.line : header.line + HEAD_LINES], header.line, separator))
     below = _unit_line(header, rows)
-    found: dict[str, str | None] = {}
+    units: dict[str, str | None] = {}
     for place, cell in enumerate(header.cells):
-        own, unit = _name_and_unit(cell)
+        own_name, unit = _name_and_unit(cell)
         for name, others in accepted.items():
-            if own in {other.casefold() for other in others}:
-                found[name] = below[place] if below and place < len(below) else unit
-    return found
+            if own_name in {other.casefold() for other in others}:
+                units[name] = below[place] if below and place < len(below) else unit
+    return units
 
 
 def _mistake(line: int, what: str, got: str | None = None, expected: str | None = None) -> Mistake:
@@ -286,7 +286,7 @@ def _find_columns(
     `wanted` holds the unit to return and the unit given by the caller, by name.
     """
     heads = [_name_and_unit(cell) for cell in header.cells]
-    found = []
+    columns = []
     for name, (unit, given) in wanted.items():
         accepted = {other.casefold(): sign for other, sign in names[name].items()}
         places = [place for place, (other, _) in enumerate(heads) if other in accepted]
@@ -299,7 +299,7 @@ def _find_columns(
             factor = accepted[heads[place][0]]
             if conversion not in {clock_time, iso_time}:
                 factor *= _factor(header.line, heads[place][0], written, unit, mistakes)
-            found.append(_Column(name, place, factor, conversion))
+            columns.append(_Column(name, place, factor, conversion))
         elif places:
             what = f"column '{name}' appears {len(places)} times"
             mistakes.append(_mistake(header.line, what))
@@ -309,7 +309,7 @@ def _find_columns(
             got = ", ".join(header.cells)
             expected = " or ".join(_head(other, unit) for other in names[name])
             mistakes.append(_mistake(header.line, what, got, expected))
-    return found
+    return columns
 
 
 def _starts_as_number(cell: str) -> bool:
@@ -335,7 +335,7 @@ def _factor(line: int, name: str, written: str | None, unit: str, mistakes: list
 
 
 def _regular_numbers(
-    body: list[str], header: _Row, found: list[_Column], separator: str
+    body: list[str], header: _Row, columns: list[_Column], separator: str
 ) -> FloatArray | None:
     """Read the columns by numpy's parser, or return None if anything in the file is irregular.
 
@@ -347,8 +347,8 @@ def _regular_numbers(
     marks = set(map(methodcaller("count", separator), body))
     if marks != {len(header.cells) - 1} or "#" in joined or '"' in joined:
         return None
-    places = [column.place for column in found]
-    converters: Any = {c.place: c.conversion for c in found if c.conversion}
+    places = [column.place for column in columns]
+    converters: Any = {c.place: c.conversion for c in columns if c.conversion}
     if comma_number in converters.values() and "." not in joined:
         body = joined.replace(",", ".").split("\n")
         converters = {k: read for k, read in converters.items() if read is not comma_number}
@@ -368,7 +368,7 @@ def _regular_numbers(
 
 
 def _numbers(
-    rows: list[_Row], header: _Row, found: list[_Column], separator: str, mistakes: list[Mistake]
+    rows: list[_Row], header: _Row, columns: list[_Column], separator: str, mistakes: list[Mistake]
 ) -> tuple[list[int], list[list[float]]]:
     """Read every cell of the columns found; return the lines of complete rows and their values."""
     width, lines, values = len(header.cells), [], []
@@ -378,10 +378,10 @@ def _numbers(
             got, expected = f"{len(row.cells)} cells", f"{width}, as in the header"
             mistakes.append(_mistake(row.line, f"too many cells{comma}", got, expected))
             continue
-        cells = [row.cells[c.place] if c.place < len(row.cells) else "" for c in found]
+        cells = [row.cells[c.place] if c.place < len(row.cells) else "" for c in columns]
         numbers = [
             _number(cell, row.line, column, mistakes)
-            for cell, column in zip(cells, found, strict=True)
+            for cell, column in zip(cells, columns, strict=True)
         ]
         if None not in numbers:
             lines.append(row.line)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,39 +53,6 @@ class WearsimError(Exception):
         self.message = message
         self.at_shell = f"{message}; {shell}" if shell else message
         super().__init__(f"{message}; {python}" if python else message)
-
-
-class ArgumentError(ValueError):
-    """An invalid argument of a function, which is an option of a verb.
-
-    Parameters
-    ----------
-    argument : str
-        Name of the argument.
-    text : str
-        What is wrong with it.
-    """
-
-    def __init__(self, argument: str, text: str) -> None:
-        self.argument = argument
-        super().__init__(text)
-
-
-@contextmanager
-def checking_argument(argument: str) -> Iterator[None]:
-    """Turn a ValueError into the error of an argument.
-
-    Raises
-    ------
-    ArgumentError
-        With the message of the ValueError.
-    """
-    try:
-        yield
-    except ArgumentError:
-        raise
-    except ValueError as error:
-        raise ArgumentError(argument, str(error)) from error
 
 
 def failure_text(error: Exception) -> str:

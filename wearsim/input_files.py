@@ -67,7 +67,7 @@ def _as_csv(header: str, *columns: Any) -> str:
 def _log_of_tdms(content: bytes, file: str) -> str:
     """Return the log of a LabVIEW file as CSV.
 
-    The time is that of a channel "time", or of the waveform properties of the channel "load".
+    The time is taken from a channel "time", or from the waveform properties of the channel "load".
     """
 
     def error(what: str, got: str | None = None, expected: str | None = None) -> ScenarioError:
@@ -83,17 +83,17 @@ def _log_of_tdms(content: bytes, file: str) -> str:
     except Exception as failure:  # of any kind that the reader raises for a damaged file
         raise error(f"is no TDMS file: {failure}") from failure
     names = ", ".join(channel.name for channel in channels) or "none"
-    found = {
+    named_channels = {
         name: [channel for channel in channels if channel.name.casefold() == name]
         for name in ("time", "load")
     }
-    for name, some in found.items():
+    for name, some in named_channels.items():
         if len(some) > 1 or (name == "load" and not some):
             raise error(f"the channel '{name}' is needed once", names, f"one channel '{name}'")
-    (load,) = found["load"]
+    (load,) = named_channels["load"]
     force = load[:] * _factor(load, "N", error)
-    if found["time"]:
-        (channel,) = found["time"]
+    if named_channels["time"]:
+        (channel,) = named_channels["time"]
         time = channel[:] * _factor(channel, "s", error)
     elif "wf_increment" in load.properties:
         time = load.time_track()

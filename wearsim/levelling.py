@@ -10,6 +10,10 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.types import FloatArray
 
+_WORN = 0.01  # part of the greatest depth above which a strip counts as worn
+_DEEP = 0.3  # part of the greatest depth above which points give the middle of a groove
+_FEWEST = 8  # unworn points on each side
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -41,7 +45,7 @@ class ComputedProfile(NamedTuple):
     y : ndarray, shape (strips,)
         Axial position [m].
     height : ndarray, shape (strips,)
-        Height above the nominal surface, of an ensemble that of the mean [m].
+        Height above the nominal surface, of an ensemble its mean [m].
     low, high : ndarray, shape (strips,)
         Ends of the band of an ensemble, which are equal for a run [m].
     start : ndarray, shape (strips,)
@@ -76,15 +80,10 @@ def rms(measured: Measured, computed: ComputedProfile) -> float:
     return float(np.sqrt(np.mean(residual**2))) if residual.size else float("nan")
 
 
-_WORN = 0.01  # part of the greatest depth above which a strip counts as worn
-_DEEP = 0.3  # part of the greatest depth above which points give the middle of a groove
-_FEWEST = 8  # unworn points on each side
-
-
 def levelled(measured: Measured, computed: ComputedProfile) -> Measured:
     """Return a measured profile without offset, inclination and axial shift.
 
-    Offset and inclination are those of the straight line through the points outside the computed
+    A straight line gives offset and inclination, fitted to the points outside the computed
     groove, the shift makes the middles of both grooves equal. The depth is not fitted.
 
     Parameters

@@ -40,6 +40,7 @@ _UNITS = (
 )
 _CLEARLY = 3.0  # heights above the ends of a profile over those below
 _INSTALL = "pip install 'wearsim[surfaces]'"
+_ALPHA = math.sqrt(math.log(2.0) / math.pi)
 
 
 @dataclass(frozen=True)
@@ -289,10 +290,10 @@ def _surface(content: bytes, file: str) -> _Surface:
     except ImportError as error:
         raise _error(file, f"{name} files need another package: {_INSTALL}") from error
     try:
-        found = reader.read(io.BytesIO(content))
+        surface = reader.read(io.BytesIO(content))
         if name == "SDF":
-            return _Surface(found.x_axis, found.y_axis, found.data)
-        (layer,) = found.layers
+            return _Surface(surface.x_axis, surface.y_axis, surface.data)
+        (layer,) = surface.layers
         height = np.atleast_2d(layer.z)
         return _Surface(layer.x_values, getattr(layer, "y_values", np.zeros(1)), height)
     except Exception as error:  # of any kind that the reader raises for a damaged file
@@ -335,9 +336,6 @@ def _chosen_row(surface: _Surface, file: str, choice: ProfileChoice) -> Profile:
     return _profile_of(y[measured], total / known.sum(axis=0)[measured], file)
 
 
-_ALPHA = math.sqrt(math.log(2.0) / math.pi)
-
-
 def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
     """Return a profile without roughness, by the Gaussian filter of ISO 16610-21.
 
@@ -355,7 +353,7 @@ def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
     Returns
     -------
     Profile
-        At equally spaced points, at most as far apart as those of the input.
+        At equally spaced points, at most as far apart as in the input.
 
     Raises
     ------

@@ -28,9 +28,9 @@ from wearsim.units import (
     Bound,
     Kind,
     QuantityError,
+    as_written,
     conversion,
     kind_of,
-    shown,
 )
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ NOT_FINITE = re.compile(r"[+-]?(?:nan|inf(?:inity)?)(?![a-z])", re.IGNORECASE)
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 
 _PATTERN = r"^\s*[+-]?[0-9.]+([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])([A-Za-zµμ°(/]|1\s*/).*$"
+V = TypeVar("V")
 
 
 def _split(value: object, expected: str) -> tuple[str, str]:
@@ -62,7 +63,7 @@ def _split(value: object, expected: str) -> tuple[str, str]:
         return number[0], unit
     elif number or (isinstance(value, int | float) and not isinstance(value, bool)):
         what = "needs a unit"
-    raise QuantityError(what, shown(value), expected)
+    raise QuantityError(what, as_written(value), expected)
 
 
 def _si(number: str, factor: Fraction) -> float:
@@ -105,7 +106,7 @@ class Quantity:
             If it is not a quantity of this kind within the bound.
         """
         number, unit = _split(value, self.expected)
-        factor = conversion(unit, self.kind.unit, shown(value), self.expected)
+        factor = conversion(unit, self.kind.unit, as_written(value), self.expected)
         return _within(self.bound, _si(number, factor), lambda _: value, self.expected)
 
     def _read(self, value: Any, info: ValidationInfo) -> float:
@@ -152,7 +153,7 @@ def _within(
         what = "must not be negative"
     else:
         return number
-    raise QuantityError(what, shown(written(number)), expected)
+    raise QuantityError(what, as_written(written(number)), expected)
 
 
 def quantity(text: str, unit: str) -> float:
@@ -263,7 +264,7 @@ class HostQuantity:
             "not negative": "a number of zero or more",
         }[self.bound] + (' or "inf"' if self.infinite else "")
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise QuantityError("is not a number", shown(value), expected)
+            raise QuantityError("is not a number", as_written(value), expected)
         return _within(self.bound, float(value), lambda _: value, expected)
 
     def __get_pydantic_core_schema__(
@@ -290,10 +291,12 @@ class _OneOrList:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        one = handler.generate_schema(get_args(source)[0])
-        several = core_schema.tuple_variable_schema(one)
-        read_one, read_list = SchemaValidator(one), SchemaValidator(several)
-        write_one: Callable[[Any], Any] = one.get("serialization", {}).get("function", lambda v: v)
+        single = handler.generate_schema(get_args(source)[0])
+        several = core_schema.tuple_variable_schema(single)
+        read_one, read_list = SchemaValidator(single), SchemaValidator(several)
+        write_one: Callable[[Any], Any] = single.get("serialization", {}).get(
+            "function", lambda v: v
+        )
 
         def read(value: object, info: ValidationInfo) -> Any:
             if isinstance(value, list | tuple):
@@ -305,12 +308,10 @@ class _OneOrList:
 
         return core_schema.with_info_plain_validator_function(
             read,
-            json_schema_input_schema=core_schema.union_schema([one, several]),
+            json_schema_input_schema=core_schema.union_schema([single, several]),
             serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
         )
 
-
-V = TypeVar("V")
 
 #: A value for all rollers, or a list with one value per roller: ``PerRoller[Length]``.
 PerRoller: TypeAlias = Annotated[V | tuple[V, ...], _OneOrList()]
@@ -340,17 +341,17 @@ class InputFile:
             return value
         expected = 'the name of a text file such as "load.csv"'
         if not isinstance(value, str) or not value.strip():
-            raise QuantityError("is not a file name", shown(value), expected)
+            raise QuantityError("is not a file name", as_written(value), expected)
         read: Callable[[str], str] | None = (info.context or {}).get("read")
         if read is None:
-            raise QuantityError("no file can be read here", shown(value))
+            raise QuantityError("no file can be read here", as_written(value))
         try:
             return cls(value, read(value))
         except ScenarioError as error:  # of a file that is converted to text
-            raise QuantityError(str(error.mistakes[0]), shown(value)) from error
+            raise QuantityError(str(error.mistakes[0]), as_written(value)) from error
         except (OSError, KeyError, ValueError) as error:
             cause = error.strerror if isinstance(error, OSError) else None
-            got = shown(value) + (f" ({cause})" if cause else "")
+            got = as_written(value) + (f" ({cause})" if cause else "")
             raise QuantityError("the file cannot be read", got) from error
 
     @classmethod

@@ -18,6 +18,7 @@ BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
 #: A number for all realisations, or one per realisation, shape (realisations,).
 Number: TypeAlias = float | FloatArray
+_MOST_Y = 4.0  # m: a wider profile is in other units
 
 
 @dataclass(frozen=True)
@@ -144,9 +145,6 @@ class Profile:
             f"<Profile: {len(y)} points, y {y[0]:.4g} to {y[-1]:.4g} mm,"
             f" height {height.min():.4g} to {height.max():.4g} um>"
         )
-
-
-_MOST_Y = 4.0  # m: a wider profile is in other units
 
 
 def _profile_error(

@@ -44,6 +44,12 @@ _SPELLINGS = str.maketrans(
 _UNIT_TEXT = re.compile(r"(?:[A-Za-z]+(?:\^[+-]?[0-9])?|1|[*/() ])+")
 
 MAX_CHARACTERS = 100  # of a quantity or unit
+_FACTOR = re.compile(
+    r"(?P<operator>\s*[*/]\s*|\s+|^)"
+    r"(?:(?P<number>[0-9.]+)|\[(?P<base>[a-z]+)\]|(?P<name>[A-Za-z]+)(?:\^(?P<power>[+-]?[0-9]))?)"
+)
+#: Time from which texts state hours instead of minutes [s].
+LONG = 3.6e5
 
 
 class QuantityError(ValueError):
@@ -65,14 +71,14 @@ class QuantityError(ValueError):
         super().__init__(", ".join(part for part in parts if part))
 
 
-def shown(value: object) -> str:
+def as_written(value: object) -> str:
     """Return `value` as written in a TOML file, abbreviated if long."""
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, list | tuple):
-        text = f"[{', '.join(shown(item) for item in value)}]"
+        text = f"[{', '.join(as_written(item) for item in value)}]"
     elif isinstance(value, str):
         text = f'"{value}"'
     else:
@@ -174,12 +180,6 @@ def _unknown_name(name: str) -> str:
 Dimensions: TypeAlias = frozenset[tuple[str, str]]
 
 
-_FACTOR = re.compile(
-    r"(?P<operator>\s*[*/]\s*|\s+|^)"
-    r"(?:(?P<number>[0-9.]+)|\[(?P<base>[a-z]+)\]|(?P<name>[A-Za-z]+)(?:\^(?P<power>[+-]?[0-9]))?)"
-)
-
-
 @cache
 def _product(text: str) -> tuple[Fraction, dict[str, int]] | None:
     """Return the size in SI of a product or quotient of units, and its powers of the dimensions.
@@ -203,8 +203,8 @@ def _product(text: str) -> tuple[Fraction, dict[str, int]] | None:
             if unit is None:
                 return None
             size *= unit[0] ** power
-            for base, own in unit[1].items():
-                powers[base] = powers.get(base, 0) + power * own
+            for base, exponent in unit[1].items():
+                powers[base] = powers.get(base, 0) + power * exponent
     return size, powers
 
 
@@ -220,7 +220,7 @@ def measure(unit: str) -> tuple[Fraction, Dimensions]:
     product = _product(text)
     if product is not None:
         size, powers = product
-        return size, frozenset((f"[{base}]", str(own)) for base, own in powers.items() if own)
+        return size, frozenset((f"[{base}]", str(power)) for base, power in powers.items() if power)
     return _measured_by_pint(unit, text)
 
 
@@ -228,11 +228,13 @@ def _measured_by_pint(unit: str, text: str) -> tuple[Fraction, Dimensions]:
     """Return size and dimensions of any unit, with brackets; errors as `measure`."""
     units = _registry()
     try:
-        one = units.Quantity(Fraction(1), units.parse_units(text)).to_root_units()
-        dimensions = frozenset((name, str(power)) for name, power in one.dimensionality.items())
+        unit_quantity = units.Quantity(Fraction(1), units.parse_units(text)).to_root_units()
+        dimensions = frozenset(
+            (name, str(power)) for name, power in unit_quantity.dimensionality.items()
+        )
     except Exception as error:  # the parser raises various exceptions for unbalanced text
         raise ValueError(f"'{unit}' is not a unit") from error
-    return Fraction(one.magnitude), dimensions
+    return Fraction(unit_quantity.magnitude), dimensions
 
 
 def kind_of(unit: str) -> Kind:
@@ -278,10 +280,6 @@ def conversion(
         got = f"{written or unit} ({kind_of(unit).name})"
         raise QuantityError("wrong dimension", got, expected)
     return size / measure(target)[0]
-
-
-#: Time from which texts state hours instead of minutes [s].
-LONG = 3.6e5
 
 
 def engineers_unit(unit: str) -> tuple[str, float]:

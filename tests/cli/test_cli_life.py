@@ -224,6 +224,28 @@ def test_bad_input_has_exit_code_2(
     assert not list(Path().glob("*.h5"))
 
 
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        ((), "--max"),  # a test without a length needs one
+        (("--max", "x"), "--max"),
+        (("--max", "1e6", "--target", "x"), "--target"),
+        (("--max", "1e6", "--target", "2e6"), "--max"),
+        (("--max", "1e6", "--rare", "300"), "--rare"),
+        (("--max", "1e6", "--limit", "x=1um"), "--limit"),
+        (("--max", "1e6", "--precision", "x"), "--precision"),
+    ],
+)
+def test_wrong_option_is_named(
+    command: Command, slim: Path, words: tuple[str, ...], option: str
+) -> None:
+    endless = re.sub(r"^(duration|passes) = .*$", "", slim.read_text(), flags=re.MULTILINE)
+    slim.write_text(endless)
+    done = command("life", slim, *words, *HERE)
+    assert done.exit_code == 2
+    assert f"Invalid value for {option}" in done.output
+
+
 def test_limit_that_is_never_reached_is_stated(command: Command, slim: Path) -> None:
     never = ["--limit", "depth=5mm", "--max", "3000", "--figure", "never.svg"]
     text = " ".join(command("life", slim, "-n", 3, *never, *HERE).output.split())

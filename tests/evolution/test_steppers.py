@@ -12,6 +12,7 @@ from wearsim.evolution.integrate import evolve
 from wearsim.evolution.quantities import centroid, oscillation
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import Attempt
+from wearsim.evolution.steppers.edges import unresolved
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_compiled, run_in_python
@@ -48,14 +49,16 @@ def test_implicit_run_matches_per_pass_within_estimate(case):
     problem, reference, found = compared(**CASES[case])
     depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(reference)[0]
     assert depth == pytest.approx(exact, rel=5e-3)
-    assert abs(depth - exact) <= found.depth_error[0]
+    # in a groove the reference takes strips as wholes at its edges: an error due to its strips
+    whole = 0.0 if found.part is None or unresolved(found).all() else 1e-4
+    assert abs(depth - exact) <= found.depth_error[0] + whole * exact
     assert found.depth_error[0] < 1e-2 * exact
     bodies = found.stacked, reference.stacked
     difference = np.linalg.norm(bodies[0] - bodies[1]) / np.linalg.norm(bodies[1])
     assert difference <= found.profile_error[0] < 1e-2
-    volume, whole = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, reference)[0]
-    assert volume == pytest.approx(whole, rel=5e-3)
-    assert abs(volume - whole) <= found.volume_error[0] + 1e-7 * whole
+    volume, true = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, reference)[0]
+    assert volume == pytest.approx(true, rel=5e-3)
+    assert abs(volume - true) <= found.volume_error[0] + 1e-7 * true
 
 
 ALTERNATING = "time [s], load [N]\n" + "\n".join(
@@ -200,8 +203,9 @@ def test_chord_method_leaves_a_small_residual(half_length, tolerance):
 
 @pytest.fixture(scope="module")
 def half_worn():
-    problem, stepper, _ = built(contact__strips=161)
-    state, _ = stepped(problem, stepper, 300_000.0)
+    problem, _, _ = built(contact__strips=161)
+    # fixed steps take strips as wholes, as explicit ones do
+    state, _ = stepped(problem, ImplicitStepper(1e-3, forced_step=10_000.0), 300_000.0)
     return problem, replace(state, coarse_step_solution=None, step=np.zeros(1))
 
 

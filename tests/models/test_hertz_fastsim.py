@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 from hertz_fastsim_examples import MATERIALS, PAIR, RIG, SPEED, balance, contact, groove
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 from scipy.integrate import trapezoid
 

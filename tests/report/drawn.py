@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from wearsim.levelling import Measured
 from wearsim.report.figures import figure_of
-from wearsim.report.page import page as pages
-from wearsim.report.page import plots
+from wearsim.report.page import page as pages, plots
 from wearsim.studies.comparison.compare import Comparison
 from wearsim.studies.comparison.panels import comparison_sheet
 from wearsim.studies.opening import views_of

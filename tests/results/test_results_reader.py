@@ -12,8 +12,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from run_examples import some_run
 
 from tests.results_compared import differences

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy import stats
 
 from wearsim.uq.estimation.moments import RowMoments, converge, is_constant, order_ranks, summarise

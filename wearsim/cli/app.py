@@ -64,6 +64,9 @@ _MODULES = {
     "dissipation": "contact",
     "resume": "run",
 }
+FAILED = 1
+INTERRUPTED = 130
+TRACEBACK = "WEARSIM_TRACEBACK"
 
 
 class LazyVerb(TyperCommand):
@@ -94,7 +97,7 @@ class LazyVerb(TyperCommand):
 
 
 def _add_option(command: Any, option: Any) -> None:
-    """Add a global option to a command and to those of a group; only its callback is called."""
+    """Add a global option to a command, or all commands of a group; only its callback is called."""
     if not any(item.name == option.name for item in command.params):
         added = copy(option)
         added.expose_value = False
@@ -152,9 +155,9 @@ def installed_verbs() -> dict[str, LazyVerb]:
     """Return the verbs of all installed distributions by name, sorted."""
     from importlib.metadata import entry_points
 
-    found, verbs = entry_points(group=GROUP), {}
-    for name in sorted(found.names):
-        points = list(found.select(name=name))
+    points_by_name, verbs = entry_points(group=GROUP), {}
+    for name in sorted(points_by_name.names):
+        points = list(points_by_name.select(name=name))
         line = "; ".join(map(_summary, points))
         verbs[name] = LazyVerb(name, line, partial(_installed, name, points))
     return verbs
@@ -169,11 +172,6 @@ def _summary(point: EntryPoint) -> str:
     lines = ((point.dist and point.dist.read_text("METADATA")) or "").splitlines()
     summaries = [line.partition(": ")[2] for line in lines if line.startswith("Summary: ")]
     return summaries[0] if summaries else f"From {_distribution(point)}."
-
-
-FAILED = 1
-INTERRUPTED = 130
-TRACEBACK = "WEARSIM_TRACEBACK"
 
 
 class Shell(TyperGroup):

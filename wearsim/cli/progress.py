@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 BETWEEN_LINES = 1.0  # s
 _REPORTS = 3  # reports of progress from which the time left is shown
 _BAR, _COLUMNS_FOR_BAR = 24, 115
+CHECKPOINT = "stopping at a checkpoint; repeat to stop at once"
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+BATCHES = "stopping after the next batch; repeat to stop at once"  # at a signal to an ensemble
 
 
 class Display:
@@ -270,10 +273,6 @@ def _estimate(progress: EnsembleProgress) -> str:
     return f"{progress.what} {with_interval(progress.estimate, unit)}"
 
 
-CHECKPOINT = "stopping at a checkpoint; repeat to stop at once"
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-
 @contextmanager
 def stop_on_signals(
     message: str = CHECKPOINT,
@@ -309,7 +308,6 @@ def stop_on_signals(
 
 
 Shown = TypeVar("Shown", bound=Display)
-BATCHES = "stopping after the next batch; repeat to stop at once"  # at a signal to an ensemble
 
 
 @contextmanager

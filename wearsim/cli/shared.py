@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
-from wearsim.errors import ArgumentError, ResultsFileError
+from wearsim.arguments import ArgumentError
+from wearsim.errors import ResultsFileError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -330,7 +331,7 @@ def checking_arguments(**options: str) -> Iterator[None]:
 
 
 def settings_with(settings: list[str] | None, **values: object) -> list[str]:
-    """Return the settings of --set, and those of options that stand for a key, if they are given.
+    """Return the settings of --set, and of options that stand for a key, if they are given.
 
     Parameters
     ----------

@@ -33,33 +33,36 @@ def contact_batch(
     cylinder_depth, roller_depth : ndarray
         Worn depths, shapes as in `WearState` [m].
     """
-    worn = problem.at_contacts(roller_depth)
-    return ContactBatch(
-        gap=gap.reshape(-1, problem.grid.strips),
-        normal_force=loads.ravel(),
-        **_input_columns(problem, loads, worn),
-        variation=_creepage_variation(problem, cylinder_depth, worn),
-        rolling_radius=_rolling_radius(problem, worn) if problem.free else None,
-        shape=problem.shape,
-        mean_radius=problem.free and problem.kinematics.cam is not None,
-    )
+    batch = problem.nominal_batch
+    changes: dict[str, Any] = {
+        "gap": gap.reshape(batch.gap.shape),
+        "normal_force": loads.ravel(),
+    }
+    if problem.slip_profile is not None or problem.free:
+        worn = problem.at_contacts(roller_depth)
+        changes["variation"] = _creepage_variation(problem, cylinder_depth, worn)
+    if problem.free:
+        changes["rolling_radius"] = _rolling_radius(problem, worn)
+        changes["bearing_torque"] = _bearing_torque(problem, loads, worn)
+    return batch.replaced(**changes)
 
 
-def _input_columns(
+def _bearing_torque(
     problem: WearProblem, loads: FloatArray, roller_depth: FloatArray
-) -> dict[str, Any]:
-    """Return the inputs of all contacts, shape (contacts,).
+) -> FloatArray:
+    """Return the torque of all rollers, shape (contacts,) [N m].
 
     Next to the skids of a cam's roller, its torque is at most that which friction transmits under
     the present load and at the present radius, until wear has moved the skids so far that they are
     located again.
     """
-    columns, cam = problem.input_columns, problem.kinematics.cam
-    if not problem.free or cam is None or not (cam.relocated or len(cam.skids)):
-        return columns
+    batch, cam = problem.nominal_batch, problem.kinematics.cam
+    torque = np.asarray(batch.bearing_torque)
+    if cam is None or not (cam.relocated or len(cam.skids)):
+        return torque
     radius = problem.kinematics.roller_radius - roller_depth.max(axis=-1)
-    most = GRIP * columns["friction"] * np.abs(loads * radius).ravel()
-    return columns | {"bearing_torque": np.clip(columns["bearing_torque"], -most, most)}
+    most = GRIP * batch.friction * np.abs(loads * radius).ravel()
+    return np.asarray(np.clip(torque, -most, most))
 
 
 def at_least(problem: WearProblem, loads: FloatArray) -> FloatArray:

@@ -203,7 +203,7 @@ def _shifted_wear(
         for name, shift in shifts.items()
         if name != "normal_force_offset"
     }
-    shifted = replace(problem, inputs=problem.inputs.with_values(values))
+    shifted = problem.with_inputs(replace(problem.inputs, **values))
     contacts = solve_present(shifted, end, loads + shifts.get("normal_force_offset", 0.0))
     return WearIncrement(shifted, contacts, passes)
 

@@ -61,13 +61,14 @@ def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:
 
 def peak_to_peak(cam: CamStations, errors: FloatArray) -> FloatArray:
     """Return greatest less smallest lift error over the angle, shape (rollers, N) [m]."""
-    return np.asarray(cam.greatest(errors).value + cam.greatest(-errors).value)
+    least, most = cam.greatest_value(np.stack([-errors, errors], axis=1))
+    return np.asarray(most + least)
 
 
 def greatest(problem: WearProblem, values: FloatArray) -> FloatArray:
     """Return the greatest of values, stations first, over the angle of a cam."""
     cam = problem.kinematics.cam
-    return np.asarray(values.max(axis=0) if cam is None else cam.greatest(values).value)
+    return np.asarray(values.max(axis=0)) if cam is None else cam.greatest_value(values)
 
 
 def extremes(problem: WearProblem, state: WearState) -> dict[str, Extreme]:

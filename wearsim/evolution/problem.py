@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.contact_batch import ContactBatchSolution
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.evolution.quantities import (
     ContactInputs,
     Kinematics,
@@ -23,12 +23,17 @@ from wearsim.evolution.quantities import (
     values_between,
 )
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
-from wearsim.types import FloatArray, Grid, IntArray
+from wearsim.types import BoolArray, FloatArray, Grid, IntArray
 
 if TYPE_CHECKING:
     from wearsim.evolution.strips import Growth
 
 FREE = 0.075  # part of all strips that is without load on each side, at least
+#: properties that do not depend on the inputs of contacts, or on the tilt alone
+_CONSTANTS = (
+    *("shape", "body_rows", "volume_weights", "nominal_least_gap", "cylinder_share", "has_spring"),
+    *("constant_load", "pauses", "greatest_load", "_wear_coefficients"),
+)
 
 
 @dataclass(frozen=True)
@@ -83,8 +88,6 @@ class WearProblem:
         known before the test.
     growth : tuple of Growth
         How the strips of each realisation grow with its groove; none where they do not.
-    resolve_edges : bool
-        Whether implicit steps resolve the edges of contacts within a strip where they can.
     """
 
     grid: Grid
@@ -106,7 +109,6 @@ class WearProblem:
     passes_per_draw: float = 1.0
     quadrature_error: float = 0.0
     growth: tuple[Growth, ...] = ()
-    resolve_edges: bool = False
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -231,8 +233,8 @@ class WearProblem:
         return self.inputs.tilt / self.kinematics.roller_radius
 
     @cached_property
-    def input_columns(self) -> dict[str, Any]:
-        """Inputs by their name in `ContactBatch`, those that no step changes, shape (contacts,)."""
+    def nominal_batch(self) -> ContactBatch:
+        """All contacts with the inputs that no step changes, on the unworn bodies without load."""
         columns: dict[str, FloatArray | float] = {
             "longitudinal_curvature": self.kinematics.longitudinal_curvature,
             "rolling_speed": self.kinematics.speed,
@@ -244,7 +246,17 @@ class WearProblem:
         if self.free:
             cam, torque = self.kinematics.cam, self.inputs.bearing_torque
             columns |= cam.free_rolling(self.inputs) if cam else {"bearing_torque": torque}
-        return {n: np.broadcast_to(column, self.shape).ravel() for n, column in columns.items()}
+        filled: dict[str, Any] = {
+            n: np.broadcast_to(c, self.shape).ravel() for n, c in columns.items()
+        }
+        shape, free = (*self.shape, self.grid.strips), self.free
+        return ContactBatch(
+            gap=np.broadcast_to(self.nominal_gap, shape).reshape(-1, shape[-1]),
+            normal_force=np.zeros(math.prod(self.shape)),
+            **filled,
+            shape=self.shape,
+            mean_radius=free and self.kinematics.cam is not None,
+        )
 
     @cached_property
     def cylinder_share(self) -> FloatArray:
@@ -310,11 +322,28 @@ class WearProblem:
         """Return the problem with every process at its mean between two times [s]."""
         if not self.varying:
             return self
-        inputs = self.inputs
-        for item in self.varying:
+        values: dict[str, FloatArray] = {}
+        for item, chosen in zip(self.varying, self._varying_contacts, strict=True):
             mean = values_between([path.mean for path in item.paths], start, stop)
-            inputs = inputs.with_value_of(item, self.roller, mean)
-        return replace(self, inputs=inputs, varying=())
+            before = values.get(item.name, getattr(self.inputs, item.name))
+            values[item.name] = np.where(chosen, mean, before)
+        return self.with_inputs(replace(self.inputs, **values))
+
+    def with_inputs(self, inputs: ContactInputs) -> WearProblem:
+        """Return the problem with constant inputs; what does not depend on them is kept."""
+        for name in _CONSTANTS if self.laws and self.linear_wear else ():
+            getattr(self, name)  # computed once, for all problems with other inputs
+        found = object.__new__(WearProblem)
+        tilted = not np.array_equal(inputs.tilt, self.inputs.tilt)
+        lost = {"nominal_batch", "spin", *(("nominal_gap", "nominal_least_gap") if tilted else ())}
+        found.__dict__.update({n: v for n, v in self.__dict__.items() if n not in lost})
+        found.__dict__.update(inputs=inputs, varying=())
+        return found
+
+    @cached_property
+    def _varying_contacts(self) -> list[BoolArray]:
+        """Whether each input of `varying` acts on each contact, shape (contacts, 1)."""
+        return [np.isin(self.roller, item.rollers)[:, None] for item in self.varying]
 
     def time(self, passes: FloatArray) -> FloatArray:
         """Return the time at which `passes` roller passes are done [s]."""

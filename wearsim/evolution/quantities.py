@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from wearsim.mechanics.cam import Extreme, Stations, greatest
+from wearsim.mechanics.cam import Extreme, Stations, greatest, greatest_value
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.types import FloatArray, IntArray
 
@@ -192,6 +192,12 @@ class CamStations:
         angle = self.angle.ravel()[values.argmax(axis=0)]
         unknown = np.full(angle.shape, np.nan)
         return Extreme(values.max(axis=0), angle, unknown, unknown)
+
+    def greatest_value(self, values: FloatArray) -> FloatArray:
+        """Return the value of `greatest` alone."""
+        if self.panels is None:
+            return np.asarray(values.max(axis=0))
+        return greatest_value(self.panels, values[self.places])
 
     def at_angle(self, values: FloatArray, angle: float) -> FloatArray:
         """Return values of the stations, first axis, interpolated to an angle [rad]."""

@@ -276,7 +276,8 @@ def joined_states(states: Sequence[WearState]) -> WearState:
     first = states[0]
     if len(states) == 1:
         return first
-    arrays = ((name, [getattr(state, name) for state in states]) for name in _AXES)
+    present = [name for name in _AXES if getattr(first, name) is not None]
+    arrays = {name: [getattr(state, name) for state in states] for name in present}
     contacts = [state.contacts for state in states]
     rows = len(first.contacts) // len(first.passes)
     # the coarse-step solution of a test begins as the test itself
@@ -285,7 +286,7 @@ def joined_states(states: Sequence[WearState]) -> WearState:
     return first.replaced(
         contacts=contacts[0].joined_with(*contacts[1:], rows=rows),
         coarse_step_solution=joined_states(coarse) if has_coarse else None,
-        **{n: np.concatenate(a, axis=_AXES[n]) for n, a in arrays if a[0] is not None},
+        **{n: np.concatenate(a, axis=_AXES[n]) for n, a in arrays.items()},
     )
 
 

@@ -34,7 +34,8 @@ LOOSEST = 0.1  # greatest tolerance of a coarse test
 COVER, FRESH_COVER = np.array([[0.5], [0.6], [0.5]]), np.array([[1.25], [1.9], [1.5]])
 STEPS = 0.15  # part of the error estimate of the coarse steps that is subtracted from it
 LEAST = 0.1  # estimate over the difference, at least
-OF_PROFILE = 0.1  # estimate of depth and volume over that of the profile, both relative, at least
+# estimates of depth and volume over that of the profile, all relative, at least
+OF_PROFILE = np.array([0.2, 0.1])
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
 COARSE_TOLERANCE = 1e-5  # of the iterations of a step
 
@@ -218,8 +219,9 @@ def strip_errors(
     fresh = coarse.approach / (coarse.approach + 3.0 * deepest) if coarse.approach > 0.0 else 0.0
     cover = COVER + (FRESH_COVER - COVER) * fresh
     found = np.maximum(LEAST * differences, cover * (differences - STEPS * np.array(by_steps)))
-    # the differences of depth and volume may be small by chance
-    found[:2] = np.maximum(found[:2], OF_PROFILE * found[2] * np.array([deepest, sizes[2]]))
+    # the differences of depth and volume may be small by chance, that of one strip more often
+    least = OF_PROFILE[:, None] * np.array([deepest, sizes[2]])
+    found[:2] = np.maximum(found[:2], least * found[2])
     return np.asarray(found)
 
 

@@ -220,7 +220,9 @@ def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearStat
         name: averaged(getattr(contacts, name), old, new)
         for name in ("line_load", "half_length", "dissipation")
     }
-    contacts = replace(contacts, y=new.y, separation=None, **columns)
+    if contacts.separation is not None:  # not known until the contacts are solved
+        columns["separation"] = np.full_like(columns["line_load"], np.nan)
+    contacts = replace(contacts, y=new.y, **columns)
     state = state.replaced(**arrays, contacts=contacts, **_auxiliary(problem, state, old))
     if abs(new.spacing / old.spacing - 1.0) < _ALIGNED:
         return state  # the added strips are without load
@@ -236,12 +238,14 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
     """
     new, gap = problem.grid, problem.nominal_gap
     assert state.separation is not None
+    assert state.part is not None
     assert state.past_sums is not None
     arrays = {
         name: averaged(getattr(state, name), old, new)
         for name in ("separation", "part", "whole_steps")
     }
     past = averaged(np.asarray(state.past_wear), old, new)
+    cut = ~np.isnan(state.part[0, 0, :, :1])  # tests that resolve edges
     inside = np.flatnonzero(shares(old, new).sum(axis=1) > 0.0)
     for added, edge in (
         (slice(0, inside[0]), inside[0]),
@@ -249,7 +253,7 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
     ):
         beyond = gap[..., added] - gap[..., edge : edge + 1]
         arrays["separation"][..., added] = arrays["separation"][..., edge : edge + 1] + beyond
-        past[1:, ..., added] = past[1:, ..., edge : edge + 1]
+        past[1:, ..., added] = np.where(cut, past[1:, ..., edge : edge + 1], past[1:, ..., added])
     # strips partly in contact are not joined with others whole
     arrays["whole_steps"] = np.where(arrays["part"] < 1.0, 0.0, np.floor(arrays["whole_steps"]))
     ratio = old.spacing / new.spacing

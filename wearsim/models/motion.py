@@ -18,7 +18,7 @@ from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import MotionLaw, MotionLawSpec, Options
 from wearsim.quantities import InputFile, Quantity
 from wearsim.types import FloatArray, IntArray
-from wearsim.units import ANGLE, conversion, shown
+from wearsim.units import ANGLE, as_written, conversion
 
 #: start of a piece, amplitude, angular frequency and phase there of a piece of an acceleration
 Piece = tuple[float, float, float, float]
@@ -206,7 +206,7 @@ def _derivative(value: str | float, order: int, unit: str) -> float:
         value = str(value)
     number, _, own = value.strip().partition(" ")
     expected = f'a derivative such as "5 {"mm" if unit == "m" else "deg"}{target[len(unit) :]}"'
-    factor = conversion(own, target, shown(value), expected)
+    factor = conversion(own, target, as_written(value), expected)
     return float(number) * float(factor)
 
 

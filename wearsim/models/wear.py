@@ -16,7 +16,7 @@ from wearsim.quantities import (
     Quantity,
 )
 from wearsim.types import ContactSolution, FloatArray
-from wearsim.units import WEAR_FACTOR, Kind, QuantityError, shown
+from wearsim.units import WEAR_FACTOR, Kind, QuantityError, as_written
 
 SPECIFIC = Quantity(Kind("a specific wear rate", "m^3/(N m)", "1e-5 mm^3/(N m)"), "not negative")
 _OF_A_TEST = "specific_wear_rate", "measured_friction"
@@ -60,7 +60,7 @@ class BodyWear(Options):
         known = isinstance(friction, int | float) and not isinstance(friction, bool)
         if not (known and 0.0 < friction < np.inf):
             what = "measured_friction is not a coefficient of friction"
-            raise QuantityError(what, shown(friction), "a number above 0")
+            raise QuantityError(what, as_written(friction), "a number above 0")
         others = {key: value for key, value in raw.items() if key not in given}
         return {**others, "k_over_h": f"{rate / friction!r} 1/Pa"}
 

@@ -10,6 +10,17 @@ from wearsim.contact_batch import ContactBatch, ContactBatchSolution, SharedWear
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray, OperatingPoint
 
+_STEPPERS = ", or evolution.stepper = 'stabilised' or 'per-pass'"
+# what a capability is required for, and other remedies than another model
+_QUANTITIES = {
+    "wear_compliance": ("wear compliance", _STEPPERS),
+    "coupled": ("contacts that wear common bodies", _STEPPERS),
+    "creepage_variation": ("creepage that varies from strip to strip", ""),
+    "bearing_torque": ("bearing torque", ""),
+    "local_friction": ("friction that varies from strip to strip", ""),
+    "friction_field": ("friction that varies from point to point", ", such as 'hertz-fastsim'"),
+}
+
 
 @dataclass(frozen=True)
 class Capabilities:
@@ -390,15 +401,3 @@ def refuse_unclaimed(
                 f"{type(model).__name__} does not support {what}, since its capabilities do not"
                 f" include {name}; choose a contact.model that does{also}"
             )
-
-
-_STEPPERS = ", or evolution.stepper = 'stabilised' or 'per-pass'"
-# what a capability is required for, and other remedies than another model
-_QUANTITIES = {
-    "wear_compliance": ("wear compliance", _STEPPERS),
-    "coupled": ("contacts that wear common bodies", _STEPPERS),
-    "creepage_variation": ("creepage that varies from strip to strip", ""),
-    "bearing_torque": ("bearing torque", ""),
-    "local_friction": ("friction that varies from strip to strip", ""),
-    "friction_field": ("friction that varies from point to point", ", such as 'hertz-fastsim'"),
-}

@@ -27,6 +27,18 @@ PROJECT = "wearsim"
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
+S = TypeVar("S", bound=Spec)
+MIGRATION = "docs/plugins.md, section 'Migration to protocol 2'"
+_HOOKS: dict[type[Spec], str] = {
+    ContactModelSpec: "wearsim_contact_models",
+    WearLawSpec: "wearsim_wear_laws",
+    LoadSpec: "wearsim_loads",
+    RandomInputSpec: "wearsim_random_inputs",
+    MotionLawSpec: "wearsim_motion_laws",
+    StudyKind: "wearsim_study_kinds",
+}
+#: modules of wearsim that implement hooks; they need no entry point
+_BUILT_IN = {"builtin": "wearsim.models", "studies": "wearsim.studies.kinds"}
 
 
 class HookSpecs:
@@ -271,22 +283,6 @@ class HookSpecs:
                     protocol=2,
                 )
         """
-
-
-S = TypeVar("S", bound=Spec)
-
-MIGRATION = "docs/plugins.md, section 'Migration to protocol 2'"
-
-_HOOKS: dict[type[Spec], str] = {
-    ContactModelSpec: "wearsim_contact_models",
-    WearLawSpec: "wearsim_wear_laws",
-    LoadSpec: "wearsim_loads",
-    RandomInputSpec: "wearsim_random_inputs",
-    MotionLawSpec: "wearsim_motion_laws",
-    StudyKind: "wearsim_study_kinds",
-}
-#: modules of wearsim that implement hooks; they need no entry point
-_BUILT_IN = {"builtin": "wearsim.models", "studies": "wearsim.studies.kinds"}
 
 
 @dataclass(frozen=True)

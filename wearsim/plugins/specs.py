@@ -22,6 +22,7 @@ BODIES: tuple[Body, ...] = ("cylinder", "roller")
 
 _NO_TIMES: FloatArray = np.zeros((0, 2))
 _NO_TIMES.flags.writeable = False
+PROTOCOL = 2  # version of the plugin interface; docs/plugins.md describes the changes
 
 
 class WearLaw(ABC):
@@ -232,9 +233,6 @@ class Process(ABC):
 
 Materials: TypeAlias = tuple[Material, Material]
 SuggestGrid: TypeAlias = Callable[[Any, float, float, float, Materials], Grid | None]
-
-
-PROTOCOL = 2  # version of the plugin interface; docs/plugins.md describes the changes
 
 
 class Options(BaseModel):

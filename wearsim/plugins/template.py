@@ -50,9 +50,9 @@ def clash(name: str) -> str | None:
     name : str
         Name of the contact model, lower-case words joined by hyphens.
     """
-    own = set().union(*(_identifiers(path) for path in _files() if path.suffix == ".py"))
-    new = {item: renamed(item, name) for item in own if _WORD.search(item)}
-    taken = {*(own - set(new)), *kwlist}
+    identifiers = set().union(*(_identifiers(path) for path in _files() if path.suffix == ".py"))
+    new = {item: renamed(item, name) for item in identifiers if _WORD.search(item)}
+    taken = {*(identifiers - set(new)), *kwlist}
     return next((item for item in sorted(new.values()) if item in taken), None)
 
 

@@ -64,6 +64,9 @@ _SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
     "pdf.fonttype": 42,
 }
+_BELOW: dict[str, Any] = {
+    "loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "columnspacing": 1.2,
+}  # fmt: skip
 
 
 @contextmanager
@@ -74,7 +77,7 @@ def figure_style() -> Iterator[None]:
 
 
 class _Figure(Figure):
-    """Figure that notebooks show; those of pyplot are shown without this."""
+    """Figure that notebooks show; figures of pyplot are shown without this."""
 
     def _repr_png_(self) -> bytes:
         return png_of(self, DPI)
@@ -156,26 +159,23 @@ def draw(axes: Axes, panel: Panel) -> None:
     if panel.message:
         write_message(axes, panel.title, [panel.message])
         return
-    axes.set(xlabel=_label(panel.x), ylabel=_label(panel.y))
     for along, axis in (("x", panel.x), ("y", panel.y)):
-        if axis.log:
-            axes.set(**{f"{along}scale": "log"})
-    second = None if panel.right is None else _second(axes, panel.right)
+        scale: Any = {f"{along}scale": "log"} if axis.log else {}
+        axes.set(**{f"{along}label": _label(axis)}, **scale)
+    sides = {False: (axes, panel.y)}
+    if panel.right is not None:
+        sides[True] = _second(axes, panel.right), panel.right
     for mark in panel.marks:
-        y = panel.right if mark.right and panel.right else panel.y
-        _draw(second if mark.right and second else axes, mark, panel.x, y)
+        drawn_on, y = sides[mark.right]
+        _draw(drawn_on, mark, panel.x, y)
     if panel.equal:
         axes.set_aspect("equal")
         axes.set_anchor("N")
     _set_axis(axes, "x", panel.x)
-    _set_axis(axes, "y", panel.y)
-    if second is not None and panel.right is not None:
-        _set_axis(second, "y", panel.right)
+    for drawn_on, y in sides.values():
+        _set_axis(drawn_on, "y", y)
     if panel.legend and axes.get_legend_handles_labels()[0]:
-        below = panel.legend == "below"
-        place: dict[str, Any] = {"loc": panel.legend}
-        if below:
-            place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.12), "columnspacing": 1.2}
+        place = _BELOW if panel.legend == "below" else {"loc": panel.legend}
         axes.legend(**place, ncols=panel.columns)
 
 

@@ -88,17 +88,17 @@ def as_frame(
     numbers : iterable of int
         Number of each row.
     """
-    found: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     for name, unit, values in columns:
         parts = {name: values}
         if values.ndim > 1:
             parts = {f"{name}.{number}": part for number, part in enumerate(values.T, 1)}
-        found |= parts
+        arrays |= parts
         units |= dict.fromkeys(parts, unit)
     library = _library("pandas")
     frame: pandas.DataFrame = library.DataFrame(
-        found, index=library.Index(list(numbers), name=axis)
+        arrays, index=library.Index(list(numbers), name=axis)
     )
     frame.attrs["units"] = units
     return frame

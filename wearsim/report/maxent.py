@@ -46,48 +46,48 @@ class MaxentView(View):
 
     def rows(self) -> Rows:
         """Return family, support, multipliers, moments and quantiles."""
-        found, parent = self.distribution, "none"
+        distribution, parent = self.distribution, "none"
         if self.parent:
             parent = f"mean {self.parent[0]:.7g}, standard deviation {self.parent[1]:.7g}"
         return [
-            Row("family", found.family),
-            Row("support", " to ".join(f"{end:g}" for end in found.support)),
-            Row("density", f"exp(-l0 - l1 x - l2 {found.third})"),
+            Row("family", distribution.family),
+            Row("support", " to ".join(f"{end:g}" for end in distribution.support)),
+            Row("density", f"exp(-l0 - l1 x - l2 {distribution.third})"),
             *(Row(f"l{number}", f"{item:.7g}") for number, item in enumerate(self.multipliers)),
             Row("parent normal distribution", parent),
             Row("mean", f"{self.mean:.7g}"),
-            Row("standard deviation", f"{found.std:.7g}"),
+            Row("standard deviation", f"{distribution.std:.7g}"),
             *(Row(f"{100.0 * p:g} % quantile", f"{x:.7g}") for p, x in self.quantiles.items()),
         ]
 
     def data(self) -> dict[str, Any]:
         """Return the distribution in the units of the given moments."""
-        found, parent = self.distribution, self.parent
+        distribution, parent = self.distribution, self.parent
         return {
-            "family": found.family,
-            "support": found.support,
+            "family": distribution.family,
+            "support": distribution.support,
             "multipliers": dict(zip(("l0", "l1", "l2"), self.multipliers, strict=True)),
-            "l2_multiplies": found.third,
+            "l2_multiplies": distribution.third,
             "parent": parent and {"mean": parent[0], "std": parent[1]},
             "mean": self.mean,
-            "std": found.std,
+            "std": distribution.std,
             "quantiles": self.quantiles,
-            "warnings": list(found.warnings),
+            "warnings": list(distribution.warnings),
         }
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the density with its central 95 %, mean, and the parent if it differs."""
-        found = self.distribution
-        low, high = found.bulk
+        distribution = self.distribution
+        low, high = distribution.bulk
         # the ends are left out, where a density may be infinite
         x = low + (high - low) * (np.arange(_POINTS) + 0.5) / _POINTS
-        density = found.density(x)
+        density = distribution.density(x)
         first, last = (self.quantiles[p] for p in (0.025, 0.975))
         inside = (x >= first) & (x <= last)
         label = f"95 %: {first:.4g} to {last:.4g}"
         marks: list[Mark] = [
             Band(x[inside], np.zeros(inside.sum()), density[inside], label=label, alpha=0.15),
-            Line(x, density, label=found.family),
+            Line(x, density, label=distribution.family),
         ]
         if self.parent:
             mean, std = self.parent
@@ -95,10 +95,10 @@ class MaxentView(View):
             if np.abs(normal - density).max() > 1e-3 * density.max():
                 text = f"parent: mean {mean:.4g}, std {std:.4g}"
                 marks.append(Line(x, normal, dash="--", width=1.0, colour=GREY, label=text))
-        marks.append(Span(found.mean, colour=ORANGE, label=f"mean {self.mean:.4g}"))
+        marks.append(Span(distribution.mean, colour=ORANGE, label=f"mean {self.mean:.4g}"))
         terms = ", ".join(f"$\\lambda_{k}$ = {item:.5g}" for k, item in enumerate(self.multipliers))
         panel = Panel(
-            f"Maximum entropy: {found.family}\n{terms}",
+            f"Maximum entropy: {distribution.family}\n{terms}",
             Axis("value", limits=(low, high)),
             Axis("probability density", limits=(0.0, 1.08 * float(density.max()))),
             marks,

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
-from wearsim.levelling import ComputedProfile, Measured, residuals, rms
+from wearsim.errors import ScenarioError
+from wearsim.levelling import ComputedProfile, Measured, levelled, residuals, rms
 from wearsim.report.text import count, shown
+
+_MISALIGNED = 0.5  # ratio of residuals below which levelling is suggested
+
+
+def level_hint(measured: Measured, computed: ComputedProfile) -> str:
+    """Return the residual that levelling would leave if it were far smaller, or an empty text."""
+    with suppress(ScenarioError):  # cannot be levelled
+        left = rms(levelled(measured, computed), computed)
+        if left < _MISALIGNED * rms(measured, computed):
+            return f"; rms {shown(left, 'um', 3)} with --level"
+    return ""
 
 
 def residual_text(measured: Measured, computed: ComputedProfile) -> str:

@@ -23,6 +23,15 @@ COLOURS = (BLUE, ORANGE, GREEN, RED)
 DASHES = ("-", "--", ":", "-.")
 MARKS = ("o", "s", "^", "D", "v")
 RECORDS, PRESSURE = "viridis", "magma"  # colour maps
+_CLASSES = (5, 60)
+HEADROOM = 0.3  # above a histogram, for the legend
+_SCALED_FROM = 10  # realisations from which an estimate sets the scale of the panel,
+_SCALED_PART = 1 / 30  # or this part of all realisations
+_LINEAR_UP_TO = 20  # realisations
+_VIRIDIS = (
+    "#440154", "#482475", "#414487", "#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70",
+    "#7ad151", "#bddf26",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,7 +122,7 @@ class Line(Mark):
 
 @dataclass(frozen=True)
 class Records(Mark):
-    """A curve for each record: all of them in a figure, that of the slider on a page.
+    """A curve for each record: all of them in a figure, the slider's on a page.
 
     Parameters
     ----------
@@ -398,10 +407,6 @@ def pass_axis(greatest: float) -> Axis:
     return Axis(name, per_si=1.0 / size)
 
 
-_CLASSES = (5, 60)
-HEADROOM = 0.3  # above a histogram, for the legend
-
-
 def histogram(values: FloatArray, classes: int | None = None) -> tuple[Bars, FloatArray]:
     """Return the density of values as bars, and the edges of the classes; by Rice's rule."""
     if classes is None:
@@ -411,11 +416,6 @@ def histogram(values: FloatArray, classes: int | None = None) -> tuple[Bars, Flo
     more = {"realisations": (number, "1")}
     bars = Bars(edges[:-1], edges[1:], density, label="realisations", alpha=0.45, more=more)
     return bars, edges
-
-
-_SCALED_FROM = 10  # realisations from which an estimate sets the scale of the panel,
-_SCALED_PART = 1 / 30  # or this part of all realisations
-_LINEAR_UP_TO = 20  # realisations
 
 
 def convergence(
@@ -462,12 +462,6 @@ def convergence(
     x = Axis("realisations", log=is_log, limits=ends, ticks=whole)
     caption = f"The estimate from the first realisations, up to {count(last)} of them."
     return Panel(title, x, Axis(name, unit, limits=limits), [*drawn, *marks], caption)
-
-
-_VIRIDIS = (
-    "#440154", "#482475", "#414487", "#355f8d", "#2a788e", "#21918c", "#22a884", "#44bf70",
-    "#7ad151", "#bddf26",
-)  # fmt: skip
 
 
 def several_colours(number: int) -> list[str]:

@@ -35,6 +35,16 @@ PER_SI = {
     "rpm": 30.0 / math.pi,
 }
 NOTHING = "-"
+#: SI units in names of JSON by the unit shown
+_SI = {"um": "m", "mm": "m", "mm^3": "m3", "MPa": "Pa", "deg": "rad", "J": "J", "W": "W", "N": "N"}
+TOO_FEW = "too few"
+TOO_FEW_REALISATIONS = "too few realisations"
+NINETY_PERCENT = (0.05, 0.95)
+_HALF_WIDTH_DIGITS = 2  # significant digits of the half-width, which set the decimals
+_MIN_DIGITS, _MAX_DIGITS = 3, 8  # significant digits of an estimate
+_WITHOUT_EXPONENT = (1e-4, 1e7)
+_ONE = 1.0 - 1e-9  # with a margin for rounding: 1 - 0.95 is slightly more than 0.05
+ROUNDING = 1e-9  # relative error that is not printed
 
 
 def shown(value: float | None, unit: str, digits: int = 4) -> str:
@@ -149,7 +159,7 @@ class Named(NamedTuple):
         return PER_SI[self.unit]
 
 
-#: observables of an ensemble by name; the last four are those of cams
+#: observables of an ensemble by name; the last four are of cams
 OBSERVABLES: Mapping[str, Named] = {
     "depth": Named("depth", "um"),
     "width": Named("width", "mm"),
@@ -166,10 +176,6 @@ OBSERVABLES: Mapping[str, Named] = {
     "depth_angle": Named("angle of the depth", "deg"),
     "peak_pressure_angle": Named("angle of the peak pressure", "deg"),
 }
-
-
-#: SI units in names of JSON by the unit shown
-_SI = {"um": "m", "mm": "m", "mm^3": "m3", "MPa": "Pa", "deg": "rad", "J": "J", "W": "W", "N": "N"}
 
 
 def si_unit(name: str) -> str:
@@ -192,21 +198,12 @@ def statistic_in_words(target: Target) -> str:
     return f"{statistic} of {OBSERVABLES[target.observable].words}"
 
 
-TOO_FEW = "too few"
-TOO_FEW_REALISATIONS = "too few realisations"
-NINETY_PERCENT = (0.05, 0.95)
-_HALF_WIDTH_DIGITS = 2  # significant digits of the half-width, which set the decimals
-_MIN_DIGITS, _MAX_DIGITS = 3, 8  # significant digits of an estimate
-_WITHOUT_EXPONENT = (1e-4, 1e7)
-_ONE = 1.0 - 1e-9  # with a margin for rounding: 1 - 0.95 is slightly more than 0.05
-
-
-def cells(found: Interval, unit: str) -> tuple[str, str]:
+def cells(estimate: Interval, unit: str) -> tuple[str, str]:
     """Return an estimate and its interval without the unit, for a table.
 
     Parameters
     ----------
-    found : Interval
+    estimate : Interval
         In SI units.
     unit : str
         A key of `PER_SI`.
@@ -216,43 +213,47 @@ def cells(found: Interval, unit: str) -> tuple[str, str]:
     estimate, interval : str
         The interval is empty if it has no width.
     """
-    value, low, high = _numbers(found, unit)
+    value, low, high = _numbers(estimate, unit)
     return value, f"{low}..{high}" if high else low
 
 
-def with_interval(found: Interval, unit: str) -> str:
+def with_interval(estimate: Interval, unit: str) -> str:
     """Return "22.10 um [21.90, 22.31]"; parameters as of `cells`."""
-    value, low, high = _numbers(found, unit)
+    value, low, high = _numbers(estimate, unit)
     named = value if unit == "1" or value == NOTHING else f"{value} {unit}"
     return named + (f" [{low}, {high}]" if high else low and f" ({low} for an interval)")
 
 
-def _numbers(found: Interval, unit: str) -> tuple[str, str, str]:
+def _numbers(estimate: Interval, unit: str) -> tuple[str, str, str]:
     """Return an estimate and the ends of its interval, or a remark instead of the ends."""
-    if not math.isfinite(found.value):
+    if not math.isfinite(estimate.value):
         return NOTHING, TOO_FEW, ""
-    if found.low == found.high:
-        return in_unit(found.value, unit), "", ""
-    if not math.isfinite(found.half_width):
-        return in_unit(found.value, unit), TOO_FEW, ""
-    value, low, high = (end * PER_SI[unit] for end in (found.value, found.low, found.high))
+    if estimate.low == estimate.high:
+        return in_unit(estimate.value, unit), "", ""
+    if not math.isfinite(estimate.half_width):
+        return in_unit(estimate.value, unit), TOO_FEW, ""
+    value, low, high = (end * PER_SI[unit] for end in (estimate.value, estimate.low, estimate.high))
     sizes = [abs(end) for end in (value, low, high) if end]
     if min(sizes) < _WITHOUT_EXPONENT[0] or max(sizes) >= _WITHOUT_EXPONENT[1]:
-        return in_unit(found.value, unit), in_unit(found.low, unit), in_unit(found.high, unit)
+        return (
+            in_unit(estimate.value, unit),
+            in_unit(estimate.low, unit),
+            in_unit(estimate.high, unit),
+        )
     place = math.floor(math.log10(abs(value))) if value else 0
     decimals = _HALF_WIDTH_DIGITS - 1 - math.floor(math.log10(0.5 * (high - low)))
     decimals = max(min(max(decimals, _MIN_DIGITS - 1 - place), _MAX_DIGITS - 1 - place), 0)
     return f"{value:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"
 
 
-def part_with_interval(found: Interval) -> str:
+def part_with_interval(part: Interval) -> str:
     """Return a fraction in per cent, "57.1 % [54.0, 60.2]"."""
-    if not math.isfinite(found.value):
+    if not math.isfinite(part.value):
         return NOTHING
-    value, low, high = (f"{100.0 * end:.1f}" for end in (found.value, found.low, found.high))
-    if found.low == found.high:
+    value, low, high = (f"{100.0 * end:.1f}" for end in (part.value, part.low, part.high))
+    if part.low == part.high:
         return f"{value} %"
-    return f"{value} % " + (f"[{low}, {high}]" if math.isfinite(found.half_width) else TOO_FEW)
+    return f"{value} % " + (f"[{low}, {high}]" if math.isfinite(part.half_width) else TOO_FEW)
 
 
 def too_few(sufficient: int) -> str:
@@ -278,7 +279,7 @@ def with_range(value: float, ends: Sequence[float], scale: float) -> str:
     """Return a value with its 95 % interval, with the digits that the interval leaves."""
     low, high = ends
     digits = 3 if (high - low) > 0.02 * value else 4
-    texts = (in_unit(scale * one, "1", digits) for one in (value, low, high))
+    texts = (in_unit(scale * end, "1", digits) for end in (value, low, high))
     return "{} ({} to {})".format(*texts)
 
 
@@ -314,9 +315,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-ROUNDING = 1e-9  # relative error that is not printed
 
 
 def by_roller(values: Any, unit: str) -> str:

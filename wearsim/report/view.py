@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from wearsim.report.panels import Panel, Sheet
     from wearsim.report.surfaces import Sampling, Surface
 
+STUDY = "Study"  # title of the table on the computation, which stands first
+ORIGIN = "Origin"  # title of the table on scenario, files and software
+_FIRST = 9  # answers that a page shows first, by default
+
 
 class Row(NamedTuple):
     """A quantity with its label.
@@ -79,11 +83,6 @@ class Table(NamedTuple):
     title: str
     rows: Sequence[Any]
     heads: Sequence[str] = ()
-
-
-_FIRST = 9  # answers that a page shows first, by default
-STUDY = "Study"  # title of the table on the computation, which stands first
-ORIGIN = "Origin"  # title of the table on scenario, files and software
 
 
 class Column(NamedTuple):

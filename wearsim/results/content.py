@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 
 
 Kind: TypeAlias = Literal["static", "history", "record", "statistic"]
+#: Groups of a results file.
+CHECKPOINT, INPUTS = "checkpoint", "inputs"
+#: Texts in the group of the inputs: the attributes, the scenario and its files.
+ABOUT, SCENARIO, FILES = "about", "scenario", "files"
+ERRORS = "surrogatepass"  # so that every Python string can be stored
 
 
 @dataclass(frozen=True)
@@ -160,12 +165,6 @@ def axis_lengths(arrays: Arrays, table: Mapping[str, Variable]) -> dict[str, int
 
 Array: TypeAlias = npt.NDArray[Any]
 Arrays: TypeAlias = dict[str, Array]
-
-#: Groups of a results file.
-CHECKPOINT, INPUTS = "checkpoint", "inputs"
-#: Texts in the group of the inputs: the attributes, the scenario and its files.
-ABOUT, SCENARIO, FILES = "about", "scenario", "files"
-ERRORS = "surrogatepass"  # so that every Python string can be stored
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -376,5 +375,5 @@ class Stored:
     def __get__(self, result: Any, owner: type) -> Array:
         if result is None:
             return self  # type: ignore[return-value]  # for `help`
-        found: Array = result.values(self._name)
-        return found
+        values: Array = result.values(self._name)
+        return values

@@ -62,8 +62,8 @@ def _about(file: Any) -> dict[str, Any]:
     """Return the fields of a file, none if it is foreign."""
     place = f"{INPUTS}/{ABOUT}"
     # earlier layouts hold a scalar there
-    found = json.loads(read_text(file[place])) if place in file and file[place].shape else {}
-    return found if isinstance(found, dict) else {}
+    about = json.loads(read_text(file[place])) if place in file and file[place].shape else {}
+    return about if isinstance(about, dict) else {}
 
 
 def as_plugin(name: str) -> dict[str, str]:

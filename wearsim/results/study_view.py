@@ -173,9 +173,9 @@ def varying_inputs(result: StudyResult[Any], drawn: Mapping[str, Any] | None) ->
     return {item.name: item.describe() for item in chosen}
 
 
-def varying_rows(found: Mapping[str, str]) -> Rows:
+def varying_rows(varying: Mapping[str, str]) -> Rows:
     """Return rows on random inputs with a description each."""
-    return [Row(f"random {name}", text) for name, text in found.items()]
+    return [Row(f"random {name}", text) for name, text in varying.items()]
 
 
 def progress_text(done: int, failed: int, requested: int, finished: bool) -> str:

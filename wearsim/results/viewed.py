@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from wearsim.errors import PluginError
 from wearsim.plugins import StudyKind, registry
 from wearsim.report.frames import as_frame
 
@@ -19,10 +20,21 @@ def study_kinds() -> list[StudyKind]:
 
 
 def kind_of_result(result: Any) -> StudyKind:
-    """Return the kind of study of a result."""
-    references = [f"{item.__module__}:{item.__qualname__}" for item in type(result).__mro__]
+    """Return the kind of study of a result.
+
+    Raises
+    ------
+    PluginError
+        If no installed plugin registers it.
+    """
     kinds = {kind.result: kind for kind in study_kinds()}
-    return next(kinds[reference] for reference in references if reference in kinds)
+    for item in type(result).__mro__:
+        if kind := kinds.get(f"{item.__module__}:{item.__qualname__}"):
+            return kind
+    raise PluginError(
+        f"{type(result).__name__} of {type(result).__module__} is the result of no kind of study"
+        " that is installed; install its plugin again"
+    )
 
 
 class Viewed:

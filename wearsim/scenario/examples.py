@@ -92,15 +92,15 @@ def scenario_schema() -> dict[str, Any]:
     random = _random_inputs()
     tables: dict[str, Any] = {}
     for table, model in TABLES.items():
-        own = _fields(model, table, random)
+        keys = _fields(model, table, random)
         if table == "cam":
             motion, laws = model.model_fields["motion"], _motion_laws()
             described = Field(None, description=motion.description)
             kind: Any = tuple[laws, ...]  # type: ignore[valid-type]
-            own |= {"motion": (kind, described)} if laws else {}
-            own = own if laws else {key: kept for key, kept in own.items() if key != "motion"}
+            keys |= {"motion": (kind, described)} if laws else {}
+            keys = keys if laws else {key: kept for key, kept in keys.items() if key != "motion"}
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
-        kind = kind or _model(table, model.__doc__, own)
+        kind = kind or _model(table, model.__doc__, keys)
         needed = table in REQUIRED and table != "cylinder"  # a cam may replace it
         tables[table] = kind, Field(... if needed else None, description=model.__doc__)
     scenario = _model(
@@ -139,7 +139,7 @@ def _one_of(name: str, models: list[Model]) -> Model | None:
 
 def _random_inputs() -> RandomInputs:
     """Return the models of what may replace a number, the friction and several numbers."""
-    own, specs = RandomInputTable.model_fields, installed(RandomInputSpec)
+    table_fields, specs = RandomInputTable.model_fields, installed(RandomInputSpec)
 
     def models(role: str, keys: dict[str, Any], name: str = "{}") -> list[Model]:
         return [
@@ -147,7 +147,7 @@ def _random_inputs() -> RandomInputs:
                 name.format(spec.name),
                 spec.summary,
                 {
-                    "distribution": (Literal[spec.name], own["distribution"]),
+                    "distribution": (Literal[spec.name], table_fields["distribution"]),
                     **keys,
                     **_fields(spec.options),
                 },
@@ -157,8 +157,11 @@ def _random_inputs() -> RandomInputs:
         ]
 
     marginal = _one_of("MarginalDistribution", models("scalar", {}, "{} as marginal"))
-    drawn = {"persistence": (own["persistence"].annotation, own["persistence"])}
-    full = {**drawn, "marginal": (marginal, Field(description=own["marginal"].description))}
+    drawn = {"persistence": (table_fields["persistence"].annotation, table_fields["persistence"])}
+    full = {
+        **drawn,
+        "marginal": (marginal, Field(description=table_fields["marginal"].description)),
+    }
     processes = models("process", full) if marginal else []
     number = _one_of("RandomInput", models("scalar", drawn) + processes)
     friction = _one_of("RandomFriction", [number, *models("field", full)] if number else [])

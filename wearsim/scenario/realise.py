@@ -30,7 +30,7 @@ def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
     Returns
     -------
     Scenario
-        Text, files and digest are those of the scenario given.
+        Text, files and digest belong to the scenario given.
 
     Raises
     ------

@@ -239,8 +239,8 @@ class Scenario:
     @property
     def paths(self) -> tuple[Path, ...]:
         """Paths of the scenario's file and of the files it names, relative to its folder."""
-        own = Path(self.file)
-        return (own, *(own.parent / split_name(name)[0] for name in self.files))
+        file = Path(self.file)
+        return (file, *(file.parent / split_name(name)[0] for name in self.files))
 
     @property
     def sha256(self) -> str:

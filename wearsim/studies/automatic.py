@@ -55,7 +55,7 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     """Return a scenario with the contact model that `contact.model = "auto"` takes.
 
     The cheapest installed model is taken whose estimated error of P_l(y) is at most
-    `contact.tolerance` in every contact that is looked at: that of the first roller at the start of
+    `contact.tolerance` in every contact that is looked at: of the first roller at the start of
     the load; in a test all contacts at the start, after a tenth of the passes and at the end, with
     random inputs at their means, as stepped by `slender`. Models that cost less than `CHEAP` count
     as equally cheap, and the one with the least estimated error is taken. If none suffices, it is
@@ -85,7 +85,11 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
         raise _refusal(scenario, f"{field} is a field, and no error is calibrated for it")
     states, where = _looked_at(scenario, test)
     reason = _coupling(scenario) or _not_calibrated(table, states)
-    every = [] if reason else [table.scaled(each) for state in states for each in state.indicators]
+    every = (
+        []
+        if reason
+        else [table.scaled(indicators) for state in states for indicators in state.indicators]
+    )
     known = [
         (max((model.error(scaled) for scaled in every), default=np.inf), model)
         for model in table.models
@@ -115,14 +119,16 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
             reason += f"; the exact theory, '{REFERENCE}', is not possible: {why}"
         raise _refusal(scenario, reason, *remedies, *(["raise the tolerance"] if every else []))
     error, model = finest[0]
-    own = "cannot be estimated" if error == np.inf else f"is estimated as {100.0 * error:.2g} %"
+    error_text = (
+        "cannot be estimated" if error == np.inf else f"is estimated as {100.0 * error:.2g} %"
+    )
     why = f"no estimated error of P_l(y) is within {accepted} {where} ({reason})"
     return _with(
         scenario,
         _choice(scenario, model.model, model.options),
         model,
         f"exact theory on its finest elements, since {why}",
-        f"contact model: the error of P_l(y) by '{model.label}' {own}, tolerance {accepted}",
+        f"contact model: the error of P_l(y) by '{model.label}' {error_text}, tolerance {accepted}",
     )
 
 
@@ -136,11 +142,11 @@ def _refusal(scenario: Scenario, reason: str, *remedies: str) -> CapabilityError
 
 
 def _choice(scenario: Scenario, model: str, options: dict[str, object]) -> ContactChoice:
-    """Return a model instead of that of a scenario, or `auto` if it is not installed."""
+    """Return a model instead of the scenario's, or `auto` if it is not installed."""
     if model not in registry().names(ContactModelSpec):
         return scenario.contact
-    found = registry().get(ContactModelSpec, model).options.model_validate(options)
-    return replace(scenario.contact, model=model, options=found)
+    chosen_options = registry().get(ContactModelSpec, model).options.model_validate(options)
+    return replace(scenario.contact, model=model, options=chosen_options)
 
 
 def _with(
@@ -202,8 +208,8 @@ def _not_calibrated(table: Calibration, states: list[_State]) -> str:
             return "creepage.differential_slip = true is not calibrated"
         if batch.friction.ndim > 1:
             return "friction that varies across the track is not calibrated"
-        for each in state.indicators:
-            if outside := table.outside(each):
+        for indicators in state.indicators:
+            if outside := table.outside(indicators):
                 return f"outside the calibrated contacts: {outside}"
     return ""
 
@@ -261,7 +267,7 @@ def _state(scout: Scenario, grid: Grid, batch: ContactBatch) -> _State:
         except WearsimError:
             continue
         loaded = batch.normal_force > _LEAST_LOAD * batch.normal_force.max()
-        found = [
+        patches = [
             indicators_of(
                 solutions[k],
                 float(batch.longitudinal_curvature[k]),
@@ -270,5 +276,5 @@ def _state(scout: Scenario, grid: Grid, batch: ContactBatch) -> _State:
             )
             for k in np.flatnonzero(loaded).tolist()
         ]
-        return _State(grid, batch, found)
+        return _State(grid, batch, patches)
     return _State(grid, batch, [])

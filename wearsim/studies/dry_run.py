@@ -42,7 +42,7 @@ def dry_run(scenario: Scenario) -> Data:
     ScenarioError, CapabilityError
         If it cannot run.
     SolverError
-        If its first contact, or that of the predicted groove, has no solution.
+        If its first contact, or the contact of the predicted groove, has no solution.
 
     Examples
     --------

@@ -10,33 +10,24 @@ from wearsim.studies.dry_run import Data
 from wearsim.units import in_engineers_unit
 
 TableRows = list[tuple[str, str]]
+_RADII = ("radius_m", "crown_radius_m", "width_m", "edge_radius_m", "chamfer_m")
+_UNITS = {"_m": ("mm", 1e-3), "_Pa": ("GPa", 1e9), "_rad": ("mrad", 1e-3)}  # by ends of keys
+_LIMIT_UNITS = {"volume": ("mm^3", 1e-9), "peak_pressure": ("MPa", 1e6), "width": ("mm", 1e-3)}
 
 
 def plan(data: Data) -> TableRows:
     """Return the description from `dry_run` as rows of name and value, in engineering units."""
     roller, patch = data["roller"], data["initial_patch"]
-    radii = f"radius {roller['radius_m'] * 1e3:.6g} mm"
-    radii += f", crown radius {roller['crown_radius_m'] * 1e3:.6g} mm"
-    if roller["width_m"] is not None:
-        radii += f", width {roller['width_m'] * 1e3:.6g} mm"
-    for key, name in (("edge_radius_m", "edge radius"), ("chamfer_m", "chamfer")):
-        if roller[key]:
-            radii += f", {name} {roller[key] * 1e3:.6g} mm"
-    if any(roller["offset_m"] or ()):
-        radii += ", offset " + " / ".join(f"{y * 1e3:.4g}" for y in roller["offset_m"]) + " mm"
-    moduli = (
-        f"contact modulus {data['contact_modulus_Pa'] / 1e9:.4g} GPa,"
-        f" shear modulus {data['shear_modulus_Pa'] / 1e9:.4g} GPa"
-    )
+    radii = [*_fields(roller, *_RADII, digits=6), *_fields(roller, "offset_m")]
     size = (
         f"{1e3 * patch['length_m']:.4g} x {1e3 * patch['width_m']:.4g} mm,"
         f" peak pressure {patch['peak_pressure_Pa'] / 1e6:.4g} MPa at {patch['load_N']:.4g} N"
     )
     return [
-        ("roller", radii),
+        ("roller", ", ".join(radii)),
         _body_row(data),
         *profile_rows(data["profile"]),
-        ("elasticity", moduli),
+        ("elasticity", ", ".join(_fields(data, "contact_modulus_Pa", "shear_modulus_Pa"))),
         ("rolling speed", _speed_text(data)),
         ("load", _load_text(data["load"])),
         *_log_rows(data["log"]),
@@ -50,14 +41,30 @@ def plan(data: Data) -> TableRows:
     ]
 
 
+def _fields(data: Data, *keys: str, digits: int = 4) -> list[str]:
+    """Return fields with the names and units that their keys state, "crown radius 400 mm".
+
+    Fields that are not given or zero are left out; of values per roller each is stated.
+    """
+    texts = []
+    for key in keys:
+        ending = key[key.rindex("_") :]
+        unit, size = _UNITS[ending]
+        values = np.ravel(data.get(key) or 0.0)
+        if values.any():
+            numbers = " / ".join(f"{value / size:.{digits}g}" for value in values)
+            texts.append(f"{key.removesuffix(ending).replace('_', ' ')} {numbers} {unit}")
+    return texts
+
+
 def _body_row(data: Data) -> tuple[str, str]:
     """Return the row of the cylinder or the cam."""
     cam = data["cam"]
     if cam is None:
-        return "cylinder", f"radius {data['cylinder']['radius_m'] * 1e3:.6g} mm"
+        return "cylinder", ", ".join(_fields(data["cylinder"], "radius_m", digits=6))
     kind = f"{cam['follower']} follower" + (" in a groove" if cam["groove"] else "")
-    count, radius = len(cam["stations"]["angle_rad"]), cam["base_radius_m"]
-    return "cam", f"base radius {radius * 1e3:.6g} mm, {kind}, {count} stations"
+    stations = f"{len(cam['stations']['angle_rad'])} stations"
+    return "cam", ", ".join([*_fields(cam, "base_radius_m", digits=6), kind, stations])
 
 
 def _speed_text(data: Data) -> str:
@@ -138,10 +145,7 @@ def _creepage_rows(creepage: Data) -> TableRows:
             words.append(f"bearing torque {torque * 1e3:.4g} N mm")
         if friction:
             words.append(f"bearing friction {friction:g}")
-    for name in ("yaw", "tilt"):
-        angles = creepage.get(f"{name}_rad", ())
-        if any(angles):
-            words.append(f"{name} " + " / ".join(f"{a * 1e3:.4g}" for a in angles) + " mrad")
+    words += _fields(creepage, "yaw_rad", "tilt_rad")
     words += ["differential slip"] if creepage["differential_slip"] else []
     return [("creepage", ", ".join(words))] if words else []
 
@@ -214,9 +218,6 @@ def _forecast_rows(forecast: Data) -> TableRows:
         f" {_rounded(forecast['file_bytes'] / 1e6)} MB (within a factor of 3)"
     )
     return [("forecast", wear), ("takes about", effort)]
-
-
-_LIMIT_UNITS = {"volume": ("mm^3", 1e-9), "peak_pressure": ("MPa", 1e6), "width": ("mm", 1e-3)}
 
 
 def _limit_rows(data: Data) -> TableRows:

@@ -30,15 +30,15 @@ LONG = 600.0  # s, a time of which it warns
 _STEPS, _STEPS_POWER = 20.0, 0.42  # at the default tolerance, of 1 + depth over elastic rise
 _TOLERANCE_POWER = -0.33
 _STAGES = 12.0  # solves of a stabilised step
-_STAGE = 0.35  # time of such a solve, over that of a groove
+_STAGE = 0.35  # time of such a solve, over a solve of a groove
 _STEP = 1.3  # time of an implicit step
 _EXPLICIT = 0.7  # time of an explicit step
 _WHOLE = 0.95  # of the width of a roller
 _CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
 _HALVINGS = 20  # for the passes at which a limit is reached
 _BISECTIONS = 5  # for the pass of a failure
-_OF_REFERENCE = 6.0  # time of a step by exact theory, over that of its unworn contacts
-_PASS = 0.06  # time of a pass in compiled code, over that of a solve
+_OF_REFERENCE = 6.0  # time of a step by exact theory, over a solve of its unworn contacts
+_PASS = 0.06  # time of a pass in compiled code, over a solve
 _STABLE = 0.03  # wear of the longest stable step, over the line load through pi E*
 _STEPS_OF_RESTART = 2.0  # of the stepper, where skids of a cam's roller have moved
 _SOLVES_OF_RESTART = 6.0
@@ -86,7 +86,7 @@ def forecast_data(
     Raises
     ------
     SolverError
-        If the contacts of the unworn bodies have no solution, or those of the predicted groove.
+        If the contacts of the unworn bodies or of the predicted groove have no solution.
     """
     scenario = draws.scenario
     passes = float(scenario.total_passes)
@@ -121,7 +121,7 @@ def _limits(
     scenario: Scenario, forecast: WearForecast, wear: Mapping[str, float]
 ) -> list[dict[str, Any]]:
     """Return the limits of [limit] with the values at the end, and when they are reached."""
-    total, found = float(scenario.total_passes), []
+    total, limits = float(scenario.total_passes), []
     for key, value in scenario.limit.given.items():
         reached = None
         if forecast.at(1.0)[key] >= value:
@@ -134,8 +134,8 @@ def _limits(
                 low, high = (low, middle) if worn else (middle, high)
             reached = high * total
         item = {"quantity": key, "unit": Limit(key.replace("_", " "), value, key).unit}
-        found.append({**item, "limit": value, "at_end": wear[key], "reached_at_passes": reached})
-    return found
+        limits.append({**item, "limit": value, "at_end": wear[key], "reached_at_passes": reached})
+    return limits
 
 
 def _check_strips(forecast: WearForecast, passes: float) -> None:
@@ -238,9 +238,9 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     restarts = restarts_of(problem, wear["clearance"])
     steps = max(min(steps + _STEPS_OF_RESTART * restarts, passes), 1.0)
     groove, solve = forecast.seconds_of_groove, forecast.seconds
-    each = _STAGES if stepper == "stabilised" else 1.0
+    stages = _STAGES if stepper == "stabilised" else 1.0
     if stepper == "stabilised":
-        per_step = each * max(_STAGE * groove, solve)
+        per_step = stages * max(_STAGE * groove, solve)
     elif stepper == "explicit":
         per_step = _EXPLICIT * groove + solve
     elif stepper == "per-pass":
@@ -258,7 +258,7 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     system = (contacts * strips) ** 2 if stepper == "implicit" else 0.0
     return Effort(
         steps=math.ceil(steps),
-        solves=math.ceil(steps * each) * problem.contacts_each,
+        solves=math.ceil(steps * stages) * problem.contacts_each,
         seconds=_START + steps * per_step + restarts * (_STATIONS + _SOLVES_OF_RESTART * groove),
         memory=_MEMORY + 5.0 * size + _SYSTEM * system,
         file_size=size,

@@ -132,7 +132,7 @@ class WearForecast:
             return np.array([np.interp(passes, done[:, s], column[:, s]) for s in stations])
 
         depth = there("total")
-        found = {
+        values = {
             "depth": there("cylinder").max(),
             "roller_depth": there("roller").max(),
             "volume": np.mean(math.tau * np.ravel(problem.kinematics.track_radius) * there("area")),
@@ -144,9 +144,9 @@ class WearForecast:
         cam = problem.kinematics.cam
         if cam is not None:
             away = np.sign(np.ravel(cam.load_factor)) * depth
-            found["lift_error"] = np.ptp(away / np.cos(np.ravel(cam.pressure_angle)))
+            values["lift_error"] = np.ptp(away / np.cos(np.ravel(cam.pressure_angle)))
         return {
-            name: float(value) if value > math.sqrt(TINY) else 0.0 for name, value in found.items()
+            name: float(value) if value > math.sqrt(TINY) else 0.0 for name, value in values.items()
         }
 
     @property
@@ -245,18 +245,18 @@ class WearForecast:
         low, high = self._centres + np.array([-_MARGIN, _MARGIN]) * half
         strips = int(min(STRIPS * (high - low) / (2.0 * _MARGIN * half), MOST_STRIPS))
         grid = grid or Grid.spanning(float(low), float(high), strips)
-        own = on_grid(self.problem, grid)
+        problem = on_grid(self.problem, grid)
         if scenario is not self.draws.scenario:
-            own = replace(own, model=prepared_model(scenario, grid))
-        worn = np.maximum(depth - own.nominal_gap + own.nominal_least_gap[..., None], 0.0)
-        rollers = np.zeros((1, own.rollers, *worn.shape[2:]))
-        for number in range(own.rollers):
-            rollers[0, number] = worn[:, own.roller == number].max(axis=(0, 1))
+            problem = replace(problem, model=prepared_model(scenario, grid))
+        worn = np.maximum(depth - problem.nominal_gap + problem.nominal_least_gap[..., None], 0.0)
+        rollers = np.zeros((1, problem.rollers, *worn.shape[2:]))
+        for number in range(problem.rollers):
+            rollers[0, number] = worn[:, problem.roller == number].max(axis=(0, 1))
         cylinder = np.repeat(worn.max(axis=(0, 1), keepdims=True), len(worn), axis=0)
         share = last["cylinder"] / np.maximum(last["cylinder"] + last["roller"], TINY)
         # a spring needs a first guess of the load on these strips
-        state = fresh_state(own) if own.has_spring else self._fresh
-        return own, state.replaced(
+        state = fresh_state(problem) if problem.has_spring else self._fresh
+        return problem, state.replaced(
             cylinder_depth=share[:, None, None, None] * cylinder,
             roller_depth=(1.0 - share.max()) * rollers,
             approach_factor=self._fresh.approach_factor,
@@ -298,13 +298,13 @@ class WearForecast:
 
 
 def _seconds_of_all(problem: WearProblem) -> float:
-    """Return the time that all contacts of the unworn bodies take by that of one [s]."""
+    """Return the time that all contacts of the unworn bodies take, from the time of one [s]."""
     batch = unworn_contacts(problem.at_time(np.zeros(1), np.zeros(1)))
-    one, seconds = batch.at(np.array([batch.normal_force.argmax()])), 0.0
+    hardest, seconds = batch.at(np.array([batch.normal_force.argmax()])), 0.0
     for _ in range(2):  # the first reads kernels from the disk, unless it takes far longer anyway
         if seconds < SLOW:
             start = perf_counter()
-            problem.model.solve(one)
+            problem.model.solve(hardest)
             seconds = perf_counter() - start
     return seconds * len(batch)
 

@@ -49,35 +49,35 @@ def kernels_of(
     steps = study == "test"
     contact, evolution = scenario.contact, scenario.evolution
     model, name = contact.model, evolution.stepper
-    found = set(_MODELS.get(model, ()))
+    names = set(_MODELS.get(model, ()))
     theory = getattr(contact.options, "tangential", "strip")
     if model == "hertz-fastsim":
         march = getattr(contact.options, "closed_form", "") == "never"
-        found |= _BATCH if study != "contact" else {"march" if march else "closed_form"}
-        found |= {"march_fields"} if fields else set()
+        names |= _BATCH if study != "contact" else {"march" if march else "closed_form"}
+        names |= {"march_fields"} if fields else set()
     elif model in _MODELS:
-        found |= _THEORIES[theory] | (_FIELDS[theory] if fields else set())
+        names |= _THEORIES[theory] | (_FIELDS[theory] if fields else set())
         if theory == "strip":
             batched = model == "slender" and scenario.creepage.drive != "free"
-            found |= {"strip_contacts"} if batched else set()
-            found |= {"solve_strips"} if fields or not batched else set()
+            names |= {"strip_contacts"} if batched else set()
+            names |= {"solve_strips"} if fields or not batched else set()
     if steps and model == "slender" and theory == "strip" and name == "per-pass":
-        found |= {"run_passes"}
+        names |= {"run_passes"}
     roles = {item.role for item in scenario.random}
     varies = "process" in roles or not scenario.load.build().constant
     redrawn = any(item.is_redrawn for item in scenario.random)
     # the test on coarse strips
     coarse = evolution.strip_error and not (name == "per-pass" and redrawn)
-    compliant, own = model in {"slender", "semi-hertzian"}, name in {"auto", "implicit"}
-    if steps and compliant and (own or coarse):
-        found |= {"formulas", "extrapolated", "new_differences", "next_steps"}
-        found |= {"linearised_wear", "wear_of_bodies"}
-        found |= {"difference_sizes" if varies else "carried_errors"}
-    doubled = name != "per-pass" if not (compliant and own) else evolution.step is not None
+    compliant, implicit = model in {"slender", "semi-hertzian"}, name in {"auto", "implicit"}
+    if steps and compliant and (implicit or coarse):
+        names |= {"formulas", "extrapolated", "new_differences", "next_steps"}
+        names |= {"linearised_wear", "wear_of_bodies"}
+        names |= {"difference_sizes" if varies else "carried_errors"}
+    doubled = name != "per-pass" if not (compliant and implicit) else evolution.step is not None
     if steps and (doubled or (coarse and not compliant)):
-        found |= {"difference_sizes"}
-    found |= {"filter_noise"} if "process" in roles else set()
-    return found | ({"smooth", "half_lengths"} if "field" in roles else set())
+        names |= {"difference_sizes"}
+    names |= {"filter_noise"} if "process" in roles else set()
+    return names | ({"smooth", "half_lengths"} if "field" in roles else set())
 
 
 @contextmanager

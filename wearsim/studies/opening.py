@@ -76,8 +76,8 @@ def open_ensemble(path: str | Path) -> EnsembleResult:
     from wearsim.studies.ensemble.file.parts import read_ensemble  # noqa: PLC0415
 
     data, kind = read_ensemble(path), kind_of(path)
-    found: EnsembleResult = kind.load("result")(data, Path(path))
-    return found
+    result: EnsembleResult = kind.load("result")(data, Path(path))
+    return result
 
 
 def comparison_of(
@@ -110,11 +110,14 @@ def comparison_of(
 
 
 def labels_of(results: Sequence[Any]) -> list[str]:
-    """Return a label for each result: the name of its file, with a number if names are equal."""
-    labels = [result.path.stem if result.path else result.title for result in results]
-    if len(set(labels)) < len(labels):
-        labels = [f"{number}: {label}" for number, label in enumerate(labels, 1)]
-    return labels
+    """Return a label for each result: the name of its file, with its folder if names are equal.
+
+    Results without a file have their title, and a number if labels are still equal.
+    """
+    short = [result.path.stem if result.path else result.title for result in results]
+    long = [str(result.path or result.title) for result in results]
+    numbered = [f"{number}: {label}" for number, label in enumerate(short, 1)]
+    return next(labels for labels in (short, long, numbered) if len(set(labels)) == len(labels))
 
 
 def views_of(results: Sequence[Any]) -> list[View]:

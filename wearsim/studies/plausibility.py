@@ -43,7 +43,7 @@ def range_90(item: RandomInput) -> list[tuple[float, float]]:
 def plausibility_warnings(scenario: Scenario) -> list[str]:
     """Return warnings of implausible pressures, creepages, friction, logs and contact widths.
 
-    Also that of an automatically chosen contact model, if its error may exceed the tolerance.
+    Also of an automatically chosen contact model, if its error may exceed the tolerance.
 
     Parameters
     ----------

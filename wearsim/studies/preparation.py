@@ -26,6 +26,7 @@ MOST_BYTES = 4_000_000_000
 
 # measured while the file is written: numbers per realisation, and per random input of a realisation
 _NUMBERS, _NUMBERS_OF_A_DRAW = 17, 2
+SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
 
 
 def checked_count(scenario: Scenario, realisations: int) -> int:
@@ -76,19 +77,16 @@ def nothing_random(what: str) -> Mistake:
     return Mistake("", "", what, None, expected)
 
 
-SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
-
-
 @cache
 def software() -> Mapping[str, str]:
     """Return the versions of the packages that results may depend on, by name."""
-    found = {}
+    versions = {}
     for name in SOFTWARE:
         try:  # a module that is loaded states its version without a search for its metadata
-            found[name] = getattr(sys.modules.get(name), "__version__", "") or version(name)
+            versions[name] = getattr(sys.modules.get(name), "__version__", "") or version(name)
         except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
+            versions[name] = "unknown"
+    return versions
 
 
 def plugins_in_use(scenario: Scenario) -> list[dict[str, str]]:
@@ -151,7 +149,7 @@ def check_plugins(path: Path, data: StudyData) -> None:
 
 
 def changed_origins(data: StudyData, scenario: Scenario) -> list[str]:
-    """Return a warning for every software version that differs from that of a file.
+    """Return a warning for every software version that differs from a file's.
 
     Parameters
     ----------
@@ -172,9 +170,9 @@ def changed_origins(data: StudyData, scenario: Scenario) -> list[str]:
 
 def _origins(versions: Mapping[str, str], plugins: list[dict[str, str]]) -> dict[str, str]:
     """Return the version of every package and the origin of every plugin in use, by name."""
-    found = dict(versions)
+    origins = dict(versions)
     for row in plugins:
         known = row["distribution"] in versions
         origin = row["distribution"] if known else f"{row['distribution']} {row['version']}"
-        found[f"the {row['kind']} '{row['name']}' of"] = origin
-    return found
+        origins[f"the {row['kind']} '{row['name']}' of"] = origin
+    return origins

@@ -43,10 +43,10 @@ def shown_progress(
         if watcher is None:
             yield shown
             return
-        own = watcher
+        callers = watcher
 
         def both(*event: object) -> None:
             shown(*event)
-            own(*event)
+            callers(*event)
 
         yield both

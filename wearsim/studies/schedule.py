@@ -96,10 +96,10 @@ class RecordSchedule:
         pass_by_pass : bool
             Whether every step is one pass, so that records are at whole numbers of passes.
         """
-        found = [0.0]
-        while found[-1] < stop:
-            found.append(min(self.due_after(found[-1], pass_by_pass), stop))
-        return np.array(found)
+        records = [0.0]
+        while records[-1] < stop:
+            records.append(min(self.due_after(records[-1], pass_by_pass), stop))
+        return np.array(records)
 
     def due_between(
         self, first: float, last: float, stop: float, pass_by_pass: bool = False
@@ -120,11 +120,11 @@ class RecordSchedule:
         list of (float, bool)
             Passes, and whether the record is at the second state.
         """
-        found, passes = [], self.due_after(first, pass_by_pass)
+        records, passes = [], self.due_after(first, pass_by_pass)
         while passes < last:
-            found.append((passes, False))
+            records.append((passes, False))
             passes = self.due_after(passes, pass_by_pass)
-        return found + [(last, True)] * (passes == last or last >= stop)
+        return records + [(last, True)] * (passes == last or last >= stop)
 
     def due_after(self, passes: float, pass_by_pass: bool) -> float:
         """Return the passes of the first record after `passes`, whole if `pass_by_pass`."""

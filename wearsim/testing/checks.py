@@ -29,6 +29,7 @@ from wearsim.types import FloatArray
 from wearsim.units import Kind
 
 F = TypeVar("F")
+S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec)
 
 
 class ConformanceError(AssertionError):
@@ -108,9 +109,9 @@ def require(condition: object, message: str) -> None:
 
 def require_values(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> None:
     """Raise ConformanceError unless values have a shape and are finite."""
-    found = np.asarray(values)
-    require(found.shape == shape, f"{name} has the shape {found.shape}, not {shape}")
-    require(np.isfinite(found).all(), f"{name} is not finite")
+    array = np.asarray(values)
+    require(array.shape == shape, f"{name} has the shape {array.shape}, not {shape}")
+    require(np.isfinite(array).all(), f"{name} is not finite")
 
 
 def require_repeatable(
@@ -179,9 +180,6 @@ def agree(
         f" {difference.flat[worst] / size if size else np.inf:.2e} of {size:.3g}, and"
         f" {tolerance:.0e} is allowed"
     )
-
-
-S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ BEHAVIOUR: Checks[ContactFixture] = Checks()
 _SOLUTION = "wearsim.types.ContactSolution"
 _MODEL = "wearsim.plugins.ContactModel"
 _SATURATION_ERROR = 0.02  # relative deviation from mu N allowed in gross sliding
+_SOLVE = "wearsim.plugins.ContactModel.solve"
 
 
 def _gross_sliding(fixture: ContactFixture) -> ContactSolution:
@@ -224,12 +225,9 @@ def convergence_with_strips(fixture: ContactFixture) -> None:
         )
 
 
-_SOLVE = "wearsim.plugins.ContactModel.solve"
-
-
-def _require_identical(one: ContactSolution, other: ContactSolution, message: str) -> None:
+def _require_identical(first: ContactSolution, other: ContactSolution, message: str) -> None:
     """Raise ConformanceError with the names of the fields that are not equal bit for bit."""
-    pairs = zip(asdict(one).items(), asdict(other).values(), strict=True)
+    pairs = zip(asdict(first).items(), asdict(other).values(), strict=True)
     changed = [name for (name, a), b in pairs if not np.array_equal(a, b)]
     require(not changed, f"{message} {', '.join(changed)}")
 

@@ -18,6 +18,12 @@ CAPABILITIES: Checks[ContactFixture] = Checks()
 _CAPABILITIES = "wearsim.plugins.Capabilities"
 _PASSES = 12
 _LOAD_ITERATIONS = 10  # each divides the change of a spring force by ten or more
+_SLIPS = {
+    "almost no slip": Creepage(1e-7, 2e-7),
+    "partial slip": Creepage(4e-4, 1e-4),
+    "all creepages": Creepage(3e-4, 4e-4, 0.3),
+    "gross sliding": Creepage(2e-2, -1e-2),
+}
 
 
 def _is_refused(fixture: ContactFixture, capability: str, call: Callable[[], Any]) -> bool:
@@ -79,7 +85,7 @@ def _uneven_compliance(fixture: ContactFixture) -> FloatArray:
 
 @CAPABILITIES.specified_in(_CAPABILITIES)
 def wear_compliance(fixture: ContactFixture) -> None:
-    """With a wear compliance c the solution is that of the gap plus c q."""
+    """With a wear compliance c the solution equals a solution for the gap plus c q."""
     compliance = _uneven_compliance(fixture)
     if _is_refused(fixture, "wear_compliance", lambda: fixture.solve(wear_compliance=compliance)):
         return
@@ -106,8 +112,11 @@ def coupled(fixture: ContactFixture) -> None:
     """Contacts coupled by the wear of a shared body each solve the gap that all of them open."""
     load = fixture.case.normal_force
     points = [fixture.point(), fixture.point(Creepage(5e-4, 2e-4), normal_force=0.8 * load)]
-    own = 0.25 * _uneven_compliance(fixture)
-    wear = SharedWear(np.array([[0, 0], [0, 1]]), np.array([[own, own], [own, 0.0 * own]]))
+    compliance = 0.25 * _uneven_compliance(fixture)
+    wear = SharedWear(
+        np.array([[0, 0], [0, 1]]),
+        np.array([[compliance, compliance], [compliance, 0.0 * compliance]]),
+    )
     batch = fixture.batch(points, [fixture.gaps["fresh"], fixture.gaps["off centre"]])
     if _is_refused(fixture, "coupled", lambda: fixture.model.solve(batch, coupling=wear)):
         return
@@ -220,12 +229,12 @@ def friction_field(fixture: ContactFixture) -> None:
     ):
         _is_refused(fixture, "friction_field", points)
         return
-    found, y = points()
+    positions, y = points()
     require(
-        found.ndim == 3 and found.shape[::2] == (2, len(y)),
-        f"x has the shape {found.shape}, not (contacts, points, strips)",
+        positions.ndim == 3 and positions.shape[::2] == (2, len(y)),
+        f"x has the shape {positions.shape}, not (contacts, points, strips)",
     )
-    x = found[0]
+    x = positions[0]
     agree("y of the friction points", y, fixture.grid.y, 0.0)
     require((np.diff(x, axis=0) <= 0.0).all(), "x does not decrease from the leading edge")
     require(not x[:, fixture.solution.half_length == 0.0].any(), "x is not 0 outside the contact")
@@ -374,14 +383,6 @@ def _run_single_solves(fixture: ContactFixture, loop: PassLoop) -> None:
         loop.line_load[g], loop.approach[g] = solution.line_load, solution.approach
 
 
-_SLIPS = {
-    "almost no slip": Creepage(1e-7, 2e-7),
-    "partial slip": Creepage(4e-4, 1e-4),
-    "all creepages": Creepage(3e-4, 4e-4, 0.3),
-    "gross sliding": Creepage(2e-2, -1e-2),
-}
-
-
 @CAPABILITIES.specified_in(_CAPABILITIES)
 def creep_factor(fixture: ContactFixture) -> None:
     """With a creep factor k tractions are those of k times the creepages, at 1/k their power."""
@@ -395,15 +396,15 @@ def creep_factor(fixture: ContactFixture) -> None:
             factor * creepage.longitudinal, factor * creepage.lateral, factor * creepage.spin
         )
         ideal = fixture.solve(fixture.point(slower))
-        found = model.solve_one(fixture.gap, curvature, fixture.point(creepage))
+        solution = model.solve_one(fixture.gap, curvature, fixture.point(creepage))
         force = float(np.hypot(ideal.force_x, ideal.force_y))
         scales = {"force_x": force, "force_y": force, "spin_moment": force * fixture.case.width}
         how = f"{case}: with a creep factor of {factor}, the"
         for name in ("line_load", "approach", *scales):
             scale = scales.get(name, 0.0)
-            agree(f"{how} {name}", getattr(found, name), getattr(ideal, name), 1e-6, scale)
+            agree(f"{how} {name}", getattr(solution, name), getattr(ideal, name), 1e-6, scale)
         for name in ("power", "dissipation"):
-            agree(f"{how} {name}", factor * getattr(found, name), getattr(ideal, name), 1e-6)
+            agree(f"{how} {name}", factor * getattr(solution, name), getattr(ideal, name), 1e-6)
     after = fixture.solve()
     require(before.power == after.power, "with_creep_factor changes the model that it is called on")
 

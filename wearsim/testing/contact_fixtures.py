@@ -25,6 +25,13 @@ STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3)
 NUMBERS = tuple(item.name for item in fields(ContactSolution) if item.type == "float")
 STRIPS = ("half_length", "line_load", "dissipation")
 _MOST_OF_OVERLAP = 1.001
+CREEPAGES = {
+    "rolling with traction": Creepage(1e-3),
+    "partial slip": Creepage(2e-4),
+    "braking": Creepage(-4e-4, 1e-4),
+    "all creepages": Creepage(3e-4, 4e-4, 0.3),
+    "gross sliding": Creepage(2e-2, -1e-2),
+}
 
 
 @dataclass(frozen=True)
@@ -90,15 +97,6 @@ class ContactCase:
         depth = groove * (0.125 * self.width) ** 2 / (2.0 * self.crown_radius)
         shape = np.exp(-(((y - 0.06 * self.width) / (0.1 * self.width)) ** 2))
         return np.asarray(y * y / (2.0 * self.crown_radius) + depth * shape)
-
-
-CREEPAGES = {
-    "rolling with traction": Creepage(1e-3),
-    "partial slip": Creepage(2e-4),
-    "braking": Creepage(-4e-4, 1e-4),
-    "all creepages": Creepage(3e-4, 4e-4, 0.3),
-    "gross sliding": Creepage(2e-2, -1e-2),
-}
 
 
 @dataclass(frozen=True)

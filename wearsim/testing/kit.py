@@ -90,7 +90,7 @@ def contact_model_tests(
     options : mapping of str to object
         Its options as written in a scenario, quantities with their units.
     case : ContactCase, optional
-        The base contact; by default that of the test rig.
+        The base contact; by default of the test rig.
     without : mapping of str to str
         Names of checks to skip, with the reason.
 
@@ -153,10 +153,10 @@ def random_input_tests(
 
     def build() -> RandomInputFixture:
         configured = ConfiguredSpec(resolved, options, kind, files)
-        own = None
+        spec = None
         if marginal is not None:
-            own = ConfiguredSpec(resolve(RandomInputSpec, marginal[0]), marginal[1], kind, files)
-        return RandomInputFixture(configured, own)
+            spec = ConfiguredSpec(resolve(RandomInputSpec, marginal[0]), marginal[1], kind, files)
+        return RandomInputFixture(configured, spec)
 
     return build_tests(random_inputs.BY_ROLE[resolved.role], build, without)
 

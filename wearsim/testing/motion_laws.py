@@ -20,6 +20,8 @@ from wearsim.testing.checks import (
 from wearsim.types import FloatArray
 
 _POINTS = 2001
+MOTION_LAW: Checks[MotionLawFixture] = spec_checks()
+_LIFT = "wearsim.plugins.MotionLaw.lift"
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,6 @@ class MotionLawFixture(Fixture[MotionLawSpec]):
         return [np.linspace(*pair, _POINTS) for pair in itertools.pairwise(edges)]
 
 
-MOTION_LAW: Checks[MotionLawFixture] = spec_checks()
-_LIFT = "wearsim.plugins.MotionLaw.lift"
-
-
 @MOTION_LAW.specified_in("wearsim.plugins.MotionLawSpec")
 def factory_builds_a_motion_law(fixture: MotionLawFixture) -> None:
     """The factory builds a MotionLaw."""
@@ -78,8 +76,8 @@ def lift_is_elementwise(fixture: MotionLawFixture) -> None:
     values, kept = fixture.lift(angle), angle.copy()
     require_values("the lift", values, (3, 11))
     require(np.array_equal(angle, kept), "lift changes its argument")
-    one = np.concatenate([fixture.lift(angle[k : k + 1]) for k in range(11)], axis=1)
-    agree("the lift at one point, compared with that at several,", one, values, 1e-12)
+    singly = np.concatenate([fixture.lift(angle[k : k + 1]) for k in range(11)], axis=1)
+    agree("the lift at one point, compared with that at several,", singly, values, 1e-12)
 
 
 @MOTION_LAW.specified_in(_LIFT)
@@ -95,7 +93,7 @@ def lift_spans_the_rise(fixture: MotionLawFixture) -> None:
 
 @MOTION_LAW.specified_in(_LIFT)
 def derivatives_match_the_lift(fixture: MotionLawFixture) -> None:
-    """The derivatives are those of the lift, and are continuous within the segment."""
+    """The derivatives belong to the lift, and are continuous within the segment."""
     scale = fixture.rise / fixture.angle
     last = None
     for angle in fixture.parts:

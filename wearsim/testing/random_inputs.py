@@ -36,6 +36,23 @@ _CLASSES: dict[str, type] = {
     "process": Process,
 }
 _REALISATIONS = 400
+ANY: Checks[RandomInputFixture] = spec_checks()
+SCALAR: Checks[RandomInputFixture] = Checks()
+JOINT: Checks[RandomInputFixture] = Checks()
+FIELD: Checks[RandomInputFixture] = Checks()
+PROCESS: Checks[RandomInputFixture] = Checks()
+_QUANTILE = "wearsim.plugins.Distribution.quantile"
+_DISTRIBUTION = "wearsim.plugins.Distribution"
+_VALUES = "wearsim.plugins.JointDistribution.values"
+BY_ROLE = {
+    role: Checks(ANY | checks)
+    for role, checks in (
+        ("scalar", SCALAR),
+        ("joint", JOINT),
+        ("field", FIELD),
+        ("process", PROCESS),
+    )
+}
 
 
 @dataclass(frozen=True)
@@ -63,16 +80,6 @@ class RandomInputFixture(Fixture[RandomInputSpec]):
         """Return the stream of uniform numbers of one realisation."""
         stream = Stream(1, self.configured.spec.name, "field")
         return partial(stream.uniforms, realisation=realisation)
-
-
-ANY: Checks[RandomInputFixture] = spec_checks()
-SCALAR: Checks[RandomInputFixture] = Checks()
-JOINT: Checks[RandomInputFixture] = Checks()
-FIELD: Checks[RandomInputFixture] = Checks()
-PROCESS: Checks[RandomInputFixture] = Checks()
-_QUANTILE = "wearsim.plugins.Distribution.quantile"
-_DISTRIBUTION = "wearsim.plugins.Distribution"
-_VALUES = "wearsim.plugins.JointDistribution.values"
 
 
 @ANY.specified_in("wearsim.plugins.RandomInputSpec")
@@ -138,7 +145,7 @@ def quantile_is_reproducible(fixture: RandomInputFixture) -> None:
 
 @SCALAR.specified_in(_DISTRIBUTION)
 def mean_and_std_match_quantile(fixture: RandomInputFixture) -> None:
-    """Mean and standard deviation are those of the quantile function."""
+    """Mean and standard deviation follow from the quantile function."""
     from scipy.special import ndtr  # noqa: PLC0415  (slow to import)
 
     scores = np.linspace(-8.1, 8.1, 40_001)
@@ -295,14 +302,3 @@ def process_matches_marginal(fixture: RandomInputFixture) -> None:
     for k in (0, 59):
         _require_marginal(process.marginal, paths[:, k], f"point {k} of the path")
     _require_support(process.marginal, paths, "the path")
-
-
-BY_ROLE = {
-    role: Checks(ANY | checks)
-    for role, checks in (
-        ("scalar", SCALAR),
-        ("joint", JOINT),
-        ("field", FIELD),
-        ("process", PROCESS),
-    )
-}

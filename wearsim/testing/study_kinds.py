@@ -29,6 +29,7 @@ from wearsim.testing.checks import Checks, require
 _TIMES = {"wall_seconds", "solve_seconds"}
 _PNG = b"\x89PNG"
 _VIEW, _KIND = "wearsim.report.view.View", "wearsim.plugins.StudyKind"
+STUDY_KIND: Checks[StudyKindFixture] = Checks()
 
 
 @dataclass(frozen=True)
@@ -60,14 +61,11 @@ class StudyKindFixture:
         return self.view.panels()
 
 
-STUDY_KIND: Checks[StudyKindFixture] = Checks()
-
-
 @STUDY_KIND.specified_in(_KIND)
 def result_is_of_the_kind(fixture: StudyKindFixture) -> None:
     """The class of the result leads to the kind, so that `plot` and notebooks find the view."""
-    found = kind_of_result(fixture.result)
-    require(found.name == fixture.spec.name, f"the result is of the kind '{found.name}'")
+    kind = kind_of_result(fixture.result)
+    require(kind.name == fixture.spec.name, f"the result is of the kind '{kind.name}'")
 
 
 @STUDY_KIND.specified_in(_KIND)

@@ -23,6 +23,15 @@ from wearsim.types import ContactSolution, FloatArray, Grid
 _SPEED = 2.618
 _LOAD, _CREEPAGE, _FRICTION = 300.0, 1e-3, 0.1
 _HALF_WIDTH, _HALF_LENGTH = 1.5e-3, 1.3e-4
+WEAR_LAW: Checks[WearLawFixture] = spec_checks()
+_DEPTH = "wearsim.plugins.WearLaw.depth_per_pass"
+_SAMPLES = 200_000
+_PARTS = ((0.0, 1.0), (0.1, 0.35), (0.5, 0.5001), (0.999, 1.0))
+_STEPS = 1000
+ANY: Checks[LoadFixture] = spec_checks()
+BASE: Checks[LoadFixture] = Checks()
+TERM: Checks[LoadFixture] = Checks()
+LOADS = {"base": Checks(ANY | BASE), "term": Checks(ANY | TERM)}
 
 
 def sliding_contact(strips: int, speed: float = _SPEED, slides: float = 1.0) -> ContactSolution:
@@ -64,10 +73,6 @@ class WearLawFixture(Fixture[WearLawSpec]):
     def depth(self, body: Body, contact: ContactSolution, speed: float = _SPEED) -> FloatArray:
         """Return the depth of one pass [m]."""
         return np.asarray(self.instance.depth_per_pass(body, contact, speed))
-
-
-WEAR_LAW: Checks[WearLawFixture] = spec_checks()
-_DEPTH = "wearsim.plugins.WearLaw.depth_per_pass"
 
 
 @WEAR_LAW.specified_in("wearsim.plugins.WearLawSpec")
@@ -155,11 +160,6 @@ def depth_is_reproducible(fixture: WearLawFixture) -> None:
         require(unchanged, f"depth_per_pass changes the {name} of its input")
 
 
-_SAMPLES = 200_000
-_PARTS = ((0.0, 1.0), (0.1, 0.35), (0.5, 0.5001), (0.999, 1.0))
-_STEPS = 1000
-
-
 @dataclass(frozen=True)
 class LoadFixture(Fixture[LoadSpec]):
     """A load or a load term under test.
@@ -193,14 +193,9 @@ class LoadFixture(Fixture[LoadSpec]):
         return np.asarray(start), power, float(np.abs(start).max())
 
 
-ANY: Checks[LoadFixture] = spec_checks()
-BASE: Checks[LoadFixture] = Checks()
-TERM: Checks[LoadFixture] = Checks()
-
-
 @ANY.specified_in("wearsim.plugins.LoadSpec")
 def factory_matches_role(fixture: LoadFixture) -> None:
-    """The factory of a base builds a Load, that of a term a LoadTerm."""
+    """The factory of a base builds a Load, the factory of a term a LoadTerm."""
     role = fixture.configured.spec.role
     required = Load if role == "base" else LoadTerm
     require(
@@ -364,6 +359,3 @@ def lag_parameters_match(fixture: LoadFixture) -> None:
         agree(f"the state {when}", fixture.instance.advance(state, power, time), expected, 1e-9)
         mean = rest + (state - rest) * (1.0 - decay) * constant / time
         agree(f"the mean force {when}", fixture.instance.mean_force(state, power, time), mean, 1e-9)
-
-
-LOADS = {"base": Checks(ANY | BASE), "term": Checks(ANY | TERM)}

@@ -10,8 +10,7 @@ import pytest
 
 from wearsim.errors import ContactError
 from wearsim.plugins import manager
-from wearsim_bench.growth import point as growth_point
-from wearsim_bench.growth import topic as growth_module
+from wearsim_bench.growth import point as growth_point, topic as growth_module
 from wearsim_bench.growth.cases import QUICK, RIG, STRIPS, Point, points, same_groove
 from wearsim_bench.growth.point import Cost, Workload
 from wearsim_bench.growth.topic import growth, measured, measurements

@@ -7,8 +7,7 @@ from dataclasses import replace
 from datetime import date
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from wearsim_bench.measure.machine import this_machine
 from wearsim_bench.measure.measurement import Measurement, Topic, pareto

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from wearsim.scenario import examples as shipped
-from wearsim.scenario import load_scenario
+from wearsim.scenario import examples as shipped, load_scenario
 from wearsim.studies.dissipation.result import DissipationResult
 from wearsim_chevalier2005 import paper
 from wearsim_chevalier2005.comparison import compare

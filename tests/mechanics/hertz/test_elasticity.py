@@ -1,8 +1,7 @@
 """Elastic constants of a pair of bodies."""
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.types import Material

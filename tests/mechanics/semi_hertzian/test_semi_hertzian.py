@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.mechanics.slender.test_influence import direct
 from wearsim.mechanics.hertz.ellipse import hertz

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import scipy.special
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.mechanics.tangential.kalker_closed_form import closed_form_parabolic
 from wearsim.mechanics.hertz.ellipse import hertz

@@ -22,8 +22,7 @@ from dask_cluster import scheduler, worker
 
 from tests.interruptible import interruptible
 from wearsim.errors import Mistake, ScenarioError, WorkerError
-from wearsim.studies.execution import dask as executors_cluster
-from wearsim.studies.execution import dask as executors_dask
+from wearsim.studies.execution import dask as executors_cluster, dask as executors_dask
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.execution.processes import AHEAD
 

@@ -12,7 +12,7 @@ from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.identify.traces import Trace, level
 from wearsim.studies.identify.trajectories import Grower, Trajectories
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.noise import Noise
 from wearsim.uq.hierarchy.pooled import Posterior
 
@@ -82,7 +82,8 @@ def test_intervals_hold_the_truth_without_shoulders():
 def test_bow_of_a_trace_is_fitted_or_warned_of():
     rng = np.random.default_rng(31)
     fitted = seen = warned = 0
-    for _ in range(SETS):
+    sets = SETS // 2
+    for _ in range(sets):
         y, height = groove(rng, K, rng.uniform(-1e-3, 1e-3), 12e-3)
         bow = 3e-6 * (y / 12e-3) ** 2
         fitted += holds(found_in(y, height + bow, curvature=True))
@@ -91,9 +92,9 @@ def test_bow_of_a_trace_is_fitted_or_warned_of():
         assert straight.fit is not None
         seen += holds(row) or bool(row.fit.warnings)
         warned += bool(straight.fit.warnings)
-    assert_95_percent(fitted)
-    assert seen >= 0.92 * SETS
-    assert warned <= 0.15 * SETS
+    assert_95_percent(fitted, sets)
+    assert seen >= 0.92 * sets
+    assert warned <= 0.15 * sets
 
 
 @pytest.mark.slow
@@ -128,7 +129,9 @@ def test_next_life_lies_in_its_predictive_interval(tests: int):
     for _ in range(REPEATS):
         m, t = rng.normal(-25.0, 0.5), abs(rng.normal(0.0, 0.5))
         apparent = rng.normal(m, np.hypot(t, inputs), tests + 1)
-        kernels = [Kernel(np.ones(1), np.array([c]), np.array([inputs])) for c in apparent[:-1]]
+        kernels = [
+            LikelihoodMixture(np.ones(1), np.array([c]), np.array([inputs])) for c in apparent[:-1]
+        ]
         posterior = Posterior.of(kernels, 60)
         low, high = posterior.next(ENDS.tolist(), more=inputs)
         held += low < apparent[-1] < high

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tests.studies.random_examples import scenario_of
-from tests.studies.run.quadrature_study import errors as quadrature_errors
-from tests.studies.run.quadrature_study import statistics
+from tests.studies.run.quadrature_study import errors as quadrature_errors, statistics
 from wearsim.evolution.error_estimates import half_quadrature, volume_of
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.single_step import explicit_step

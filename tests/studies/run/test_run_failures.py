@@ -26,8 +26,7 @@ from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies import schedule
 from wearsim.studies.opening import open_results
-from wearsim.studies.run import recorder
-from wearsim.studies.run import run as studies
+from wearsim.studies.run import recorder, run as studies
 from wearsim.studies.run.recorder import Event, Warned
 from wearsim.studies.run.result import Result, read_results
 

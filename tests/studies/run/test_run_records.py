@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from study_examples import LOADS, ROLLERS, STEPPERS, run_differences, short
 from wearsim.errors import StepError
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
+from wearsim.studies.opening import open_results
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.result import Result
 
@@ -73,7 +75,7 @@ def _short_side_steps(monkeypatch: pytest.MonkeyPatch, longest: float) -> None:
     side_step = StepDoublingStepper.side_step
 
     def step(self, problem, state, passes):
-        if passes > longest:
+        if (passes > longest).any():
             raise StepError(f"{passes} passes are too many")
         return side_step(self, problem, state, passes)
 
@@ -94,11 +96,13 @@ def test_failing_side_step_is_halved(
 
 
 def test_record_without_side_step_fails_the_run(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     _short_side_steps(monkeypatch, 0.0)
+    path = tmp_path / "failed.h5"
     with pytest.raises(StepError, match="too many"):
-        studies.run(short(**{"outputs.records": 12, "outputs.spacing": "log"}))
+        studies.run(short(**{"outputs.records": 12, "outputs.spacing": "log"}), path)
+    assert "too many" in open_results(path).failure
 
 
 @pytest.mark.parametrize("stepper", ["compiled passes", "passes in Python"])

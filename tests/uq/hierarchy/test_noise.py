@@ -60,21 +60,22 @@ def means_and_stds(log: np.ndarray, mean: np.ndarray, std: np.ndarray) -> np.nda
 @pytest.mark.parametrize("length", [0.3e-3, 1.5e-3])
 def test_integral_over_the_noise_equals_that_of_a_fine_grid(length: float):
     rng, noise, sets = np.random.default_rng(4), Noise(1e-6, length, 0.1e-6), 12
-    y = np.arange(-12e-3, 12e-3, 0.12e-3)
+    y = np.arange(-12e-3, 12e-3, 0.16e-3)
     count = len(y)
     heights = noise.sample(y, rng.standard_normal((2, count, sets)))
     # the unknown that matters is the height of a step in both edges of a groove
     forms = np.column_stack([np.abs(y) < 7e-3, np.ones(count), y / 12e-3]).astype(float)
     freedom, rows = count - forms.shape[1], []
-    for decades in np.linspace(-4.4, np.log10(12e-3), 36):
-        for white in np.linspace(0.0, 1.0, 40)[:-1] ** 2:
+    for decades in np.linspace(-4.4, np.log10(12e-3), 30):
+        for white in np.linspace(0.0, 1.0, 30)[:-1] ** 2:
             unit = Noise(float(np.sqrt(1.0 - white)), 10.0**decades, float(np.sqrt(white)))
             root = np.linalg.cholesky(covariance(y, unit))
             z = np.linalg.solve(root, np.column_stack([heights, forms]))
             inverse = np.linalg.inv(z[:, sets:].T @ z[:, sets:])
             found = inverse @ z[:, sets:].T @ z[:, :sets]
             squares = ((z[:, :sets] - z[:, sets:] @ found) ** 2).sum(axis=0)
-            log = np.log(10.0**decades * np.sqrt(max(white, 1e-4))) - np.log(np.diag(root)).sum()
+            # on a grid of ln length, the density that is proportional to the length is its square
+            log = np.log(100.0**decades * np.sqrt(max(white, 1e-4))) - np.log(np.diag(root)).sum()
             log += 0.5 * np.linalg.slogdet(inverse)[1] - 0.5 * freedom * np.log(squares)
             rows.append([log, found[0], np.sqrt(inverse[0, 0] * squares / freedom)])
     mean, std = means_and_stds(*np.array(rows).transpose(1, 0, 2))

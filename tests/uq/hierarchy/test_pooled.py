@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import chdtrc, chdtri, ndtri
 
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import Posterior
 from wearsim.uq.hierarchy.verdict import ALPHA, Design, Power, word
 
@@ -14,9 +14,9 @@ from wearsim.uq.hierarchy.verdict import ALPHA, Design, Power, word
 PAPER = 1.5 * np.log([28.0, 48.0, 62.0])
 
 
-def normal(centre: float, std: float) -> Kernel:
+def normal(centre: float, std: float) -> LikelihoodMixture:
     """Return the likelihood of a test whose apparent ln K is normal."""
-    return Kernel(np.ones(1), np.array([centre]), np.array([std]))
+    return LikelihoodMixture(np.ones(1), np.array([centre]), np.array([std]))
 
 
 def normal_power(tests: int, variance: float, t: float) -> float:
@@ -25,7 +25,7 @@ def normal_power(tests: int, variance: float, t: float) -> float:
     return float(chdtrc(tests - 1, limit * variance / (variance + t * t)))
 
 
-def paper() -> list[Kernel]:
+def paper() -> list[LikelihoodMixture]:
     """Return the paper's tests with the scatter of normal inputs."""
     return [normal(centre, 0.417) for centre in PAPER]
 
@@ -57,7 +57,7 @@ def test_flat_prior_of_m_gives_the_closed_form():
 @pytest.mark.parametrize("tests", [3, 8, 20])
 def test_verdict_has_its_error_rate_and_the_ideal_power(tests: int):
     middles = (np.arange(256) + 0.5) / 256
-    kernel = Kernel.of(np.zeros(256), 0.417 * ndtri(middles), np.full(256, 0.01))
+    kernel = LikelihoodMixture.of(np.zeros(256), 0.417 * ndtri(middles), np.full(256, 0.01))
     design = Design([kernel], tests, sets=4000)
     assert design.rates(0.0)[0] <= 0.07
     ideal = normal_power(tests, 0.417**2, 0.4)
@@ -105,7 +105,7 @@ def test_small_detected_scatter_is_negligible():
 def test_smoothing_keeps_mean_and_variance_of_the_draws():
     rng = np.random.default_rng(4)
     centre, std = rng.gamma(2.0, 0.3, 60), np.full(60, 0.02)
-    kernel = Kernel.of(np.zeros(60), centre, std)
+    kernel = LikelihoodMixture.of(np.zeros(60), centre, std)
     assert kernel.mean == pytest.approx(centre.mean())
     assert kernel.variance == pytest.approx(centre.var() + 0.02**2)
     assert kernel.effective_size == pytest.approx(60.0)
@@ -113,7 +113,7 @@ def test_smoothing_keeps_mean_and_variance_of_the_draws():
 
 def test_deviations_follow_the_likelihood():
     rng = np.random.default_rng(5)
-    kernel = Kernel(np.array([0.7, 0.3]), np.array([0.0, 1.0]), np.array([0.1, 0.2]))
+    kernel = LikelihoodMixture(np.array([0.7, 0.3]), np.array([0.0, 1.0]), np.array([0.1, 0.2]))
     found = kernel.deviations(rng.random((2, 100_000)))
     assert found.mean() == pytest.approx(0.0, abs=0.01)
     assert found.std() == pytest.approx(kernel.variance**0.5, rel=0.01)

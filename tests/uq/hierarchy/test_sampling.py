@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import Posterior
 from wearsim.uq.hierarchy.sampling import sample_hierarchy
 
@@ -17,7 +17,9 @@ DENSITIES = np.exp(-0.5 * ((GRID - CENTRES[:, None]) / STD) ** 2)
 
 
 def test_samples_have_the_quantiles_of_the_quadrature():
-    kernels = [Kernel(np.ones(1), np.array([centre]), np.array([STD])) for centre in CENTRES]
+    kernels = [
+        LikelihoodMixture(np.ones(1), np.array([centre]), np.array([STD])) for centre in CENTRES
+    ]
     posterior = Posterior.of(kernels)
     m, t, ln_k = sample_hierarchy(GRID, DENSITIES, 400, 1)
     shares = (0.05, 0.5, 0.95)

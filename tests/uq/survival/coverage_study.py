@@ -17,6 +17,7 @@ from wearsim.uq.distributions.base import Distribution
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.comparison import quantile_ratio, same_machine, two_specimens
 from wearsim.uq.survival.distributions import CountedLives, FactorMixture
+from wearsim.uq.survival.effective import LEAST_NUMBER
 from wearsim.uq.survival.fits import fit_lives
 from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
 from wearsim.uq.survival.scores import score_function
@@ -114,7 +115,8 @@ def study(
             add(what, "likelihood", fit.interval(share))
         what = "P(life < target)"
         add(what, "exact", probability_before(life, observed, TARGET))
-        add(what, "mixture", mixtures[0].probability_before(TARGET))
+        if mixtures[0].effective_number(TARGET) >= LEAST_NUMBER:  # others are not stated
+            add(what, "mixture", mixtures[0].probability_before(TARGET))
         for method, (one, two) in (("counted", counted), ("mixture", mixtures)):
             drawn = quantile_ratio(two, one, 0.1, most, samples=500)
             add("ratio of B10", f"bootstrap, {method}", drawn)

@@ -34,6 +34,7 @@ OF_FACTOR = math.log(1.5)  # standard deviation of ln K
 FRICTION = (1.2, 1.6)  # factor of its scatter
 SIZES = (40, 400)
 PROBABILITIES = (1e-2, 1e-4, 1e-6)
+RARE_TESTS = 200  # further tests
 INPUTS = 3  # with scores, of which the first two have an effect
 
 #: ln kappa over its scale from two normal scores.
@@ -142,18 +143,19 @@ def _failed(form: str, factor: float, scores: np.ndarray, life: float) -> np.nda
 
 
 def by_further_tests(
-    form: str, factor: float, count: int, probability: float, tests: int = 200
+    form: str, factor: float, count: int, probability: float, studies: int = STUDIES
 ) -> Cell:
     """Return how often importance sampling is stated, and its interval right."""
     life = math.exp(log_target(form, factor, probability))
     found = [
-        importance(form, factor, count, tests, life, (SEED, number)) for number in range(STUDIES)
+        importance(form, factor, count, RARE_TESTS, life, (SEED, number))
+        for number in range(studies)
     ]
     stated = [item.probability for item in found if item.is_reliable]
     held = sum(item.low <= probability <= item.high for item in stated)
     values = [item.value for item in stated]
     variation = float(np.std(values)) / probability if len(values) > 1 else math.nan
-    return Cell(len(stated), held, STUDIES, variation)
+    return Cell(len(stated), held, studies, variation)
 
 
 def rows() -> Iterator[str]:

@@ -40,6 +40,11 @@ from wearsim.errors import PluginError
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
 
+_STOPPING = (
+    "stopping after the current realisations, results are kept; repeat to stop at once and lose"
+    " them"
+)
+
 
 def contact(
     scenario: ScenarioFile,
@@ -140,12 +145,6 @@ def _notes_on_means(scenario: Scenario) -> list[str]:
     if fields:
         notes.append(f"random fields are set to the means of their marginals: {', '.join(fields)}")
     return notes
-
-
-_STOPPING = (
-    "stopping after the current realisations, results are kept; repeat to stop at once and lose"
-    " them"
-)
 
 
 def dissipation(

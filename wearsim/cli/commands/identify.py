@@ -126,7 +126,9 @@ def identify(
         typer.Option(
             "--posterior",
             metavar="K.toml",
-            help="Distribution of K/H of the next specimen, as a table of a scenario.",
+            help="Distribution of K/H of the next specimen, as a table of a scenario; beside it"
+            " K.csv, with what is not known of its median and scatter, for `wearsim life"
+            " --posterior`.",
             show_default=False,
         ),
     ] = None,
@@ -179,6 +181,7 @@ def identify(
     loaded = read_scenario(scenario, settings_with(settings, seed=seed))
     from wearsim.studies.identify.inputs import fixed
 
+    overrides: dict[str, object] = {}
     if fix is not None:
         with checking("--fix"):
             overrides = fixed(fix)
@@ -196,9 +199,11 @@ def identify(
     text, both = "give before and shoulders in the tests file", "--before or --shoulders"
     refuse(tests is not None and (before or shoulders), text, both)
     inputs = [*loaded.paths, *(profiles or []), *([tests] if tests else [])]
-    if posterior is not None:
-        refuse_existing(posterior, force, "--posterior")
-    for path in (figure, posterior):
+    levels = None if posterior is None else posterior.with_suffix(".csv")
+    for path in (posterior, levels):
+        if path is not None:
+            refuse_existing(path, force, "--posterior")
+    for path in (figure, posterior, levels):
         refuse_same_file(path, output if output is not None else Path(), inputs)
     from wearsim.cli.progress import Counter, watching
     from wearsim.quantities import quantity
@@ -217,6 +222,7 @@ def identify(
             shoulders=distance,
             curvature=curvature,
             share=bodies,
+            fix=overrides,
             choice=choice,
             draws=draws,
             negligible=negligible,
@@ -225,7 +231,8 @@ def identify(
         )
     if posterior is not None:
         save_text(result.posterior_toml(), posterior)
-    more = {"posterior": posterior}
+        save_text(result.posterior_csv(), posterior.with_suffix(".csv"))
+    more = {"posterior": posterior, "both levels": levels}
     files = {"results file": result.path, **more}
     show_with_figure(result.view, figure, json=json, files=files, more=more)
 

@@ -128,6 +128,15 @@ def life(
             show_default=False,
         ),
     ] = None,
+    posterior: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="K.csv",
+            help="K/H with what is not known of it, from `wearsim identify --posterior`, instead of"
+            " the wear factor of the scenario; of a results file without new tests.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,
@@ -150,27 +159,31 @@ def life(
             "--max": most,
             "--precision": precision,
             "--sweep": sweep,
+            "--set": settings,
+            "--seed": seed,
+            "--output": output,
         }
-        given |= {"--set": settings, "--seed": seed, "--output": output}
         refuse_options(given, "has no meaning for results files")
-        results = [_opened(path, target, shares) for path in designs]
-        variables = [result.variable for result in results]
-        from wearsim.studies.life.stored_settings import swept_variable
-
-        is_sweep = swept_variable(results)
-        labels = [item.text for item in variables if item] if is_sweep else _labels(designs)
-        show_lives(results, labels, json, figure)
+        show_lives(*_reopened(designs, target, shares, posterior), json, figure)
         return
+    from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
+    from wearsim.results.io.outputs import check_output
+    from wearsim.studies.life.settings import checked_study
+
     labels, scenarios, key = _variants(designs, sweep, settings_with(settings, seed=seed))
+    if posterior is not None:
+        from wearsim.studies.life.factor import with_posterior
+
+        with checking("--posterior"):
+            scenarios = [with_posterior(scenario, posterior) for scenario in scenarios]
     arguments: dict[str, Any] = {
         "target": target,
         "b": shares,
         "most": most,
         "precision": precision,
+        "rare": rare,
+        "rare_method": rare_method,
     }
-    arguments |= {"rare": rare, "rare_method": rare_method}
-    from wearsim.studies.life.settings import checked_study
-
     with checking_arguments(limits="--limit", most="--max"):
         scenarios = [
             checked_study(scenario, realisations, limits=limit or [], **arguments)[0]
@@ -179,9 +192,6 @@ def life(
     paths = _paths(scenarios, labels, output)
     scheduler = checked_scheduler(scheduler, workers)
     going_on = partial(_going_on, labels, scenarios, paths, key)
-    from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
-    from wearsim.results.io.outputs import check_output
-
     for scenario, path in zip(scenarios, paths, strict=True):
         refuse_same_file(figure, path, scenario.paths)
         with going_on(path):
@@ -242,8 +252,22 @@ def _shares(text: str) -> tuple[float, ...]:
     return shares
 
 
-def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeResult:
-    """Return the result in a file, for another target and other percentages."""
+def _reopened(
+    designs: Sequence[Path], target: str | None, shares: tuple[float, ...], posterior: Path | None
+) -> tuple[list[LifeResult], list[str]]:
+    """Return the results in files, and their labels: of a sweep the values of its key."""
+    from wearsim.studies.life.stored_settings import swept_variable
+
+    results = [_opened(path, target, shares, posterior) for path in designs]
+    if swept_variable(results) is None:
+        return results, _labels(designs)
+    return results, [result.variable.text for result in results if result.variable]
+
+
+def _opened(
+    path: Path, target: str | None, shares: tuple[float, ...], posterior: Path | None
+) -> LifeResult:
+    """Return the result in a file, for another target, other percentages and another K/H."""
     from wearsim.results.kinds import kind_of
     from wearsim.studies.life.settings import parse_life
 
@@ -257,6 +281,9 @@ def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeRe
         text = f"{life:,.0f} {result.unit} is beyond the maximum of {path}"
         refuse(life > result.most, f"{text}, {result.most:,.0f} {result.unit}", "--target")
         changed["target"] = life * result.settings.per_unit
+    if posterior is not None:
+        with checking("--posterior"):
+            result = result.with_posterior(posterior)
     return result.with_settings(**changed)
 
 

@@ -35,15 +35,12 @@ from wearsim.cli.shared import (
     refuse_options,
     write_notes,
 )
-from wearsim.errors import ScenarioError
 
 if TYPE_CHECKING:
     from wearsim.levelling import Measured
     from wearsim.profiles import ProfileChoice
     from wearsim.report.view import View
 
-
-_MISALIGNED = 0.5  # ratio of residuals below which levelling is suggested
 
 MeasuredFiles = Annotated[
     list[Path] | None,
@@ -145,11 +142,10 @@ def measured_profiles(
         given = {"--level": level, "--angle": angle}
         refuse_options(given, "needs a measured profile, --measured")
         return []
-    from wearsim.levelling import Measured, levelled, rms
+    from wearsim.levelling import Measured, levelled
     from wearsim.profiles import load_profile, sign_note
     from wearsim.quantities import quantity
-    from wearsim.report.measured import residual_text
-    from wearsim.report.text import shown
+    from wearsim.report.measured import level_hint, residual_text
 
     with checking("--angle"):
         at = None if angle is None else quantity(angle, "rad")
@@ -165,19 +161,11 @@ def measured_profiles(
     computed = None if test is None else test.profile(at)
     if computed is None:
         return profiles
-    for place, profile in enumerate(profiles):
-        try:
-            corrected = levelled(profile, computed)
-        except ScenarioError:
-            if level:
-                raise
-            corrected = profile
-        text = f"{profile.label}: {residual_text(corrected if level else profile, computed)}"
-        if level:
-            profiles[place] = corrected
-        elif rms(corrected, computed) < _MISALIGNED * rms(profile, computed):
-            text += f"; rms {shown(rms(corrected, computed), 'um', 3)} with --level"
-        note(text)
+    if level:
+        profiles = [levelled(profile, computed) for profile in profiles]
+    for profile in profiles:
+        hint = "" if level else level_hint(profile, computed)
+        note(f"{profile.label}: {residual_text(profile, computed)}{hint}")
     return profiles
 
 
@@ -211,22 +199,13 @@ def compare(
     refuse(len(files) < 2, text, "FILE.h5")
     if figure is not None:
         refuse_inputs(figure, files, "the comparison")
-    from wearsim.studies.opening import comparison_of
+    for file in files:
+        refuse(files.count(file) > 1, f"{file} is given twice", "FILE.h5")
+    from wearsim.studies.opening import comparison_of, labels_of
 
     results = [wearsim.open_results(file) for file in files]
     check_figure(figure, force)
-    show_with_figure(comparison_of(results, _labels(files), observable), figure, json=json)
-
-
-def _labels(files: list[Path]) -> list[str]:
-    """Return the names of the files, with their folders where the names are not unique."""
-    stems = [file.stem for file in files]
-    if len(set(stems)) == len(stems):
-        return stems
-    names = [str(file) for file in files]
-    for name in names:
-        refuse(names.count(name) > 1, f"{name} is given twice", "FILE.h5")
-    return names
+    show_with_figure(comparison_of(results, labels_of(results), observable), figure, json=json)
 
 
 def export(

@@ -23,6 +23,8 @@ from wearsim.cli.shared import (
     write_table,
 )
 
+_HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities", "summary")
+
 
 def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False) -> None:
     """Check a scenario: print all mistakes, or the inputs and a summary of the run."""
@@ -131,14 +133,11 @@ def _unwritable(error: OSError, path: Path, option: str) -> typer.BadParameter:
     return typer.BadParameter(message, param_hint=option)
 
 
-_HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities", "summary")
-
-
 def plugins(json: Json = False) -> None:
     """List contact models, wear laws, loads, random inputs and motion laws."""
     from wearsim.plugins import registry
 
-    found = registry()
+    installed = registry()
     entries: list[dict[str, Any]] = [
         {
             "name": item.spec.name,
@@ -151,11 +150,11 @@ def plugins(json: Json = False) -> None:
             "summary": item.spec.summary,
             "references": list(item.spec.references),
         }
-        for item in found.all()
+        for item in installed.all()
     ]
     if json:
         keys = ("entry_point", "distribution", "version", "cause")
-        broken = [{key: getattr(item, key) for key in keys} for item in found.broken]
+        broken = [{key: getattr(item, key) for key in keys} for item in installed.broken]
         write_json({"plugins": entries, "broken": broken})
         return
     for entry in entries:
@@ -163,7 +162,7 @@ def plugins(json: Json = False) -> None:
     write_list(_HEADS, [[str(entry[head]) for head in _HEADS] for entry in entries])
     for refusal in filter(None, (entry["refused"] for entry in entries)):
         note(f"refused: {refusal}")
-    for item in found.broken:
+    for item in installed.broken:
         note(
             f"broken: plugin '{item.entry_point}' of {item.distribution} {item.version}"
             f" failed to load: {item.cause}"

@@ -22,33 +22,103 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, separated
+from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.mechanics.numerics.edge_strips import SETTLED, EdgeStrips, start_edges
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import next_steps
-from wearsim.types import BoolArray, FloatArray
+from wearsim.types import BoolArray, FloatArray, IntArray
+
+GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
+#: fields of a state about the edges of contacts; not a number in tests that do not resolve them
+FIELDS = "separation", "part", "whole_steps"
 
 
 def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool:
-    """Return whether steps resolve the edges of contacts within a strip.
+    """Return whether steps resolve the edges of contacts within a strip once there is a groove.
 
-    The contact model must return the separation, and every contact its own body or station.
+    The contact model must return the separation, every contact must have its own body or station,
+    and load and inputs must be constant: where they vary, an edge also retreats.
     """
     stations, each, _ = problem.shape
     varies = problem.constant_load is None or len(problem.varying) > 0
+    varies |= stations == 1 and (problem.has_spring or bool(problem.terms))
     apart = not problem.has_nodes and (stations == 1 or each == 1)
-    wanted = problem.resolve_edges and contacts.separation is not None
-    return wanted and apart and not varies
+    return contacts.separation is not None and apart and not varies
 
 
-def starting_edges(problem: WearProblem, contacts: ContactBatchSolution) -> dict[str, FloatArray]:
-    """Return `separation`, `part` and `whole_steps` of a state from its contacts."""
-    loaded = problem.values_of(contacts, "line_load") > 0.0
-    return {
-        "separation": np.where(loaded, 0.0, problem.values_of(contacts, "separation")),
+def unresolved_edges(problem: WearProblem) -> dict[str, FloatArray]:
+    """Return `FIELDS` of a state that does not resolve edges yet."""
+    return dict.fromkeys(FIELDS, np.full((*problem.shape, problem.grid.strips), np.nan))
+
+
+def without_edges(state: WearState) -> WearState:
+    """Return a state that steps advance on whole strips."""
+    assert state.past_sums is not None
+    return state.replaced(**dict.fromkeys(FIELDS), past_sums=state.past_sums[:, -1:])
+
+
+def with_unresolved_edges(problem: WearProblem, state: WearState) -> WearState:
+    """Return the result of a step on whole strips with the fields of other tests."""
+    assert state.past_sums is not None
+    bodies = np.full((len(state.past_sums), len(state.stacked), len(state.passes)), np.nan)
+    sums = np.concatenate([bodies, state.past_sums], axis=1)
+    return state.replaced(**unresolved_edges(problem), past_sums=sums)
+
+
+def unresolved(state: WearState) -> BoolArray:
+    """Return which tests do not resolve edges, of a state with `FIELDS`."""
+    assert state.part is not None
+    return np.asarray(np.isnan(state.part[0, 0, :, 0]))
+
+
+def by_resolution(
+    problem: WearProblem, state: WearState
+) -> list[tuple[IntArray, WearProblem, WearState]]:
+    """Return the places of tests that resolve edges and of those that do not, with their states.
+
+    Edges are resolved from the step on at whose start the bodies have worn to a groove: wear, not
+    elasticity, then gives the contact its shape.
+    """
+    every = np.arange(len(state.passes))
+    if state.part is None:
+        return [(every, problem, state)]
+    whole = unresolved(state)
+    if whole.any():
+        state = _with_new_edges(problem, state, whole)
+        whole = unresolved(state)
+    parts = []
+    for kind in (False, True):
+        places = np.flatnonzero(whole == kind)
+        if places.size:
+            part = state.at(places)
+            parts.append((places, problem.at(places), without_edges(part) if kind else part))
+    return parts
+
+
+def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
+    """Return a state in which tests that have worn to a groove resolve edges."""
+    shape = (*problem.shape, problem.grid.strips)
+    assert state.contacts.separation is not None
+    assert state.past_sums is not None
+    assert state.past_wear is not None
+    worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
+    separation = state.contacts.separation.reshape(shape)
+    begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3))
+    begins &= sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
+    if not begins.any():
+        return state
+    loaded = state.contacts.line_load.reshape(shape) > 0.0
+    found = {
+        "separation": np.where(loaded, 0.0, separation),
         "part": np.where(loaded, 1.0, 0.0),
         "whole_steps": np.where(loaded, SETTLED, 0.0),
     }
+    column, sums = begins[:, None], state.past_sums.copy()
+    fields = {n: np.where(column, one, getattr(state, n)) for n, one in found.items()}
+    sums[:, :-1] = np.where(begins, state.past_wear.sum(axis=-1), sums[:, :-1])
+    return state.replaced(**fields, past_sums=sums)
 
 
 def separated_bodies(problem: WearProblem, state: WearState) -> FloatArray:
@@ -115,6 +185,27 @@ def crossed_strips(state: WearState) -> BoolArray | None:
     return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
 
 
+def young_strips(state: WearState) -> BoolArray | None:
+    """Return which strips of the bodies take steps of first order.
+
+    Points of formulas of the state's order would lie ahead of the edge or close to it. There the
+    surfaces close as the power 3/2 of the distance from it, and higher orders would overshoot.
+    A worn roller of a cam meets the edges at all stations at different times. Its wear by one of
+    them has no past points, and both bodies of a contact must wear by the same formula: no strip
+    is young then.
+    """
+    if state.whole_steps is None or state.part is None or state.past_wear is None:
+        return None
+    assert state.order is not None
+    touching, stations = state.part > 0.0, len(state.part)
+    young, ahead = touching & (state.whole_steps < state.order[:, None]), ~touching
+    found = [(young.any(axis=axis) | ahead.all(axis=axis)) for axis in (1, 0)]
+    if stations > 1:
+        unworn = ~(state.past_wear[0][stations:] > 0.0).any(axis=(0, 2))
+        found = [one & unworn[:, None] for one in found]
+    return np.concatenate(found)
+
+
 def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
     """Return errors of the depths that a step adds, which agree with those of their sums.
 
@@ -144,13 +235,27 @@ def squares(depths: FloatArray) -> FloatArray:
 def parts_of_bodies(state: WearState) -> FloatArray:
     """Return the part of each strip's error that counts, as `WearState.stacked`.
 
-    The formulas also continue the separation of strips that are not in contact.
+    The formulas also continue the separation of strips that are not in contact, and those that the
+    edge has just crossed are not smooth enough for an estimate, see `first_order_errors`.
     """
-    if state.part is None:
+    young = young_strips(state)
+    if young is None:
         return np.ones(state.stacked.shape)
+    assert state.part is not None
     assert state.past_wear is not None
     parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
-    return np.where(state.past_wear[0] > 0.0, parts, 0.0)
+    return np.where(young | (state.past_wear[0] <= 0.0), 0.0, parts)
+
+
+def first_order_errors(end: WearState) -> FloatArray:
+    """Return the errors that a step adds to young strips in contact, as `WearState.stacked` [m]."""
+    young, past, spans = young_strips(end), end.past_wear, end.past_spans
+    assert young is not None
+    assert past is not None
+    assert spans is not None
+    factor = spans[0] / (1.0 / spans[0] + 1.0 / spans[1])
+    factor = np.where(np.isfinite(spans[1]), factor, 0.0)
+    return np.where(young & (past[0] > 0.0), factor[:, None] * past[2], 0.0)
 
 
 def with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearState:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -12,26 +12,22 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.contacts import at_least
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
-)
-from wearsim.evolution.error_estimates import (
     DEPTH_EXPONENT,
     VOLUME_EXPONENT,
     greatest_depth,
     with_pass_errors,
 )
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step
+from wearsim.evolution.steppers.conditions import Conditions, conditions_of, exposure
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
 from wearsim.evolution.steppers.loads import (
     abrupt_loads,
-    mean_force,
-    smooth_loads,
     with_feedback,
 )
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
@@ -48,7 +44,8 @@ from wearsim.mechanics.numerics.multistep import (
 )
 from wearsim.types import BoolArray, FloatArray, IntArray
 
-SHARE = 0.5  # part of the tolerance that a step may add to the profiles
+# part of the tolerance that a step may add to the profiles, by differences and by step doubling
+SHARE, DOUBLED_SHARE = 0.35, 0.9
 COVER = np.array([[4.0], [2.0], [6.0]])  # safety factors on the errors of depth, volume, profile
 # least errors of depth and profile, over that of the volume, all relative and with their factors: a
 # groove of wrong volume has the wrong depth and width, which further wear does not correct
@@ -61,7 +58,7 @@ PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power o
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
 # safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
-EDGES, OF_EDGES = 3.0, 5.0
+EDGES, OF_EDGES = 8.0, 5.0
 # safety factors of volume and profile, also those of step doubling, whose error of the volume is a
 # sum of absolute changes
 OF_STEPS = COVER[1:, 0].tolist()
@@ -99,14 +96,33 @@ class ImplicitStepper(StepDoublingStepper):
     to the profiles, estimated by the next divided difference. The sum of these errors, as far as
     later wear has not reduced them, is the error estimate of the test. Where load or inputs vary,
     and with fixed steps, step doubling estimates it.
+
+    Parameters
+    ----------
+    tolerance, forced_step
+        As of `Stepper`.
+    by_doubling : bool
+        Whether step doubling estimates the error of all tests: the wear of a contact model may not
+        be smooth enough for differences.
     """
 
     taper = 4.0
     follows_trends = True
 
+    def __init__(
+        self, tolerance: float, forced_step: float | None = None, by_doubling: bool = False
+    ) -> None:
+        super().__init__(tolerance, forced_step)
+        self.by_doubling = by_doubling
+
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state with the rates and differences that the formulas need."""
-        return state if state.past_spans is not None else with_rates(problem, state)
+        if state.past_spans is not None:
+            return state
+        state = with_rates(problem, state)
+        if self.forced_step is None and edges.resolves_edges(problem, state.contacts):
+            state = edges.with_unresolved_edges(problem, state)
+        return state
 
     def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the length of the first step, shape (realisations,) [passes]."""
@@ -116,8 +132,30 @@ class ImplicitStepper(StepDoublingStepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step, estimate its error, and choose order and length of the next one."""
+        if state.part is None:
+            return self._attempt(problem, state, step, stop, scheme)
+        attempts, places = [], []
+        for some, here, start in edges.by_resolution(problem, state):
+            tried = self._attempt(here, start, step[some], stop, scheme)
+            if start.part is None:
+                ends = tuple(edges.with_unresolved_edges(here, end) for end in tried.path)
+                tried = replace(tried, path=ends)
+            attempts.append(tried)
+            places.append(some)
+        if len(attempts) == 1:
+            return attempts[0]
+        order = np.argsort(np.concatenate(places))
+        path = (joined_states([one.path[0] for one in attempts]).at(order),)
+        excess = np.concatenate([one.excess for one in attempts])[order]
+        return Attempt(path, excess, np.concatenate([one.ratio for one in attempts])[order])
+
+    def _attempt(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
+    ) -> Attempt:
+        """Take a step in tests that all resolve edges or all do not."""
         varies = problem.constant_load is None or len(problem.varying) > 0
-        if varies or self.forced_step is not None:  # local errors miss peaks of a load
+        # local errors miss peaks of a load
+        if varies or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
         end = scheme(problem, state, step)
         end = with_pass_errors(problem, state, end, end, scheme, step)
@@ -162,7 +200,7 @@ class ImplicitStepper(StepDoublingStepper):
         if not problem.varying:  # many rows of a log average out within a step
             left = np.where(doubled.varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
         part = (end.passes / stop) ** PART_EXPONENT / left
-        scale = part / self.tolerance
+        scale = part / (DOUBLED_SHARE * self.tolerance)
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, _most(end)),
             *(edges.parts_of_bodies(end), own, order),
@@ -270,7 +308,7 @@ def _estimates(
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
     if crossed is not None:
-        at_edges = np.where(crossed, EDGES * added, 0.0)
+        at_edges = EDGES * (np.where(crossed, added, 0.0) + edges.first_order_errors(end))
         sizes[2] = np.hypot(
             sizes[2], np.sqrt((at_edges**2).sum(axis=(0, 2)) / edges.squares(depths))
         )
@@ -295,7 +333,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     times = problem.time(state.passes)
     here = problem.at_time(times, times)
     force = problem.force(times)
-    exposure = _exposure(here, problem, force)
+    own = exposure(here, problem, force)
     spans = np.full((ROWS - 1, len(state.passes)), np.inf)
     spans[0] = 0.0
     feedback, error = problem.has_spring or bool(problem.terms), state.stepping_error
@@ -304,16 +342,13 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
         loads = carried_loads(here, state.contacts)
         past_feedback[0] = loads - with_feedback(here, force, np.zeros(()), ())
     if past_feedback is not None and problem.has_spring:
-        past_feedback[1] = unloading(here, state, exposure)
+        past_feedback[1] = unloading(here, state, own)
     wear, energy = _wear_per_pass(here, state.contacts)
-    of_edges: dict[str, FloatArray | None] = {"separation": None, "part": None, "whole_steps": None}
-    if edges.resolves_edges(problem, state.contacts):
-        of_edges |= edges.starting_edges(problem, state.contacts)
-    sums = _sums_per_pass(wear if of_edges["part"] is not None else None, energy)
+    sums = _sums_per_pass(None, energy)
     return state.replaced(
-        **of_edges,
-        past_wear=_starting(wear, exposure),
-        past_sums=_starting(sums, exposure)[..., 0],
+        **dict.fromkeys(edges.FIELDS),
+        past_wear=_starting(wear, own),
+        past_sums=_starting(sums, own)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
@@ -355,54 +390,6 @@ def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
     return np.asarray(sums[..., None])
 
 
-@dataclass(frozen=True)
-class _Conditions:
-    """Prescribed conditions of a step.
-
-    Wear is nearly proportional to the load and the friction coefficient. Their product, integrated
-    over the passes, is the exposure; the formulas take it as independent variable, in which wear
-    is smooth also where load and friction vary.
-
-    Parameters
-    ----------
-    force : ndarray, shape (realisations,) or (stations, 1, realisations)
-        Load before feedback for the solution at the end of the step [N].
-    own, mean : ndarray, shape (realisations,)
-        Exposure per pass in these conditions, and its mean over the step.
-    """
-
-    force: FloatArray
-    own: FloatArray
-    mean: FloatArray
-
-
-def _conditions(
-    here: WearProblem, problem: WearProblem, state: WearState, passes: FloatArray
-) -> _Conditions:
-    """Return the conditions of a step; `here` is the problem with processes at their means.
-
-    The load is that at the end of the step where it varies smoothly, and else its mean.
-    """
-    if problem.constant_load is not None and not problem.varying:
-        exposure = _exposure(here, problem, problem.constant_load)
-        return _Conditions(problem.constant_load, exposure, exposure)
-    force = mean = mean_force(problem, state, passes)
-    smooth = smooth_loads(problem, state.passes, passes)
-    if smooth.any():
-        force = np.where(smooth, problem.force(problem.time(state.passes + passes)), mean)
-    return _Conditions(force, _exposure(here, problem, force), _exposure(here, problem, mean))
-
-
-def _exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> FloatArray:
-    """Return the exposure per pass for a load before feedback, shape (realisations,) [N]."""
-    if force.ndim > 1:  # of a cam
-        force = problem.mean_over_turn(force)[0, 0]
-    exposure = at_least(problem, force + here.inputs.mean_offset)
-    if any(item.name == "friction" for item in problem.varying):
-        exposure = exposure * here.inputs.friction.mean(axis=0)
-    return np.asarray(exposure)
-
-
 def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
@@ -421,8 +408,15 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     """
     if state.past_spans is None:
         state = with_rates(problem, state)
+    if state.part is not None:
+        parts = edges.by_resolution(problem, state)
+        if len(parts) > 1 or parts[0][2].part is None:
+            ends = [_split_step(*part, passes) for part in parts]
+            order = np.argsort(np.concatenate([some for some, _, _ in parts]))
+            return joined_states(ends).at(order)
+        state = parts[0][2]
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
-    conditions = _conditions(here, problem, state, passes)
+    conditions = conditions_of(here, problem, state, passes)
     order = Past.of(state).order
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
@@ -439,17 +433,25 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
         if again.size:
             columns = (column[..., again] for column in vars(conditions).values())
-            some = here.at(again), state.at(again), passes[again], _Conditions(*columns)
+            some = here.at(again), state.at(again), passes[again], Conditions(*columns)
             part, decreased[again] = _step(*some, np.full_like(again, lower))
             end = end.with_others(again, part)
     return end
+
+
+def _split_step(
+    places: IntArray, problem: WearProblem, state: WearState, passes: FloatArray
+) -> WearState:
+    """Return the end of a step of some tests, see `edges.by_resolution`."""
+    end = implicit_step(problem, state, passes[places])
+    return edges.with_unresolved_edges(problem, end) if state.part is None else end
 
 
 def _step(
     problem: WearProblem,
     state: WearState,
     passes: FloatArray,
-    conditions: _Conditions,
+    conditions: Conditions,
     order: IntArray,
 ) -> tuple[WearState, BoolArray]:
     """Return the state after an implicit step, and whether depths or energy would decrease.
@@ -464,6 +466,11 @@ def _step(
     formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
     added, guess = extrapolated(weights, past.wear)
+    scale, young = None, edges.young_strips(state)
+    if young is not None:
+        added = np.where(young, half_pass[:, None] * past.wear[0], added)
+        first = (conditions.mean * passes / conditions.own - half_pass) / worn_passes
+        scale = np.where(young, first[:, None], 1.0)
     old_sums = past.sums[..., None]
     sums = extrapolated(weights, old_sums)[0]
     feedback = None
@@ -471,9 +478,12 @@ def _step(
         old = past.feedback.reshape(ROWS, -1, realisations, 1)
         feedback = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
         feedback = feedback.reshape(problem.shape)
-    step = EndOfStep(problem, state, level + added, added, conditions.force, passes, worn_passes)
+    step = EndOfStep(
+        problem, state, level + added, added, conditions.force, passes, worn_passes, scale
+    )
     end, worn, feedback, parts = step.solved(level + guess, feedback)
     rates, change = worn / worn_passes[:, None], added + worn
+    rates = rates if scale is None else rates / scale
     energy_rate = _energy_per_pass(problem, end.contacts)
     sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
     sums = sums + worn_passes[:, None] * sum_rates

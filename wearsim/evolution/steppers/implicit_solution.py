@@ -36,6 +36,7 @@ from wearsim.types import BoolArray, FloatArray
 MAX_FIXED_POINT = 60
 DAMPED_FROM = 10  # iterations; far fewer are usual
 CONVERGED = 500.0  # change of wear over the whole depth, relative to the tolerance of iterations
+OF_EDGES = 10.0  # the same of strips partly in contact, over that of the others
 LEAST_GUESS = 0.1  # first guess of a load over the one before; ratio of its iterates
 # relative change of loads with a spring: part of that in the step, at most this over the tolerance
 # of iterations
@@ -116,6 +117,8 @@ class EndOfStep:
         Length of the step.
     worn_passes : ndarray, shape (realisations,)
         Passes of the wear at the end.
+    scale : ndarray, shape as `base`, optional
+        What they are multiplied by in strips that follow the formula of first order.
     """
 
     problem: WearProblem
@@ -125,6 +128,7 @@ class EndOfStep:
     force: FloatArray
     passes: FloatArray
     worn_passes: FloatArray
+    scale: FloatArray | None = None
 
     def solved(self, guess: FloatArray, feedback: FloatArray | None) -> Solved:
         """Solve contacts, wear and loads together.
@@ -210,7 +214,7 @@ class EndOfStep:
                 of_edges = compare_edges(
                     edges, active, gaps, slopes, linear, apart, load, new, level
                 )
-                rest = np.maximum(rest, of_edges)
+                rest = np.maximum(rest, of_edges / OF_EDGES)
             if np.count_nonzero(active) < len(active):  # of realisations that have converged
                 each = exponents.reshape(-1, len(active), shape[1])
                 each[:, ~active] = known.reshape(each.shape)[:, ~active]
@@ -279,7 +283,11 @@ class EndOfStep:
     def _parts(self, contacts: ContactBatchSolution) -> FloatArray:
         """Return the contributions of the contacts to the wear, shape (2, contacts, strips) [m]."""
         parts = self.problem.wear_parts(contacts, self.worn_passes)
-        return parts.reshape(2, *contacts.line_load.shape)
+        parts = parts.reshape(2, *contacts.line_load.shape)
+        if self.scale is None:
+            return parts
+        rows = self.problem.body_rows.T
+        return np.asarray(parts * self.scale[rows].reshape(parts.shape))
 
     def _equilibrium(
         self,

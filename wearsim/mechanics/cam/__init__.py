@@ -1,6 +1,6 @@
 """Cams: motion of the follower, kinematics of the roller on the cam, stations along the angle."""
 
-from wearsim.mechanics.cam.extremes import Extreme, greatest, integral_error
+from wearsim.mechanics.cam.extremes import Extreme, greatest, greatest_value, integral_error
 from wearsim.mechanics.cam.follower import Follower, RollerKinematics
 from wearsim.mechanics.cam.motion import Motion, Panel, Segment, motion_mistakes
 from wearsim.mechanics.cam.outline import angles_by_chord, angles_by_number
@@ -34,6 +34,7 @@ __all__ = [
     "eccentric_cam",
     "extreme",
     "greatest",
+    "greatest_value",
     "integral_error",
     "motion_mistakes",
     "moved_stations",

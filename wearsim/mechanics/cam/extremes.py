@@ -60,12 +60,9 @@ def greatest(stations: Stations, values: FloatArray) -> Extreme:
         np.array(column).reshape(-1, *(1,) * (values.ndim - 1))
         for column in zip(*((p.start, p.stop - p.start) for p in stations.panels), strict=True)
     )
-    numbers = np.array(stations.numbers)
-    panels = np.empty((4, len(numbers), *values.shape[1:]))
-    for number in set(stations.numbers):
-        chosen = np.flatnonzero(numbers == number)
-        rows = values[stations.first[chosen, None] + np.arange(number)]
-        panels[:, chosen] = _of_panels(rows, starts[chosen], widths[chosen])
+    panels = np.empty((4, len(stations.numbers), *values.shape[1:]))
+    for chosen, places in stations.groups:
+        panels[:, chosen] = _of_panels(values[places], starts[chosen], widths[chosen])
     # a station, or two at the ends, say nothing about what is between them
     panels[2, _with_few(stations, 2)] = np.abs(values).max(axis=0)
     few = _with_few(stations, 3)
@@ -85,6 +82,15 @@ def greatest(stations: Stations, values: FloatArray) -> Extreme:
     away = np.where(rival, apart, 0.0).max(axis=0)
     bound = np.where(twin | rival, peak + error, -np.inf).max(axis=0) - largest
     return Extreme(largest, at, bound, np.clip(away, own_angle, math.pi))
+
+
+def greatest_value(stations: Stations, values: FloatArray) -> FloatArray:
+    """Return the value of `greatest` alone, in a third of the time."""
+    peak = np.empty((len(stations.numbers), *values.shape[1:]))
+    for chosen, places in stations.groups:
+        rows = values[places]
+        peak[chosen] = rows[:, 0] if rows.shape[1] == 1 else _peaks(rows).value
+    return np.asarray(np.take_along_axis(peak, _first_of_equal(peak, axis=0), axis=0)[0])
 
 
 def integral_error(stations: Stations, values: FloatArray) -> FloatArray:
@@ -139,25 +145,8 @@ def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[F
     if number == 1:
         middle = np.broadcast_to(start + 0.5 * width, rows[:, 0].shape)
         return [rows[:, 0], middle, np.zeros_like(middle), np.zeros_like(middle)]
-    count = _PER_STATION * (number - 1)
-    points = 0.5 - 0.5 * np.cos(np.pi / count * np.arange(count + 1))
-    samples = _product(interpolation(number, points), rows)
-    place = _first_of_equal(samples, axis=1)
-    value = np.take_along_axis(samples, place, axis=1)[:, 0]
-    first = np.pi / count * place[:, 0]
-    # Newton's method on the sum of c cos(order phi), in which the ends of a panel are stationary
-    orders = np.arange(number).reshape(-1, *(1,) * (rows.ndim - 2))
-    cosines = _product(_transform(number), rows)
-    phi = first
-    for _ in range(_ITERATIONS):
-        turned = orders * phi[:, None]
-        slope = -_sum(orders * cosines * np.sin(turned))
-        bend = _sum(orders**2 * cosines * np.cos(turned))
-        step = slope / np.where(bend > 0.0, bend, np.inf)
-        phi = np.clip(phi + np.clip(step, -np.pi / count, np.pi / count), 0.0, np.pi)
-    gain = _sum(cosines * (np.cos(orders * phi[:, None]) - np.cos(orders * first[:, None])))
-    higher = gain > _ROUNDING * np.abs(value)
-    value, phi = np.where(higher, value + gain, value), np.where(higher, phi, first)
+    value, phi, bend, cosines, samples, place = _peaks(rows)
+    points, count = _sampling(number)[0], samples.shape[1] - 1
     error = np.abs(cosines[:, max(number - 2, 1) :]).sum(axis=1)
     part_of_panel = 0.5 - 0.5 * np.cos(phi)
     # the vertex lies where samples are within twice the error
@@ -176,6 +165,54 @@ def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[F
     return [value, start + width * part_of_panel, error, moved]
 
 
+class _Peaks(NamedTuple):
+    """Greatest value of panels, shape (panels, ...), and what it is found from.
+
+    Its angle phi, the second derivative of minus the value by phi, the amplitudes of cosines, the
+    samples, and the number of the greatest of them.
+    """
+
+    value: FloatArray
+    phi: FloatArray
+    bend: FloatArray
+    cosines: FloatArray
+    samples: FloatArray
+    place: IntArray
+
+
+def _peaks(rows: FloatArray) -> _Peaks:
+    """Return the peaks of panels of several stations; rows as of `_of_panels`."""
+    number = rows.shape[1]
+    points, matrix = _sampling(number)
+    count = len(points) - 1
+    samples = _product(matrix, rows)
+    place = _first_of_equal(samples, axis=1)
+    value = np.take_along_axis(samples, place, axis=1)[:, 0]
+    first = np.asarray(np.pi / count * place[:, 0], dtype=np.float64)
+    # Newton's method on the sum of c cos(order phi), in which the ends of a panel are stationary
+    orders = np.arange(number).reshape(-1, *(1,) * (rows.ndim - 2))
+    cosines = _product(_transform(number), rows)
+    phi = first
+    for _ in range(_ITERATIONS):
+        turned = orders * phi[:, None]
+        slope = -_sum(orders * cosines * np.sin(turned))
+        bend = _sum(orders**2 * cosines * np.cos(turned))
+        step = slope / np.where(bend > 0.0, bend, np.inf)
+        phi = np.clip(phi + np.clip(step, -np.pi / count, np.pi / count), 0.0, np.pi)
+    gain = _sum(cosines * (np.cos(orders * phi[:, None]) - np.cos(orders * first[:, None])))
+    higher = gain > _ROUNDING * np.abs(value)
+    value, phi = np.where(higher, value + gain, value), np.where(higher, phi, first)
+    return _Peaks(value, phi, bend, cosines, samples, place)
+
+
+@lru_cache
+def _sampling(number: int) -> tuple[FloatArray, FloatArray]:
+    """Return the samples of a panel, from 0 to 1, and the matrix from its stations to them."""
+    count = _PER_STATION * (number - 1)
+    points = 0.5 - 0.5 * np.cos(np.pi / count * np.arange(count + 1))
+    return points, interpolation(number, points)
+
+
 @lru_cache
 def _transform(number: int) -> FloatArray:
     """Return the matrix from values at stations to the amplitudes of cos(order phi)."""
@@ -187,10 +224,8 @@ def _transform(number: int) -> FloatArray:
 
 def _product(matrix: FloatArray, rows: FloatArray) -> FloatArray:
     """Return a matrix times the second axis; the round-off is that of a single column."""
-    found = np.zeros((len(rows), len(matrix), *rows.shape[2:]))
-    for place, column in enumerate(matrix.T):
-        found += column.reshape(-1, *(1,) * (rows.ndim - 2)) * rows[:, place, None]
-    return found
+    factors = matrix.reshape(*matrix.shape, *(1,) * (rows.ndim - 2))
+    return np.asarray(np.add.accumulate(factors * rows[:, None], axis=2)[:, :, -1])
 
 
 def _sum(values: FloatArray) -> FloatArray:

@@ -93,6 +93,13 @@ class Stations:
         return np.cumsum([0, *self.numbers[:-1]])
 
     @cached_property
+    def groups(self) -> list[tuple[IntArray, IntArray]]:
+        """Panels with equal numbers of stations: their numbers, and those of their stations."""
+        numbers = np.array(self.numbers)
+        panels = [np.flatnonzero(numbers == number) for number in sorted(set(self.numbers))]
+        return [(p, self.first[p, None] + np.arange(numbers[p[0]])) for p in panels]
+
+    @cached_property
     def angle(self) -> FloatArray:
         """Angle of each station, shape (stations,) [rad]."""
         each = zip(self.panels, self.numbers, strict=True)

@@ -29,6 +29,7 @@ from wearsim.mechanics.slender.half_length import (
     HalfLengths,
     add_around,
     add_length_slopes,
+    fill_log_scales,
     find_factors,
     log_half_length,
     new_half_lengths,
@@ -38,7 +39,6 @@ from wearsim.mechanics.slender.newton import (
     CONVERGED,
     GAP_TOLERANCE,
     SINGULAR,
-    fill_log_scales,
     solve_slender,
 )
 from wearsim.mechanics.tangential.strip_interaction import StripElasticity

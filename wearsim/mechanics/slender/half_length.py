@@ -20,6 +20,7 @@ narrower than long, and by strips with a very small load next to strips with a g
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -333,3 +334,16 @@ def add_length_slopes(
         for i in range(max(first, j - 2 * REACH), min(last, j + 2 * REACH) + 1):
             if column >= 0 and index[k, i] >= 0:
                 matrix[column, index[k, i]] += scale * gathered[j - i + 2 * REACH, i]
+
+
+@subroutine
+def fill_log_scales(
+    contact_modulus: float,
+    longitudinal_curvature: FloatArray,
+    spacing: float,
+    log_scale: FloatArray,
+) -> None:
+    """Fill ln(a/dy) of a strip of each contact under 1 N/m without interaction (s = 1)."""
+    for k in range(longitudinal_curvature.shape[0]):
+        scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature[k])
+        log_scale[k] = 0.5 * math.log(scale) - math.log(spacing)

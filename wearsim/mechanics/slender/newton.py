@@ -18,8 +18,7 @@ coupled step.
 
 from __future__ import annotations
 
-import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +35,7 @@ from wearsim.mechanics.slender.body_wear import (
 from wearsim.mechanics.slender.half_length import (
     HalfLengths,
     fill_half_lengths,
+    fill_log_scales,
     find_factors,
     new_half_lengths,
 )
@@ -48,6 +48,7 @@ from wearsim.mechanics.slender.newton_step import (
     complete_surface,
     correct_residual,
     fill_jacobian,
+    fill_separation,
     new_newton_state,
     number_strips,
     predict_surface,
@@ -170,46 +171,182 @@ def check_convergence(
     return (CONTINUE, 0.0) if entered else (CONVERGED, change)
 
 
+class ContactSet(NamedTuple):
+    """Contacts of a set: gap [m] and wear compliance [m/(N/m)] of the strips, loads [N].
+
+    Also the strip width [m], 1/(pi E*) [1/Pa], and the table of `influence_table`.
+    """
+
+    gap: FloatArray
+    compliance: FloatArray
+    loads: FloatArray
+    spacing: float
+    unit: float
+    table: FloatArray
+
+
 @subroutine
-def fill_separation(
-    k: int,
-    gap: FloatArray,
-    approach: float,
+def start_strips(
+    these: ContactSet,
+    members: Any,
+    worn: Any,
+    corrected: bool,
     line_load: FloatArray,
     state: NewtonState,
-    separation: FloatArray,
-) -> None:
-    """Fill the distance between the deformed surfaces of contact `k` in strips without load.
-
-    Strips that are not followed have the displacement of the nearest one that is.
+) -> bool:
+    """Assign rows to the loaded strips of all contacts, and add the load that they lack.
 
     Parameters
     ----------
-    gap, line_load, separation : ndarray, shape (contacts, strips)
-        Gap [m], q [N/m] and the result [m].
-    approach : float
-        Approach relative to the least gap [m].
+    members, worn
+        `bodies` and `shared` of the set, or None.
+    corrected : bool
+        Whether a foundation corrects the line loads in any case.
+
+    Returns
+    -------
+    bool
+        Whether a foundation corrects the line loads.
     """
-    first, last = state.left[k], state.right[k] - 1
-    for i in range(gap.shape[1]):
-        near = min(max(i, first), last)
-        beyond = gap[k, i] - gap[k, near]
-        separation[k, i] = max(state.surface[k, near] + beyond - approach, 0.0)
-        if line_load[k, i] > 0.0:
-            separation[k, i] = 0.0
+    gap, contacts = these.gap, line_load.shape[0]
+    lowest, softness = state.lowest, state.softness
+    for k in range(contacts):
+        # relative to the least gap, as the displacements under a vanishing load would be lost in
+        # the rounding of a deep groove
+        lowest[k], state.fresh[k] = gap[k, 0], True
+        for i in range(line_load.shape[1]):
+            lowest[k] = min(lowest[k], gap[k, i])
+            softness[k, i] = these.compliance[k, i]
+            if members is not None:  # as if all contacts wore the same strips
+                both = worn[k, 0, i] + worn[k, 1, i]
+                softness[k, i] += contacts * both
+            corrected = corrected or softness[k, i] > 0.0
+        missing = add_missing_load(these.loads[k] / these.spacing, line_load[k])
+        corrected = missing > MUCH or corrected
+        number_strips(k, line_load, FIRST_MARGIN, state)
+    return corrected
 
 
 @subroutine
-def fill_log_scales(
-    contact_modulus: float,
-    longitudinal_curvature: FloatArray,
-    spacing: float,
-    log_scale: FloatArray,
+def rest_contacts(
+    these: ContactSet,
+    members: Any,
+    worn: Any,
+    displaced: bool,
+    line_load: FloatArray,
+    approach: FloatArray,
+    lengths: HalfLengths,
+    state: NewtonState,
 ) -> None:
-    """Fill ln(a/dy) of a strip of each contact under 1 N/m without interaction (s = 1)."""
-    for k in range(longitudinal_curvature.shape[0]):
-        scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature[k])
-        log_scale[k] = 0.5 * math.log(scale) - math.log(spacing)
+    """Fill line loads and approaches of contacts on a foundation.
+
+    Those with line loads keep them, unless the foundation lies under the displacement by these
+    loads, `displaced`; the other parameters are as of `start_strips`.
+    """
+    surface, softness, unit = state.surface, state.softness, these.unit
+    soft, widest = (FOUNDATION if displaced else FIRST_FOUNDATION) * unit, -np.inf
+    for k in range(line_load.shape[0]):
+        for i in range(line_load.shape[1]):
+            surface[k, i] = these.gap[k, i] - state.lowest[k]
+            if displaced:
+                own = these.compliance[k, i]
+                surface[k, i] -= (soft + softness[k, i] - own) * line_load[k, i]
+        if displaced:
+            widest = max(widest, find_factors(k, line_load, False, lengths))
+    if members is not None and displaced:
+        add_depths(members, worn, line_load, surface)
+    for k in range(line_load.shape[0] if widest <= HIGHEST else 0):
+        if displaced:
+            add_displacement(k, these.table, unit, line_load, lengths, state)
+        if displaced or state.size[k] == 0:
+            load, first, end = these.loads[k] / these.spacing, state.left[k], state.right[k]
+            rest_on_foundation(k, surface, softness, soft, load, first, end, line_load, approach)
+
+
+@subroutine
+def factor_contacts(
+    these: ContactSet,
+    members: Any,
+    worn: Any,
+    system: Any,
+    line_load: FloatArray,
+    lengths: HalfLengths,
+    state: NewtonState,
+) -> tuple[int, bool]:
+    """Fill surfaces and residuals of all contacts, and factor new Jacobians where needed.
+
+    Parameters
+    ----------
+    system
+        Equations of the shared bodies, or None; the others are as of `start_strips`.
+
+    Returns
+    -------
+    status : int
+        CONTINUE or the cause of failure.
+    renewed : bool
+        Whether a contact has a new Jacobian.
+    """
+    surface, unit, renewed = state.surface, these.unit, False
+    for k in range(line_load.shape[0]):
+        for i in range(line_load.shape[1]):
+            own = these.compliance[k, i] * line_load[k, i]
+            surface[k, i] = these.gap[k, i] - state.lowest[k] + own
+        if state.fresh[k]:
+            number_strips(k, line_load, MARGIN, state)
+            renewed = True
+    if members is not None:
+        add_depths(members, worn, line_load, surface)
+        if renewed:
+            number_depths(members, these.compliance, worn, state, system, state.softness)
+    for k in range(line_load.shape[0]):
+        fresh = state.fresh[k]
+        if find_factors(k, line_load, fresh, lengths) > HIGHEST:
+            return TOO_FINE, renewed
+        if not fresh:
+            add_displacement(k, these.table, unit, line_load, lengths, state)
+        elif fill_jacobian(k, these.table, unit, state.softness, line_load, lengths, state):
+            solve_factored(state.matrix[k], state.size[k], state.unit_load[k])
+            state.unit_load_sum[k] = 0.0
+            for row in range(state.size[k]):
+                state.unit_load_sum[k] += state.unit_load[k, row]
+            state.fresh[k] = False
+            if members is not None:
+                fill_responses(k, state, system)
+        if state.fresh[k] or not abs(state.unit_load_sum[k]) > 0.0:
+            return SINGULAR, renewed
+        for row in range(state.size[k]):
+            state.missing[k, row] = -surface[k, state.place[k, row]]
+    if members is not None and renewed and not factor_depths(worn, state, system):
+        return SINGULAR, renewed
+    return CONTINUE, renewed
+
+
+@subroutine
+def fill_steps(
+    these: ContactSet,
+    members: Any,
+    worn: Any,
+    system: Any,
+    corrected: bool,
+    line_load: FloatArray,
+    approach: FloatArray,
+    lengths: HalfLengths,
+    state: NewtonState,
+) -> None:
+    """Fill steps and approaches of all contacts; parameters as of `factor_contacts`.
+
+    Residuals are `corrected` by the nonlinear part of the last step.
+    """
+    for k in range(line_load.shape[0]):
+        if corrected:
+            correct_residual(k, these.table, these.unit, line_load, lengths, state)
+        for row in range(state.size[k]):
+            state.step[k, row] = state.missing[k, row]
+        solve_factored(state.matrix[k], state.size[k], state.step[k])
+        add_approach(k, these.loads[k] / these.spacing, line_load, state, approach)
+    if members is not None:
+        solve_depths(worn, state, system, approach)
 
 
 @kernel
@@ -275,15 +412,20 @@ def solve_slender(
     table, half_length = borrowed(table), borrowed(half_length)
     owned = new_newton_state(contacts, n), new_half_lengths(curvature_influence, contacts)
     state, lengths = borrowed(owned)
-    surface, lowest, softness = state.surface, state.lowest, state.softness
+    members: Any = None
+    worn: Any = None
+    system: Any = None
     if bodies is not None:
         depths = new_depth_system(bodies, n)
         members, worn, system = borrowed((bodies, shared, depths))
     for number in range(gap.shape[0]):
-        load, total, delta = loads[number], line_load[number], approach[number]
-        own = compliance[number]
-        started, finite = False, True
+        total, delta = line_load[number], approach[number]
+        wear: Any = None
+        if bodies is not None:
+            wear = worn[number]
+        these = ContactSet(gap[number], compliance[number], loads[number], spacing, unit, table)
         fill_log_scales(contact_modulus, longitudinal_curvature[number], spacing, lengths.log_scale)
+        started, finite = False, True
         for k in range(contacts):
             for i in range(n):
                 started = started or total[k, i] > 0.0
@@ -292,102 +434,31 @@ def solve_slender(
         for attempt in range(2 if finite else 0):
             if attempt > 0:
                 total[:] = 0.0
-            corrected = not started
-            for k in range(contacts):
-                # relative to the least gap, as the displacements under a vanishing load would be
-                # lost in the rounding of a deep groove
-                lowest[k], state.fresh[k] = gap[number, k, 0], True
-                for i in range(n):
-                    lowest[k] = min(lowest[k], gap[number, k, i])
-                    softness[k, i] = own[k, i]
-                    if bodies is not None:  # as if all contacts wore the same strips
-                        both = worn[number, k, 0, i] + worn[number, k, 1, i]
-                        softness[k, i] += contacts * both
-                    corrected = corrected or softness[k, i] > 0.0
-                corrected = add_missing_load(load[k] / spacing, total[k]) > MUCH or corrected
-                number_strips(k, total, FIRST_MARGIN, state)
+            corrected = start_strips(these, members, wear, not started, total, state)
             # a foundation gives loads to contacts without a start; another one, under the
             # displacements of these loads, brings them within a tenth in a quarter of the time of a
             # Jacobian. A second attempt does without
             for sweep in range(2 if corrected and attempt == 0 else 1):
-                soft, widest = (FOUNDATION if sweep else FIRST_FOUNDATION) * unit, -np.inf
-                for k in range(contacts):
-                    for i in range(n):
-                        surface[k, i] = gap[number, k, i] - lowest[k]
-                        if sweep:
-                            surface[k, i] -= (soft + softness[k, i] - own[k, i]) * total[k, i]
-                    if sweep:
-                        widest = max(widest, find_factors(k, total, False, lengths))
-                if bodies is not None and sweep:
-                    add_depths(members, worn[number], total, surface)
-                for k in range(contacts if widest <= HIGHEST else 0):
-                    if sweep:
-                        add_displacement(k, table, unit, total, lengths, state)
-                    if sweep or state.size[k] == 0:
-                        sum_of_loads, first, end = load[k] / spacing, state.left[k], state.right[k]
-                        rest_on_foundation(
-                            k, surface, softness, soft, sum_of_loads, first, end, total, delta
-                        )
+                rest_contacts(these, members, wear, sweep > 0, total, delta, lengths, state)
             outcome, before, stale, iteration = CONTINUE, 0.0, 0.0, 0
             while outcome == CONTINUE:
                 iteration += 1
-                renewed = False
-                for k in range(contacts):
-                    for i in range(n):
-                        surface[k, i] = gap[number, k, i] - lowest[k] + own[k, i] * total[k, i]
-                    if state.fresh[k]:
-                        number_strips(k, total, MARGIN, state)
-                        renewed = True
-                if bodies is not None:
-                    add_depths(members, worn[number], total, surface)
-                    if renewed:
-                        number_depths(members, own, worn[number], state, system, softness)
-                for k in range(contacts):
-                    fresh = state.fresh[k]
-                    if find_factors(k, total, fresh, lengths) > HIGHEST:
-                        outcome = TOO_FINE
-                        break
-                    if not fresh:
-                        add_displacement(k, table, unit, total, lengths, state)
-                    elif fill_jacobian(k, table, unit, softness, total, lengths, state):
-                        solve_factored(state.matrix[k], state.size[k], state.unit_load[k])
-                        state.unit_load_sum[k] = 0.0
-                        for row in range(state.size[k]):
-                            state.unit_load_sum[k] += state.unit_load[k, row]
-                        state.fresh[k] = False
-                        if bodies is not None:
-                            fill_responses(k, state, system)
-                    if state.fresh[k] or not abs(state.unit_load_sum[k]) > 0.0:
-                        outcome = SINGULAR
-                        break
-                    for row in range(state.size[k]):
-                        state.missing[k, row] = -surface[k, state.place[k, row]]
+                outcome, renewed = factor_contacts(
+                    these, members, wear, system, total, lengths, state
+                )
                 if outcome != CONTINUE:
-                    break
-                if (
-                    bodies is not None
-                    and renewed
-                    and not factor_depths(worn[number], state, system)
-                ):
-                    outcome = SINGULAR
                     break
                 # the second sweep corrects the Jacobian by the nonlinearity of large changes
                 for sweep in range(2 if renewed or stale > SMALL else 1):
-                    for k in range(contacts):
-                        if sweep:
-                            correct_residual(k, table, unit, total, lengths, state)
-                        for row in range(state.size[k]):
-                            state.step[k, row] = state.missing[k, row]
-                        solve_factored(state.matrix[k], state.size[k], state.step[k])
-                        add_approach(k, load[k] / spacing, total, state, delta)
-                    if bodies is not None:
-                        solve_depths(worn[number], state, system, delta)
+                    fill_steps(
+                        these, members, wear, system, sweep > 0, total, delta, lengths, state
+                    )
                 change, left = update_loads(total, state, iteration > CAUTIOUS)
                 stale = change if renewed else stale + change
                 for k in range(contacts):
-                    predict_surface(k, surface, state)
+                    predict_surface(k, state.surface, state)
                 if bodies is not None:
-                    add_depths(members, worn[number], state.change, surface)
+                    add_depths(members, wear, state.change, state.surface)
                 outcome, before = check_convergence(
                     iteration, unit, before, change, left, table, lengths, state, delta, total
                 )
@@ -398,7 +469,7 @@ def solve_slender(
                 fill_half_lengths(spacing, total, lengths, half_length[number])
                 for k in range(contacts):
                     fill_separation(k, gap[number], delta[k], total, state, separation[number])
-                    delta[k] += lowest[k]
+                    delta[k] += state.lowest[k]
                 break
     if bodies is not None:
         kept(depths)

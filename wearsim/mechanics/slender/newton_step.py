@@ -379,3 +379,32 @@ def update_loads(line_load: FloatArray, state: NewtonState, cautious: bool) -> t
             line_load[k, i], state.change[k, i] = new, new - old
         change = max(change, greatest / peak)
     return change, left
+
+
+@subroutine
+def fill_separation(
+    k: int,
+    gap: FloatArray,
+    approach: float,
+    line_load: FloatArray,
+    state: NewtonState,
+    separation: FloatArray,
+) -> None:
+    """Fill the distance between the deformed surfaces of contact `k` in strips without load.
+
+    Strips that are not followed have the displacement of the nearest one that is.
+
+    Parameters
+    ----------
+    gap, line_load, separation : ndarray, shape (contacts, strips)
+        Gap [m], q [N/m] and the result [m].
+    approach : float
+        Approach relative to the least gap [m].
+    """
+    first, last = state.left[k], state.right[k] - 1
+    for i in range(gap.shape[1]):
+        near = min(max(i, first), last)
+        beyond = gap[k, i] - gap[k, near]
+        separation[k, i] = max(state.surface[k, near] + beyond - approach, 0.0)
+        if line_load[k, i] > 0.0:
+            separation[k, i] = 0.0

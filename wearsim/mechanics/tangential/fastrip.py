@@ -29,8 +29,8 @@ from wearsim.mechanics.tangential.fastsim import (
 )
 from wearsim.mechanics.tangential.strip_with_spin import (
     Moduli,
-    Motion,
     Strip,
+    StripMotion,
     beyond_strip_theory,
     slip_at,
     strip_of,
@@ -44,7 +44,7 @@ _STEP_RATIO = 5  # steps of FASTSIM per step here, as the direction is a smoothe
 def fastrip(
     half_length: FloatArray,
     bound_peak: FloatArray,
-    motion: Motion,
+    motion: StripMotion,
     moduli: Moduli,
     flexibility: float,
     points: int,
@@ -57,7 +57,7 @@ def fastrip(
         a(y) [m]; strips with a = 0 get zeros.
     bound_peak : ndarray, shape (strips,)
         Friction times the greatest pressure of the strip [Pa].
-    motion : Motion
+    motion : StripMotion
         The rigid slip.
     moduli : Moduli
         The amended moduli.
@@ -191,7 +191,7 @@ def turn_direction(
 def fastrip_fields(
     half_length: FloatArray,
     bound_peak: FloatArray,
-    motion: Motion,
+    motion: StripMotion,
     moduli: Moduli,
     points: int,
 ) -> FloatArray:

@@ -43,7 +43,7 @@ class Moduli(NamedTuple):
     spin_across: float
 
 
-class Motion(NamedTuple):
+class StripMotion(NamedTuple):
     """Rigid slip per unit of rolling velocity, and its product with the moduli.
 
     Longitudinal slip (strips,), and xi Gx + s Gk (strips,) [Pa]; eta and phi [1/m].
@@ -108,7 +108,7 @@ def amended_moduli(
 
 @kernel
 def beyond_strip_theory(
-    j: int, half_length: FloatArray, bound_peak: FloatArray, motion: Motion, moduli: Moduli
+    j: int, half_length: FloatArray, bound_peak: FloatArray, motion: StripMotion, moduli: Moduli
 ) -> bool:
     """Return whether strip `j` has no adhesion zone in strip theory because of spin.
 
@@ -129,7 +129,7 @@ def beyond_strip_theory(
 
 @subroutine
 def strip_of(
-    j: int, half_length: FloatArray, bound_peak: FloatArray, motion: Motion, moduli: Moduli
+    j: int, half_length: FloatArray, bound_peak: FloatArray, motion: StripMotion, moduli: Moduli
 ) -> Strip:
     """Return strip `j` with its shift and the traction's direction at the onset of slip.
 
@@ -139,7 +139,7 @@ def strip_of(
         Number of the strip.
     half_length, bound_peak : ndarray, shape (strips,)
         a(y) [m] and friction times the greatest pressure of the strip [Pa], both positive.
-    motion : Motion
+    motion : StripMotion
         The rigid slip.
     moduli : Moduli
         The amended moduli.

@@ -135,16 +135,18 @@ class Slender(StripModel):
             number = int(np.argmin(finite.all(axis=0)))
             error = power_not_finite(batch.point(number), line_load=line_load[number])
             raise naming_contact(error, number, batch)
-        return ContactBatchSolution(
-            y=self._grid.y,
-            half_length=half_length,
-            line_load=line_load,
-            dissipation=dissipation,
-            approach=approach,
-            longitudinal_creepage=batch.longitudinal,
-            iterations=iterations,
-            separation=separation,
-            **dict(zip(SUMS, sums, strict=True)),
+        return ContactBatchSolution.of_columns(
+            {
+                "y": self._grid.y,
+                "half_length": half_length,
+                "line_load": line_load,
+                "dissipation": dissipation,
+                "approach": approach,
+                "longitudinal_creepage": batch.longitudinal,
+                "iterations": iterations,
+                "separation": separation,
+                **dict(zip(SUMS, sums, strict=True)),
+            }
         )
 
     def _solve_normal(

@@ -21,7 +21,7 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
 )
 from wearsim.mechanics.tangential.strip_with_spin import (
     Moduli,
-    Motion,
+    StripMotion,
     amended_moduli,
     beyond_strip_theory,
 )
@@ -350,7 +350,7 @@ class FastripTheory(TangentialTheory):
     @staticmethod
     def _problem(
         strips: Strips, pair: ElasticPair, slip: LocalSlip, friction: FloatArray, part: slice
-    ) -> tuple[FloatArray, FloatArray, Motion, Moduli]:
+    ) -> tuple[FloatArray, FloatArray, StripMotion, Moduli]:
         """Return the arguments of the kernels for the strips of `part`."""
         a, b = equivalent_ellipse(strips)
         coefficients = creepage_coefficients(a / b, pair.poisson_ratio)
@@ -360,7 +360,7 @@ class FastripTheory(TangentialTheory):
         return (
             np.ascontiguousarray(strips.half_length[part]),
             np.ascontiguousarray((friction * peak_pressure(strips, elliptic=True))[part]),
-            Motion(
+            StripMotion(
                 np.ascontiguousarray(slip.longitudinal[part]),
                 np.ascontiguousarray(drive[part]),
                 float(slip.lateral),

@@ -24,7 +24,7 @@ from wearsim.models.tangential.base import LocalSlip, Strips, TangentialTheory, 
 from wearsim.models.tangential.fastsim import FastripTheory, FastsimTheory
 from wearsim.plugins import Options
 from wearsim.types import BoolArray, ContactFields, FloatArray
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 
 
 def _along(
@@ -202,7 +202,7 @@ class TangentialOptions(Options):
         if theory is not None and theory not in users:
             raise QuantityError(
                 f'is not used with tangential = "{theory}"',
-                shown(value),
+                as_written(value),
                 "none of it, or " + " or ".join(f'tangential = "{user}"' for user in users),
             )
         return value

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Part:
+class PagePart:
     """Part of a page: a view with its panels drawn.
 
     Parameters
@@ -155,7 +155,7 @@ def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
     )
 
 
-def part_of(view: View, measured: Sequence[Measured] = ()) -> Part:
+def part_of(view: View, measured: Sequence[Measured] = ()) -> PagePart:
     """Return a view as a part of a page, with its panels drawn."""
     from wearsim.report.page.plots import plots_of  # noqa: PLC0415  (imports bokeh)
 
@@ -163,9 +163,9 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> Part:
     tables, computed = view.tables(), view.profile()
     if measured and computed is not None:
         residuals = [
-            Row(one.label, residual_text(one, view.profile(one.angle) or computed))
-            for one in measured
+            Row(profile.label, residual_text(profile, view.profile(profile.angle) or computed))
+            for profile in measured
         ]
         tables.insert(-1, Table("Measured profiles", residuals))
     remarks = [*filter(None, [view.failures]), *view.warnings, *view.notes]
-    return Part(view, view.rows(), tables, remarks, *plots_of(sheet))
+    return PagePart(view, view.rows(), tables, remarks, *plots_of(sheet))

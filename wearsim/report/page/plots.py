@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from bokeh.models.annotations import BoxAnnotation, ColorBar, Label
-from bokeh.models.annotations import Span as Rule
+from bokeh.models.annotations import BoxAnnotation, ColorBar, Label, Span as Rule
 from bokeh.models.axes import LinearAxis
 from bokeh.models.formatters import BasicTickFormatter, NumeralTickFormatter
 from bokeh.models.mappers import LinearColorMapper
@@ -45,25 +44,23 @@ _MARKERS: dict[str, Any] = {
     "v": "inverted_triangle", "+": "cross", "|": "dash",
 }  # fmt: skip
 _PALETTES = {"magma": Magma256, "magma_r": Magma256[::-1], "viridis": Viridis256}
+_TEXT = dict.fromkeys(("axis_label_text_color", "major_label_text_color"), "#222222")
+_LEGEND: dict[str, Any] = {
+    "ncols": 2, "orientation": "horizontal", "border_line_alpha": 0.0, "click_policy": "hide",
+    "padding": 4, "label_text_font_size": "13px", "label_text_color": "#222222",
+}  # fmt: skip
 _CELLS = 301  # of an image along each axis, if its places are irregular
 
 
 def plots_of(sheet: Sheet) -> tuple[list[tuple[Panel, Any]], list[str]]:
     """Return the panels of a page with their figures, and the texts of the slider."""
     shown = [panel for panel in sheet.panels.values() if not panel.figure_only]
-    steps = list(sheet.steps)
-    if steps:
-        steps = [steps[number] for number in evenly_spaced(len(steps), MOST_RECORDS)]
-    return [(panel, draw(panel)) for panel in shown], steps
+    kept = evenly_spaced(len(sheet.steps), MOST_RECORDS) if sheet.steps else ()
+    return [(panel, draw(panel)) for panel in shown], [sheet.steps[number] for number in kept]
 
 
 def draw(panel: Panel) -> Any:
     """Return the figure of a panel."""
-    scales: dict[str, Any] = {
-        "x_axis_type": "log" if panel.x.log else "linear",
-        "y_axis_type": "log" if panel.y.log else "linear",
-        "match_aspect": panel.equal,
-    }
     plot: Any = figure(
         height=340,
         sizing_mode="stretch_width",
@@ -73,27 +70,26 @@ def draw(panel: Panel) -> Any:
         y_axis_label=_plain(panel.y.label),
         toolbar_location="above",
         min_border_right=14,  # for half of the last tick label
-        **scales,
+        x_axis_type="log" if panel.x.log else "linear",
+        y_axis_type="log" if panel.y.log else "linear",
+        match_aspect=panel.equal,
     )
     plot.toolbar.logo = None
     _set_axis(plot, "x", panel.x)
     _set_axis(plot, "y", panel.y)
     if panel.right is not None:
-        low, high = _limits(panel.right)
-        # a plain range, since one that follows the data would follow those of both axes
+        # a plain range, since one that follows the data would follow both axes
         values = [np.ravel(mark.y) for mark in panel.marks if isinstance(mark, Line) and mark.right]
         data = np.concatenate(values) * panel.right.scale
-        margin = 0.05 * float(np.nanmax(data) - np.nanmin(data))
-        low = float(np.nanmin(data)) - margin if low is None else low
-        high = float(np.nanmax(data)) + margin if high is None else high
+        least, greatest = float(np.nanmin(data)), float(np.nanmax(data))
+        margin = 0.05 * (greatest - least)
+        low, high = _limits(panel.right, least - margin, greatest + margin)
         plot.extra_y_ranges = {"right": Range1d(start=low, end=high)}
         label = _plain(panel.right.label)
         plot.add_layout(LinearAxis(y_range_name="right", axis_label=label), "right")
     for axis in (*plot.xaxis, *plot.yaxis):
-        axis.axis_label_text_font_style = "normal"
-        axis.axis_label_text_font_size = "14px"
-        axis.major_label_text_font_size = "13px"
-        axis.axis_label_text_color = axis.major_label_text_color = "#222222"
+        axis.update(axis_label_text_font_style="normal", axis_label_text_font_size="14px")
+        axis.update(major_label_text_font_size="13px", **_TEXT)
     plot.grid.grid_line_color = "#e4e4e4"
     for mark in panel.marks:
         y = panel.right if mark.right and panel.right else panel.y
@@ -107,20 +103,18 @@ def _plain(text: str) -> str:
     return text.replace("$", "").replace("_l", "").replace("_d", "").replace("\n", " ")
 
 
-def _limits(axis: Axis) -> tuple[float | None, float | None]:
-    low, high = (None if end is None else float(end * axis.scale) for end in axis.limits)
-    return low, high
+def _limits(axis: Axis, *default: float) -> list[Any]:
+    """Return the ends of an axis in its unit; those that follow the data are None by default."""
+    ends = zip(axis.limits, default or (None, None), strict=True)
+    return [other if end is None else float(end * axis.scale) for end, other in ends]
 
 
 def _set_axis(plot: Any, along: str, axis: Axis) -> None:
-    low, high = _limits(axis)
-    if low is not None and high is not None:
-        plot.update(**{f"{along}_range": Range1d(start=low, end=high)})
-    else:
-        ends: dict[str, Any] = {} if low is None else {"start": low}
-        ends |= {} if high is None else {"end": high}
-        # ticks at the places of the data only, without the lines of annotations
-        plot.update(**{f"{along}_range": DataRange1d(only_visible=True, **ends)})
+    named = zip(("start", "end"), _limits(axis), strict=True)
+    ends: dict[str, Any] = {name: end for name, end in named if end is not None}
+    # ticks at the places of the data only, without the lines of annotations
+    shown = Range1d(**ends) if len(ends) > 1 else DataRange1d(only_visible=True, **ends)
+    plot.update(**{f"{along}_range": shown})
     ticks = plot.xaxis if along == "x" else plot.yaxis
     if axis.ticks is not None:
         places = [float(tick * axis.scale) for tick in axis.ticks]
@@ -139,27 +133,22 @@ def _set_legend(plot: Any) -> None:
     """Move the legend below the axes; a click on an entry hides its line."""
     for legend in plot.legend:
         plot.add_layout(legend, "below")
-        legend.update(ncols=2, orientation="horizontal", border_line_alpha=0.0)
-        legend.update(click_policy="hide", padding=4)
-        legend.update(label_text_font_size="13px", label_text_color="#222222")
+        legend.update(**_LEGEND)
 
 
 def _source(columns: Mapping[str, Any]) -> ColumnDataSource:
     """Return columns, numbers in single precision."""
     arrays = {name: np.asarray(values) for name, values in columns.items()}
-    single = {
-        name: array.astype(np.float32) if array.dtype.kind == "f" else array
-        for name, array in arrays.items()
-    }
-    return ColumnDataSource(single)
+    floats = {name: array for name, array in arrays.items() if array.dtype.kind == "f"}
+    single = {name: array.astype(np.float32) for name, array in floats.items()}
+    return ColumnDataSource(arrays | single)
 
 
 def _colour(colour: Any) -> Any:
     """Return a colour of matplotlib as one of CSS; "0.3" is a grey."""
-    if isinstance(colour, str) and colour.replace(".", "").isdigit():
-        level = round(255 * float(colour))
-        return f"#{level:02x}{level:02x}{level:02x}"
-    return colour
+    if not (isinstance(colour, str) and colour.replace(".", "").isdigit()):
+        return colour
+    return f"#{f'{round(255 * float(colour)):02x}' * 3}"
 
 
 def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
@@ -205,17 +194,23 @@ def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
 
 def _hover(plot: Any, renderers: Sequence[Any], *tips: tuple[str, str], line: bool = False) -> None:
     """Show values of the drawn data under the pointer, of a line also above and below it."""
-    mode: Literal["vline", "mouse"] = "vline" if line else "mouse"
-    columns = {text[: text.index("{")] for _, text in tips if "{" in text}
-    printed: Any = dict.fromkeys((name for name in columns if name[0] == "@"), "printf")
-    tool = HoverTool(renderers=list(renderers), tooltips=list(tips), mode=mode, formatters=printed)
-    plot.add_tools(tool)
+    columns = [text.partition("{")[0] for _, text in tips if text[0] == "@" and "{" in text]
+    printed: Any = dict.fromkeys(columns, "printf")
+    options: Any = {"mode": "vline" if line else "mouse", "formatters": printed}
+    plot.add_tools(HoverTool(renderers=list(renderers), tooltips=list(tips), **options))
 
 
 def _tip(axis: Axis, column: str, name: str = "") -> tuple[str, str]:
     """Return the name of an axis, and the text of a column in its unit."""
     unit = "" if axis.unit == "1" else f" {_plain(axis.unit)}"
     return _plain(name or axis.name or "value"), f"@{column}{{%.5g}}{unit}"
+
+
+def _more(mark: Line | Bars) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """Return the further values of a mark as columns in their units, and their texts."""
+    axes = {Axis(name, unit): values for name, (values, unit) in mark.more.items()}
+    columns = {f"more{k}": np.asarray(v) * axis.scale for k, (axis, v) in enumerate(axes.items())}
+    return columns, [_tip(axis, name) for axis, name in zip(axes, columns, strict=True)]
 
 
 def _draw_line(
@@ -230,32 +225,23 @@ def _draw_line(
         return
     if not len(places):
         return
-    every = np.arange(len(places))
-    if not mark.dash:
-        every = evenly_spaced(len(places), MOST_POINTS)
-    further = {
-        f"more{number}": np.asarray(column)[every] * Axis("", unit).scale
-        for number, (column, unit) in enumerate(mark.more.values())
-    }
-    source = _source({"x": places[every], "y": values[every], **further})
-    tips = [_tip(x, "x"), _tip(y, "y", mark.label.split("\n")[0])]
-    tips += [
-        _tip(Axis(name, unit), f"more{number}")
-        for number, (name, (_, unit)) in enumerate(mark.more.items())
-    ]
+    every = evenly_spaced(len(places), len(places) if mark.dash else MOST_POINTS)
+    further, more_tips = _more(mark)
+    chosen = {name: column[every] for name, column in further.items()}
+    source = _source({"x": places[every], "y": values[every], **chosen})
+    tips = [_tip(x, "x"), _tip(y, "y", mark.label.split("\n")[0]), *more_tips]
     width = max(1.5 * mark.width, 1.0)
     line = {"source": source, "line_width": width, "line_dash": _DASHES.get(mark.dash, "solid")}
     if mark.dash and mark.steps:
         plot.step("x", "y", mode="after", **line, **style, **named)
-        # values under the pointer are those of a line, which steps do not have
+        # values under the pointer need a line, which steps do not have
         pointed = plot.line("x", "y", source=source, line_alpha=0.0)
     elif mark.dash:
         pointed = plot.line("x", "y", **line, **style, **named)
     if mark.marker and not mark.at_end:
         look = {"marker": _MARKERS[mark.marker], "size": max(mark.size, 2.0) * 1.3}
         look |= {"fill_color": "white"} if mark.open else {}
-        if mark.marker == "|":
-            look |= {"angle": 0.5 * np.pi}
+        look |= {"angle": 0.5 * np.pi} if mark.marker == "|" else {}
         points = plot.scatter("x", "y", source=source, **look, **style, **named)
         pointed = pointed if mark.dash else points
     _hover(plot, [pointed], *tips, line=bool(mark.dash))
@@ -283,7 +269,7 @@ def _draw_band(
         places = np.repeat(places, 2)[1:]
     source = _source({"x": places, "low": low, "high": high})
     plot.varea("x", "low", "high", source=source, **style, **named)
-    # values under the pointer are those of a line, which areas do not have
+    # values under the pointer need a line, which areas do not have
     line = plot.line("x", "high", source=source, line_alpha=0.0)
     unit = "" if y.unit == "1" else f" {_plain(y.unit)}"
     ends = f"@low{{%.5g}} to @high{{%.5g}}{unit}"
@@ -300,7 +286,8 @@ def _draw_bars(
         "value": np.asarray(mark.value, dtype=float) * size.scale,
     }
     columns["start"] = np.full(len(columns["low"]), mark.start * size.scale)
-    columns |= {f"more{number}": values for number, (values, _) in enumerate(mark.more.values())}
+    further, more_tips = _more(mark)
+    columns |= further
     if isinstance(mark.colour, list):
         columns["colour"] = mark.colour
         style = {**style, "color": "colour"}
@@ -314,21 +301,16 @@ def _draw_bars(
         tips.insert(0, ("", "@name"))
     elif place.names is None:
         tips.insert(0, (place.name, f"@low{{%.5g}} to @high{{%.5g}} {_plain(place.unit)}"))
-    tips += [
-        _tip(Axis(name, unit), f"more{number}")
-        for number, (name, (_, unit)) in enumerate(mark.more.items())
-    ]
     bars = plot.quad(**ends, source=_source(columns), **style, **named)
-    _hover(plot, [bars], *tips)
+    _hover(plot, [bars], *tips, *more_tips)
 
 
 def _draw_span(plot: Any, mark: Span, scale: float, named: dict[str, Any]) -> None:
     low, colour = float(mark.low * scale), _colour(mark.colour)
     across = mark.across == "x"
     if mark.high is not None:
-        high = float(mark.high * scale)
-        ends: dict[str, Any] = {"left": low, "right": high}
-        ends = ends if across else {"bottom": low, "top": high}
+        names = ("left", "right") if across else ("bottom", "top")
+        ends: dict[str, Any] = dict(zip(names, (low, float(mark.high * scale)), strict=True))
         plot.add_layout(BoxAnnotation(fill_color=colour, fill_alpha=mark.alpha, **ends))
         return
     rule = Rule(
@@ -355,9 +337,8 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
     greatest = float(np.nanmax(values)) or 1.0
     mapper = LinearColorMapper(palette=_PALETTES[mark.colours], low=0.0, high=greatest)
     mapper.nan_color = "rgba(0, 0, 0, 0)"
-    left, bottom = float(across[0] * x.scale), float(up[0] * y.scale)
-    width, height = float(np.ptp(across) * x.scale), float(np.ptp(up) * y.scale)
-    extent = {"x": left, "y": bottom, "dw": width, "dh": height}
+    extent = {"x": float(across[0] * x.scale), "y": float(up[0] * y.scale)}
+    extent |= {"dw": float(np.ptp(across) * x.scale), "dh": float(np.ptp(up) * y.scale)}
     picture = plot.image(image=[values.astype(np.float32)], color_mapper=mapper, **extent)
     bar = ColorBar(color_mapper=mapper, width=12, title=_plain(mark.axis.label))
     bar.title_text_font_style = "normal"

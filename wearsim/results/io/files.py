@@ -129,7 +129,7 @@ def _opened(path: str | Path) -> h5py.File:
     import h5py  # noqa: PLC0415  (takes 0.2 s to import)
 
     # no lock is needed, since a file is replaced whole, but HDF5 requires the flags of locking
-    # with which the file is open already, such as those of xarray
+    # with which the file is open already, such as xarray's
     for locking in (False, "best-effort"):
         try:
             return h5py.File(path, "r", locking=locking)
@@ -251,7 +251,7 @@ def write_results(path: str | Path, data: StudyData, storage: Storage = DISK) ->
     ResultsFileError
         If it cannot be written; an existing file is then unchanged.
     ValueError
-        If the variables are not those of the schema, or their shapes are inconsistent.
+        If the variables differ from the schema, or their shapes are inconsistent.
     """
     from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 

@@ -162,7 +162,7 @@ def put_variables(
     Raises
     ------
     ValueError
-        If the variables are not those of the schema, or their shapes are inconsistent.
+        If the variables differ from the schema, or their shapes are inconsistent.
     """
     arrays = variables | (reserved or {})
     lengths = axis_lengths(arrays, schema.variables)

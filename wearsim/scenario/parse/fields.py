@@ -16,10 +16,37 @@ from pydantic.fields import FieldInfo
 from wearsim.plugins import Distribution, FrictionField, JointDistribution, Options, Process
 from wearsim.quantities import HostQuantity, Quantity
 from wearsim.types import FloatArray
-from wearsim.units import in_engineers_unit, shown
+from wearsim.units import as_written, in_engineers_unit
 from wearsim.uq.sampling.sampler import BELOW_ONE
 
 _LIMITS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
+LEAST = 1.0 - BELOW_ONE  # least uniform number of a draw
+MISALIGNMENT = "creepage.misalignment"
+FRICTION = "friction.coefficient"
+#: random values of one contact: field name in the contact solution, by scenario key
+CONTACT_FIELDS = {
+    "load.normal_force": "normal_force_offset",
+    FRICTION: "friction",
+    "creepage.longitudinal": "longitudinal",
+    "creepage.bearing_torque": "bearing_torque",
+    "creepage.yaw": "yaw",
+    "creepage.tilt": "tilt",
+}
+#: keys of the values that may vary from pass to pass
+OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
+#: keys of the values that may differ from roller to roller
+OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
+#: roles of the distributions that need a marginal distribution
+WITH_MARGINAL = ("field", "process")
+#: last parts of keys in these tables whose values cannot be random
+_FIXED = ("creep_factor", "specific_wear_rate", "measured_friction")
+RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
+_ROLES: dict[Role, type] = {
+    "scalar": Distribution,
+    "joint": JointDistribution,
+    "field": FrictionField,
+    "process": Process,
+}
 
 
 def _parts(annotation: Any) -> list[Any]:
@@ -93,7 +120,7 @@ def _form(part: Any, quantity: Quantity | None = None) -> str | None:
                 return item.expected
         return _form(get_args(part)[0])
     if get_origin(part) is Literal:
-        return "one of " + ", ".join(shown(item) for item in get_args(part))
+        return "one of " + ", ".join(as_written(item) for item in get_args(part))
     if _is_model(part) or get_origin(part) is dict:
         return "a table"
     names = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
@@ -102,8 +129,8 @@ def _form(part: Any, quantity: Quantity | None = None) -> str | None:
 
 def _limits(marks: Iterable[Any]) -> dict[str, Any]:
     """Return the bounds of a number, by their names in pydantic."""
-    found = [(name, getattr(mark, name, None)) for mark in marks for name in _LIMITS]
-    return {name: bound for name, bound in found if bound is not None}
+    limits = [(name, getattr(mark, name, None)) for mark in marks for name in _LIMITS]
+    return {name: bound for name, bound in limits if bound is not None}
 
 
 def in_words(limits: Mapping[str, Any]) -> str:
@@ -147,7 +174,7 @@ class RandomTarget:
                 ends[k] = str(end)
             elif self.quantity:
                 ends[k] = self.quantity.write(end)
-        return shown(ends)
+        return as_written(ends)
 
 
 def target_of(field: FieldInfo) -> RandomTarget | None:
@@ -169,28 +196,6 @@ def target_of(field: FieldInfo) -> RandomTarget | None:
 
 Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass", "per-turn"]
 Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
-
-LEAST = 1.0 - BELOW_ONE  # least uniform number of a draw
-MISALIGNMENT = "creepage.misalignment"
-FRICTION = "friction.coefficient"
-#: random values of one contact: field name in the contact solution, by scenario key
-CONTACT_FIELDS = {
-    "load.normal_force": "normal_force_offset",
-    FRICTION: "friction",
-    "creepage.longitudinal": "longitudinal",
-    "creepage.bearing_torque": "bearing_torque",
-    "creepage.yaw": "yaw",
-    "creepage.tilt": "tilt",
-}
-#: keys of the values that may vary from pass to pass
-OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
-#: keys of the values that may differ from roller to roller
-OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
-#: roles of the distributions that need a marginal distribution
-WITH_MARGINAL = ("field", "process")
-#: last parts of keys in these tables whose values cannot be random
-_FIXED = ("creep_factor", "specific_wear_rate", "measured_friction")
-RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
 
 
 class RandomInputTable(Options):
@@ -218,14 +223,6 @@ def can_be_random(name: str) -> bool:
 def amount(value: float, quantity: Quantity | None) -> str:
     """Return the text of an SI value in the engineering unit of its quantity."""
     return in_engineers_unit(value, quantity.kind.unit if quantity else "1")
-
-
-_ROLES: dict[Role, type] = {
-    "scalar": Distribution,
-    "joint": JointDistribution,
-    "field": FrictionField,
-    "process": Process,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,10 +297,10 @@ class RandomInput:
     @property
     def scalar(self) -> Distribution:
         """Distribution of one value; the marginal one for a field or a process."""
-        found = getattr(self.distribution, "marginal", self.distribution)
-        if not isinstance(found, Distribution):
+        distribution = getattr(self.distribution, "marginal", self.distribution)
+        if not isinstance(distribution, Distribution):
             raise TypeError(f"{self.name} sets several values")
-        return found
+        return distribution
 
     @property
     def extremes(self) -> tuple[float, float]:

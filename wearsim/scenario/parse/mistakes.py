@@ -17,7 +17,7 @@ from wearsim.errors import Mistake, PluginError, ScenarioError
 from wearsim.plugins import Spec, registry
 from wearsim.quantities import DECIMAL_COMMA, NUMBER, Quantity
 from wearsim.scenario.parse.fields import RandomInput, choices, field_at, form, model_at
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 
 M = TypeVar("M", bound=BaseModel)
 S = TypeVar("S", bound=Spec)
@@ -193,7 +193,7 @@ def replace_numbers(
     model : BaseModel
         A model of a table.
     values : mapping of str to object
-        Numbers in SI by key; a mapping has those of a model within it.
+        Numbers in SI by key; a mapping has the numbers of a model within it.
     table : str
         The table's name.
     """
@@ -235,7 +235,7 @@ def _translate(
     elif error and isinstance(error.__cause__, ScenarioError):
         mistakes.add_file(error.__cause__, place, key)
     elif error:
-        mistakes.add(place, key, str(error), None if isinstance(value, dict) else shown(value))
+        mistakes.add(place, key, str(error), None if isinstance(value, dict) else as_written(value))
     elif kind == "extra_forbidden":
         known = model_at(model, loc[:-1])
         here = [*(known.model_fields if known else ())]
@@ -255,7 +255,7 @@ def _translate(
             what = "needs a number without quotes" + (" and %" if value.endswith("%") else "")
         message = details["msg"].removeprefix("Input should be ")
         expected = expected or message[:1].lower() + message[1:]
-        mistakes.add(place, key, what, shown(value), expected)
+        mistakes.add(place, key, what, as_written(value), expected)
 
 
 def key_of_file(raw: Mapping[str, object], file: str) -> str:
@@ -267,5 +267,5 @@ def split_keys(
     raw: Mapping[str, object], model: type[BaseModel]
 ) -> tuple[dict[str, object], dict[str, object]]:
     """Split a table into the keys of `model` and all others."""
-    own = {key: value for key, value in raw.items() if key in model.model_fields}
-    return own, {key: value for key, value in raw.items() if key not in own}
+    known = {key: value for key, value in raw.items() if key in model.model_fields}
+    return known, {key: value for key, value in raw.items() if key not in known}

@@ -40,7 +40,7 @@ from wearsim.scenario.parse.mistakes import (
     split_keys,
     validate_options,
 )
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 
 Loc: TypeAlias = tuple[str | int, ...]
 
@@ -58,7 +58,7 @@ def validate(
     """Return a table, which may have random inputs, as a model, or None after adding mistakes.
 
     The random inputs are added to `mistakes.random`, and the model has their means. The parameters
-    are those of `validate_options`.
+    as of `validate_options`.
     """
     values, refused = _with_means(mistakes, model, raw, table)
     return validate_options(mistakes, model, values, table, other_keys, refused=refused)
@@ -112,7 +112,9 @@ def _means(
     item = read_random_input(mistakes, value, name, target)
     rivals = [other for other in target.components if other in raw]
     for other in rivals:
-        mistakes.add(table, other, f"is set by {key} already", shown(raw[other]), "one of the two")
+        mistakes.add(
+            table, other, f"is set by {key} already", as_written(raw[other]), "one of the two"
+        )
     if item is None or rivals or not _fits(mistakes, item, target, table, key):
         return {}
     mistakes.random[name] = item
@@ -176,8 +178,8 @@ def read_random_input(
         The number, or the numbers, that it sets.
     """
     before, kind = len(mistakes.entries), raw["distribution"]
-    own, options = split_keys(raw, RandomInputTable)
-    table = validate_options(mistakes, RandomInputTable, own, name)
+    keys, options = split_keys(raw, RandomInputTable)
+    table = validate_options(mistakes, RandomInputTable, keys, name)
     named = isinstance(kind, str)
     spec = mistakes.find_plugin(RandomInputSpec, kind, name, "distribution") if named else None
     if spec is None or not _check_role(mistakes, spec, name, target):
@@ -195,7 +197,7 @@ def read_random_input(
     sets = distribution.components if isinstance(distribution, JointDistribution) else ()
     if sets and sorted(sets) != sorted(target.components):
         expected = f"a distribution of {' and '.join(target.components)}"
-        mistakes.add(name, "distribution", f"sets {' and '.join(sets)}", shown(kind), expected)
+        mistakes.add(name, "distribution", f"sets {' and '.join(sets)}", as_written(kind), expected)
     if len(mistakes.entries) > before or table is None:
         return None
     return RandomInput(
@@ -223,13 +225,13 @@ def _check_role(mistakes: Mistakes, spec: RandomInputSpec, name: str, target: Ra
     }.get(spec.role, "")
     if target.components:
         what = f"sets one value, but {name} sets {' and '.join(target.components)}"
-    mistakes.add(name, "distribution", what, shown(spec.name), _one_of(roles))
+    mistakes.add(name, "distribution", what, as_written(spec.name), _one_of(roles))
     return False
 
 
 def _one_of(roles: Collection[str]) -> str:
     """Return the names of the distributions with these roles, for messages."""
-    names = [shown(spec.name) for spec in installed(RandomInputSpec) if spec.role in roles]
+    names = [as_written(spec.name) for spec in installed(RandomInputSpec) if spec.role in roles]
     return f"one of {', '.join(names)}"
 
 
@@ -243,7 +245,7 @@ def _check_persistence(
         what = "is not for a process, which runs through the whole test"
     if what:
         allowed = '"per-test" or "per-roller"' if name in OF_A_ROLLER else '"per-test"'
-        mistakes.add(name, "persistence", what, shown(persistence), allowed)
+        mistakes.add(name, "persistence", what, as_written(persistence), allowed)
 
 
 def _read_marginal(
@@ -257,15 +259,15 @@ def _read_marginal(
         )
     if not isinstance(raw, dict):
         return None
-    own, options = split_keys(raw, RandomInputTable)
-    kind = own.pop("distribution", None)
-    for key in sorted(own):
-        mistakes.add(place, key, f"belongs in [{name}], not in its marginal", shown(own[key]))
+    keys, options = split_keys(raw, RandomInputTable)
+    kind = keys.pop("distribution", None)
+    for key in sorted(keys):
+        mistakes.add(place, key, f"belongs in [{name}], not in its marginal", as_written(keys[key]))
     spec = None
     if kind is None:
         mistakes.add(place, "distribution", "is missing", None, expected)
     elif not isinstance(kind, str):
-        mistakes.add(place, "distribution", "is not text", shown(kind), expected)
+        mistakes.add(place, "distribution", "is not text", as_written(kind), expected)
     else:
         spec = mistakes.find_plugin(RandomInputSpec, kind, place, "distribution")
     if spec and spec.role != "scalar":
@@ -273,7 +275,7 @@ def _read_marginal(
             place,
             "distribution",
             f"is a {spec.role}, but a marginal is the distribution of one number",
-            shown(kind),
+            as_written(kind),
             expected,
         )
         return None

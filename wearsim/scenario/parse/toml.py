@@ -57,12 +57,13 @@ from wearsim.scenario.tables.plugin import (
     ContactTable,
     LoadTable,
     WearTable,
+    check_contained,
     read_contact,
     read_load,
     read_wear,
 )
 from wearsim.types import Profile
-from wearsim.units import shown
+from wearsim.units import as_written
 
 #: Keys that exclude each other: an override of one removes the others.
 _ALTERNATIVES = {**ALTERNATIVES, "creepage": (("misalignment", "yaw"), ("misalignment", "tilt"))}
@@ -72,6 +73,38 @@ PROFILE = "cylinder.profile"
 PROFILE_FILE = "profile-from-python.csv"
 #: Keys that say how the file of a profile is read.
 _OF_PROFILE_FILES = ("profile_columns", "profile_units", *(f"profile_{key}" for key in ROW_CHOICES))
+MAX_NESTING = 20  # a scenario has at most five levels
+TOO_DEEP = "is nested too deeply", None, f"at most {MAX_NESTING} levels of tables and lists"
+TABLES: dict[str, type[Options]] = {
+    "roller": RollerTable,
+    "cylinder": CylinderTable,
+    "cam": CamTable,
+    "follower": FollowerTable,
+    "lubricant": LubricantTable,
+    "operation": OperationTable,
+    "load": LoadTable,
+    "friction": FrictionTable,
+    "creepage": CreepageTable,
+    "contact": ContactTable,
+    "wear": WearTable,
+    "evolution": EvolutionTable,
+    "outputs": OutputsTable,
+    "limit": LimitTable,
+    "sampling": SamplingTable,
+}
+#: [cam] replaces [cylinder]
+REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
+_ABSENT = {*REQUIRED, "wear", "cam", "follower", "lubricant"}  # tables without defaults
+#: functions that read the tables with more checks than their models have
+READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
+    "roller": read_roller,
+    "cylinder": read_cylinder,
+    "load": read_load,
+    "creepage": read_creepage,
+    "contact": read_contact,
+    "wear": read_wear,
+    "outputs": read_outputs,
+}
 
 
 def parse_override(text: str) -> tuple[str, object]:
@@ -130,7 +163,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             mistakes.append(Mistake("", f"{dotted:.60}", *TOO_DEEP))
             continue
         try:
-            tables = [_descend(one, names, key) for one in (document, plain)]
+            tables = [_descend(whole, names, key) for whole in (document, plain)]
             unused = set()
             if dotted == PROFILE and isinstance(value, Profile):
                 unused = {name for name in tables[0] if name in _OF_PROFILE_FILES}
@@ -145,7 +178,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
         except ValueError as error:
             unfit = isinstance(error, tomlkit.exceptions.ConvertError)
             what = "has a value that TOML cannot hold" if unfit else str(error)
-            mistakes.append(Mistake("", dotted, what, shown(value)))
+            mistakes.append(Mistake("", dotted, what, as_written(value)))
     if mistakes:
         raise ScenarioError(file, mistakes)
     written = tomlkit.dumps(document)
@@ -154,10 +187,6 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
         if tomllib.loads(written) == plain:
             return written
     return tomlkit.dumps(plain)
-
-
-MAX_NESTING = 20  # a scenario has at most five levels
-TOO_DEEP = "is nested too deeply", None, f"at most {MAX_NESTING} levels of tables and lists"
 
 
 def is_deep(value: object) -> bool:
@@ -194,39 +223,6 @@ def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, 
         if not isinstance(table, MutableMapping):
             raise ValueError(f"cannot be set, since '{name}' is not a table")
     return table  # type: ignore[no-any-return]
-
-
-TABLES: dict[str, type[Options]] = {
-    "roller": RollerTable,
-    "cylinder": CylinderTable,
-    "cam": CamTable,
-    "follower": FollowerTable,
-    "lubricant": LubricantTable,
-    "operation": OperationTable,
-    "load": LoadTable,
-    "friction": FrictionTable,
-    "creepage": CreepageTable,
-    "contact": ContactTable,
-    "wear": WearTable,
-    "evolution": EvolutionTable,
-    "outputs": OutputsTable,
-    "limit": LimitTable,
-    "sampling": SamplingTable,
-}
-#: [cam] replaces [cylinder]
-REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
-_ABSENT = {*REQUIRED, "wear", "cam", "follower", "lubricant"}  # tables without defaults
-
-#: functions that read the tables with more checks than those of their models
-READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
-    "roller": read_roller,
-    "cylinder": read_cylinder,
-    "load": read_load,
-    "creepage": read_creepage,
-    "contact": read_contact,
-    "wear": read_wear,
-    "outputs": read_outputs,
-}
 
 
 def flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
@@ -283,6 +279,7 @@ def parse_fields(
     assemble_cam(mistakes, sections, "cam" in tables)
     check_lists(mistakes, data, sections["limit"])
     check_correlation(mistakes, sections["sampling"])
+    check_contained(mistakes)
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)
     notes = (
@@ -321,7 +318,7 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
     match = re.fullmatch(r"(?P<what>.*) \(at (?P<place>.*)\)", message, re.DOTALL)
     if re.fullmatch(r".*\.toml", text.strip()):
         remedy = "TOML; load_scenario reads a file"
-        return Mistake("", "", "is the name of a file, not its text", shown(text), remedy)
+        return Mistake("", "", "is the name of a file, not its text", as_written(text), remedy)
     if match is None:
         return Mistake("", "", f"is not valid TOML: {message}")
     what = match["what"][:1].lower() + match["what"][1:]
@@ -346,14 +343,14 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
 
 def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
     """Return the keys above the tables; add a mistake for each unknown key and table."""
-    own = {key: data[key] for key in TopTable.model_fields if key in data}
-    for key in [key for key in data if key not in TABLES and key not in own]:
+    keys = {key: data[key] for key in TopTable.model_fields if key in data}
+    for key in [key for key in data if key not in TABLES and key not in keys]:
         if isinstance(data[key], dict):
             hint = nearest(key, TABLES) or f" (known: {', '.join(TABLES)})"
             mistakes.add(key, "", f"unknown table{hint}")
         else:
             mistakes.add("", key, f"unknown key{mistakes.hint(key, TopTable.model_fields)}")
-    return validate(mistakes, TopTable, own, "") or TopTable()
+    return validate(mistakes, TopTable, keys, "") or TopTable()
 
 
 def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> Any:
@@ -364,7 +361,7 @@ def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> A
     raw = data.get(table, {})
     if not isinstance(raw, dict):
         mistakes.add(
-            "", table, "is not a table", shown(raw), f"a line [{table}] and its keys below"
+            "", table, "is not a table", as_written(raw), f"a line [{table}] and its keys below"
         )
         return None
     check_alternatives(mistakes, raw, table)

@@ -34,7 +34,7 @@ from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.scenario.tables.plugin import ContactChoice
 from wearsim.types import FloatArray, Material, Profile
-from wearsim.units import ANGLE, INERTIA, QuantityError, shown
+from wearsim.units import ANGLE, INERTIA, QuantityError, as_written
 
 _ROUNDING = 1e-9
 DUNDURS_LIMIT = 0.01
@@ -64,13 +64,15 @@ class MaterialTable(Options):
 
 
 def _read_material(value: object) -> Material:
-    expected = f"one of {', '.join(shown(name) for name in MATERIALS)} or a table of its constants"
+    expected = (
+        f"one of {', '.join(as_written(name) for name in MATERIALS)} or a table of its constants"
+    )
     if isinstance(value, str) and value in MATERIALS:
         return MATERIALS[value]
     if not isinstance(value, dict):
         raise QuantityError(
             "unknown material" if isinstance(value, str) else "is not a material",
-            shown(value),
+            as_written(value),
             expected,
         )
     table = MaterialTable.model_validate_json(json.dumps(value, default=str), strict=True)

@@ -15,7 +15,7 @@ from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.tables.bodies import Cylinder, MaterialField, Roller
 from wearsim.scenario.tables.cam_motion import SHAPES, read_motion
 from wearsim.scenario.tables.cam_points import MeasuredPoints
-from wearsim.units import COMPRESSIBILITY, INERTIA, MASS, VISCOSITY, shown
+from wearsim.units import COMPRESSIBILITY, INERTIA, MASS, VISCOSITY, as_written
 
 _WAYS = ("motion", "lift", "profile", "shape")
 
@@ -177,7 +177,7 @@ def refuse_cylinder(mistakes: Mistakes, data: Mapping[str, object]) -> None:
         load = data.get("load")
         if isinstance(load, dict) and str(load.get("kind", "")).startswith("follower"):
             mistakes.add(
-                "load", "kind", "needs the follower of a cam", shown(load["kind"]), "[cam]"
+                "load", "kind", "needs the follower of a cam", as_written(load["kind"]), "[cam]"
             )
 
 

@@ -117,9 +117,9 @@ def read_lift_table(
         either_way=True,
         choice=CHOICE.format("LIFT"),
     )
-    found = columns[lift] / follower.arm_length if follower.swings and length else columns[lift]
-    refuse_few(path, len(found), FEWEST_ROWS, "rows for a quintic spline")
-    return columns[angle], found
+    lifts = columns[lift] / follower.arm_length if follower.swings and length else columns[lift]
+    refuse_few(path, len(lifts), FEWEST_ROWS, "rows for a quintic spline")
+    return columns[angle], lifts
 
 
 def one_turn(path: str, angle: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -161,8 +161,8 @@ def motion_of_table(
         motion = motion_of("lift", light, curve.dwells)
         scatter = scatter_through_points(turned[:-1], curve.noise)
         points = turned[:-1], curve.residual
-        own = curve.noise, tolerance, *points, scatter, curve.second_error, peak(curve)
-        return motion, MeasuredPoints(path, "lift", unit, *own)
+        fitted = curve.noise, tolerance, *points, scatter, curve.second_error, peak(curve)
+        return motion, MeasuredPoints(path, "lift", unit, *fitted)
     steps = np.unique(np.round(np.degrees(kinks(around, closed)[1]) % 360.0, 6))
     if len(steps):
         at = ", ".join(f"{place:.6g} deg" for place in steps[:5])

@@ -25,7 +25,7 @@ from wearsim.scenario.parse.random_inputs import validate
 from wearsim.scenario.tables.cam_lift import motion_of_lift
 from wearsim.scenario.tables.cam_points import MeasuredPoints
 from wearsim.scenario.tables.cam_surface import motion_of_profile
-from wearsim.units import ANGLE, LENGTH, QuantityError, shown
+from wearsim.units import ANGLE, LENGTH, QuantityError, as_written
 
 if TYPE_CHECKING:
     from wearsim.scenario.tables.cam import CamTable
@@ -121,9 +121,9 @@ def _from_laws(
 
 def _from_law(mistakes: Mistakes, place: str, raw: dict[str, object], unit: str) -> Segment | None:
     """Return the segment of an entry, or None after adding its mistakes."""
-    own, rest = split_keys(raw, MotionTable)
-    entry = validate_options(mistakes, MotionTable, own, place)
-    name = own.get("law")
+    keys, rest = split_keys(raw, MotionTable)
+    entry = validate_options(mistakes, MotionTable, keys, place)
+    name = keys.get("law")
     spec = (
         mistakes.find_plugin(MotionLawSpec, name, place, "law") if isinstance(name, str) else None
     )
@@ -131,10 +131,10 @@ def _from_law(mistakes: Mistakes, place: str, raw: dict[str, object], unit: str)
     if entry is None or spec is None or options is None:
         return None
     if spec.rise == "required" and entry.rise is None:
-        mistakes.add(place, "rise", f"is needed with law = {shown(entry.law)}", "none")
+        mistakes.add(place, "rise", f"is needed with law = {as_written(entry.law)}", "none")
         return None
     if spec.rise != "required" and entry.rise is not None:
-        mistakes.add(place, "rise", f"has no meaning with law = {shown(entry.law)}")
+        mistakes.add(place, "rise", f"has no meaning with law = {as_written(entry.law)}")
         return None
     try:
         rise = _rise(entry.rise, unit)

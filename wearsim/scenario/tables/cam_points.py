@@ -46,7 +46,7 @@ class MeasuredPoints:
     tolerance : float, optional
         Noise that the scenario states.
     angle, residual : ndarray, shape (points,)
-        Angle of each point from the first on [rad], and its value less that of the spline.
+        Angle of each point from the first on [rad], and its value less the spline.
     scatter, error : float
         Scatter of the acceleration of a curve through every point, and standard error of that of
         the smoothed one, root mean squares over the turn [m/rad^2 or 1/rad].

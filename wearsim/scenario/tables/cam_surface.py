@@ -70,10 +70,10 @@ def motion_of_profile(
         np.append(theta, theta[0] + math.tau), np.append(lift, lift[0]), closed=True
     )
     even = np.linspace(0.0, math.tau, POINTS + 1)
-    found = closed(theta[0] + (even - theta[0]) % math.tau)[0]
-    found[-1] = found[0]
+    radii = closed(theta[0] + (even - theta[0]) % math.tau)[0]
+    radii[-1] = radii[0]
     unit = "rad" if follower.swings else "m"
-    return motion_of_table(notes, path, even, found, unit, 0.0)
+    return motion_of_table(notes, path, even, radii, unit, 0.0)
 
 
 def _surface_table(
@@ -90,10 +90,10 @@ def _surface_table(
         polar = has_dimension(units.get(names[0]) or heads.get(names[0]), "rad")
     else:
         polar = "radius" in heads
-        own = column_names(file.text)
-        if not polar and not {"x", "y"} & set(own):
+        given_columns = column_names(file.text)
+        if not polar and not {"x", "y"} & set(given_columns):
             what = "has neither the columns angle and radius, nor x and y"
-            raise ScenarioError(path, [Mistake("", "", what, ", ".join(own), choice)])
+            raise ScenarioError(path, [Mistake("", "", what, ", ".join(given_columns), choice)])
     if polar:
         wanted = {names[0]: "rad", names[1]: "m"}
         columns = read_columns(
@@ -218,14 +218,14 @@ class _Parts:
     def __call__(self, angle: FloatArray) -> FloatArray:
         """Return lift and derivatives by the angle, shape (3, points)."""
         angle = np.asarray(angle)
-        found = np.zeros((3, len(angle)))
+        values = np.zeros((3, len(angle)))
         for start, length, level in self.dwells:
-            found[0, np.mod(angle - start, math.tau) <= length] = level
+            values[0, np.mod(angle - start, math.tau) <= length] = level
         for start, length, spline in self.splines:
             within = np.mod(angle - start, math.tau)
             inside = within < length
-            found[:, inside] = spline(within[inside])
-        return found
+            values[:, inside] = spline(within[inside])
+        return values
 
 
 def _parts(

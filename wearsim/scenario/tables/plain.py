@@ -22,10 +22,20 @@ from wearsim.quantities import (
 from wearsim.scenario.parse.fields import RandomTarget
 from wearsim.scenario.parse.mistakes import Mistakes, nearest
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.units import ANGLE, VOLUME, QuantityError, shown
+from wearsim.units import ANGLE, VOLUME, QuantityError, as_written
 from wearsim.uq.sampling.sampler import GaussianCopula
 
 DEFAULT_TOLERANCE = 1e-3
+DEFAULT_RECORDS = 20
+LARGEST_ANGLE = 0.1  # rad; slip and shift are linear in the angles
+CADENCES = ("records", "every_passes", "every")
+#: keys of which at most one may be given; exactly one of a radius and a diameter
+ALTERNATIVES = {
+    "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
+    "cylinder": (("radius", "diameter"),),
+    "operation": (("duration", "passes", "turns"),),
+    "outputs": (CADENCES,),
+}
 
 
 class TopTable(Options):
@@ -78,7 +88,7 @@ def _refuse(value: object) -> None:
     """Reject a value: a random input is read before the validation."""
     raise QuantityError(
         "is not a random input",
-        shown(value),
+        as_written(value),
         'a table such as {distribution = "disc", radius = "2 mrad"}',
     )
 
@@ -160,11 +170,6 @@ class EvolutionTable(Options):
         " automatically by default.",
     )
     max_steps: int = Field(default=1_000_000, gt=0, description="Maximum number of steps.")
-    resolve_edges: bool = Field(
-        default=False,
-        description="Resolve the edge of a contact within a strip: the pressure at the edge of a"
-        " growing groove then converges. Implicit steps under constant load only.",
-    )
     strip_error: bool = Field(
         default=True,
         description="Estimate the error due to the strips, by a second test on strips of twice the"
@@ -239,19 +244,6 @@ class SamplingTable(Options):
         default=(),
         description="Rank correlations, each with the names of two random inputs and a number.",
     )
-
-
-DEFAULT_RECORDS = 20
-LARGEST_ANGLE = 0.1  # rad; slip and shift are linear in the angles
-CADENCES = ("records", "every_passes", "every")
-
-#: keys of which at most one may be given; exactly one of a radius and a diameter
-ALTERNATIVES = {
-    "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
-    "cylinder": (("radius", "diameter"),),
-    "operation": (("duration", "passes", "turns"),),
-    "outputs": (CADENCES,),
-}
 
 
 def check_alternatives(mistakes: Mistakes, raw: Mapping[str, object], table: str) -> None:
@@ -350,7 +342,7 @@ def check_correlation(mistakes: Mistakes, table: SamplingTable | None) -> None:
             continue  # an input that has mistakes itself adds none here
         for item in [item for item in pair if item.role != "scalar"]:
             what = f"'{item.name}' is a {item.role}, and only single numbers can be correlated"
-            mistakes.add("sampling", key, what, shown(item.kind))
+            mistakes.add("sampling", key, what, as_written(item.kind))
         first, second = (item.persistence for item in pair)
         if first != second:
             mistakes.add(

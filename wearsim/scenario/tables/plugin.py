@@ -27,7 +27,14 @@ from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.types import Grid, Material
-from wearsim.units import shown
+from wearsim.units import as_written
+from wearsim.uq.distributions.two_levels import TwoLevels
+
+AUTO = "auto"
+#: a volume or an area per force: mm^3/(N m), mm^2/N, also with kN or MN
+_PER_LOAD = re.compile(
+    r"m(?:\^|\*\*)?[23²³]\s*/\s*\(?\s*[kM]?N(?![A-Za-z])|m[23²³^*]*\s*/\s*\(?[kM]?Nm\b"
+)
 
 
 class ContactTable(Options):
@@ -46,9 +53,6 @@ class ContactTable(Options):
         default=None,
         description="Axial position of the strip grid's centre; chosen automatically by default.",
     )
-
-
-AUTO = "auto"
 
 
 class ChosenTable(Options):
@@ -176,11 +180,6 @@ class WearChoice:
         return self.spec.factory(self.options)
 
 
-#: a volume or an area per force: mm^3/(N m), mm^2/N, also with kN or MN
-_PER_LOAD = re.compile(
-    r"m(?:\^|\*\*)?[23²³]\s*/\s*\(?\s*[kM]?N(?![A-Za-z])|m[23²³^*]*\s*/\s*\(?[kM]?Nm\b"
-)
-
 #: model of the table's own keys, key with the name of the plugin, kind of plugin
 PLUGIN_TABLES: dict[str, tuple[type[Options], str, type[Spec]]] = {
     "contact": (ContactTable, "model", ContactModelSpec),
@@ -197,9 +196,9 @@ def _choose(
     The first two are None after adding their mistakes.
     """
     model, key, kind = PLUGIN_TABLES[table]
-    own, rest = split_keys(raw, model)
-    name = own.get(key, model.model_fields[key].default)
-    values = validate(mistakes, model, own, table)
+    keys, rest = split_keys(raw, model)
+    name = keys.get(key, model.model_fields[key].default)
+    values = validate(mistakes, model, keys, table)
     spec = mistakes.find_plugin(kind, name, table, key) if isinstance(name, str) else None
     return values, spec, rest
 
@@ -225,21 +224,21 @@ def read_contact(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice
     raw = {"model": _default_model(mistakes), **raw} if "model" not in raw else raw
     if raw["model"] == AUTO:
         return _read_auto(mistakes, raw)
-    own, spec, rest = _choose(mistakes, "contact", raw)
+    keys, spec, rest = _choose(mistakes, "contact", raw)
     options = validate(mistakes, spec.options, rest, "contact", ContactTable) if spec else None
-    if own is None or options is None:
+    if keys is None or options is None:
         return None
-    return ContactChoice(own.model, options, own.strips, own.width, own.centre)
+    return ContactChoice(keys.model, options, keys.strips, keys.width, keys.centre)
 
 
 def _read_auto(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice | None:
     """Return the automatic choice of a contact model, or the model that a study has chosen."""
     given, rest = split_keys(raw, ContactTable)
-    own = validate(mistakes, ContactTable, given, "contact")
+    keys = validate(mistakes, ContactTable, given, "contact")
     auto = validate(mistakes, AutoTable, rest, "contact", ContactTable)
-    if own is None or auto is None:
+    if keys is None or auto is None:
         return None
-    strips = own.strips, own.width, own.centre
+    strips = keys.strips, keys.width, keys.centre
     if auto.chosen is None:
         return ContactChoice(AUTO, auto, *strips)
     chosen = auto.chosen
@@ -253,7 +252,7 @@ def _read_auto(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice |
 
 def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | None:
     """Return the wear law, or None after adding the mistakes of the table [wear]."""
-    own, spec, rest = _choose(mistakes, "wear", raw)
+    keys, spec, rest = _choose(mistakes, "wear", raw)
     options = validate(mistakes, spec.options, rest, "wear", WearTable) if spec else None
     mistakes.notes += _rate_notes(rest)
     if {"wear.factor", "wear.cylinder.k_over_h"} <= mistakes.random.keys():
@@ -263,7 +262,25 @@ def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | Non
             " k_over_h holds the scatter between specimens, as that of identify --posterior does"
         )
         mistakes.add("wear", "factor", what, None, remedy)
-    return WearChoice(own.law, options) if own and options is not None else None
+    return WearChoice(keys.law, options) if keys and options is not None else None
+
+
+def check_contained(mistakes: Mistakes) -> None:
+    """Add the mistakes of random inputs whose scatter a posterior of K/H contains already."""
+    for factor in mistakes.random_inputs:
+        if not isinstance(factor.distribution, TwoLevels):
+            continue
+        for item in mistakes.random_inputs:
+            for key in set(item.keys) & set(factor.distribution.contained):
+                mistakes.add(
+                    item.name,
+                    "",
+                    f"is random, and the posterior of {factor.name} contains the scatter of {key},"
+                    " which was neither random nor known in the identification: it counts twice",
+                    item.describe(),
+                    f"a fixed value; or identify K/H again with {key} random, or with --fix if it"
+                    " was equal in all tests",
+                )
 
 
 def _rate_notes(raw: Mapping[str, object]) -> list[str]:
@@ -283,7 +300,7 @@ def _rate_notes(raw: Mapping[str, object]) -> list[str]:
 
 def read_load(mistakes: Mistakes, raw: Mapping[str, object]) -> LoadChoice | None:
     """Return the load with its terms, or None after adding the mistakes of the table [load]."""
-    own, spec, rest = _choose(mistakes, "load", raw)
+    keys, spec, rest = _choose(mistakes, "load", raw)
     kinds = {known.name: known.role for known in installed(LoadSpec)}
     tables = {
         key: value
@@ -293,7 +310,7 @@ def read_load(mistakes: Mistakes, raw: Mapping[str, object]) -> LoadChoice | Non
         and (key not in spec.options.model_fields if spec else key in kinds)
     }
     terms = [_read_term(mistakes, name, options) for name, options in tables.items()]
-    if own is None or spec is None:
+    if keys is None or spec is None:
         return None
     if spec.role == "term":
         mistakes.add(
@@ -303,12 +320,12 @@ def read_load(mistakes: Mistakes, raw: Mapping[str, object]) -> LoadChoice | Non
     rest = {key: value for key, value in rest.items() if key not in tables}
     for name in [key for key in rest if key not in spec.options.model_fields]:
         if kinds.get(name) == "term":
-            got = shown(rest.pop(name))
+            got = as_written(rest.pop(name))
             mistakes.add("load", name, "is a term of the load", got, f"a table [load.{name}]")
     options = validate(mistakes, spec.options, rest, "load", LoadTable)
     if options is None:
         return None
-    load = LoadChoice(own.kind, options, tuple(term for term in terms if term is not None))
+    load = LoadChoice(keys.kind, options, tuple(term for term in terms if term is not None))
     check_load(mistakes, load)
     return load
 
@@ -350,7 +367,7 @@ def described_model(model: str, scenario_text: str) -> str:
     table = tomllib.loads(scenario_text).get("contact", {})
     automatic = table.get("model") == AUTO and "chosen" in table
     given = [
-        f"{key} = {shown(value)}"
+        f"{key} = {as_written(value)}"
         for key, value in (table["chosen"].get("options", {}) if automatic else table).items()
         if key not in ContactTable.model_fields
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.cam import (
     Panel,
+    RollerKinematics,
     Rolling,
     SkidArc,
     Stations,
@@ -22,6 +23,7 @@ from wearsim.mechanics.cam import (
 )
 from wearsim.models.loads import FollowerLoad
 from wearsim.scenario import Scenario
+from wearsim.scenario.tables.cam import Cam
 from wearsim.studies.cam.point import Point
 from wearsim.types import BoolArray, FloatArray
 
@@ -30,6 +32,7 @@ SHARP = 2.0  # radius of the pitch curve over that of the roller, below which th
 PART_OF_TOLERANCE = 0.25  # for the stations
 LEAST_LOAD = 1e-4  # of the greatest, where the flank of a groove changes
 _FINE = 1e-10  # tolerance of integrals over a turn
+MOST_KNOWN = 1000  # sets of angles of a cam at which the motion of the roller is kept
 
 
 class CamTurn:
@@ -51,6 +54,7 @@ class CamTurn:
             what = "is needed for the kinematics of a cam"
             raise ScenarioError(scenario.file, [Mistake("cam", "", what, "none", "a table [cam]")])
         self.scenario, self.cam = scenario, scenario.cam
+        self._path = _path_of(self.cam)
         self._integrals: dict[str, float] = {}
         self.speed = scenario.operation.speed
         load = scenario.load.build()
@@ -83,7 +87,7 @@ class CamTurn:
             force = force + stations.values_at_angles(change, point.angle)
         return np.asarray(np.maximum(force, 0.0))
 
-    def effort(self, lift: FloatArray, theta: FloatArray) -> FloatArray:
+    def effort(self, lift: FloatArray | Sequence[FloatArray], theta: FloatArray) -> FloatArray:
         """Return the force [N] or torque [N m] on the follower, positive on the outer flank."""
         if self.load is None:
             raise ValueError("the load is not that of a follower")
@@ -95,28 +99,32 @@ class CamTurn:
 
         The flank of a groove is that which the load presses on, unless it is given.
         """
-        follower = self.cam.follower
+        if inner is None or self.load is None:
+            grooved = self.cam.groove and self.load is not None
+            inner = self.effort(lift, theta) < 0.0 if grooved else np.zeros(len(theta), dtype=bool)
+        return self._loaded(self.cam.follower.kinematics(lift, inner), theta, inner)
+
+    def _loaded(self, found: RollerKinematics, theta: FloatArray, inner: BoolArray) -> Point:
+        """Return the state for a motion of the roller on the flanks `inner`."""
+        follower, lever = self.cam.follower, self.cam.follower.lever * np.cos(found.pressure_angle)
         if self.load is None:
-            inner = np.zeros(len(theta), dtype=bool)
-            found = follower.kinematics(lift)
             force = np.full(len(theta), self._constant)
-            effort = force * follower.lever * np.cos(found.pressure_angle)
-            spring = 0.0
+            effort, spring = force * follower.lever * np.cos(found.pressure_angle), 0.0
         else:
-            effort, spring = self.effort(lift, theta), self.load.spring
-            if inner is None:
-                inner = (effort < 0.0) & self.cam.groove
-            found = follower.kinematics(lift, inner)
-            force = follower.normal_force(found, np.where(inner, -effort, effort))
+            effort = self.effort((found.lift, found.lift_per_rad, found.lift_per_rad2), theta)
+            force, spring = np.where(inner, -effort, effort) / lever, self.load.spring
             if self.cam.groove:  # it vanishes where the flank changes
                 force = np.maximum(force, LEAST_LOAD * self._greatest_effort / follower.lever)
-        lever = follower.lever * np.cos(found.pressure_angle)
         return Point(theta, found, inner, force, effort * found.lift_per_rad, spring / lever**2)
 
     def at(self, panel: Panel, theta: FloatArray) -> Point:
         """Return the state at angles within a panel [rad]."""
         inner = np.full(len(theta), self.is_inner(panel))
-        return self.point(self.cam.motion.lift_in(panel.segment, theta), theta, inner)
+        return self._loaded(self.rolling(panel, theta), theta, inner)
+
+    def rolling(self, panel: Panel, theta: FloatArray) -> RollerKinematics:
+        """Return the motion of the roller at angles within a panel [rad]."""
+        return self._path.at(panel.segment, theta, self.is_inner(panel))
 
     def is_inner(self, panel: Panel) -> bool:
         """Return whether the roller touches the inner flank of a groove in a panel."""
@@ -257,8 +265,8 @@ class CamTurn:
     @cached_property
     def curvatures(self) -> tuple[float, float]:
         """Least and greatest relative curvature along rolling [1/m]."""
-        greatest, _ = extreme(self.panels, lambda p, x: self.at(p, x).kinematics.relative_curvature)
-        least, _ = extreme(self.panels, lambda p, x: -self.at(p, x).kinematics.relative_curvature)
+        greatest, _ = extreme(self.panels, lambda p, x: self.rolling(p, x).relative_curvature)
+        least, _ = extreme(self.panels, lambda p, x: -self.rolling(p, x).relative_curvature)
         return -least, greatest
 
     @cached_property
@@ -403,15 +411,14 @@ class CamTurn:
 
     def radius(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the distance of the cam's surface from its axis at angles within a panel [m]."""
-        point = self.at(panel, theta)
-        x, y = surface_points(self.cam.follower, point.kinematics, point.angle)[1]
+        x, y = surface_points(self.cam.follower, self.rolling(panel, theta), theta)[1]
         return np.asarray(np.hypot(x, y))
 
     def _undercut(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the curvature of the pitch curve times the roller's radius, 1 at a cusp."""
-        point = self.at(panel, theta)
-        side = np.where(point.inner, -1.0, 1.0)
-        return np.asarray(side * point.kinematics.pitch_curvature * self.scenario.roller.radius)
+        side = -1.0 if self.is_inner(panel) else 1.0
+        curvature = self.rolling(panel, theta).pitch_curvature
+        return np.asarray(side * curvature * self.scenario.roller.radius)
 
     def place(self, theta: float) -> str:
         """Return an angle and its segment in words."""
@@ -419,6 +426,33 @@ class CamTurn:
         number = int(motion.segment_at(np.array([theta]))[0])
         degrees = round(math.degrees(theta), 4) % 360.0
         return f"{degrees:.4g} deg, {motion.segment_label(number)}"
+
+
+class _Path:
+    """Motion of the roller of a cam, computed once for the turns of all loads.
+
+    Parameters
+    ----------
+    cam : Cam
+    """
+
+    def __init__(self, cam: Cam) -> None:
+        self._cam = cam
+        self._known: dict[tuple[int, bool, bytes], RollerKinematics] = {}
+
+    def at(self, segment: int, theta: FloatArray, inner: bool) -> RollerKinematics:
+        """Return the motion at angles within a segment [rad], on the inner flank of a groove."""
+        key = segment, inner, theta.tobytes()
+        found = self._known.get(key)
+        if found is None:
+            lift = self._cam.motion.lift_in(segment, theta)
+            found = self._cam.follower.kinematics(lift, inner)
+            if len(self._known) < MOST_KNOWN:
+                self._known[key] = found
+        return found
+
+
+_path_of = lru_cache(maxsize=4)(_Path)
 
 
 @lru_cache(maxsize=16)

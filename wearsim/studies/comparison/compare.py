@@ -270,20 +270,22 @@ def _deeper(result: Comparable, first: Comparable, observable: str) -> Interval:
 
 def _difference(result: Result, first: Result, observable: str) -> Interval:
     """Return how much more one run has than another, with the sum of their estimated errors."""
-    one, other = (_of_run(run, observable) for run in (result, first))
-    return Interval(one.value - other.value, one.low - other.high, one.high - other.low)
+    value, other = (_of_run(run, observable) for run in (result, first))
+    return Interval(value.value - other.value, value.low - other.high, value.high - other.low)
 
 
 def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -> Paired | None:
     """Return the comparison of tests with the same random numbers, where there are any."""
     if not is_ensemble(first) or not have_same_draws(result, first):
         return None
-    (numbers, values), (others, firsts) = (_values(one, observable) for one in (result, first))
-    both, own, its = np.intersect1d(numbers, others, assume_unique=True, return_indices=True)
+    (numbers, values), (others, firsts) = (_values(tests, observable) for tests in (result, first))
+    both, places, places_of_first = np.intersect1d(
+        numbers, others, assume_unique=True, return_indices=True
+    )
     if len(both) == 0:
         return None
     plan: Design = "sobol" if result.plan == "sobol" else "monte-carlo"
-    return paired(values[own], firsts[its], plan, both % REPLICATES)
+    return paired(values[places], firsts[places_of_first], plan, both % REPLICATES)
 
 
 def _of_run(result: Result, observable: str) -> Interval:
@@ -293,21 +295,21 @@ def _of_run(result: Result, observable: str) -> Interval:
     return Interval(value, value - error, value + error)
 
 
-def have_same_draws(one: EnsembleResult, other: EnsembleResult) -> bool:
+def have_same_draws(first: EnsembleResult, other: EnsembleResult) -> bool:
     """Return whether realisations of the same number have the same random numbers."""
     plans = [
         "monte-carlo" if result.plan == "control-variate" else result.plan
-        for result in (one, other)
+        for result in (first, other)
     ]
     keys, groups = (
-        [{item[name] for item in getattr(result.raw, kind)} for result in (one, other)]
+        [{item[name] for item in getattr(result.raw, kind)} for result in (first, other)]
         for kind, name in (("inputs", "key"), ("groups", "name"))
     )
     return (
         plans[0] == plans[1]
         # strata depend on the number of realisations, and Saltelli's rows on that of the inputs
-        and (plans[0] != "latin-hypercube" or one.requested == other.requested)
+        and (plans[0] != "latin-hypercube" or first.requested == other.requested)
         and (plans[0] != "saltelli" or groups[0] == groups[1])
-        and one.raw.seed == other.raw.seed
+        and first.raw.seed == other.raw.seed
         and bool(keys[0] & keys[1])
     )

@@ -182,7 +182,7 @@ def _has_range(row: Compared) -> bool:
 def _profiles(profiles: dict[str, ComputedProfile]) -> Panel:
     """Return the worn profiles of several results in one panel."""
     y = np.sort(np.concatenate([profile.y for profile in profiles.values()]))
-    worn = [np.interp(y, one.y, one.start - one.low) for one in profiles.values()]
+    worn = [np.interp(y, item.y, item.start - item.low) for item in profiles.values()]
     marks: list[Mark] = []
     for colour, (label, profile) in zip(
         several_colours(len(profiles)), profiles.items(), strict=True

@@ -43,18 +43,18 @@ def length(row: Compared) -> str:
     return f"{count(row.passes)} passes, {simulated(row.time)}"
 
 
-def against(found: Comparison, row: Compared) -> list[tuple[str, str]]:
+def against(comparison: Comparison, row: Compared) -> list[tuple[str, str]]:
     """Return the comparison of a result with the first one, as table rows.
 
     Parameters
     ----------
-    found : Comparison
+    comparison : Comparison
     row : Compared
         One of its rows except the first.
     """
-    first = found.rows[0]
-    unit = OBSERVABLES[found.observable].unit
-    more, less = ("deeper", "shallower") if found.observable == "depth" else ("more", "less")
+    first = comparison.rows[0]
+    unit = OBSERVABLES[comparison.observable].unit
+    more, less = ("deeper", "shallower") if comparison.observable == "depth" else ("more", "less")
     if row.difference is not None:
         errors = (first.value.half_width, row.value.half_width)
         text = _of_runs(row.difference, errors, unit, more, less)
@@ -93,12 +93,12 @@ def _of_tests(first: Compared, row: Compared, deeper: Interval) -> str:
     return f"in {part_with_interval(deeper)} of {pairs}"
 
 
-def _of_pairs(found: Paired, unit: str, more: str, less: str) -> str:
+def _of_pairs(pairs: Paired, unit: str, more: str, less: str) -> str:
     """Return the difference between tests with the same draws."""
-    by = found.difference
-    if found.count == 1:
+    by = pairs.difference
+    if pairs.count == 1:
         amount = f"{more if by.value > 0.0 else less} by {shown(abs(by.value), unit)}"
         return f"{amount if by.value else 'equal'} in the only pair of tests"
     if by.low == by.value == by.high == 0.0:
         return EQUAL
-    return f"in {part_with_interval(found.share)}, by {with_interval(by, unit)} on average"
+    return f"in {part_with_interval(pairs.share)}, by {with_interval(by, unit)} on average"

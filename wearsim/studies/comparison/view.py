@@ -64,24 +64,24 @@ class ComparisonView(View):
 
     def tables(self) -> list[Table]:
         """Return what is compared, and the estimates with their intervals."""
-        found, named = self.comparison, OBSERVABLES[self.comparison.observable]
+        comparison, named = self.comparison, OBSERVABLES[self.comparison.observable]
         what = f"{named.words} at the end" + (f", for values of {self.key}" if self.key else "")
         described = [
             Row(row.label, f"{kind(row)}; {length(row)}; {file}")
-            for row, file in zip(found.rows, self.files, strict=True)
+            for row, file in zip(comparison.rows, self.files, strict=True)
         ]
-        estimated = next((row.quantiles for row in found.rows if row.quantiles), ())
+        estimated = next((row.quantiles for row in comparison.rows if row.quantiles), ())
         quantiles = (f"{100 * probability:g} %" for probability, _ in estimated)
         heads = ["[" + named.unit + "]", "mean", "std", *quantiles]
-        lines = [line for row in found.rows for line in _lines(row, named.unit, len(heads))]
+        lines = [line for row in comparison.rows for line in _lines(row, named.unit, len(heads))]
         study = Table(STUDY, [Row("compared", what), *described])
         return [study, Table("", lines, heads), self._side_by_side()]
 
     def _side_by_side(self) -> Table:
         """Return all answers of the results, one column for each of them."""
         answers = [{row.label: row.text for row in view.rows()} for view in self._views]
-        labels = list(dict.fromkeys(label for found in answers for label in found))
-        lines = [[label, *(found.get(label, NOTHING) for found in answers)] for label in labels]
+        labels = list(dict.fromkeys(label for texts in answers for label in texts))
+        lines = [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels]
         return Table("", lines, ["at the end", *(row.label for row in self.comparison.rows)])
 
     def overview(self) -> Overview:
@@ -97,13 +97,13 @@ class ComparisonView(View):
 
     def data(self) -> dict[str, Any]:
         """Return the comparison in SI units; all results are compared with the first."""
-        found = self.comparison
+        comparison = self.comparison
         return {
-            "observable": si_key(found.observable),
-            "same_length": found.equally_long,
+            "observable": si_key(comparison.observable),
+            "same_length": comparison.equally_long,
             "compared": [
                 {**_data(row, file), "at_end": view.data()}
-                for row, file, view in zip(found.rows, self.files, self._views, strict=True)
+                for row, file, view in zip(comparison.rows, self.files, self._views, strict=True)
             ],
             "title": self.key or None,
         }
@@ -155,16 +155,16 @@ def comparison_view(
     return ComparisonView(compare(results, labels, name), key)
 
 
-def _warnings(found: Comparison) -> list[str]:
+def _warnings(comparison: Comparison) -> list[str]:
     """Return warnings of unequal lengths of the tests and of failed realisations."""
     texts = []
-    if not found.equally_long:
-        ends = "; ".join(f"{row.label}: {length(row)}" for row in found.rows)
+    if not comparison.equally_long:
+        ends = "; ".join(f"{row.label}: {length(row)}" for row in comparison.rows)
         texts.append(f"the tests differ in length ({ends}), which contributes to the differences")
     texts += [
         f"{count(row.failed)} of the {count(row.done + row.failed)} realisations of {row.label}"
         " failed; estimates from the others may be biased"
-        for row in found.rows
+        for row in comparison.rows
         if row.failed
     ]
     return texts
@@ -203,7 +203,7 @@ def _data(row: Compared, file: str) -> dict[str, Any]:
         "time_s": row.time,
         "value": asdict(row.value),
         "std": asdict(row.std) if row.std is not None else None,
-        "quantiles": [{"probability": p, **asdict(found)} for p, found in row.quantiles],
+        "quantiles": [{"probability": p, **asdict(quantile)} for p, quantile in row.quantiles],
         "probability_of_more_than_first": asdict(row.deeper) if row.deeper else None,
         "paired_with_first": paired,
         "difference_from_first": asdict(row.difference) if row.difference else None,

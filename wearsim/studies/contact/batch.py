@@ -36,6 +36,8 @@ from wearsim.types import FloatArray
 from wearsim.uq.sampling.sobol import Stream
 
 _MAX_POINTS = 2**20  # upper limit of the search for a sufficient number
+# probabilities between the extremes at which a random option of the load is tried
+_BETWEEN = np.array([0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99])
 
 
 class LocalFriction:
@@ -165,10 +167,6 @@ def _least(count: int, unresolved: Callable[[int], str | None]) -> int:
     return count + 1 + bisect_left(counts, True, key=lambda points: unresolved(points) is None)
 
 
-# probabilities between the extremes at which a random option of the load is tried
-_BETWEEN = np.array([0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99])
-
-
 def _is_wider_than_profile(scenario: Scenario) -> bool:
     """Return whether the contact with every input at its mean is wider than the profile."""
     try:
@@ -180,7 +178,7 @@ def _is_wider_than_profile(scenario: Scenario) -> bool:
 class Realisations:
     """One contact of a scenario for every realisation of its random inputs.
 
-    The contact is that of the first roller on the cylinder at the start of the load. A realisation
+    The contact belongs to the first roller on the cylinder at the start of the load. A realisation
     does not depend on others of its batch, except that all share the strips.
 
     Parameters

@@ -22,6 +22,8 @@ INSTALL = {"halfspace": "pip install ./plugins/wearsim-halfspace"}
 
 #: Builds a model with some options for strips.
 Build = Callable[[Options, Grid], ContactModel]
+_SOLUTIONS = 2  # of a reference
+_SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class ContactErrors:
     Parameters
     ----------
     dissipation : float
-        L2 norm over the strips of the difference of P_l(y), over that of the reference.
+        L2 norm over the strips of the difference of P_l(y), over the norm of the reference.
     greatest : float
         Greatest difference of P_l(y), over the greatest value of the reference.
     power, peak_pressure, half_length : float
@@ -57,7 +59,7 @@ class ContactReference:
     model : str
         Name of the model.
     y : ndarray, shape (strips,)
-        Axial position of its strips [m], which may extend beyond those of the contact.
+        Axial position of its strips [m], which may extend beyond the contact's.
     dissipation : ndarray, shape (strips,)
         P_l(y) [W/m].
     line_load : ndarray, shape (strips,)
@@ -85,8 +87,8 @@ class ContactReference:
         """Return the differences of a solution on strips of the same width from the reference."""
         beyond = (len(self.y) - len(solution.y)) // 2
         scalars = self.power, self.peak_pressure, self.half_length, self.adhesion_fraction
-        own = np.concatenate([scalars, self.line_load, self.dissipation])
-        return _differences(_values(solution, beyond), own)
+        reference = np.concatenate([scalars, self.line_load, self.dissipation])
+        return _differences(_values(solution, beyond), reference)
 
 
 def reference_spec(name: str) -> ContactModelSpec:
@@ -168,30 +170,38 @@ def solve_reference(
         return _values(model.solve_one(heights, longitudinal_curvature, _on(point, grid, on)))
 
     if spec.reference and "mx" in spec.options.model_fields:
-        usual, found = spec.options.model_fields["mx"].default, []
+        usual, solutions = spec.options.model_fields["mx"].default, []
         for part in resolutions:
             try:
-                found.append(solve(spec.options.model_validate({"mx": round(part * usual)}), grid))
+                solutions.append(
+                    solve(spec.options.model_validate({"mx": round(part * usual)}), grid)
+                )
             except ContactError as error:
                 failure = error
-            if len(found) == _SOLUTIONS:
+            if len(solutions) == _SOLUTIONS:
                 break
         else:
             raise failure
-        values, coarse = found
-        own = _differences(coarse, values)
+        values, coarse = solutions
+        errors = _differences(coarse, values)
     else:
         values = solve(spec.options(), grid)
         half = Grid.spanning(*grid.edges, (grid.strips + 1) // 2)
         coarse, scalars = solve(spec.options(), half), len(_SCALARS)
         fields = coarse[scalars:].reshape(2, -1)
         there = [np.interp(grid.y, half.y, field) for field in fields]
-        own = _differences(np.concatenate([coarse[:scalars], *there]), values)
+        errors = _differences(np.concatenate([coarse[:scalars], *there]), values)
     line_load, dissipation = values[len(_SCALARS) :].reshape(2, -1)
-    own = replace(own, **{name: abs(error) for name, error in vars(own).items()})
+    errors = replace(errors, **{name: abs(error) for name, error in vars(errors).items()})
     scalars_of = dict(zip(_SCALARS, values[: len(_SCALARS)].tolist(), strict=True))
     return ContactReference(
-        name, grid.y, dissipation, line_load, **scalars_of, own=own, seconds=perf_counter() - start
+        name,
+        grid.y,
+        dissipation,
+        line_load,
+        **scalars_of,
+        own=errors,
+        seconds=perf_counter() - start,
     )
 
 
@@ -201,7 +211,7 @@ def at_creepage(point: OperatingPoint, solution: ContactSolution) -> OperatingPo
     return replace(point, creepage=creepage, bearing_torque=None, rolling_radius=None)
 
 
-def excess(
+def error_above_tolerance(
     name: str,
     model: ContactModel,
     grid: Grid,
@@ -241,35 +251,31 @@ def excess(
         reference = solve_reference(name, grid, materials, gap, curvature, point, FEW, creep_factor)
     except WearsimError:
         return ""
-    error, own = reference.errors_of(solution).dissipation, reference.own.dissipation
-    if error <= tolerance + own:
+    error, error_of_reference = reference.errors_of(solution).dissipation, reference.own.dissipation
+    if error <= tolerance + error_of_reference:
         return ""
     return (
         f"P_l(y) differs by {100.0 * error:.2g} % from '{name}' (whose own error is"
-        f" {100.0 * own:.2g} %), tolerance {100.0 * tolerance:g} %"
+        f" {100.0 * error_of_reference:.2g} %), tolerance {100.0 * tolerance:g} %"
     )
-
-
-_SOLUTIONS = 2  # of a reference
-_SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
 
 
 def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:
     """Return scalars, q(y) and P_l(y) of a solution in one array, with zeros for strips beyond."""
     scalars = solution.power, solution.peak_pressure, float(solution.half_length.max())
-    fields = (np.pad(each, beyond) for each in (solution.line_load, solution.dissipation))
+    fields = (np.pad(field, beyond) for field in (solution.line_load, solution.dissipation))
     return np.concatenate([[*scalars, solution.adhesion_fraction], *fields])
 
 
 def _differences(values: FloatArray, reference: FloatArray) -> ContactErrors:
-    """Return the differences of values from those of a reference, ordered as by `_values`."""
+    """Return the differences of values from a reference, ordered as by `_values`."""
     count = len(_SCALARS)
     power, pressure, length = (
         values[: count - 1] / _nonzero(reference[: count - 1]) - 1.0
     ).tolist()
-    found, exact = (each[count:].reshape(2, -1)[1] for each in (values, reference))
-    norms = [float(np.linalg.norm(each)) for each in (found - exact, exact)]
-    peaks = [float(np.abs(each).max()) for each in (found - exact, exact)]
+    strips, exact = (part[count:].reshape(2, -1)[1] for part in (values, reference))
+    norms = [float(np.linalg.norm(part)) for part in (strips - exact, exact)]
+    peaks = [float(np.abs(part).max()) for part in (strips - exact, exact)]
     return ContactErrors(
         norms[0] / (norms[1] or 1.0),
         peaks[0] / (peaks[1] or 1.0),

@@ -43,7 +43,7 @@ class ErrorModel:
     options : dict of str to Any
         Options with other than default values.
     cost : float
-        Measured time of one contact, over that of the cheapest.
+        Measured time of one contact, over the cheapest model.
     coefficients : ndarray, shape (36,)
         Of the quadratic polynomial of the scaled indicators that gives ln(error).
     factor : float
@@ -94,10 +94,10 @@ class Calibration:
 
     def _limited(self, indicators: FloatArray) -> FloatArray:
         """Return indicators within their range, where nothing changes for the worse beyond it."""
-        found = indicators.copy()
-        found[_UNLIMITED_ABOVE] = np.minimum(found, self.greatest)[_UNLIMITED_ABOVE]
-        found[_UNLIMITED_BELOW] = np.maximum(found, self.least)[_UNLIMITED_BELOW]
-        return found
+        limited = indicators.copy()
+        limited[_UNLIMITED_ABOVE] = np.minimum(limited, self.greatest)[_UNLIMITED_ABOVE]
+        limited[_UNLIMITED_BELOW] = np.maximum(limited, self.least)[_UNLIMITED_BELOW]
+        return limited
 
 
 def preference(error: float, model: ErrorModel) -> tuple[float, float]:

@@ -122,10 +122,10 @@ def _spread_out(length: int, wanted: int) -> IntArray:
 
 
 def _strips(study: ContactStudy) -> dict[str, Panel]:
-    """Return line load and dissipated power per length, with those of a reference."""
+    """Return line load and dissipated power per length, also of a reference."""
     solution, reference, errors = study.solution, study.reference, study.errors
     inside = _touching(solution.line_load)
-    found = {}
+    panels = {}
     for name, key, unit, colour, title, label in (
         ("line load", "line_load", "N/mm", BLUE, "Line load", "q"),
         (
@@ -145,8 +145,8 @@ def _strips(study: ContactStudy) -> dict[str, Panel]:
             marks.append(Line(*curve, dash="--", width=1.0, colour=BLACK, label=text))
             top = 1.25 * 1.05 * max(float(values.max()), float(theirs.max()))
         y, caption = Axis(label, unit, limits=(0.0, top)), f"{title} across the track."
-        found[name] = Panel(title, Y, y, marks, caption, legend="upper center")
-    return found
+        panels[name] = Panel(title, Y, y, marks, caption, legend="upper center")
+    return panels
 
 
 def _touching(line_load: FloatArray) -> slice:

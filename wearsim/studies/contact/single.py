@@ -39,7 +39,7 @@ from wearsim.types import (
 
 GRID_DEPENDENT = 0.1  # relative change of the peak pressure with half as many strips
 
-_BEYOND = 0.15  # strips beyond either end of those of a model that ends them with its contact
+_BEYOND = 0.15  # strips beyond either end of a model's strips that end with its contact
 _FEWEST = 5  # minimum number of strips for an error estimate
 
 

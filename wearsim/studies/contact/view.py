@@ -71,11 +71,11 @@ class ContactView(View):
         reference, errors = self.result.reference, self.result.errors
         if reference is None or errors is None:
             return []
-        own, rows = vars(reference.own), []
+        errors_of_reference, rows = vars(reference.own), []
         for name, error in vars(errors).items():
             sign = "" if name in {"dissipation", "greatest"} else "+" if error >= 0.0 else "-"
             text = f"{sign}{shown(abs(round(error, _DIGITS)), '%', 2)}"
-            theirs = shown(round(own[name], _DIGITS), "%", 2)
+            theirs = shown(round(errors_of_reference[name], _DIGITS), "%", 2)
             rows.append(Row(_DIFFERENCES[name], f"{text}, its own error {theirs}"))
         rows.append(Row("time of the reference", lapse(reference.seconds)))
         return [Table(f"difference from '{reference.model}'", rows)]

@@ -53,7 +53,7 @@ def dissipation(
 ) -> DissipationResult:
     """Solve one contact for many realisations of its random inputs.
 
-    The contact is that of the first roller at the start of the load. Every random input is drawn
+    The contact belongs to the first roller at the start of the load. Every random input is drawn
     once per realisation for any persistence; a process from its marginal distribution.
 
     Parameters

@@ -43,16 +43,16 @@ _LABELS = (
 
 def dissipation_sheet(result: DissipationResult, measured: Sequence[Measured] = ()) -> Sheet:
     """Return convergence of mean and deviation, density of the power, and power per length."""
-    found, constant = result.convergence(), result.summaries["power"].is_constant
+    course, constant = result.convergence(), result.summaries["power"].is_constant
     panels = {"density": _density(result)}
     panels |= {"band": _band(result), "realisations": _realisations(result)}
     for name, title in _LABELS:
-        value, error = getattr(found, name), getattr(found, f"{name}_error")
+        value, error = getattr(course, name), getattr(course, f"{name}_error")
         if constant:  # a constant power has rounding errors only
             error = np.zeros_like(error)
             value = np.zeros_like(value) if name == "std" else value
         panels[name] = convergence(
-            title, f"{name} of $P_d$", "W", found.count, value, value - error, value + error
+            title, f"{name} of $P_d$", "W", course.count, value, value - error, value + error
         )
     return Sheet(
         f"{result.title}\n{_caption(result)}",

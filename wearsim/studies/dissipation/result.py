@@ -82,6 +82,11 @@ DISSIPATION = Schema(
     ),
     VARIABLES,
 )
+#: Probabilities that bound 95 % of the realisations.
+BAND = (0.025, 0.975)
+#: Probabilities of eq. 21 of Chevalier et al. (2005), where the labels P+ and P- are swapped.
+PAPER_BAND = (0.05, 0.95)
+SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "peak_pressure")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -143,14 +148,6 @@ def read_dissipation(path: str | Path) -> DissipationData:
     """Read the file of a dissipation study; errors as of `read_study`."""
     data: DissipationData = read_study(path, DissipationData)
     return data
-
-
-#: Probabilities that bound 95 % of the realisations.
-BAND = (0.025, 0.975)
-#: Probabilities of eq. 21 of Chevalier et al. (2005), where the labels P+ and P- are swapped.
-PAPER_BAND = (0.05, 0.95)
-
-SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "peak_pressure")
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,14 +240,14 @@ class DissipationResult(StudyResult[DissipationData]):
         (100, True)
         """
         counts = np.geomspace(1, self.count, min(points, self.count)).round()
-        found = converge(self.power, np.unique(counts.astype(np.int64)))
+        course = converge(self.power, np.unique(counts.astype(np.int64)))
         if self.raw.plan != "sobol":
-            return found
+            return course
         errors = [
-            _replicated_errors(self.power[:count], self.raw.replicates) for count in found.count
+            _replicated_errors(self.power[:count], self.raw.replicates) for count in course.count
         ]
         mean_error, std_error = np.array(errors).T
-        return replace(found, mean_error=mean_error, std_error=std_error)
+        return replace(course, mean_error=mean_error, std_error=std_error)
 
 
 def summaries(
@@ -282,17 +279,17 @@ def _summary(
     from wearsim.uq.estimation.estimates import estimate  # noqa: PLC0415  (not of a run)
 
     design: Design = "sobol" if plan == "sobol" else "monte-carlo"
-    found = summarise(values, probabilities)
+    summary = summarise(values, probabilities)
     known = estimate(values, probabilities, design, np.arange(len(values)) % replicates)
-    found = replace(found, mean_interval=known.mean, std_interval=known.std)
-    if design == "monte-carlo" or found.is_constant:
-        return found
+    summary = replace(summary, mean_interval=known.mean, std_interval=known.std)
+    if design == "monte-carlo" or summary.is_constant:
+        return summary
     mean_error, std_error = _replicated_errors(values, replicates)
     quantiles = [Quantile(item.value, item.low, item.high, p) for p, item in known.quantiles]
     return replace(
-        found,
+        summary,
         mean=known.mean.value,
-        std=known.std.value if math.isfinite(known.std.value) else found.std,
+        std=known.std.value if math.isfinite(known.std.value) else summary.std,
         mean_error=mean_error,
         std_error=std_error,
         quantiles=tuple(quantiles),
@@ -311,9 +308,9 @@ def _replicated_errors(values: FloatArray, replicates: int) -> tuple[float, floa
     return errors.error(deviation), errors.error(deviation**2) / (2.0 * std)
 
 
-def as_numbers(found: dict[str, Summary]) -> dict[str, Any]:
+def as_numbers(estimates: dict[str, Summary]) -> dict[str, Any]:
     """Return estimates ready for JSON, with None where they are not finite."""
-    return {name: _finite(asdict(summary)) for name, summary in found.items()}
+    return {name: _finite(asdict(summary)) for name, summary in estimates.items()}
 
 
 def _finite(value: Any) -> Any:

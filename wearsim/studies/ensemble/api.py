@@ -105,7 +105,7 @@ def ensemble(
     on_notice : callable, optional
         Called with a message when a worker is lost, or a cluster has no workers.
     storage : Storage
-        File operations; those of the operating system, except in tests.
+        File operations, of the operating system except in tests.
 
     Returns
     -------
@@ -240,7 +240,7 @@ def resume_ensemble(
     on_notice: Callable[[str], None] | None = None,
     storage: Storage = DISK,
 ) -> EnsembleResult:
-    """Continue an ensemble from its file; the result is bit for bit that of an unbroken one.
+    """Continue an ensemble from its file; the result equals an unbroken one bit for bit.
 
     Parameters
     ----------

@@ -38,6 +38,9 @@ from wearsim.types import FloatArray, Grid, IntArray
 
 _RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
 _ARRAYS = ("from_apex", "roller", "weight", "slip_profile")
+MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
+MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
+SCALARS = ("depth_error", "volume_error", "steps", "solves")
 
 
 def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
@@ -81,7 +84,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
 
 
 def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
-    """Return one problem whose realisations are those of the given problems, all compatible."""
+    """Return one problem with the realisations of the given problems, all compatible."""
     columns = (
         np.concatenate([getattr(problem.inputs, item.name) for problem in problems], axis=1)
         for item in fields(ContactInputs)
@@ -106,12 +109,7 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
     )
 
 
-MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
-
-MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
-
 Observables = dict[str, float]
-SCALARS = ("depth_error", "volume_error", "steps", "solves")
 
 
 @dataclass(frozen=True)
@@ -152,9 +150,9 @@ class RealisationRun:
     def can_join(self, other: RealisationRun) -> bool:
         """Return whether two tests that can be batched can be in one batch."""
         settings = [
-            (one.stop, one.schedule, scenario.outputs.width_threshold, scenario.evolution)
-            for one in (self, other)
-            for scenario in (one.draws.scenario,)
+            (run.stop, run.schedule, scenario.outputs.width_threshold, scenario.evolution)
+            for run in (self, other)
+            for scenario in (run.draws.scenario,)
         ]
         return settings[0] == settings[1] and compatible(self.problem, other.problem)
 
@@ -244,14 +242,14 @@ def curves_at_end(
     if cam is None:
         return [{"depth_profile": profile} for profile in depths[0]]
     angles = cam.greatest(depths.max(axis=-1)).angle.tolist()
-    found = [
+    at_end = [
         {"depth_profile": np.maximum(cam.at_angle(depths[:, v], angle), 0.0)}
         for v, angle in enumerate(angles)
     ]
     stations = [turn_of(scenario).stations for scenario in scenarios]
-    for curves, curve in zip(found, lift_curves(problem, state, stations), strict=True):
+    for curves, curve in zip(at_end, lift_curves(problem, state, stations), strict=True):
         curves["lift_error_curve"] = curve
-    return found
+    return at_end
 
 
 def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:
@@ -270,8 +268,8 @@ def observe(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]
 
     done, failed = bisect_failures(step, np.arange(len(runs)))
     results: dict[int, RunObservations | Exception] = dict(failed)
-    for places, found in done:
-        results.update(zip(places.tolist(), found, strict=True))
+    for places, values in done:
+        results.update(zip(places.tolist(), values, strict=True))
     return [results[place] for place in range(len(runs))]
 
 
@@ -291,7 +289,7 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         if with_courses:
             add_step(courses, advance)
         due = due_records(advance, schedule, stop, stepper.pass_by_pass)
-        for part in [due] if runs[0].can_be_batched else [[one] for one in due]:
+        for part in [due] if runs[0].can_be_batched else [[record] for record in due]:
             tests.fail(_record(stepper, advance, part, threshold, rows))
         end, deep = advance.end, too_deep_tests(advance, scenario)
         for number, failure in deep.items():
@@ -304,10 +302,10 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         numbers = advance.numbers[over].tolist()
         scenarios = [runs[number].draws.scenario for number in numbers]
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
-        for place, number, found in zip(over.tolist(), numbers, curves, strict=True):
+        for place, number, curve in zip(over.tolist(), numbers, curves, strict=True):
             chosen, grid = np.array([place]), advance.problem.grid
             scalars = scalars_of(advance.problem.at(chosen), end.at(chosen))
-            results[number] = RunObservations(rows[number], scalars, found, grid)
+            results[number] = RunObservations(rows[number], scalars, curve, grid)
     add_strip_errors(runs, problem, courses, results)
     results |= tests.failures
     return [results[number] for number in range(len(runs))]
@@ -320,7 +318,7 @@ def add_strip_errors(
     results: Mapping[int, RunObservations | Exception],
     observe: Observe | None = None,
 ) -> dict[int, tuple[FloatArray, dict[str, FloatArray]]]:
-    """Add the errors due to the strips to those of the results, by the same tests on coarse ones.
+    """Add the errors due to the strips to the results, by the same tests on coarse strips.
 
     Parameters
     ----------
@@ -360,8 +358,8 @@ def add_strip_errors(
                 name: np.array([item[name] for item in course.observed])
                 for name in (course.observed[0] if course.observed else ())
             }
-            found = observed_errors(other, np.append(0.0, passes), observed)
-            added[number] = errors, {name: values[-1] for name, values in found.items()}
+            stated = observed_errors(other, np.append(0.0, passes), observed)
+            added[number] = errors, {name: values[-1] for name, values in stated.items()}
             result.scalars["depth_error"] += float(errors[0])
             result.scalars["volume_error"] += float(errors[1])
     return added
@@ -383,13 +381,13 @@ def too_deep_tests(advance: Advance, scenario: Scenario, less: str = "") -> dict
     less : str
         As in `too_deep_failure`.
     """
-    each = zip(
+    depths = zip(
         advance.numbers.tolist(),
         greatest_depth(advance.end.depths).tolist(),
         advance.end.passes.tolist(),
         strict=True,
     )
-    failures = {n: too_deep_failure(scenario, depth, passes, less) for n, depth, passes in each}
+    failures = {n: too_deep_failure(scenario, depth, passes, less) for n, depth, passes in depths}
     return {number: failure for number, failure in failures.items() if failure}
 
 
@@ -408,7 +406,7 @@ def _record(
 
     done, failed = bisect_failures(observed, np.arange(len(due))) if due else ([], {})
     numbers = [int(advance.numbers[place]) for _, place, _ in due]
-    for chosen, found in done:
-        for number, row in zip(chosen.tolist(), found, strict=True):
+    for chosen, values in done:
+        for number, row in zip(chosen.tolist(), values, strict=True):
             rows[numbers[number]].append(row)
     return {numbers[number]: error for number, error in failed.items()}

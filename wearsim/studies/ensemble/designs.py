@@ -48,7 +48,7 @@ def sources(
 
     It is the number of the realisation, except in Saltelli's plan: there d + 2 consecutive
     realisations, a row, share two draws A and B of d inputs. They are A, B, and A with each input
-    in turn replaced by that of B.
+    in turn replaced by the column of B.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 
 SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
-GROWTH = 4  # greatest ratio of the size of a batch to that of the greatest before it
+GROWTH = 4  # greatest ratio of the size of a batch to the greatest before it
 MOST_IN_BATCH = 256
 AHEAD = 3  # batches for each worker that may be beyond the next interim analysis
 BETWEEN_ESTIMATES = 0.5  # s
@@ -129,8 +129,8 @@ def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bo
             f"{target} was not reached by {result.requested} realisations",
         ),
     )
-    found = [text for applies, text in warnings if applies]
-    return [*plausibility_warnings(result.scenario), *found]
+    texts = [text for applies, text in warnings if applies]
+    return [*plausibility_warnings(result.scenario), *texts]
 
 
 class EnsembleWork:
@@ -284,7 +284,7 @@ class EnsembleWork:
     def _batch_size(self) -> int:
         """Return the batch size for `SECONDS`, limited so that all workers end together.
 
-        The rate is that of the last batches: before the first ones the workers load the kernels,
+        The last batches give the rate: before the first ones the workers load the kernels,
         and a realisation takes longer in a small batch.
         """
         workers = max(self.pool.workers, 1)

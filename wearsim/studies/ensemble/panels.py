@@ -98,12 +98,12 @@ def _caption(result: EnsembleResult) -> str:
     )
     if result.count == 0:
         return text
-    depth, found = result.estimate("depth", -1, NINETY_PERCENT), result.worn_profile()
+    depth, profile = result.estimate("depth", -1, NINETY_PERCENT), result.worn_profile()
     if result.count == 1:
         return f"{text}\ndepth {shown(depth.mean.value, 'um')}"
     text += f"\nmean depth {shown(depth.mean.value, 'um')}"
-    if found.start.any():
-        lowest = shown(-float(found.height.min()), "um")
+    if profile.start.any():
+        lowest = shown(-float(profile.height.min()), "um")
         text += f" worn since the start, mean profile {lowest} below nominal"
     if result.is_constant("depth"):
         return f"{text}, equal in all realisations"
@@ -144,10 +144,10 @@ def _density(result: EnsembleResult) -> Panel:
     if result.count == 1 or result.is_constant("depth"):
         where = "the only realisation" if result.count == 1 else f"all {count(result.count)}"
         return message(title, f"{shown(float(depth.mean()), 'um')} in {where}: no density to draw")
-    found = result.estimate("depth", -1, (0.05, 0.5, 0.95))
-    low, median, high = (found.quantile(p).value for p in (0.05, 0.5, 0.95))
+    estimate = result.estimate("depth", -1, (0.05, 0.5, 0.95))
+    low, median, high = (estimate.quantile(p).value for p in (0.05, 0.5, 0.95))
     lines: list[tuple[float, str, str, str]] = [
-        (found.mean.value, BLACK, "--", f"mean {shown(found.mean.value, 'um')}"),
+        (estimate.mean.value, BLACK, "--", f"mean {shown(estimate.mean.value, 'um')}"),
         (median, BLUE, "-", f"median {shown(median, 'um')}"),
     ]
     if sufficient_for(result.count, NINETY_PERCENT[0]):
@@ -173,9 +173,9 @@ def _convergence(result: EnsembleResult) -> Panel:
     """Return the convergence of the estimate of the target, by default of the mean depth."""
     target = Target.parse(result.until or _DEFAULT)
     named = OBSERVABLES[target.observable]
-    counts, found = result.convergence(target)
+    counts, intervals = result.convergence(target)
     value, low, high = (
-        np.array([getattr(item, end) for item in found]) for end in ("value", "low", "high")
+        np.array([getattr(item, end) for item in intervals]) for end in ("value", "low", "high")
     )
     labels = {-target.width: "", target.width: f"target: ±{100 * target.width:g} %"}
     marks = [
@@ -188,23 +188,23 @@ def _convergence(result: EnsembleResult) -> Panel:
 
 def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
     """Return the mean worn profile with its 95 % range, and measured profiles over it."""
-    found = result.worn_profile()
-    marks: list[Mark] = [Line(found.y, found.height, colour=BLACK, label="mean")]
-    if found.label:
-        marks.insert(0, Band(found.y, found.low, found.high, label=found.label))
-    if found.start.any():
+    profile = result.worn_profile()
+    marks: list[Mark] = [Line(profile.y, profile.height, colour=BLACK, label="mean")]
+    if profile.label:
+        marks.insert(0, Band(profile.y, profile.low, profile.high, label=profile.label))
+    if profile.start.any():
         label = "start of the tests"
-        marks.append(Line(found.y, found.start, dash="--", width=1.0, colour=GREY, label=label))
-    limits = worn_limits(found.y, found.start - found.low, *(one.y for one in measured))
+        marks.append(Line(profile.y, profile.start, dash="--", width=1.0, colour=GREY, label=label))
+    limits = worn_limits(profile.y, profile.start - profile.low, *(item.y for item in measured))
     title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
-    title += "" if found.kept == result.count else f", of the first {count(found.kept)}"
-    deepest = shown(float((found.start - found.height).max()), "um")
+    title += "" if profile.kept == result.count else f", of the first {count(profile.kept)}"
+    deepest = shown(float((profile.start - profile.height).max()), "um")
     return Panel(
         title,
         Axis(Y, "mm", limits=limits),
         HEIGHT,
         [*marks, *measured_marks(measured)],
-        f"Mean of {count(found.kept)} profiles, {deepest} deep, and the band of the tests.",
+        f"Mean of {count(profile.kept)} profiles, {deepest} deep, and the band of the tests.",
         legend="lower right",
     )
 
@@ -282,10 +282,10 @@ def _label(item: Effect) -> str:
     return f"{item.name} (not significant)" if item.without_effect else item.name
 
 
-def _intervals(places: FloatArray, found: list[Interval], colour: str) -> Whiskers:
-    known = [np.isfinite(index.value) for index in found]
+def _intervals(places: FloatArray, intervals: list[Interval], colour: str) -> Whiskers:
+    known = [np.isfinite(index.value) for index in intervals]
     low, high = (
-        np.where(known, np.clip([getattr(index, end) for index in found], 0.0, 1.0), np.nan)
+        np.where(known, np.clip([getattr(index, end) for index in intervals], 0.0, 1.0), np.nan)
         for end in ("low", "high")
     )
     return Whiskers(places, low, high, horizontal=True, colour=colour)

@@ -37,6 +37,8 @@ DRAWS = 1_000_000  # draws from which the mean of the control variate is compute
 _BLOCK = 65536
 _FIRST_DRAW = 2**31  # number of the first of these draws, beyond any realisation
 _NEWTON_TOLERANCE = 1e-14
+AXIS_REALISATIONS = 64  # realisations that determine the axis, whatever the ensemble's size
+WIDTH_MARGIN = 1.05  # width of the axis over the widest of these realisations
 
 
 def control_of(drawer: Drawer, draws: int = DRAWS) -> dict[str, float] | None:
@@ -88,10 +90,10 @@ def closed_form_depths(
     rollers, speed = scenario.operation.rollers, scenario.rolling_speed
 
     def value(key: str, mean: float | tuple[float, ...]) -> FloatArray:
-        found = columns.get(key)
-        if found is None:
-            found = np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
-        return found[:, None] if found.ndim == 1 else found
+        drawn = columns.get(key)
+        if drawn is None:
+            drawn = np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
+        return drawn[:, None] if drawn.ndim == 1 else drawn
 
     creepage, load = scenario.creepage, scenario.load.build()
     law = None if scenario.wear is None else scenario.wear.build()
@@ -157,10 +159,6 @@ def _inverse(t: FloatArray) -> FloatArray:
     return np.asarray(x)
 
 
-AXIS_REALISATIONS = 64  # realisations that determine the axis, whatever the ensemble's size
-WIDTH_MARGIN = 1.05  # width of the axis over that of the widest of these realisations
-
-
 def profile_axis(scenario: Scenario) -> Grid:
     """Return the strips on which the final profiles of an ensemble are stored.
 
@@ -175,7 +173,7 @@ def profile_axis(scenario: Scenario) -> Grid:
     Raises
     ------
     WearsimError
-        If no strips fit any of the first realisations; the error is that of the first one.
+        If no strips fit any of the first realisations, with the error of the first one.
     """
     drawer, reach, error = Drawer(scenario, "monte-carlo"), [], None
     for number in range(AXIS_REALISATIONS):

@@ -208,15 +208,17 @@ class EnsembleResult(EnsembleValues):
         >>> course.mean.shape == course.passes.shape
         True
         """
-        found = [self._estimate(values, QUANTILES) for values in self._by_record(name)]
+        estimates = [self._estimate(values, QUANTILES) for values in self._by_record(name)]
         return Course(
             passes=self.record_passes,
             time=self.record_time,
-            mean=np.array([item.mean.value for item in found]),
-            mean_low=np.array([item.mean.low for item in found]),
-            mean_high=np.array([item.mean.high for item in found]),
-            std=np.array([item.std.value for item in found]),
-            quantiles={p: np.array([item.quantile(p).value for item in found]) for p in QUANTILES},
+            mean=np.array([item.mean.value for item in estimates]),
+            mean_low=np.array([item.mean.low for item in estimates]),
+            mean_high=np.array([item.mean.high for item in estimates]),
+            std=np.array([item.std.value for item in estimates]),
+            quantiles={
+                p: np.array([item.quantile(p).value for item in estimates]) for p in QUANTILES
+            },
         )
 
     def _by_record(self, name: str) -> Iterator[FloatArray]:
@@ -347,17 +349,17 @@ class EnsembleResult(EnsembleValues):
         >>> sorted(tests.statistics())[:2]
         ['depth_mean', 'depth_profile_high']
         """
-        found: dict[str, FloatArray] = {}
+        statistics: dict[str, FloatArray] = {}
         for name in self.observables:
             course = self.course(name)
-            found[f"{name}_mean"], found[f"{name}_std"] = course.mean, course.std
-            found[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
+            statistics[f"{name}_mean"], statistics[f"{name}_std"] = course.mean, course.std
+            statistics[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
         for name in KEPT:
             if name in self.raw.schema.variables:
                 band = self.band(name)
                 parts = ("mean", "std", "low", "high")
-                found |= {f"{name}_{part}": getattr(band, part) for part in parts}
-        return found
+                statistics |= {f"{name}_{part}": getattr(band, part) for part in parts}
+        return statistics
 
     def is_constant(self, name: str) -> bool:
         """Return whether an observable is equal in all realisations, within rounding.

@@ -20,8 +20,7 @@ from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.run.result import Result, read_results
 from wearsim.studies.run.run import resume, run
-from wearsim.units import QuantityError, conversion
-from wearsim.units import kind_of as quantity_kind
+from wearsim.units import QuantityError, conversion, kind_of as quantity_kind
 
 if TYPE_CHECKING:
     import xarray
@@ -140,7 +139,7 @@ def sweep(
     Raises
     ------
     ResultsFileError
-        If a file exists, or is that of two values.
+        If a file exists, or belongs to two values.
     ScenarioError, CapabilityError, TypeError, ValueError
         As in `run` or `ensemble`; those known from the arguments before the first one runs.
     Interrupted
@@ -173,7 +172,7 @@ def run_sweep(
     on_value: Callable[[str, Path | None], None] | None = None,
     **options: Any,
 ) -> list[Any]:
-    """Run the scenarios of a sweep, one per value; the other parameters are those of `sweep`."""
+    """Run the scenarios of a sweep, one per value; the other parameters as of `sweep`."""
     paths = [None if output is None else path_of(output, value) for value in values]
     same = [path for path in paths if path is not None and paths.count(path) > 1]
     if same:
@@ -186,9 +185,9 @@ def run_sweep(
         request: tuple[object, ...] = (scenario.sha256,)
         if realisations is not None:
             precision = named_precision(options.get("precision"), options.get("until"))
-            found = checked_request(scenario, realisations, options.get("plan"), precision)
-            until = "" if found.target is None else str(found.target)
-            request += (found.plan, found.realisations, until)
+            checked = checked_request(scenario, realisations, options.get("plan"), precision)
+            until = "" if checked.target is None else str(checked.target)
+            request += (checked.plan, checked.realisations, until)
         resumed.append(not force and path is not None and _requested(path) == request)
         if path is not None and not resumed[-1]:
             check_output(path, force, scenario.paths)
@@ -276,16 +275,16 @@ def parse_sweep(text: str) -> tuple[str, tuple[str, ...]]:
     return key.strip(), values
 
 
-def _are_equal(one: str, other: str) -> bool:
+def _are_equal(text: str, other: str) -> bool:
     """Return whether two values are equal, also in different units."""
-    matches = [_QUANTITY.fullmatch(value) for value in (one, other)]
+    matches = [_QUANTITY.fullmatch(value) for value in (text, other)]
     if matches[0] is None or matches[1] is None:
-        return one == other
+        return text == other
     (first, unit), (second, other_unit) = matches[0].groups(), matches[1].groups()
     if not (unit and other_unit):
         return not (unit or other_unit) and float(first) == float(second)
     try:
         factor = conversion(other_unit, unit)
     except ValueError:  # reported when the scenario is read
-        return one == other
+        return text == other
     return Fraction(first) == Fraction(second) * factor

@@ -179,14 +179,14 @@ class EnsembleValues(StudyResult[EnsembleData]):
 
     @cached_property
     def _independent(self) -> slice | IntArray:
-        """Independent realisations: with Saltelli's plan, those of the blocks A and B."""
+        """Independent realisations: with Saltelli's plan, the blocks A and B."""
         if self.plan != "saltelli":
             return slice(None)
         return np.flatnonzero(self.numbers % (len(self.raw.groups) + 2) < 2)
 
     @property
     def kept(self) -> int:
-        """Number of stored profiles: those of the first realisations."""
+        """Number of stored profiles, of the first realisations."""
         return kept_profiles(self.requested, len(self.y))
 
     @cached_property
@@ -205,7 +205,7 @@ class EnsembleValues(StudyResult[EnsembleData]):
         Returns
         -------
         ndarray, shape (realisations, ...)
-            In SI; the last axis is that of strips or angles.
+            In SI; the last axis has strips or angles.
 
         Raises
         ------

@@ -102,12 +102,9 @@ class RealisationsView(StudyView[Shown]):
             band = result.band("lift_error_curve")
             tables["lift_error.csv"] = [_band("angle", "rad", "lift error", band)]
         if result.failed:
-            numbers, errors = zip(*result.errors.items(), strict=True)
-            failures = [
-                Column("realisation", list(map(str, numbers))),
-                Column("error", list(errors)),
-            ]
-            tables["failures.csv"] = [failures]
+            numbers, errors = map(str, result.errors), result.errors.values()
+            failures = {"realisation": list(numbers), "error": list(errors)}
+            tables["failures.csv"] = [[Column(*column) for column in failures.items()]]
         return tables
 
 
@@ -179,8 +176,8 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         if not result.count:
             return rows
         if result.until:
-            reached = _target_met(result, Target.parse(result.until))
-            rows.append(Row(f"precision {result.until}", reached))
+            met = _target_met(result, Target.parse(result.until))
+            rows.append(Row(f"precision {result.until}", met))
         saved = result.estimate("depth", -1, ()).variance_saved
         if saved is not None:
             text = f"removes {shown(saved, '%', 3)} of the variance of the mean depth"
@@ -282,11 +279,11 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
 def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
     """Return the estimates of an observable, and below them their intervals."""
-    named, found = OBSERVABLES[name], result.estimate(name, -1, QUANTILES)
+    named, estimate = OBSERVABLES[name], result.estimate(name, -1, QUANTILES)
     if result.is_constant(name) and result.count > 1:
-        value, _ = cells(found.mean, named.unit)
+        value, _ = cells(estimate.mean, named.unit)
         return [(named.label, value, CONSTANT, *[NOTHING] * len(QUANTILES))]
-    items = [found.mean, found.std, *(interval for _, interval in found.quantiles)]
+    items = [estimate.mean, estimate.std, *(interval for _, interval in estimate.quantiles)]
     texts = [cells(item, named.unit) for item in items]
     if named.unit == "deg":  # the mean of 359 and 1 deg is not 180 deg
         texts[:2] = [(NOTHING, "")] * 2
@@ -313,9 +310,9 @@ def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
 
 def _target_met(result: EnsembleResult, target: Target) -> str:
     """Return whether a target is reached, and the half-width of the interval."""
-    found = result.estimate_for(target)
-    interval, achieved = target.interval(found), target.achieved(found)
-    is_reached, realisations = target.reached(found), f"{count(result.count)} realisations"
+    estimate = result.estimate_for(target)
+    interval, achieved = target.interval(estimate), target.achieved(estimate)
+    is_reached, realisations = target.reached(estimate), f"{count(result.count)} realisations"
     word = "reached" if is_reached else "not reached"
     if not math.isfinite(interval.half_width) or math.isnan(interval.value):
         return f"{word}: {TOO_FEW_REALISATIONS}"
@@ -330,9 +327,11 @@ def _target_met(result: EnsembleResult, target: Target) -> str:
     return f"{text}, but the sample is too small" if too_small else text
 
 
-def _estimate(found: Estimate) -> dict[str, Any]:
-    data = asdict(found)
-    data["quantiles"] = [{"probability": p, **asdict(interval)} for p, interval in found.quantiles]
+def _estimate(estimate: Estimate) -> dict[str, Any]:
+    data = asdict(estimate)
+    data["quantiles"] = [
+        {"probability": p, **asdict(interval)} for p, interval in estimate.quantiles
+    ]
     return data
 
 

@@ -160,22 +160,22 @@ class Cluster:
         """
         before = self._threads
         try:
-            found = self._client.nthreads()
+            threads = self._client.nthreads()
         except Exception as error:
             # the client tries to reconnect for some time, then it closes
             if self._client.status not in {"running", "connecting"}:
                 raise self._unreachable() from error
             return
         self._checked_at = now = time.monotonic()
-        self._threads, lost = sum(found.values()), sorted(self._present - set(found))
-        self._present = set(found)
+        self._threads, lost = sum(threads.values()), sorted(self._present - set(threads))
+        self._present = set(threads)
         if self._threads:
             self._had_workers_at = now
             if lost and self._on_notice is not None:
                 self._on_notice(
                     f"lost {'workers' if len(lost) > 1 else 'worker'} {', '.join(lost)}, and"
-                    f" {len(found)} {'are' if len(found) > 1 else 'is'} left; unfinished batches"
-                    " are done again"
+                    f" {len(threads)} {'are' if len(threads) > 1 else 'is'} left; unfinished"
+                    " batches are done again"
                 )
         elif self._on_notice is not None and before:
             self._on_notice(f"waiting for workers: there are none at {self._address}")
@@ -237,9 +237,9 @@ def cluster(
             stack.callback(log.setLevel, log.level)
             log.setLevel(logging.CRITICAL + 1)
         client = stack.enter_context(_connected(address))
-        found = Cluster(client, address, on_notice, stop_requested)
-        found.check_versions()
-        yield found
+        cluster_of_client = Cluster(client, address, on_notice, stop_requested)
+        cluster_of_client.check_versions()
+        yield cluster_of_client
 
 
 def _local_cluster(count: int) -> LocalCluster:

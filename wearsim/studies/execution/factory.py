@@ -64,8 +64,10 @@ def executor(
                 f'Dask is not installed ({error}); install it with: pip install "wearsim[cluster]"'
             ) from error
         address = None if scheduler == "dask" else scheduler
-        with cluster(address, count, on_notice, stop_requested or (lambda: False)) as found:
-            yield found
+        with cluster(
+            address, count, on_notice, stop_requested or (lambda: False)
+        ) as workers_of_cluster:
+            yield workers_of_cluster
     elif scheduler == "serial" or count == 1:
         yield InProcess()
     elif scheduler == "threads":

@@ -28,11 +28,11 @@ from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.identify.traces import Trace, level, measured_depth
 from wearsim.studies.identify.trajectories import Grown, Trajectories
 from wearsim.types import FloatArray
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.noise import Noise, fit_noise
 
 _FIRST_NOISE = Noise(1e-6, 0.2e-3, 0.1e-6)  # of a trace without shoulders, before its own is fitted
-_NOISE_OF_LIFT = Noise(1e-6, 0.05, 1e-6)  # before that of the residuals is fitted; lengths in rad
+_NOISE_OF_LIFT = Noise(1e-6, 0.05, 1e-6)  # before noise is fitted to the residuals; lengths in rad
 _BAND = 100  # draws of the band of fitted profiles
 _SUSPECT = 1.6
 _CONFOUNDED = Mistake(
@@ -56,7 +56,7 @@ class Fit:
     ratio, probability, correlation : float, optional
         Mean square of the residuals whitened by the noise of the shoulders, 1 where model and noise
         are right; probability of a greater one; autocorrelation of neighbouring whitened residuals.
-        None without shoulders, where the noise is that of the residuals themselves.
+        None without shoulders, where the residuals themselves give the noise.
     suspects : tuple of str
         Warnings on depth and form of the groove.
     """
@@ -73,14 +73,14 @@ class Fit:
     @property
     def warnings(self) -> list[str]:
         """Warnings if the model does not describe the trace."""
-        found = [f"{self.trace.name}: {text}" for text in self.suspects]
+        texts = [f"{self.trace.name}: {text}" for text in self.suspects]
         if self.ratio is not None and self.ratio >= _SUSPECT:
-            found.append(
+            texts.append(
                 f"{self.trace.name}: residuals are {np.sqrt(self.ratio):.1f} times the noise of the"
                 " shoulders: the model does not describe this groove, and its interval may be too"
                 " small; is it of another rig, or are inputs missing that the scenario should draw?"
             )
-        return found
+        return texts
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Identified:
     item : Measurement
     likelihood : DrawLikelihood
         For the draws of the test.
-    kernel : Kernel
+    kernel : LikelihoodMixture
         Likelihood of ln K/H.
     depth : tuple of float, optional
         Measured depth: value, and ends of the 95 % interval [m]; None without shoulders, and where
@@ -109,7 +109,7 @@ class Identified:
 
     item: Measurement
     likelihood: DrawLikelihood
-    kernel: Kernel
+    kernel: LikelihoodMixture
     depth: tuple[float, float, float] | None
     model_depth: tuple[float, float, float]
     area: tuple[float, float, float] | None
@@ -119,7 +119,7 @@ class Identified:
     shares: Mapping[str, float] = field(default_factory=dict)
 
 
-def kernel_of(found: DrawLikelihood, name: str) -> Kernel:
+def kernel_of(likelihood: DrawLikelihood, name: str) -> LikelihoodMixture:
     """Return the likelihood of ln K/H, the draws of the other inputs averaged.
 
     Raises
@@ -127,10 +127,12 @@ def kernel_of(found: DrawLikelihood, name: str) -> Kernel:
     ScenarioError
         If no draw describes the test.
     """
-    known = np.isfinite(found.log_evidence)
+    known = np.isfinite(likelihood.log_evidence)
     if not known.any():
         raise ScenarioError(name, [Mistake("", "", "no draw of the inputs describes this groove")])
-    return Kernel.of(found.log_evidence[known], found.mean[known], found.std[known])
+    return LikelihoodMixture.of(
+        likelihood.log_evidence[known], likelihood.mean[known], likelihood.std[known]
+    )
 
 
 def identified(
@@ -164,7 +166,7 @@ def identified(
         assert item.depth is not None
         assert item.depth_std is not None
         depth = _around(item.depth, item.depth_std)
-        found = depth_likelihood(item.depth, item.depth_std, grown, item.surface)
+        likelihood = depth_likelihood(item.depth, item.depth_std, grown, item.surface)
     elif item.lift is not None:
         model: TraceLikelihood = LiftLikelihood(
             trace.y,
@@ -177,8 +179,8 @@ def identified(
             curvature=item.runout,
         )
         model = _with_noise(model)
-        found = model.integrated()
-        fit = _fit(model, found, trace)
+        likelihood = model.integrated()
+        fit = _fit(model, likelihood, trace)
     else:
         if trace.noise is not None and trace.depth is not None:
             rows = profiles_of_depth(grown, item.surface, trace.depth)
@@ -200,19 +202,19 @@ def identified(
         )
         if trace.noise is None:
             model = _with_noise(model)
-        found = model.integrated()
-        check_covered(found, grown, trace)
-        fit = _fit(model, found, trace)
-    kernel = kernel_of(found, item.name)
+        likelihood = model.integrated()
+        check_covered(likelihood, grown, trace)
+        fit = _fit(model, likelihood, trace)
+    kernel = kernel_of(likelihood, item.name)
     step = grown.y[1] - grown.y[0]
     sizes = grown.depth[item.surface]
-    model_depth = _interval(size_of(item.surface, sizes), grown, found)
-    area = None if item.lift else _interval(sizes.sum(axis=2) * step, grown, found)
-    energy = _interval(grown.energy, grown, found)
+    model_depth = _interval(size_of(item.surface, sizes), grown, likelihood)
+    area = None if item.lift else _interval(sizes.sum(axis=2) * step, grown, likelihood)
+    energy = _interval(grown.energy, grown, likelihood)
     if fit is not None and fit.trace.noise is not None:
         suspects += [*other_depth(depth, model_depth)] if depth is not None else []
-        fit = replace(fit, suspects=(*suspects, *other_form(model, found)))
-    return Identified(item, found, kernel, depth, model_depth, area, energy, fit, passes)
+        fit = replace(fit, suspects=(*suspects, *other_form(model, likelihood)))
+    return Identified(item, likelihood, kernel, depth, model_depth, area, energy, fit, passes)
 
 
 def _around(value: float, std: float) -> tuple[float, float, float]:
@@ -240,21 +242,21 @@ def _with_noise(model: TraceLikelihood) -> TraceLikelihood:
     return model
 
 
-def _fit(model: TraceLikelihood, found: DrawLikelihood, trace: Trace) -> Fit:
+def _fit(model: TraceLikelihood, likelihood: DrawLikelihood, trace: Trace) -> Fit:
     """Return the best profile, the band of profiles, and the check of residuals."""
     from scipy.special import fdtrc  # noqa: PLC0415  (slow to import)
 
-    score = np.where(np.isfinite(found.log_evidence), found.log_evidence, -np.inf)
+    score = np.where(np.isfinite(likelihood.log_evidence), likelihood.log_evidence, -np.inf)
     weight = np.exp(score - score.max())
     order = np.argsort(-weight)[:_BAND]
     # equally spaced quantiles of the draws, and of ln K within a draw
     bound = np.cumsum(weight[order]) / weight[order].sum()
     draws = order[np.searchsorted(bound, (np.arange(_BAND) + 0.5) / _BAND)]
     spread = np.sqrt(2.0) * np.sin(2.4 * np.arange(_BAND))  # unit variance, no pattern
-    ln_k = found.mean[draws] + spread * found.std[draws]
-    worn = model.worn(draws, ln_k, found.shift[draws])
+    ln_k = likelihood.mean[draws] + spread * likelihood.std[draws]
+    worn = model.worn(draws, ln_k, likelihood.shift[draws])
     best = np.array([int(order[0])])
-    at_best = found.mean[best], found.shift[best]
+    at_best = likelihood.mean[best], likelihood.shift[best]
     worn = np.column_stack([model.worn(best, *at_best), worn])
     forms = model.forms
     columns = np.column_stack([forms, trace.height[:, None] + worn])
@@ -278,19 +280,21 @@ def _fit(model: TraceLikelihood, found: DrawLikelihood, trace: Trace) -> Fit:
     )
 
 
-def _interval(sizes: FloatArray, grown: Grown, found: DrawLikelihood) -> tuple[float, float, float]:
+def _interval(
+    sizes: FloatArray, grown: Grown, likelihood: DrawLikelihood
+) -> tuple[float, float, float]:
     """Return a size of the groove and its 95 % interval, from sizes (draws, records)."""
-    score = np.where(np.isfinite(found.log_evidence), found.log_evidence, -np.inf)
+    score = np.where(np.isfinite(likelihood.log_evidence), likelihood.log_evidence, -np.inf)
     weight = np.exp(score - score.max())
     weight /= weight.sum()
     logs = np.log(np.maximum(sizes, 1e-300))
     mean, slope = np.empty((2, len(logs)))
     for draw, (known, values) in enumerate(zip(grown.ln_k, logs, strict=True)):
-        mean[draw] = np.interp(found.mean[draw], known, values)
-        place = int(np.clip(np.searchsorted(known, found.mean[draw]), 1, len(known) - 1))
+        mean[draw] = np.interp(likelihood.mean[draw], known, values)
+        place = int(np.clip(np.searchsorted(known, likelihood.mean[draw]), 1, len(known) - 1))
         slope[draw] = (values[place] - values[place - 1]) / (known[place] - known[place - 1])
     centre = float(weight @ mean)
-    variance = float(weight @ ((mean - centre) ** 2 + (slope * found.std) ** 2))
+    variance = float(weight @ ((mean - centre) ** 2 + (slope * likelihood.std) ** 2))
     ends = centre + 1.96 * np.sqrt(variance) * np.array([0.0, -1.0, 1.0])
     value, low, high = np.exp(ends).tolist()
     return value, low, high
@@ -302,7 +306,7 @@ def exponent(rows: Sequence[Identified]) -> tuple[float, float, float] | None:
     Parameters
     ----------
     rows : sequence of Identified
-        Traces of one test; those of the same place as the first are used.
+        Traces of one test; traces of the same place as the first are used.
     """
     rows = [row for row in rows if row.item.surface == rows[0].item.surface]
     if len(rows) < 2:

@@ -19,7 +19,7 @@ from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.cam_wear import Wanted, size_of
 from wearsim.studies.identify.analysis import Identified, identified
-from wearsim.studies.identify.inputs import with_known
+from wearsim.studies.identify.inputs import contained_inputs, with_known
 from wearsim.studies.identify.lifts import read_change
 from wearsim.studies.identify.measurements import (
     Measurement,
@@ -33,7 +33,7 @@ from wearsim.studies.identify.result import IdentificationResult
 from wearsim.studies.identify.traces import Trace, read_trace, smoothed
 from wearsim.studies.identify.trajectories import Grower, Trajectories, check_law
 from wearsim.studies.progress import shown_progress
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 from wearsim.uq.hierarchy.verdict import NEGLIGIBLE
 
 MOST_DRAWS = 768  # where a trace leaves few of the first ones
@@ -138,7 +138,13 @@ def identify(
         rows = study.rows(watch)
     specimens = specimens_of(rows)
     seconds = time.monotonic() - started
-    given = {"measured": tables_of(items), "draws": draws, "shared": shared}
+    fixed = [key_of(key) for key in fix or ()]
+    given = {
+        "measured": tables_of(items),
+        "draws": draws,
+        "shared": shared,
+        "contained": contained_inputs(study.scenario, items, fixed),
+    }
     data = content(study.scenario, specimens, negligible, study.notes, created, seconds, **given)
     data.warnings.extend(study.left_out)
     if output is not None:
@@ -246,7 +252,7 @@ class _Study:
 
     def rows(self, watch: Callable[[int, int], None] | None) -> list[Identified]:
         """Run the wear tests, and return the wear factor of each groove in the given order."""
-        found: dict[int, Identified] = {}
+        identified_tests: dict[int, Identified] = {}
         counts = {"done": 0, "before": 0}
 
         def report(done: int, total: int) -> None:
@@ -267,8 +273,8 @@ class _Study:
                 self.notes += [note] if note not in self.notes else []
             if trajectories.lost:
                 self.notes.append(f"{trajectories.lost} draws are left out, whose tests failed")
-            found.update({id(row.item): row for row in some})
-        return [found[id(item)] for item in self.items if id(item) in found]
+            identified_tests.update({id(row.item): row for row in some})
+        return [identified_tests[id(item)] for item in self.items if id(item) in identified_tests]
 
     def _group(
         self, group: Sequence[_Ready], draws: int | None, report: Callable[[int, int], None]
@@ -283,7 +289,7 @@ class _Study:
             high = max(ready.depths[1] for ready in group)
             trajectories = grower.grow((low, high), [ready.passes for ready in group])
         else:
-            wanted = [Wanted(one.item.surface, one.passes, *one.depths) for one in group]
+            wanted = [Wanted(test.item.surface, test.passes, *test.depths) for test in group]
             trajectories = grower.grow_on_cam(wanted)
         return [self._identified(ready, trajectories) for ready in group], trajectories
 
@@ -307,13 +313,13 @@ def shares(row: Identified, trajectories: Trajectories) -> dict[str, float]:
     if used.sum() < 16:
         return {}
     mean = row.likelihood.mean[used].argsort().argsort()
-    found = {}
+    parts = {}
     for key, values in trajectories.values.items():
         size = np.abs(values[used])
         if np.ptp(size) > 0.0:
             rank = size.argsort().argsort()
-            found[key] = float(np.corrcoef(rank, mean)[0, 1] ** 2)
-    return found
+            parts[key] = float(np.corrcoef(rank, mean)[0, 1] ** 2)
+    return parts
 
 
 def _passes(scenario: Scenario, item: Measurement) -> float:
@@ -323,19 +329,19 @@ def _passes(scenario: Scenario, item: Measurement) -> float:
     text = item.at.strip()
     try:
         if text.endswith("passes"):
-            found = float(text.removesuffix("passes"))
+            passes = float(text.removesuffix("passes"))
         elif text.endswith("turns") and scenario.cam is not None:
-            found = float(text.removesuffix("turns")) * scenario.operation.rollers
+            passes = float(text.removesuffix("turns")) * scenario.operation.rollers
         else:
-            found = quantity(text, "s") * scenario.pass_rate
+            passes = quantity(text, "s") * scenario.pass_rate
     except ValueError as error:
         what = error.what if isinstance(error, QuantityError) else "is no number of passes"
         expected = 'a time such as "100 min", or "2e5 passes", of a cam also "1e5 turns"'
-        raise item.refused(Mistake("", "at", what, shown(item.at), expected)) from error
-    if not 0.0 < found <= scenario.total_passes * (1.0 + 1e-9):
+        raise item.refused(Mistake("", "at", what, as_written(item.at), expected)) from error
+    if not 0.0 < passes <= scenario.total_passes * (1.0 + 1e-9):
         what, expected = "is not within the test", f"up to {scenario.total_time / 60.0:.6g} min"
         raise item.refused(Mistake("", "at", what, item.at, expected))
-    return found
+    return passes
 
 
 def _check_place(scenario: Scenario, item: Measurement) -> None:

@@ -14,7 +14,7 @@ from wearsim.types import FloatArray
 
 _EDGE = 0.01  # of the depth, where a groove ends
 _WIDTH_WARNED, _WIDTH_REFUSED = 0.08, 0.25  # relative difference of measured and predicted width
-_FOREIGN = 100.0  # mean square of the residuals over that of the noise
+_FOREIGN = 100.0  # mean square of the residuals over the variance of the noise
 _LEAST_PART = 0.1  # of a variance, that a difference of two estimates has at least
 _OTHER_DEPTH = 2.58  # standard deviations: 2 to 3 sound grooves of a hundred are warned of
 _OTHER_FORM = 1.645  # the same: 6 straight traces of a hundred, since a curvature is seen late
@@ -23,7 +23,7 @@ _OTHER_FORM = 1.645  # the same: 6 straight traces of a hundred, since a curvatu
 def profiles_of_depth(grown: Grown, body: str, depth: float) -> FloatArray:
     """Return the worn profile of each draw at a depth, shape (draws, strips) [m].
 
-    It is that of the nearest record, scaled as a groove that grows.
+    The profile of the nearest record is scaled as a groove that grows.
     """
     rows = grown.depth[body]
     record = np.abs(np.log(np.maximum(rows.max(axis=2), 1e-12) / depth)).argmin(axis=1)
@@ -74,11 +74,11 @@ def check_width(trace: Trace, y: FloatArray, rows: FloatArray) -> list[str]:
     return [what]
 
 
-def check_covered(found: DrawLikelihood, grown: Grown, trace: Trace) -> None:
+def check_covered(likelihood: DrawLikelihood, grown: Grown, trace: Trace) -> None:
     """Refuse a trace whose best wear factor is at the end of those computed."""
-    best = int(found.chi2.argmin())
+    best = int(likelihood.chi2.argmin())
     top = grown.ln_k[best, -1]
-    if trace.depth is None and found.mean[best] + found.std[best] > top:
+    if trace.depth is None and likelihood.mean[best] + likelihood.std[best] > top:
         raise ScenarioError(
             trace.name,
             [
@@ -93,7 +93,7 @@ def check_covered(found: DrawLikelihood, grown: Grown, trace: Trace) -> None:
             ],
         )
     freedom = len(trace.y) - 4
-    ratio = float(found.chi2.min()) / freedom
+    ratio = float(likelihood.chi2.min()) / freedom
     if ratio > _FOREIGN:
         raise ScenarioError(
             trace.name,
@@ -137,23 +137,22 @@ def _micrometres(ends: tuple[float, float, float]) -> str:
     return f"{value:.2f} um ({low:.2f} to {high:.2f})"
 
 
-def other_form(model: TraceLikelihood, found: DrawLikelihood) -> list[str]:
+def other_form(model: TraceLikelihood, likelihood: DrawLikelihood) -> list[str]:
     """Return a warning if a curvature of the trace changes K/H by more than chance.
 
     Only the most probable draw of the inputs is considered.
     """
     if model.curvature:
         return []
-    best = [int(np.where(np.isfinite(found.log_evidence), found.log_evidence, -np.inf).argmax())]
+    best = [int(np.nanargmax(likelihood.log_evidence))]
     grown = model.grown
     depth = {model.body: grown.depth[model.body][best]}
     alone = replace(grown, ln_k=grown.ln_k[best], depth=depth, energy=grown.energy[best])
-    line, curve = (
-        replace(model, grown=alone, curvature=curved).integrated() for curved in (False, True)
-    )
-    change = float(curve.mean[0] - line.mean[0])
-    scale = np.sqrt(max(float(curve.std[0] ** 2), (1.0 + _LEAST_PART) * float(line.std[0] ** 2)))
-    if abs(change) < _OTHER_FORM * np.sqrt(scale**2 - float(line.std[0] ** 2)):
+    curve = replace(model, grown=alone, curvature=True).integrated()
+    change = float(curve.mean[0] - likelihood.mean[best[0]])
+    straight = float(likelihood.std[best[0]] ** 2)
+    more = max(float(curve.std[0] ** 2) - straight, _LEAST_PART * straight)
+    if abs(change) < _OTHER_FORM * np.sqrt(more):
         return []
     what = (
         "the residuals may follow a curvature of the trace; with it K/H changes by"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,16 +12,43 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.models.random.distributions import TableDistribution
-from wearsim.quantities import quantity
+from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import amount, can_be_random
+from wearsim.scenario.parse.toml import flat
 from wearsim.studies.identify.measurements import Measurement, key_of
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 
 _SPAN = 6.0  # standard deviations of a measured value that are considered
 _POINTS = 801
 _EITHER_SIGN = {"creepage.yaw", "creepage.tilt", "roller.offset"}
+_ALWAYS = {"creepage.yaw", "creepage.tilt"}  # inputs of any rig, zero by default
 _LEAST = 1e-9  # probability of the values within that span by the scenario
+
+
+def contained_inputs(
+    scenario: Scenario, tests: Sequence[Measurement], fixed: Sequence[str]
+) -> list[str]:
+    """Return the inputs that are neither drawn nor known in all tests, by dotted key.
+
+    Where they differ between the tests, the difference is taken for one of K/H.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    tests : sequence of Measurement
+    fixed : sequence of str
+        Keys that the user has fixed as known and equal in all tests.
+    """
+    drawn = {key for item in scenario.random for key in item.keys}
+    known = {*fixed, *set.intersection(*(set(test.values) for test in tests))}
+    given = {
+        key
+        for key, value in flat(tomllib.loads(scenario.text))
+        if can_be_random(key) and NUMBER.match(str(value)) and not key.startswith("wear.")
+    }
+    options = {key for key in given for item in scenario.random if key.startswith(f"{item.name}.")}
+    return sorted((given | _ALWAYS) - options - drawn - known)
 
 
 def with_known(scenario: Scenario, test: Measurement) -> Scenario:
@@ -36,27 +64,27 @@ def with_known(scenario: Scenario, test: Measurement) -> Scenario:
     if not test.values:
         return scenario
     before = {key: item for item in scenario.random for key in item.keys}
-    found = _changed(scenario, test.values, test, "set")
-    random = list(found.random)
+    known = _changed(scenario, test.values, test, "set")
+    random = list(known.random)
     for key, error in test.errors.items():
         item = before.get(key)
         if not can_be_random(key) or (item is not None and item.role == "joint"):
             by = "" if item is None else f" alone, since {item.name} sets it with others"
             what, expected = f"cannot be random{by}", "only a known value in set"
-            raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
+            raise test.refused(Mistake("", f"std.{key}", what, as_written(error), expected))
         if item is None:
-            changed = _changed(found, {key: _normal(key, test.values[key], error)}, test, "std")
-            random += [one for one in changed.random if one.name == key]
+            changed = _changed(known, {key: _normal(key, test.values[key], error)}, test, "std")
+            random += [random_input for random_input in changed.random if random_input.name == key]
         else:
             std = _std(item, error, key, test)
-            random.append(_measured(item, _number(found, key), std, test))
-    return replace(found, random=tuple(sorted(random, key=lambda one: one.name)))
+            random.append(_measured(item, _number(known, key), std, test))
+    return replace(known, random=tuple(sorted(random, key=lambda random_input: random_input.name)))
 
 
 def _changed(
     scenario: Scenario, values: Mapping[str, object], test: Measurement, table: str
 ) -> Scenario:
-    """Return a scenario with other values, whose mistakes are those of a table of the test."""
+    """Return a scenario with other values, whose mistakes are reported of a table of the test."""
     try:
         return scenario.changed(values)
     except ScenarioError as error:
@@ -94,15 +122,15 @@ def _number(scenario: Scenario, key: str) -> float:
 def _std(item: RandomInput, error: object, key: str, test: Measurement) -> float:
     """Return a standard deviation in SI."""
     kind = item.quantity.kind if item.quantity else None
-    found, what = 0.0, "must be above 0"
+    std, what = 0.0, "must be above 0"
     try:
-        found = quantity(str(error), kind.unit) if kind else float(str(error))
+        std = quantity(str(error), kind.unit) if kind else float(str(error))
     except ValueError as failure:
         what = failure.what if isinstance(failure, QuantityError) else "is not a number"
-    if 0.0 < found < math.inf:
-        return found
+    if 0.0 < std < math.inf:
+        return std
     expected = kind.expected("positive") if kind else "a number above 0"
-    raise test.refused(Mistake("", f"std.{key}", what, shown(error), expected))
+    raise test.refused(Mistake("", f"std.{key}", what, as_written(error), expected))
 
 
 def _measured(item: RandomInput, value: float, std: float, test: Measurement) -> RandomInput:
@@ -132,16 +160,16 @@ def fixed(text: str) -> dict[str, object]:
     ValueError
         If a part is no key with a value.
     """
-    found: dict[str, object] = {}
+    values: dict[str, object] = {}
     for part in text.split(","):
         name, equals, value = part.partition("=")
         if not equals or not name.strip() or not value.strip():
             raise ValueError(f"'{part}' is not an input with a value, such as friction=0.1")
         try:
-            found[key_of(name.strip())] = float(value)
+            values[key_of(name.strip())] = float(value)
         except ValueError:
-            found[key_of(name.strip())] = value.strip()
-    return found
+            values[key_of(name.strip())] = value.strip()
+    return values
 
 
 def with_measured(scenario: Scenario, stds: Mapping[str, float]) -> Scenario:

@@ -27,7 +27,7 @@ from wearsim.uq.hierarchy.noise import MOST_POINTS
 
 
 def read_change(item: Measurement, follower: Follower) -> Trace:
-    """Return the lift of a worn cam less that of the unworn one, as a trace along the angle.
+    """Return the lift of a worn cam less the lift before wear, as a trace along the angle.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def read_change(item: Measurement, follower: Follower) -> Trace:
     if count > 1:
         starts = np.arange(0, len(angle), count)
         sizes = np.diff(np.append(starts, len(angle)))
-        angle, change = (np.add.reduceat(one, starts) / sizes for one in (angle, change))
+        angle, change = (np.add.reduceat(values, starts) / sizes for values in (angle, change))
     unworn_points = np.zeros(len(angle), dtype=np.bool_)
     words = "the lift before the test"
     return Trace(

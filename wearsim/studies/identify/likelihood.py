@@ -28,7 +28,7 @@ _FIRST = 4.0  # variance of the first lattice over that at the maximum, which ha
 _COARSE = 0.05  # part of its variance by which a lattice is wider than the moments on it
 _UNFIT, _OFF = 0.35, 0.3  # of ln variance and of the mean, in standard deviations
 _VALUES = 3_000_000  # of an array
-_DROPPED = 80.0  # of chi2 above that of the best draw
+_DROPPED = 80.0  # of chi2 above the best draw
 _LONGEST = np.array([0.4, 1e-3])  # greatest change of ln K and shift in one iteration
 
 
@@ -128,18 +128,18 @@ class TraceLikelihood:
 
     def chi2(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:
         """Return the sum of squared residuals, shape (columns,)."""
-        found = np.empty(len(draw))
+        values = np.empty(len(draw))
         block = max(_VALUES // len(self.y), 1)
         for start in range(0, len(draw), block):
             some = slice(start, start + block)
-            found[some] = (self.residual(draw[some], ln_k[some], shift[some]) ** 2).sum(axis=0)
-        return found
+            values[some] = (self.residual(draw[some], ln_k[some], shift[some]) ** 2).sum(axis=0)
+        return values
 
     def deviance(
         self, models: NoiseModels, draw: IntArray, ln_k: FloatArray, shift: FloatArray
     ) -> FloatArray:
         """Return -2 times the log likelihood, the noise integrated, shape (columns,)."""
-        found = np.empty(len(draw))
+        values = np.empty(len(draw))
         block = max(_VALUES // len(self.y), 1)
         for start in range(0, len(draw), block):
             some = slice(start, start + block)
@@ -148,8 +148,8 @@ class TraceLikelihood:
             squares = squared_residuals(np.ascontiguousarray(sum_.T), *filters)
             score = models.log_weight[:, None] - models.exponent[:, None] * np.log(squares)
             top = score.max(axis=0)
-            found[some] = -2.0 * (top + np.log(np.exp(score - top).sum(axis=0)))
-        return found
+            values[some] = -2.0 * (top + np.log(np.exp(score - top).sum(axis=0)))
+        return values
 
     def _start(self) -> tuple[FloatArray, FloatArray]:
         """Return ln K and shift from which the maximum is sought, for each draw."""
@@ -163,8 +163,8 @@ class TraceLikelihood:
             shift = np.zeros_like(shift)
         tried = np.linspace(ends[:, 0], ends[:, 1], _STARTS, axis=1)
         owner = np.repeat(draws, _STARTS)
-        found = self.chi2(owner, tried.ravel(), shift[owner]).reshape(tried.shape)
-        return tried[draws, found.argmin(axis=1)], shift
+        values = self.chi2(owner, tried.ravel(), shift[owner]).reshape(tried.shape)
+        return tried[draws, values.argmin(axis=1)], shift
 
     def maximum(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the maximum for each draw by the Gauss-Newton method.
@@ -191,10 +191,10 @@ class TraceLikelihood:
                 here = position[some]
                 moves = np.array([[0.0, 0.0], [small[0], 0.0], [0.0, small[1]]])
                 tried = (moves[:, None] + here).reshape(-1, 2)
-                found = self.residual(np.tile(some, 3), *tried.T).reshape(count, 3, -1)
-                base = found[:, 0]
+                residuals = self.residual(np.tile(some, 3), *tried.T).reshape(count, 3, -1)
+                base = residuals[:, 0]
                 # derivatives, shape (2, points, columns)
-                slope = (found[:, 1:] - base[:, None]).transpose(1, 0, 2) / small[:, None, None]
+                slope = (residuals[:, 1:] - base[:, None]).transpose(1, 0, 2) / small[:, None, None]
                 normal[some] = np.einsum("apc,bpc->cab", slope, slope)
                 gradient[some] = np.einsum("apc,pc->ca", slope, base)
             if not self.lateral:
@@ -224,7 +224,7 @@ class TraceLikelihood:
         best = float(self.deviance(models, first, *centre[first].T)[0])
         lattice = _LATTICE if self.lateral else _LATTICE[np.abs(_LATTICE[:, 1]) < 0.1]
         log_evidence = np.full(len(centre), -np.inf)
-        found, spread = centre.copy(), np.sqrt(covariance[:, 0, 0])
+        place, spread = centre.copy(), np.sqrt(covariance[:, 0, 0])
         covariance *= _FIRST
         pending = kept
         for _ in range(_ROUNDS):
@@ -245,7 +245,7 @@ class TraceLikelihood:
                 second[:, 1, 1] = 1.0
             area = root[:, 0, 0] * (root[:, 1, 1] if self.lateral else 1.0)
             log_evidence[pending] = np.log(total * area) - 0.5 * (least - best)
-            found[pending], spread[pending] = mean, np.sqrt(second[:, 0, 0])
+            place[pending], spread[pending] = mean, np.sqrt(second[:, 0, 0])
             unfit = np.abs(np.log(second[:, 0, 0] / covariance[pending, 0, 0]))
             off = np.abs(mean[:, 0] - centre[pending, 0]) / np.sqrt(covariance[pending, 0, 0])
             # few points of a lattice that is too coarse have weight
@@ -254,7 +254,7 @@ class TraceLikelihood:
             pending = pending[(unfit > _UNFIT) | (off > _OFF)]
             if not len(pending):
                 break
-        return DrawLikelihood(log_evidence, found[:, 0], spread, found[:, 1], chi2)
+        return DrawLikelihood(log_evidence, place[:, 0], spread, place[:, 1], chi2)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.scenario.parse.mistakes import nearest
 from wearsim.scenario.parse.toml import as_toml
-from wearsim.units import QuantityError, shown
+from wearsim.units import QuantityError, as_written
 
 #: Short names of inputs.
 SHORT = {
@@ -65,7 +65,7 @@ class Measurement:
     angle : float, optional
         Angle of the cam at which the groove was measured [rad].
     lift : Path, optional
-        File of the lift of the worn cam, instead of a profile; `before` is that of the unworn cam.
+        File of the lift of the worn cam, instead of a profile; `before` is of the unworn cam.
     runout : bool
         Whether the lifts differ by an unknown run-out too, since the cam was mounted again.
     file, place : str
@@ -187,12 +187,12 @@ def read_tests(path: str | Path) -> list[Measurement]:
     mistakes = [Mistake("", key, "is unknown", None, _EXAMPLE) for key in tables]
     if not isinstance(tests, list) or not all(isinstance(test, dict) for test in tests or []):
         raise ScenarioError(str(path), [*mistakes, Mistake("", "", "has no tests", None, _EXAMPLE)])
-    found = []
+    measurements = []
     for number, table in enumerate(tests, 1):
-        found.append(_read_test(table, f"test {number}", file, mistakes))
+        measurements.append(_read_test(table, f"test {number}", file, mistakes))
     if mistakes:
         raise ScenarioError(str(path), mistakes)
-    return found
+    return measurements
 
 
 def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
@@ -216,7 +216,7 @@ def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
     def length(value: float | None) -> str | None:
         return None if value is None else f"{float(value)!r} m"
 
-    found = []
+    tables = []
     for item in items:
         choice = item.choice
         table: dict[str, Any] = {
@@ -240,8 +240,8 @@ def tables_of(items: Sequence[Measurement]) -> list[dict[str, Any]]:
             "mean_rows": choice.mean_rows,
             "row_at": length(choice.at),
         }
-        found.append({key: as_toml(value) for key, value in table.items() if value is not None})
-    return found
+        tables.append({key: as_toml(value) for key, value in table.items() if value is not None})
+    return tables
 
 
 def _read_test(
@@ -250,7 +250,9 @@ def _read_test(
     """Return one test, and add its mistakes."""
 
     def wrong(key: str, what: str, got: object, expected: str) -> None:
-        mistakes.append(Mistake(place, key, what, None if got is None else shown(got), expected))
+        mistakes.append(
+            Mistake(place, key, what, None if got is None else as_written(got), expected)
+        )
 
     def amount(key: str, unit: str, expected: str) -> float | None:
         if key not in table:
@@ -352,10 +354,10 @@ def _name(name: str, table: Mapping[str, Any]) -> str:
 
 def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, object]:
     """Return values by dotted key."""
-    found: dict[str, object] = {}
+    keys: dict[str, object] = {}
     for key, value in table.items():
         if isinstance(value, dict):
-            found |= _flat(value, f"{start}{key}.")
+            keys |= _flat(value, f"{start}{key}.")
         else:
-            found[f"{start}{key}"] = value
-    return found
+            keys[f"{start}{key}"] = value
+    return keys

@@ -19,7 +19,7 @@ from wearsim.studies.identify.inputs import with_measured
 from wearsim.studies.identify.likelihood import depth_likelihood
 from wearsim.studies.identify.measurements import key_of
 from wearsim.studies.identify.trajectories import CYLINDER, ROLLER, Grower, check_law, factors
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.verdict import MOST_TESTS, NEGLIGIBLE, POWER_SETS, Power
 
 SCATTERS = (0.2, 0.4, 0.8)
@@ -114,32 +114,37 @@ def plan_tests(
         name = ", ".join(f"{key} measured to {std:.3g}" for key, std in stds.items())
         designs.append((name, with_measured(scenario, stds)))
     return [
-        _planned(name, _kernel(one, draws, on_progress), tests, negligible, sets, scenario.seed)
-        for name, one in designs
+        _planned(name, _kernel(design, draws, on_progress), tests, negligible, sets, scenario.seed)
+        for name, design in designs
     ]
 
 
 def sizes(first: int, last: int) -> list[int]:
     """Return at most nine numbers of tests from the first to the last, about equal in ratio."""
-    found = np.geomspace(first, last, _MOST_SIZES).round().astype(int)
-    return sorted({first, last, *found.tolist()})
+    spaced = np.geomspace(first, last, _MOST_SIZES).round().astype(int)
+    return sorted({first, last, *spaced.tolist()})
 
 
 def _kernel(
     scenario: Scenario, draws: int | None, on_progress: Callable[[int, int], None] | None
-) -> Kernel:
+) -> LikelihoodMixture:
     """Return the likelihood of ln K/H by a test of mean inputs that wears as the scenario."""
     cylinder, roller = factors(scenario)
     known = {CYLINDER: np.array([cylinder]), ROLLER: np.array([roller])}
     depth = float(closed_form_depths(scenario, known, 1)[0])
     passes = float(scenario.total_passes)
     grown = Grower(scenario, draws, on_progress=on_progress).grow((depth, depth), [passes])
-    found = depth_likelihood(depth, DEPTH_ERROR * depth, grown.by_passes[passes], "cylinder")
-    return kernel_of(found, scenario.file)
+    likelihood = depth_likelihood(depth, DEPTH_ERROR * depth, grown.by_passes[passes], "cylinder")
+    return kernel_of(likelihood, scenario.file)
 
 
 def _planned(
-    name: str, kernel: Kernel, tests: Sequence[int], negligible: float, sets: int, seed: int
+    name: str,
+    kernel: LikelihoodMixture,
+    tests: Sequence[int],
+    negligible: float,
+    sets: int,
+    seed: int,
 ) -> PlannedDesign:
     power = Power([kernel], negligible=negligible, seed=seed, sets=sets)
     rates = {t: [power.rates(count, t) for count in tests] for t in (0.0, *SCATTERS)}
@@ -147,8 +152,8 @@ def _planned(
         name,
         kernel.variance**0.5,
         tuple(tests),
-        {t: tuple(random for random, _ in found) for t, found in rates.items()},
-        {t: tuple(explained for _, explained in found) for t, found in rates.items()},
+        {t: tuple(random for random, _ in pairs) for t, pairs in rates.items()},
+        {t: tuple(explained for _, explained in pairs) for t, pairs in rates.items()},
         {t: power.needed(t) for t in SCATTERS},
     )
 

@@ -15,7 +15,7 @@ from wearsim.studies.identify.likelihood import DrawLikelihood
 from wearsim.studies.identify.result import IdentificationData
 from wearsim.studies.preparation import origin_of
 from wearsim.types import FloatArray
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import PRIOR_SCALE, Posterior
 from wearsim.uq.hierarchy.verdict import ALPHA, MOST_TESTS, Design, Power, word
 
@@ -25,6 +25,7 @@ MEASURED = 0.1  # standard deviation of ln K/H if the inputs are measured
 FEW_DRAWS = 25.0
 _CURVE = 601  # values of ln K/H of a stored density
 _NODES = 81  # parts of the likelihood of a specimen that joins several tests
+_FIVE = (0.025, 0.05, 0.5, 0.95, 0.975)
 
 
 @dataclass(frozen=True)
@@ -36,13 +37,13 @@ class Specimen:
     name : str
     tests : list of list of Identified
         Traces of each test in the order of passes.
-    kernel : Kernel
+    kernel : LikelihoodMixture
         Likelihood of ln K/H.
     """
 
     name: str
     tests: list[list[Identified]]
-    kernel: Kernel
+    kernel: LikelihoodMixture
 
 
 def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
@@ -64,11 +65,11 @@ def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
     groups: dict[str, list[Identified]] = {}
     for number, row in enumerate(rows):
         groups.setdefault(row.item.group or f"\0{number}", []).append(row)
-    found = []
+    specimens = []
     for name, members in groups.items():
         tests: list[list[Identified]] = []
         for row in members:
-            before = [(one.passes, one.item.surface) for one in tests[-1]] if tests else []
+            before = [(test.passes, test.item.surface) for test in tests[-1]] if tests else []
             later = bool(before) and row.passes >= before[-1][0]
             continues = later and (row.passes, row.item.surface) not in before
             same = continues and _same_inputs(row, tests[-1][-1])
@@ -77,17 +78,17 @@ def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
             else:
                 tests.append([row])
         label = members[0].item.name if name.startswith("\0") else name
-        found.append(Specimen(label, tests, _kernel(label, tests)))
-    return found
+        specimens.append(Specimen(label, tests, _kernel(label, tests)))
+    return specimens
 
 
-def _same_inputs(one: Identified, other: Identified) -> bool:
+def _same_inputs(first: Identified, other: Identified) -> bool:
     """Return whether two grooves have the same draws of the inputs."""
-    known = (one.item.values, one.item.errors) == (other.item.values, other.item.errors)
-    return known and len(one.likelihood.mean) == len(other.likelihood.mean)
+    known = (first.item.values, first.item.errors) == (other.item.values, other.item.errors)
+    return known and len(first.likelihood.mean) == len(other.likelihood.mean)
 
 
-def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> Kernel:
+def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> LikelihoodMixture:
     """Return the likelihood of ln K/H of a specimen from all of its tests."""
     kernels = []
     for test in tests:
@@ -108,10 +109,10 @@ def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> Kernel:
         what = "its tests contradict each other: no K/H describes them all"
         raise ScenarioError(name, [Mistake("", "group", what)])
     step = grid[1] - grid[0]
-    return Kernel.of(np.log(np.maximum(weight, 1e-300)), grid, np.full_like(grid, step))
+    return LikelihoodMixture.of(np.log(np.maximum(weight, 1e-300)), grid, np.full_like(grid, step))
 
 
-def log_density(kernel: Kernel, grid: FloatArray) -> FloatArray:
+def log_density(kernel: LikelihoodMixture, grid: FloatArray) -> FloatArray:
     """Return the logarithm of the likelihood of ln K/H of a specimen, whose integral is 1."""
     away = (grid[:, None] - kernel.centre) / kernel.std
     parts = -0.5 * away**2 + np.log(kernel.weight / kernel.std) - 0.5 * np.log(2.0 * np.pi)
@@ -178,9 +179,6 @@ def _three(quantiles: Sequence[float]) -> dict[str, float]:
     """Return a value with its 95 and 90 % intervals from five quantiles."""
     low, low_90, value, high_90, high = map(float, quantiles)
     return {"value": value, "low": low, "high": high, "low_90": low_90, "high_90": high_90}
-
-
-_FIVE = (0.025, 0.05, 0.5, 0.95, 0.975)
 
 
 def _test(row: Identified, specimen: Specimen) -> dict[str, Any]:
@@ -269,9 +267,9 @@ def _summary(
             "factor": float(np.exp((high - low) / 3.92)),
         },
         "exponents": {
-            name: dict(zip(("value", "low", "high"), found, strict=True))
-            for name, found in exponents.items()
-            if found is not None
+            name: dict(zip(("value", "low", "high"), fitted, strict=True))
+            for name, fitted in exponents.items()
+            if fitted is not None
         },
         "to_decide": _to_decide(specimens, negligible, scenario.seed, verdict),
     }
@@ -289,7 +287,7 @@ def _to_decide(
     measure = [key for key, part in sorted(shares.items(), key=lambda item: -item[1]) if part > 0.1]
     count, kernels = len(specimens), [specimen.kernel for specimen in specimens]
     known = float(np.mean([k.variance - k.variance_of_inputs for k in kernels]))
-    measured = Kernel(np.ones(1), np.zeros(1), np.array([np.sqrt(MEASURED**2 + known)]))
+    measured = LikelihoodMixture(np.ones(1), np.zeros(1), np.array([np.sqrt(MEASURED**2 + known)]))
     now, then = (Power(k, negligible=negligible, seed=seed) for k in (kernels, [measured]))
     return {
         "scatter": SHOWN,
@@ -305,7 +303,7 @@ def _to_decide(
 
 def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list[str]:
     """Return remarks on fits, on the number of draws and on missing random inputs."""
-    found = [text for row in rows if row.fit is not None for text in row.fit.warnings]
+    texts = [text for row in rows if row.fit is not None for text in row.fit.warnings]
     few = [
         specimen.name
         for specimen in specimens
@@ -314,17 +312,17 @@ def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list
         and len(specimen.tests) == 1
     ]
     if few:
-        found.append(
+        texts.append(
             f"{', '.join(few)}: fewer than {FEW_DRAWS:.0f} draws describe the shape of the groove;"
             " give more with --draws"
         )
     if len(specimens) > 1 and all(len(row.likelihood.mean) == 1 for row in rows):
-        found.append(
+        texts.append(
             "no input of the scenario is random: differences of load, friction, creepage or slack"
             " between the tests count as scatter of K/H; give their distributions in the scenario,"
             " or measured values with std in a tests file"
         )
-    return found
+    return texts
 
 
 def _traces(rows: Sequence[Identified]) -> dict[str, FloatArray]:
@@ -332,12 +330,12 @@ def _traces(rows: Sequence[Identified]) -> dict[str, FloatArray]:
     fits = [row.fit for row in rows]
     points = max([len(fit.trace.y) for fit in fits if fit is not None], default=1)
     names = ("y", "height", "fitted", "low", "high", "unworn")
-    found = {f"trace_{name}": np.full((len(rows), points), np.nan) for name in names}
+    traces = {f"trace_{name}": np.full((len(rows), points), np.nan) for name in names}
     for place, fit in enumerate(fits):
         if fit is None:
             continue
         trace = fit.trace
         columns = (trace.y, trace.height, fit.fitted, fit.low, fit.high, trace.unworn)
         for name, column in zip(names, columns, strict=True):
-            found[f"trace_{name}"][place, : len(trace.y)] = column
-    return found
+            traces[f"trace_{name}"][place, : len(trace.y)] = column
+    return traces

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from wearsim.models.random.posterior import CONTAINED, SPECIMENS
 from wearsim.report.frames import dataset_of
 from wearsim.results.content import (
     Arrays,
@@ -20,6 +22,7 @@ from wearsim.results.content import (
     by_name,
 )
 from wearsim.types import FloatArray
+from wearsim.uq.distributions.two_levels import TwoLevels
 
 if TYPE_CHECKING:
     import xarray
@@ -84,9 +87,11 @@ class IdentificationData(StudyData):
         Required number of draws.
     shared : bool
         Whether both bodies have one unknown factor of their K/H.
+    contained : list of str
+        Dotted keys of inputs that were neither drawn nor known, see `levels`.
     """
 
-    optional: ClassVar[frozenset[str]] = frozenset({"measured", "draws", "shared"})
+    optional: ClassVar[frozenset[str]] = frozenset({"measured", "draws", "shared", "contained"})
 
     tests: list[dict[str, Any]]
     specimens: list[str]
@@ -95,6 +100,7 @@ class IdentificationData(StudyData):
     measured: list[dict[str, Any]] = field(default_factory=list)
     draws: int | None = None
     shared: bool = False
+    contained: list[str] = field(default_factory=list)
 
     base_schema: ClassVar[Schema] = IDENTIFICATION
 
@@ -157,12 +163,12 @@ class IdentificationResult(StudyResult[IdentificationData]):
     @property
     def scatter_of_k(self) -> dict[str, float]:
         """Scatter of ln K/H with its 90 and 95 % intervals."""
-        found: dict[str, float] = self.raw.summary["scatter_of_k"]
-        return found
+        scatter: dict[str, float] = self.raw.summary["scatter_of_k"]
+        return scatter
 
     @property
     def bayes_factor(self) -> float:
-        """Evidence of equal wear factors over that of scattered ones."""
+        """Evidence of equal wear factors over the evidence of scattered ones."""
         return float(self.raw.summary["bayes_factor"])
 
     @property
@@ -226,7 +232,7 @@ class IdentificationResult(StudyResult[IdentificationData]):
         >>> print(wearsim.identify("rig.toml", depths).posterior_toml().splitlines()[3])
         [wear.cylinder.k_over_h]
         """
-        found, scatter = self.raw.summary["next_specimen"], self.scatter_of_k
+        following, scatter = self.raw.summary["next_specimen"], self.scatter_of_k
         return (
             f"# K/H of the next specimen by {len(self.raw.specimens)} specimens\n"
             f"# {self.verdict_words}\n"
@@ -234,6 +240,44 @@ class IdentificationResult(StudyResult[IdentificationData]):
             f" (95 %: {scatter['low']:.3g} to {scatter['high']:.3g})\n"
             "[wear.cylinder.k_over_h]\n"
             'distribution = "lognormal"\n'
-            f'median = "{found["median_per_Pa"]:.5g} 1/Pa"\n'
-            f"factor = {found['factor']:.5g}\n"
+            f'median = "{following["median_per_Pa"]:.5g} 1/Pa"\n'
+            f"factor = {following['factor']:.5g}\n"
         )
+
+    @cached_property
+    def levels(self) -> TwoLevels:
+        """Distribution of K/H of the next specimen, with what is not known of its two numbers.
+
+        Weights over mean m and scatter t of ln K/H. Its `contained` are inputs that were neither
+        drawn nor known in all tests: where they differed, t contains it.
+
+        Examples
+        --------
+        >>> from wearsim.studies.identify.measurements import Measurement
+        >>> depths = [Measurement(f"test {d}", depth=d, depth_std=1e-6) for d in (45e-6, 48e-6)]
+        >>> levels = wearsim.identify("rig.toml", depths).levels
+        >>> levels.specimens, levels.contained
+        (2, ('creepage.longitudinal', 'creepage.tilt', 'creepage.yaw', 'load.normal_force'))
+        """
+        grid = self.scatter, self.values("mean_ln_k"), self.posterior
+        return TwoLevels.on_grid(*grid, len(self.raw.specimens), self.raw.contained)
+
+    def posterior_csv(self) -> str:
+        """Return both levels of K/H as the CSV file of the distribution "posterior".
+
+        Examples
+        --------
+        >>> from wearsim.studies.identify.measurements import Measurement
+        >>> depths = [Measurement(f"test {d}", depth=d, depth_std=1e-6) for d in (45e-6, 48e-6)]
+        >>> print(wearsim.identify("rig.toml", depths).posterior_csv().splitlines()[3])
+        median [1/Pa],scatter,weight
+        """
+        levels = self.levels
+        lines = [
+            "# K/H of specimens: weights of medians, and of scatters of ln K/H between specimens",
+            f"# {SPECIMENS}: {levels.specimens}",
+            f"# {CONTAINED}: {', '.join(levels.contained)}",
+            "median [1/Pa],scatter,weight",
+        ]
+        rows = zip(np.exp(levels.m), levels.t, levels.weight, strict=True)
+        return "\n".join([*lines, *(f"{k:.8g},{t:.6g},{w:.6g}" for k, t, w in rows), ""])

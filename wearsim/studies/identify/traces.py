@@ -216,7 +216,7 @@ def level(
         Crown radius of the roller [m].
     extents : tuple of float, optional
         Predicted extents of the groove to the left and right of its middle [m]; shoulders begin
-        beyond them and a margin. By default those of a conforming groove of the measured depth.
+        beyond them and a margin. By default the extents of a conforming groove as deep as measured.
 
     Raises
     ------
@@ -306,7 +306,7 @@ def measured_depth(
 ) -> tuple[float, float]:
     """Return the greatest depth of a groove below its shoulders, and its standard deviation [m].
 
-    It is that of a parabola through the bottom of the groove, fitted together with offset,
+    It is taken from a parabola through the bottom of the groove, fitted together with offset,
     inclination and perhaps curvature of the shoulders under correlated noise; no wear model is
     used. The deepest point, even of a smoothed trace, is too deep on average.
 
@@ -315,7 +315,7 @@ def measured_depth(
     trace : Trace
         With shoulders.
     crown_radius : float
-        Crown radius of the roller, which is nearly that of the bottom [m].
+        Crown radius of the roller, which is nearly the radius of the bottom [m].
     curvature : bool
         Whether the trace has an unknown curvature.
     """
@@ -331,13 +331,13 @@ def measured_depth(
     white = models.whitened(np.column_stack([height, forms])).transpose(1, 0, 2)
     z, lines = white[:, :, :1], white[:, :, 1:]
     inverse = np.linalg.inv(lines.transpose(0, 2, 1) @ lines)
-    found = (inverse @ lines.transpose(0, 2, 1) @ z)[..., 0]
-    squares = ((z[..., 0] - np.einsum("mjf,mf->mj", lines, found)) ** 2).sum(axis=1)
+    coefficients = (inverse @ lines.transpose(0, 2, 1) @ z)[..., 0]
+    squares = ((z[..., 0] - np.einsum("mjf,mf->mj", lines, coefficients)) ** 2).sum(axis=1)
     score = models.log_weight - models.exponent * np.log(squares)
-    vertex = np.clip(-0.5 * found[:, 1] / found[:, 2], -1.0, 1.0)
-    slope = np.zeros_like(found)
+    vertex = np.clip(-0.5 * coefficients[:, 1] / coefficients[:, 2], -1.0, 1.0)
+    slope = np.zeros_like(coefficients)
     slope[:, :3] = np.column_stack([np.ones_like(vertex), vertex, vertex**2])
-    depth = -(slope * found).sum(axis=1)
+    depth = -(slope * coefficients).sum(axis=1)
     variance = np.einsum("mf,mfg,mg->m", slope, inverse, slope) * squares / (2.0 * models.exponent)
     weight = np.exp(score - score.max())
     weight /= weight.sum()

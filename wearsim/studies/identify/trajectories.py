@@ -56,7 +56,7 @@ class ListedPasses(RecordSchedule):
 
     def next_record(self, passes: float) -> float:
         """Return the passes of the first record after `passes`, infinity after the last."""
-        return next((one for one in self.passes if one > passes), np.inf)
+        return next((number for number in self.passes if number > passes), np.inf)
 
 
 @dataclass(frozen=True)
@@ -223,11 +223,11 @@ class Grower:
 
     def values(self) -> dict[str, FloatArray]:
         """Return the drawn values by key, shape (draws,); means over rollers and time."""
-        found: dict[str, list[float]] = {}
+        values: dict[str, list[float]] = {}
         for draws in self.draws:
             for key, value in {**draws.values, **draws.time_means}.items():
-                found.setdefault(key, []).append(float(np.mean(value)))
-        return {key: np.array(value) for key, value in found.items()}
+                values.setdefault(key, []).append(float(np.mean(value)))
+        return {key: np.array(value) for key, value in values.items()}
 
     def grow(self, depths: tuple[float, float], passes: Sequence[float]) -> Trajectories:
         """Run the wear tests.
@@ -261,12 +261,14 @@ class Grower:
         wanted : sequence of Wanted
             Sizes of the measured grooves and changes of the lift.
         """
-        times = sorted({one.passes for one in wanted})
+        times = sorted({item.passes for item in wanted})
         k, sizes = self._pilot(wanted, times[-1])
         # with one test for each K/H, a groove that was measured earlier needs a greater one
-        part = np.array([one.passes / times[-1] if self.reasons else 1.0 for one in wanted])
-        low, high = np.array([(one.low, one.high) for one in wanted]).T / sizes
-        low, high = (k * each**1.5 / part for each in (BELOW / _ROOM * low, ABOVE * _ROOM * high))
+        part = np.array([item.passes / times[-1] if self.reasons else 1.0 for item in wanted])
+        low, high = np.array([(item.low, item.high) for item in wanted]).T / sizes
+        low, high = (
+            k * depths**1.5 / part for depths in (BELOW / _ROOM * low, ABOVE * _ROOM * high)
+        )
         cylinder, roller = factors(self.scenario)
         columns = self.drawer.columns(0, self.count)
         share = {ROLLER: np.full(self.count, roller)} if self.shared else {}
@@ -278,12 +280,14 @@ class Grower:
         return self._grown_at(times, start, float(high.max() / low.min()))
 
     def _pilot(self, wanted: Sequence[Wanted], passes: float) -> tuple[float, FloatArray]:
-        """Return a wear factor near that of the first draw, and the sizes that it wears [m]."""
+        """Return a wear factor near the first draw, and the sizes that it wears [m]."""
         k = factors(self.scenario)[0]
-        high = np.array([one.high for one in wanted])
+        high = np.array([item.high for item in wanted])
         for number in range(_PILOTS):
             profiles = self._run([(0, k)], [passes], pilot=True)[1][0][0][0]
-            sizes = np.array([float(size_of(one.surface, profiles[one.surface])) for one in wanted])
+            sizes = np.array(
+                [float(size_of(item.surface, profiles[item.surface])) for item in wanted]
+            )
             if not (sizes > 0.0).all():
                 where = wanted[int(sizes.argmin())].surface
                 what = "the model does not wear there"
@@ -307,23 +311,23 @@ class Grower:
             shape = (len(kept), count)
             ln_k = np.log(start[kept])[:, None] + np.log(scale)
             by_passes = {
-                one: self._grown(ln_k, [state[place] for state in states], shape)
-                for place, one in enumerate(times)
+                item: self._grown(ln_k, [state[place] for state in states], shape)
+                for place, item in enumerate(times)
             }
         else:
             stop = times[-1]
             records = stop * span ** (np.arange(count) / (count - 1) - 1.0)
             records[-1] = stop
             kept, states = self._run(list(enumerate(start)), records.tolist())
-            flat = [one for state in states for one in state]
+            flat = [item for state in states for item in state]
             ln_tau = np.log(start[kept])[:, None] + np.log(records)
             grown = self._grown(ln_tau, flat, ln_tau.shape)
-            # the energy is that of the passes of a record, and grows as they do
+            # the energy belongs to the passes of a record, and grows as they do
             by_passes = {
-                one: replace(
-                    grown, ln_k=ln_tau - np.log(one), energy=grown.energy * (one / records)
+                item: replace(
+                    grown, ln_k=ln_tau - np.log(item), energy=grown.energy * (item / records)
                 )
-                for one in times
+                for item in times
             }
         values = {key: column[kept] for key, column in self.values().items()}
         return Trajectories(values, self.reasons, by_passes, self.count - len(kept))
@@ -332,13 +336,13 @@ class Grower:
         """Return the wear factor with which each draw wears to a depth, for rigid bodies."""
         cylinder, roller = factors(self.scenario)
         columns = self.drawer.columns(0, self.count)
-        found = np.full(self.count, cylinder)
+        factor = np.full(self.count, cylinder)
         for _ in range(8):  # a mounting spring slows the wear as the groove deepens
-            share = {ROLLER: found * (roller / cylinder)} if self.shared else {}
-            known = {**columns, CYLINDER: found, **share}
+            share = {ROLLER: factor * (roller / cylinder)} if self.shared else {}
+            known = {**columns, CYLINDER: factor, **share}
             reached = closed_form_depths(self.scenario, known, self.count)
-            found = found * np.clip(depth / np.maximum(reached, 1e-3 * depth), 0.1, 10.0) ** 1.5
-        return found
+            factor = factor * np.clip(depth / np.maximum(reached, 1e-3 * depth), 0.1, 10.0) ** 1.5
+        return factor
 
     def _grown(
         self, ln_k: FloatArray, states: Sequence[tuple[Any, ...]], shape: tuple[int, ...]
@@ -346,7 +350,7 @@ class Grower:
         assert self._grid is not None
         profiles, energies = zip(*states, strict=True)
         depth = {
-            name: np.array([one[name] for one in profiles]).reshape(*shape, -1)
+            name: np.array([profile[name] for profile in profiles]).reshape(*shape, -1)
             for name in profiles[0]
         }
         start = start_height(self.scenario, self._grid)
@@ -371,8 +375,8 @@ class Grower:
         for number, k in tests:
             draws = self.draws[number]
             ratio = roller / cylinder if self.shared else 0.0
-            own = factors(draws.scenario)[1]
-            scenario = with_factors(draws.scenario, k, k * ratio if self.shared else own)
+            mean_factor = factors(draws.scenario)[1]
+            scenario = with_factors(draws.scenario, k, k * ratio if self.shared else mean_factor)
             scenario = replace(scenario, operation=table, evolution=evolution)
             ready.append(replace(draws, scenario=scenario))
         last = {number: place for place, (number, _) in enumerate(tests)}  # of the greatest wear
@@ -397,8 +401,8 @@ class Grower:
         failures: dict[int, Exception] = {}
         done = 0
         for group in batch_groups(runs):
-            found, failed = _step(group, schedule, grid, views)
-            results.update(found)
+            grown, failed = _step(group, schedule, grid, views)
+            results.update(grown)
             failures.update(failed)
             done += len(group)
             if not pilot:
@@ -418,9 +422,9 @@ def _covering(grids: Sequence[Grid], extents: Sequence[Extent]) -> Grid:
     low = min(grid.edges[0] for grid in grids)
     high = max(grid.edges[1] for grid in grids)
     middle, spacing = 0.5 * (low + high), float(np.median([grid.spacing for grid in grids]))
-    half = max(abs(one.centre - middle) + one.final for one in extents)
-    one = Grid.spanning(middle - 0.5 * spacing, middle + 0.5 * spacing, 1)
-    return lattice(one, max(half, 0.5 * (high - low)))
+    half = max(abs(extent.centre - middle) + extent.final for extent in extents)
+    extent = Grid.spanning(middle - 0.5 * spacing, middle + 0.5 * spacing, 1)
+    return lattice(extent, max(half, 0.5 * (high - low)))
 
 
 def _step(
@@ -447,12 +451,14 @@ def _step(
         for advance in tests:
             due = due_records(advance, schedule, stop, stepper.pass_by_pass)
             # tests that are not stepped together have individual steppers, and one record each
-            for part in [due] if len(runs) > 1 else [[one] for one in due]:
+            for part in [due] if len(runs) > 1 else [[record] for record in due]:
                 if not part:
                     continue
                 present, states = states_at(stepper, advance, part)
                 numbers = [runs[int(advance.numbers[place])].number for _, place, _ in part]
-                profiles = _profiles(present, states, grid, [views.get(one) for one in numbers])
+                profiles = _profiles(
+                    present, states, grid, [views.get(record) for record in numbers]
+                )
                 for row, number in enumerate(numbers):
                     results[number].append((profiles[row], float(states.energy[row])))
         failures.update({runs[place].number: error for place, error in tests.failures.items()})

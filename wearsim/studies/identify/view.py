@@ -92,15 +92,18 @@ class IdentificationView(StudyView[IdentificationResult]):
         low, high = min(parts), max(parts)
         inputs = f"{high} %" if low == high else f"{low} to {high} %"
         return [
-            Row("K/H holds for the energy", ", ".join(shown(one, "J", 3) for one in energies)),
+            Row(
+                "K/H holds for the energy", ", ".join(shown(energy, "J", 3) for energy in energies)
+            ),
             Row("variance of ln K/H from inputs", inputs),
             *(
                 Row(
                     f"depth of {name}",
-                    f"~ passes^{found['value']:.3f} ({found['low']:.3f} to {found['high']:.3f});"
-                    f" {_EXPECTED:.3f} for rigid bodies in full slip under a constant load",
+                    f"~ passes^{exponent['value']:.3f} ({exponent['low']:.3f} to"
+                    f" {exponent['high']:.3f}); {_EXPECTED:.3f} for rigid bodies in full slip"
+                    " under a constant load",
                 )
-                for name, found in result.summary["exponents"].items()
+                for name, exponent in result.summary["exponents"].items()
             ),
             Row("wall time", lapse(result.raw.wall_seconds)),
         ]
@@ -217,9 +220,9 @@ def _number(value: float | None, scale: float = 1.0) -> str:
     return "" if value is None else f"{scale * value:.12g}"
 
 
-def _wear_factor(found: Mapping[str, float], names: Sequence[str]) -> str:
+def _wear_factor(factor: Mapping[str, float], names: Sequence[str]) -> str:
     """Return a wear factor with its interval."""
-    value, *ends = (found[name] for name in names)
+    value, *ends = (factor[name] for name in names)
     return f"{with_range(value, ends, _SCALE)} 1e-12 1/Pa"
 
 
@@ -243,27 +246,28 @@ def _cells(test: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def deciding(found: Mapping[str, Any], tests: int) -> str:
+def deciding(decision: Mapping[str, Any], tests: int) -> str:
     """Return what would decide, in words.
 
     Parameters
     ----------
-    found : mapping of str to object
+    decision : mapping of str to object
         "to_decide" of the JSON output.
     tests : int
         Number of tests at hand.
     """
-    measure = ", ".join(found["measure"]) or "all inputs"
-    many = found["tests"]
-    now = f"{found['power']:.2f} by these {tests} tests" if tests > 1 else "0 by one test"
+    measure = ", ".join(decision["measure"]) or "all inputs"
+    many = decision["tests"]
+    now = f"{decision['power']:.2f} by these {tests} tests" if tests > 1 else "0 by one test"
     lines = [
-        f"a scatter of {found['scatter']:g} is seen with probability {now}, and 0.8 by "
-        + (f"{many}" if many else f"more than {found['most_tests']}")
+        f"a scatter of {decision['scatter']:g} is seen with probability {now}, and 0.8 by "
+        + (f"{many}" if many else f"more than {decision['most_tests']}")
         + " such tests"
     ]
-    if found["tests_if_measured"] and found["power_if_measured"] > found["power"]:
+    if decision["tests_if_measured"] and decision["power_if_measured"] > decision["power"]:
         lines.append(
-            f"with {measure} measured, so that inputs leave 0.1: {found['power_if_measured']:.2f},"
-            f" and 0.8 by {found['tests_if_measured']} tests"
+            f"with {measure} measured, so that inputs leave 0.1:"
+            f" {decision['power_if_measured']:.2f}, and 0.8 by"
+            f" {decision['tests_if_measured']} tests"
         )
     return "\n".join(lines)

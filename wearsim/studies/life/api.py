@@ -75,7 +75,7 @@ def life(
     output : path, optional
         Results file; without it the result is kept in memory only.
     limits : sequence of str
-        Limits in addition to those of the scenario, or instead of equal ones: "depth 50 um",
+        Limits in addition to the scenario's, or instead of equal ones: "depth 50 um",
         "lift_error=30um".
     target : float or str, optional
         Life of which the probability is estimated, a number of passes or turns, or "200 h".
@@ -131,8 +131,8 @@ def life(
         rare=rare,
         rare_method=rare_method,
     )
-    if variable and (found := design_variable(scenario, variable)):
-        settings = replace(settings, variable=asdict(found))
+    if variable and (value := design_variable(scenario, variable)):
+        settings = replace(settings, variable=asdict(value))
     if output is not None:
         check_output(output, force, scenario.paths)
     runner, content = _prepared(scenario, settings, aim)
@@ -162,11 +162,11 @@ def _results_path(output: str | Path | None) -> Iterator[Path]:
 
 def _opened(path: Path, in_memory: bool) -> LifeResult:
     """Open the result of a study; read all of it if it is to be kept in memory only."""
-    found = cast("LifeResult", open_ensemble(path))
+    result = cast("LifeResult", open_ensemble(path))
     if not in_memory:
-        return found
-    variables = {name: found.raw.variables[name] for name in found.raw.schema.variables}
-    return replace(found, raw=replace(found.raw, variables=variables), path=None)
+        return result
+    variables = {name: result.raw.variables[name] for name in result.raw.schema.variables}
+    return replace(result, raw=replace(result.raw, variables=variables), path=None)
 
 
 def resume_life(
@@ -182,7 +182,7 @@ def resume_life(
     on_notice: Callable[[str], None] | None = None,
     storage: Storage = DISK,
 ) -> LifeResult:
-    """Continue a study of lives from its file; the result is that of an unbroken one.
+    """Continue a study of lives from its file; the result equals an unbroken one.
 
     Parameters
     ----------
@@ -240,8 +240,11 @@ def resume_life(
 def _finish_stages(work: EnsembleWork, runner: LifeRunner) -> None:
     """Run all tests, also those for rare events stage by stage; raises as `EnsembleWork`."""
     work.run()
-    while found := next_stages(work.result()):
-        stages, total = (*runner.settings.stages, *found), found[-1]["first"] + found[-1]["count"]
+    while further := next_stages(work.result()):
+        stages, total = (
+            (*runner.settings.stages, *further),
+            further[-1]["first"] + further[-1]["count"],
+        )
         settings = replace(runner.settings, stages=stages)
         runner = LifeRunner(runner.scenario, total, runner.grid, settings, runner.base)
         work.extend(runner, total, life={**asdict(settings), "base": runner.base})
@@ -334,11 +337,11 @@ def sweep_life(
     paths = [path_of(output, name) for name in names]
     if len(set(paths)) < len(paths):
         raise ValueError("two values have the same file; write them differently")
-    for one, path in zip(scenarios, paths, strict=True):
-        check_output(path, options.get("force", False), one.paths)
+    for design, path in zip(scenarios, paths, strict=True):
+        check_output(path, options.get("force", False), design.paths)
     results = []
-    for one, name, path in zip(scenarios, names, paths, strict=True):
+    for design, name, path in zip(scenarios, names, paths, strict=True):
         if on_value is not None:
             on_value(name, path)
-        results.append(life(one, realisations, path, variable=key, **options))
+        results.append(life(design, realisations, path, variable=key, **options))
     return results

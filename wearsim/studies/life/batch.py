@@ -85,8 +85,8 @@ def observe_lives(
 
     done, failed = bisect_failures(step, np.arange(len(runs)))
     results: dict[int, LifeRun | Exception] = dict(failed)
-    for places, found in done:
-        results.update(zip(places.tolist(), found, strict=True))
+    for places, lives in done:
+        results.update(zip(places.tolist(), lives, strict=True))
     return [results[place] for place in range(len(runs))]
 
 
@@ -161,8 +161,14 @@ class _Group:
         for place, number in enumerate(numbers):
             passes = float(advance.end.passes[place])
             self.tests[number].history.append((passes, relative[:, place]))
+        # the only state of a path may be known to be below all limits
+        reached = (relative.max(axis=0) >= 1.0) | (len(advance.path) > 2)
         open_places = np.array(
-            [place for place, number in enumerate(numbers) if self.tests[number].found is None],
+            [
+                k
+                for k, number in enumerate(numbers)
+                if self.tests[number].found is None and reached[k]
+            ],
             dtype=np.int64,
         )
 
@@ -232,15 +238,15 @@ class _Group:
 
     def _errors_by_stations(self, problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
         """Return the errors due to the stations of a cam by quantity, (tests,) [SI]."""
-        found = extremes(problem, state)
-        if not found:
+        extreme_values = extremes(problem, state)
+        if not extreme_values:
             none = np.zeros(len(state.passes))
             return {"depth": none, "lift error": none, "peak pressure": none}
-        lift = found["least_wear"].error + found["greatest_wear"].error
+        lift = extreme_values["least_wear"].error + extreme_values["greatest_wear"].error
         errors = {
-            "depth": found["depth"].error,
+            "depth": extreme_values["depth"].error,
             "lift error": lift.max(axis=0),
-            "peak pressure": found["peak_pressure"].error.max(axis=0),
+            "peak pressure": extreme_values["peak_pressure"].error.max(axis=0),
         }
         return {name: np.nan_to_num(values) for name, values in errors.items()}
 

@@ -53,18 +53,18 @@ class LivesView(View):
     def rows(self) -> Rows:
         """Return the comparison of each design with the first one."""
         first, rows = self.labels[0], list[Row]()
-        for label, found in zip(self.labels[1:], self.compared, strict=True):
+        for label, comparison in zip(self.labels[1:], self.compared, strict=True):
             of = "" if len(self.compared) == 1 else f", {first} against {label}"
-            ratio = f"{first} has {_factor(found.b10_ratio)} times the B10 of {label}"
+            ratio = f"{first} has {_factor(comparison.b10_ratio)} times the B10 of {label}"
             machine = "unknown: the studies have no common draws"
-            if found.same_machine is not None:
+            if comparison.same_machine is not None:
                 machine = (
-                    f"{first} outlives {label} on {part_with_interval(found.same_machine)} of the"
-                    " machines, each with the same drawn values for both designs"
+                    f"{first} outlives {label} on {part_with_interval(comparison.same_machine)} of"
+                    " the machines, each with the same drawn values for both designs"
                 )
             specimens = (
                 f"a specimen of {first} outlives a specimen of {label}, drawn separately, with"
-                f" probability {part_with_interval(found.two_specimens)}"
+                f" probability {part_with_interval(comparison.two_specimens)}"
             )
             rows += [Row(f"B10 ratio{of}", ratio), Row(f"same machine{of}", machine)]
             rows.append(Row(f"two specimens{of}", specimens))
@@ -101,22 +101,22 @@ def lives_view(
     return LivesView(results, labels)
 
 
-def _factor(found: Interval) -> str:
-    if not math.isfinite(found.value):
+def _factor(ratio: Interval) -> str:
+    if not math.isfinite(ratio.value):
         return "an unknown number of"
-    if not math.isfinite(found.half_width):
-        return f"{found.value:.3f} [unbounded]"
-    if found.half_width == 0.0:
-        return f"{found.value:.3f}"
-    return f"{found.value:.3f} [{found.low:.3f}, {found.high:.3f}]"
+    if not math.isfinite(ratio.half_width):
+        return f"{ratio.value:.3f} [unbounded]"
+    if ratio.half_width == 0.0:
+        return f"{ratio.value:.3f}"
+    return f"{ratio.value:.3f} [{ratio.low:.3f}, {ratio.high:.3f}]"
 
 
-def _comparison(found: LifeComparison) -> dict[str, Any]:
+def _comparison(comparison: LifeComparison) -> dict[str, Any]:
     return {
-        "b10_ratio": asdict(found.b10_ratio),
-        "same_machine": asdict(found.same_machine) if found.same_machine else None,
-        "two_specimens": asdict(found.two_specimens),
-        "pairs": found.count,
+        "b10_ratio": asdict(comparison.b10_ratio),
+        "same_machine": asdict(comparison.same_machine) if comparison.same_machine else None,
+        "two_specimens": asdict(comparison.two_specimens),
+        "pairs": comparison.count,
     }
 
 
@@ -125,9 +125,9 @@ def _against(variable: DesignVariable, results: Sequence[LifeResult]) -> dict[st
     return {
         "key": variable.key,
         "unit": variable.unit,
-        "values": [one.variable.value for one in results if one.variable],
+        "values": [result.variable.value for result in results if result.variable],
         "b": {
-            f"{share:g}": [asdict(one.b(share)) for one in results]
+            f"{share:g}": [asdict(result.b(share)) for result in results]
             for share in results[0].settings.shares
         },
     }

@@ -64,7 +64,7 @@ def log_weight(
     names = list(shift)
     scores = drawn_scores(drawer, names, realisation, 1)
     shares, shifts = zip(*(mixture or ((1.0, shift),)), strict=True)
-    vectors = [np.array([one[name] for name in names]) for one in shifts]
+    vectors = [np.array([by_input[name] for name in names]) for by_input in shifts]
     return float(mixture_log_weights(scores, shares, vectors)[0])
 
 

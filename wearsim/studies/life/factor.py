@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +16,7 @@ from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray
 
 SHARED = "wear.factor"  # of cylinder and roller
+CYLINDER = "wear.cylinder.k_over_h"
 OF_BODIES = {f"wear.{body}.k_over_h": body for body in BODIES}
 RARE = 1e-6  # probability of a greater factor than that up to which tests are run
 NEGLIGIBLE = 1e-12  # the same for a life before the target
@@ -125,3 +129,35 @@ def _obstacle(scenario: Scenario) -> str:
     if scenario.evolution.stepper == "per-pass":
         return "every pass is solved separately"
     return ""
+
+
+def with_posterior(scenario: Scenario, file: str | Path) -> Scenario:
+    """Return a scenario whose wear factor has the posterior in a file.
+
+    It is K/H of the cylinder or cam. Where a random `wear.factor` multiplies K/H of both bodies, it
+    is this factor, so that K/H of the cylinder has the posterior and the ratio of both stays.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    file : path
+        From `wearsim identify --posterior`.
+
+    Raises
+    ------
+    ScenarioError
+        If the file cannot be used, or contains the scatter of an input that is random.
+    """
+    key, table = posterior_table(scenario, file)
+    return scenario.changed({key: table})
+
+
+def posterior_table(scenario: Scenario, file: str | Path) -> tuple[str, dict[str, object]]:
+    """Return the key of the wear factor, and its table with the posterior in a file."""
+    name = Path(os.path.relpath(file, Path(scenario.file).parent)).as_posix()
+    table: dict[str, object] = {"distribution": "posterior", "file": name}
+    if any(item.name == SHARED for item in scenario.random) and scenario.wear is not None:
+        options: Any = scenario.wear.options
+        own = options.cylinder.wear_factor
+        return SHARED, {**table, "over": f"{own!r} 1/Pa"}
+    return CYLINDER, table

@@ -113,12 +113,13 @@ def _against(designs: Sequence[_Design]) -> Panel:
     assert variable is not None
     unit, size = engineers_unit(variable.unit)
     by_value = sorted(
-        ((one.variable.value, one) for one in results if one.variable), key=lambda pair: pair[0]
+        ((result.variable.value, result) for result in results if result.variable),
+        key=lambda pair: pair[0],
     )
     shares, marks = results[0].settings.shares, list[Mark]()
     for share, colour in zip(shares, several_colours(len(shares)), strict=True):
-        found = [(value, one.b(share)) for value, one in by_value]
-        known = [(value, life) for value, life in found if np.isfinite(life.value)]
+        pairs = [(value, result.b(share)) for value, result in by_value]
+        known = [(value, life) for value, life in pairs if np.isfinite(life.value)]
         if not known:
             continue
         values, lives = zip(*known, strict=True)
@@ -231,7 +232,7 @@ def _tornado(designs: Sequence[_Design]) -> Panel:
     """Return how far each input moves the life from its median, and the 95 % intervals."""
     title, results = "What moves the life", [design.result for design in designs]
     effects = [{} if result.are_equal else result.tornado() for result in results]
-    names = list(dict.fromkeys(name for found in effects for name in found))
+    names = list(dict.fromkeys(name for by_input in effects for name in by_input))
     if not names:
         alone = {result.settings.factor for result in results if result.settings.alone}
         text = f"only {', '.join(alone)}" if alone else "too few realisations, or equal lives"
@@ -239,11 +240,11 @@ def _tornado(designs: Sequence[_Design]) -> Panel:
         lines = [line for obstacle in obstacles for line in obstacle.split("; ")]
         return message(title, *(lines or [text]))
     height, marks = 0.7 / len(designs), list[Mark]()
-    for number, (found, design) in enumerate(zip(effects, designs, strict=True)):
+    for number, (by_input, design) in enumerate(zip(effects, designs, strict=True)):
         middle = (number - 0.5 * (len(designs) - 1)) * height
-        places = np.array([names.index(name) for name in found], dtype=float) + middle
+        places = np.array([names.index(name) for name in by_input], dtype=float) + middle
         for end, alpha in enumerate((0.35, 0.8)):
-            ends = [effect.factors[end] for effect in found.values()]
+            ends = [effect.factors[end] for effect in by_input.values()]
             value = [factor.value for factor in ends]
             low, high = ([getattr(factor, side) for factor in ends] for side in ("low", "high"))
             label = design.named if end else ""

@@ -25,6 +25,7 @@ from wearsim.uq.survival.rare_events import log_weights, next_shift
 
 LEAST_TESTS = 200
 _ADAPTED = 2  # stages that choose the shift, each with a quarter of the tests
+_IMPROVING = 4  # one test of so many improves the shifts
 
 
 def next_stages(result: LifeResult) -> list[dict[str, Any]]:
@@ -46,8 +47,8 @@ def next_stages(result: LifeResult) -> list[dict[str, Any]]:
         return []
     importance = by_importance(result)
     if needs_subset(settings.rare_method, importance):
-        found = by_subset(result)
-        return [found] if isinstance(found, dict) else []
+        further = by_subset(result)
+        return [further] if isinstance(further, dict) else []
     if importance:
         return []
     if settings.factor:
@@ -74,9 +75,6 @@ def next_stages(result: LifeResult) -> list[dict[str, Any]]:
     return [{"first": first, "count": count, "shift": moved}]
 
 
-_IMPROVING = 4  # one test of so many improves the shifts
-
-
 def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:
     """Return the next tests of importance sampling of the inputs other than the wear factor.
 
@@ -96,7 +94,7 @@ def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:
     plain = {"first": 0, "count": settings.plain, "shift": {}}
     drawn = [_stage_scores(result, names, stage) for stage in (plain, *stages)]
     numbers = np.concatenate([places for places, _ in drawn])
-    scores = np.concatenate([found for _, found in drawn])
+    scores = np.concatenate([further for _, further in drawn])
     mixture = result.mixture_of(numbers)
     if not stages:
         names, points = _points(names, scores, mixture, target / settings.per_unit)
@@ -110,9 +108,9 @@ def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:
     done = sum(stage["count"] for stage in stages)
     parts = [DEFENSIVE, *((1.0 - DEFENSIVE) * part for part in parts)]
     sizes = _parts(settings.rare - done, parts)
-    found = _stages(settings.plain + done, sizes, names, [np.zeros(len(names)), *means])
-    mixed = [(stage["count"] / sum(sizes), stage["shift"]) for stage in found]
-    return [{**stage, "mixture": mixed} for stage in found]
+    further = _stages(settings.plain + done, sizes, names, [np.zeros(len(names)), *means])
+    mixed = [(stage["count"] / sum(sizes), stage["shift"]) for stage in further]
+    return [{**stage, "mixture": mixed} for stage in further]
 
 
 def _points(
@@ -126,7 +124,7 @@ def _points(
     effects = influence(scores[known], log)
     chosen = np.sort(np.argsort(-effects, kind="stable")[:MOST_INPUTS])
     points = design_points(
-        scores[known][:, chosen], log, lambda found: mixture.needed_score(found, life)
+        scores[known][:, chosen], log, lambda scores_found: mixture.needed_score(scores_found, life)
     )
     return [names[place] for place in chosen], points
 
@@ -154,9 +152,9 @@ def _parts(total: int, shares: Sequence[float]) -> list[int]:
 def _stages(
     first: int, sizes: Sequence[int], names: list[str], shifts: Sequence[FloatArray]
 ) -> list[dict[str, Any]]:
-    found = []
+    stages = []
     for size, shift in zip(sizes, shifts, strict=True):
         moved = dict(zip(names, map(float, shift), strict=True))
-        found.append({"first": first, "count": size, "shift": moved})
+        stages.append({"first": first, "count": size, "shift": moved})
         first += size
-    return [stage for stage in found if stage["count"]]
+    return [stage for stage in stages if stage["count"]]

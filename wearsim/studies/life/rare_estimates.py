@@ -20,20 +20,20 @@ def responses(result: LifeValues) -> FloatArray:
     settings = result.settings
     assert settings.target is not None
     span = max(settings.target * _SPAN, 1.0), settings.most
-    found = np.log(np.clip(result.raw.rows("life", 0, None), *span) / settings.target)
-    return np.where(result.raw.status == DONE, found, np.nan)
+    logs = np.log(np.clip(result.raw.rows("life", 0, None), *span) / settings.target)
+    return np.where(result.raw.status == DONE, logs, np.nan)
 
 
 def rare_estimates(result: LifeValues) -> dict[str, RareProbability]:
     """Return the estimates of the methods that are complete, in the order of their use."""
-    found: dict[str, RareProbability] = {}
+    estimates: dict[str, RareProbability] = {}
     if importance := by_importance(result):
-        found[IMPORTANCE] = importance
+        estimates[IMPORTANCE] = importance
     if needs_subset(result.settings.rare_method, importance):
         subset = by_subset(result)
         if isinstance(subset, RareProbability):
-            found[SUBSET] = subset
-    return found
+            estimates[SUBSET] = subset
+    return estimates
 
 
 def needs_subset(method: str, importance: RareProbability | None) -> bool:
@@ -89,9 +89,9 @@ def by_subset(result: LifeValues) -> RareProbability | dict[str, Any]:
                 return {**plan, "parents": parents, "scale": stage.scale}
             first = stages.pop(0)["first"]
             numbers = np.append(numbers, np.arange(first, first + missing))
-        found = known[numbers[-stage.count :]]
+        values = known[numbers[-stage.count :]]
         try:
-            stage = work.send(np.where(np.isnan(found), np.inf, found))
+            stage = work.send(np.where(np.isnan(values), np.inf, values))
         except StopIteration as end:
             estimate: RareProbability = end.value
             return estimate

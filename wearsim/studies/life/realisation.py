@@ -172,7 +172,11 @@ class LifeRunner(RealisationRunner):
         stages = np.searchsorted(ends, numbers, side="right")
         for stage in np.unique(stages).tolist():
             level = 0
-            left = [n for n, own in zip(numbers, stages.tolist(), strict=True) if own == stage]
+            left = [
+                n
+                for n, stage_of_test in zip(numbers, stages.tolist(), strict=True)
+                if stage_of_test == stage
+            ]
             while left:
                 left, level = self._attempt(level, stage, left, outcomes), level + 1
         return [outcomes[number] for number in numbers]
@@ -191,12 +195,14 @@ class LifeRunner(RealisationRunner):
                 outcomes[number] = Outcome(number=number, values=drawn, error=failure_text(error))
         last = runner.scenario.total_passes >= self.longest
         for group in batch_groups(runs):
-            for run, found in zip(group, observe_lives(group, limits), strict=True):
-                ended = isinstance(found, Exception) or found.reached or found.failure is not None
+            for run, outcome in zip(group, observe_lives(group, limits), strict=True):
+                ended = (
+                    isinstance(outcome, Exception) or outcome.reached or outcome.failure is not None
+                )
                 if not (ended or last):
                     left.append(run.number)
                 else:
-                    outcomes[run.number] = self._life_outcome(runner, run, found)
+                    outcomes[run.number] = self._life_outcome(runner, run, outcome)
         return sorted(left)
 
     def _level(self, level: int, stage: int) -> LevelRunner:
@@ -204,30 +210,30 @@ class LifeRunner(RealisationRunner):
         if (level, stage) not in self._levels:
             passes = min(self.base * EXTENSION**level, self.longest)
             scenario = with_length(self.scenario, passes)
-            own = self.settings.stages[stage - 1] if stage else {"shift": {}}
+            stage_settings = self.settings.stages[stage - 1] if stage else {"shift": {}}
             changes = changes_of(self.settings.stages[:stage])
             self._levels[level, stage] = LevelRunner(
                 scenario,
                 self.total,
                 self.grid,
                 self.fixed,
-                own["shift"],
+                stage_settings["shift"],
                 changes,
-                own.get("mixture", ()),
+                stage_settings.get("mixture", ()),
             )
         return self._levels[level, stage]
 
     def _life_outcome(
-        self, runner: LevelRunner, run: RealisationRun, found: LifeRun | Exception
+        self, runner: LevelRunner, run: RealisationRun, outcome: LifeRun | Exception
     ) -> Outcome:
         """Return the outcome of a realisation, with its life at the drawn wear factor."""
-        if isinstance(found, Exception) or found.failure is not None:
-            return self.outcome(run, found)
-        scalars, scale, score_mean = dict(found.scalars), 1.0, 0.0
+        if isinstance(outcome, Exception) or outcome.failure is not None:
+            return self.outcome(run, outcome)
+        scalars, scale, score_mean = dict(outcome.scalars), 1.0, 0.0
         if self.factor is not None:
             scale = self.settings.reference / float(run.drawn[self.settings.factor])
             score_mean = self.factor.score_mean(runner.drawer, run.number)
         for name in ("life", "life_low", "life_high"):
             scalars[name] *= scale
         scalars |= {"score_mean": score_mean, "log_weight": runner.log_weight(run.number)}
-        return self.outcome(run, replace(found, scalars=scalars))
+        return self.outcome(run, replace(outcome, scalars=scalars))

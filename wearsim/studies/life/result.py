@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from wearsim.studies.life.factor import posterior_table
 from wearsim.studies.life.rare_estimates import rare_estimates
 from wearsim.studies.life.stored_settings import LifeComparison
 from wearsim.studies.life.values import LifeValues
@@ -31,6 +33,7 @@ from wearsim.uq.survival.lives import (
     survival_curve,
 )
 from wearsim.uq.survival.rare_events import RareProbability
+from wearsim.uq.survival.two_levels import UncertainLife
 
 _QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
 _POINTS = 200  # of a curve
@@ -46,7 +49,7 @@ class LifeResult(LifeValues):
     raw : EnsembleData
     path : Path, optional
     law : Distribution, optional
-        Distribution of the wear factor, instead of that of the scenario.
+        Distribution of the wear factor, instead of the scenario's.
 
     Examples
     --------
@@ -76,9 +79,13 @@ class LifeResult(LifeValues):
     def method(self) -> str:
         """Method of the intervals of lives, in words."""
         if self.settings.alone:
-            return "none: the wear factor is integrated exactly, and nothing else is random"
+            exact = "the wear factor is integrated exactly, and nothing else is random"
+            return (
+                f"credible, by the posterior of K/H: {exact}" if self.levels else f"none: {exact}"
+            )
         if self.is_exact:
-            return "Student's t of the probability of failure on the logit scale, inverted"
+            method = "Student's t of the probability of failure on the logit scale, inverted"
+            return f"credible, by the posterior of K/H, with {method}" if self.levels else method
         if self.censored:
             return "exact, between order statistics; lives beyond the maximum are censored"
         return "exact, between order statistics"
@@ -117,6 +124,28 @@ class LifeResult(LifeValues):
         inputs = {item.name: item for item in changed.random}
         return replace(self, law=inputs[settings.factor].scalar)
 
+    def with_posterior(self, file: str | Path) -> LifeResult:
+        """Return the lives with the posterior of K/H of an identification, without new tests.
+
+        Parameters
+        ----------
+        file : path
+            CSV of `wearsim identify --posterior`.
+
+        Raises
+        ------
+        ScenarioError
+            If the file cannot be used, or contains the scatter of an input that is random.
+        ValueError
+            As `with_wear_factor`.
+        """
+        key, table = posterior_table(self.scenario, file)
+        if self.settings.factor and key != self.settings.factor:
+            raise ValueError(
+                f"the posterior is of {key}, and the lives are of {self.settings.factor}"
+            )
+        return self.with_wear_factor(table)
+
     def b(self, percent: float) -> Interval:
         """Return the life that a percentage of the specimens does not reach, as B10.
 
@@ -130,7 +159,8 @@ class LifeResult(LifeValues):
         Interval
             Sampling interval; the value is nan beyond the censoring and with too few counted lives
             (69 for B1, 7 for B10), and -inf an end for which there are too few. See `b_error` for
-            the numerical error.
+            the numerical error. With a posterior of the wear factor the value is the predictive
+            one, and the interval is credible, see `uncertain_life`.
 
         Examples
         --------
@@ -139,7 +169,40 @@ class LifeResult(LifeValues):
         >>> print(f"{found.value:.3g}, 95 % interval {found.low:.3g} to {found.high:.3g}")
         8.5e+05, 95 % interval 7.98e+05 to 9.08e+05
         """
-        return self._b(percent, "life")
+        uncertain = self.uncertain_life(percent)
+        if uncertain is None:
+            return self._b(percent, "life")
+        return self._within_censoring(uncertain.interval)
+
+    def uncertain_life(self, percent: float) -> UncertainLife | None:
+        """Return the life of a percentage with what is not known of the wear factor.
+
+        Parameters
+        ----------
+        percent : float
+            10 for B10.
+
+        Returns
+        -------
+        UncertainLife or None
+            Predictive and plug-in life, credible interval, and the variance due to the wear tests
+            and to the realisations; None unless the wear factor has the distribution "posterior".
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.uncertain_life(10) is None
+        True
+        """
+        if self.uncertain is None:
+            return None
+        if percent not in self._uncertain_lives:
+            self._uncertain_lives[percent] = self.uncertain.quantile(percent / 100.0)
+        return self._uncertain_lives[percent]
+
+    @cached_property
+    def _uncertain_lives(self) -> dict[float, UncertainLife]:
+        return {}
 
     def b_error(self, percent: float) -> tuple[float, float]:
         """Return the life of a percentage if all lives are in error by their numerical bounds.
@@ -161,17 +224,22 @@ class LifeResult(LifeValues):
         if not self.is_exact:
             lives = self._lives(name)
             return life_quantile(np.minimum(lives, self.most), np.isfinite(lives), share)
-        found = self._distribution(name).quantile(share)
-        if found.value <= self.most:
+        return self._within_censoring(self._distribution(name).quantile(share))
+
+    def _within_censoring(self, quantile: Interval) -> Interval:
+        """Return a life with its interval, unknown beyond the censoring."""
+        if quantile.value <= self.most:
             return Interval(
-                found.value, found.low, found.high if found.high <= self.most else math.inf
+                quantile.value,
+                quantile.low,
+                quantile.high if quantile.high <= self.most else math.inf,
             )
-        return Interval(math.nan, min(found.low, self.most), math.inf)
+        return Interval(math.nan, min(quantile.low, self.most), math.inf)
 
     def lower_bound(self, percent: float) -> float:
         """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown.
 
-        It is that of the lives as counted.
+        It applies to the lives as counted.
 
         Examples
         --------
@@ -195,8 +263,8 @@ class LifeResult(LifeValues):
         if not self.count or life > self.most:
             return UNKNOWN
         if self.is_exact:
-            obstacle = self.probability_obstacle(life)
-            return UNKNOWN if obstacle else self.distribution.probability_before(life)
+            lives = self.uncertain or self.distribution
+            return UNKNOWN if self.probability_obstacle(life) else lives.probability_before(life)
         return probability_before(np.minimum(self.lives, self.most), self.observed, life)
 
     def survival(self, life: float) -> Interval:
@@ -208,8 +276,10 @@ class LifeResult(LifeValues):
         >>> print(f"{lives.survival(675_000).value:.2%}")
         96.64%
         """
-        found = self.probability_before(life)
-        return Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low)
+        failed_before = self.probability_before(life)
+        return Interval(
+            1.0 - failed_before.value, 1.0 - failed_before.high, 1.0 - failed_before.low
+        )
 
     def survival_curve(self) -> SurvivalCurve:
         """Return the survival with its band from 0 to the last life, or the maximum of the tests.
@@ -217,8 +287,8 @@ class LifeResult(LifeValues):
         Examples
         --------
         >>> curve = wearsim.open_results("rig-life.h5").survival_curve()
-        >>> curve.life[0], curve.survival[0]
-        (0.0, 1.0)
+        >>> print(curve.life[0], curve.survival[0])
+        0.0 1.0
         """
         if not self.is_exact:
             curve = survival_curve(np.minimum(self.lives, self.most), self.observed)
@@ -230,7 +300,8 @@ class LifeResult(LifeValues):
             return SurvivalCurve(np.concatenate([[0.0], curve.life, last]), *parts)
         end = min(self.distribution.quantile_of_mean(0.999), self.most)
         life = np.linspace(0.0, end, _POINTS)
-        ended = [self.distribution.probability_before(float(n)) for n in life[1:]]
+        estimates = self.uncertain or self.distribution
+        ended = [estimates.probability_before(float(n)) for n in life[1:]]
         survival, low, high = (
             np.array([1.0, *(1.0 - getattr(item, name) for item in ended)])
             for name in ("value", "high", "low")
@@ -246,21 +317,21 @@ class LifeResult(LifeValues):
         lives = np.minimum(self.lives[positive], self.most)
         if not len(lives):
             return []
-        found = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
-        return sorted((fit for fit in found if fit is not None), key=lambda fit: fit.aic)
+        fitted = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
+        return sorted((fit for fit in fitted if fit is not None), key=lambda fit: fit.aic)
 
     def _indices(
         self, name: str, groups: list[str]
     ) -> Mapping[str, tuple[Interval, Interval | None]]:
-        """Return first-order indices; those of "life" are of its logarithm, or unknown."""
+        """Return first-order indices, of "life" for its logarithm, or unknown."""
         if name != "life":
             return super()._indices(name, groups)
         if self.effects_obstacle:
             return dict.fromkeys(groups, (UNKNOWN, None))
         from wearsim.uq.sensitivity.sobol_indices import first_order  # noqa: PLC0415  (rarely needed)
 
-        found = first_order(self.log_lives, self.drawn_numbers(groups))
-        return {group: (index, None) for group, index in found.items()}
+        indices = first_order(self.log_lives, self.drawn_numbers(groups))
+        return {group: (index, None) for group, index in indices.items()}
 
     def tornado(self) -> dict[str, SignedEffect]:
         """Return the effect of each input on the logarithm of life, by its name, greatest first.
@@ -291,20 +362,24 @@ class LifeResult(LifeValues):
         if self.effects_obstacle:
             return {}
         drawn = self.drawn_numbers([item["name"] for item in self.raw.groups])
-        factor, logs, found = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
+        factor, logs, by_input = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
         if factor in drawn and self.is_known_throughout and not self.at_once:
             # life is kappa/K: kappa holds all that the other inputs change
             logs = np.log(self.values("life") * self.values(factor))
             low, middle, high = np.log((self.law or self._drawn_law).quantile(_QUANTILES)).tolist()
-            found[factor] = exact_effect(middle - low, middle - high)
+            by_input[factor] = exact_effect(middle - low, middle - high)
             del drawn[factor]
-        laws = {one.name: one.scalar for one in self.scenario.random if one.role == "scalar"}
+        laws = {
+            random_input.name: random_input.scalar
+            for random_input in self.scenario.random
+            if random_input.role == "scalar"
+        }
         scores = {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
-        found |= effects(logs, scores)
-        return dict(sorted(found.items(), key=lambda item: -item[1].size))
+        by_input |= effects(logs, scores)
+        return dict(sorted(by_input.items(), key=lambda item: -item[1].size))
 
     def compare(self, other: LifeResult) -> LifeComparison:
-        """Compare the lives with those of another design.
+        """Compare the lives with another design's.
 
         Parameters
         ----------
@@ -347,7 +422,7 @@ class LifeResult(LifeValues):
         paired = self.raw.seed == other.raw.seed
         first, second = self.distribution, other.distribution
         name = "known_lives" if math.isinf(most) else "lives"
-        one, two = (getattr(item, name) for item in both)
+        lives, other_lives = (getattr(item, name) for item in both)
         common = np.intersect1d(self.numbers, other.numbers)
         if paired and not (first.exact and second.exact):
             places = [np.searchsorted(item.numbers, common) for item in both]
@@ -355,8 +430,12 @@ class LifeResult(LifeValues):
                 paired = False
             else:
                 first, second = _at(first, places[0]), _at(second, places[1])
-                one, two = one[places[0]], two[places[1]]
-        machine = same_machine(one, two, most) if paired and len(one) == len(two) else None
+                lives, other_lives = lives[places[0]], other_lives[places[1]]
+        machine = (
+            same_machine(lives, other_lives, most)
+            if paired and len(lives) == len(other_lives)
+            else None
+        )
         if machine and all(item.settings.alone for item in both):  # for any wear factor
             machine = Interval(machine.value, machine.value, machine.value)
         return LifeComparison(
@@ -379,7 +458,8 @@ class LifeResult(LifeValues):
         if target.observable != LIFE:
             return super().estimate_for(target)
         share = float(target.statistic)
-        life = self.b(100.0 * share) if self.count >= _FEWEST else UNKNOWN
+        # more realisations do not reduce what is not known of the wear factor
+        life = self._b(100.0 * share, "life") if self.count >= _FEWEST else UNKNOWN
         return Estimate(
             self.count, UNKNOWN, UNKNOWN, ((share, life),), math.nan, math.nan, self.method
         )
@@ -388,7 +468,7 @@ class LifeResult(LifeValues):
     def rare(self) -> RareProbability | None:
         """Probability of a life before the target from tests for rare events, if requested.
 
-        It is that of the last method in `rare_estimates`.
+        It is given by the last method in `rare_estimates`.
         """
         return next(reversed(self.rare_estimates.values()), None)
 

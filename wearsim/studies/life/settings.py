@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import ArgumentError, Mistake, ScenarioError, checking_argument
+from wearsim.arguments import ArgumentError, checking_argument
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.limits import OF_LIFE, Limit
 from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import Scenario
@@ -41,7 +42,7 @@ def checked_study(
     rare: int = 0,
     rare_method: str = "auto",
 ) -> tuple[Scenario, LifeSettings, Target | None]:
-    """Return scenario, settings and target of a study, whose arguments are those of `life`.
+    """Return scenario, settings and target of a study; arguments as of `life`.
 
     Raises
     ------
@@ -114,7 +115,7 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
     ScenarioError
         If there is none, or one is of no meaning for the scenario.
     """
-    found: dict[str, str] = {}
+    changes: dict[str, str] = {}
     for text in limits:
         name = text.replace("_", " ").split("=")[0].strip().lower().removeprefix("worn ")
         if "=" in text and name not in OF_LIFE:
@@ -125,10 +126,10 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
                 f"'{text}' does not end a life, expected a limit of {', '.join(OF_LIFE)}; a time"
                 " after which lives are censored is the maximum"
             )
-        if f"limit.{limit.key}" in found:
+        if f"limit.{limit.key}" in changes:
             raise ValueError(f"'{text}': a limit of {limit.quantity} is given twice")
-        found[f"limit.{limit.key}"] = limit.text.removeprefix(limit.quantity).strip()
-    changed = scenario.changed(found) if found else scenario
+        changes[f"limit.{limit.key}"] = limit.text.removeprefix(limit.quantity).strip()
+    changed = scenario.changed(changes) if changes else scenario
     if not changed.limit.given:
         what, expected = "is needed for a life", 'one limit or more, such as depth = "50 um"'
         raise ScenarioError(scenario.file, [Mistake("limit", "", what, "none", expected)])
@@ -164,8 +165,8 @@ def settings_of(
         with checking_argument("most"):
             longest = per_unit * parse_life(most, unit, rate, "max")
     else:
-        own = float(scenario.total_passes) if scenario.has_length else 0.0
-        longest = LONGEST * max(own, aim or 0.0)
+        length = float(scenario.total_passes) if scenario.has_length else 0.0
+        longest = LONGEST * max(length, aim or 0.0)
         if longest == 0.0:
             raise ArgumentError(
                 "most",
@@ -235,15 +236,15 @@ def parse_life(value: float | str, unit: str, rate: float, what: str) -> float:
     """
     text = str(value).strip()
     try:
-        found = float(text.removesuffix(unit))
+        life = float(text.removesuffix(unit))
     except ValueError:
         try:
-            found = rate * quantity(text, "s")
+            life = rate * quantity(text, "s")
         except QuantityError as error:
             raise ValueError(
                 f"{what} '{text}' is not a life, expected a number of {unit} such as 675000, or a"
                 " time such as '200 h'"
             ) from error
-    if not 0.0 < found < np.inf:
+    if not 0.0 < life < np.inf:
         raise ValueError(f"{what} '{text}' must be above zero")
-    return found
+    return life

@@ -118,7 +118,7 @@ class LifeComparison:
     Parameters
     ----------
     b10_ratio : Interval
-        B10 of the first over that of the second.
+        B10 of the first over B10 of the second.
     same_machine : Interval, optional
         Probability that the first outlives the second with the same drawn values; None without
         common draws.

@@ -11,6 +11,7 @@ from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.life.stored_settings import DesignVariable, LifeSettings
 from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim.uq.distributions.base import Distribution
+from wearsim.uq.distributions.two_levels import TwoLevels
 from wearsim.uq.survival.distributions import (
     CountedLives,
     FactorMixture,
@@ -18,6 +19,7 @@ from wearsim.uq.survival.distributions import (
 )
 from wearsim.uq.survival.effective import LEAST_NUMBER
 from wearsim.uq.survival.scores import ScoreFunction, score_function
+from wearsim.uq.survival.two_levels import UncertainLives
 
 _MOST_UNKNOWN = 0.02  # share of lives at an end of the range up to which effects are stated
 
@@ -43,7 +45,7 @@ class LifeValues(EnsembleResult):
 
     @property
     def variable(self) -> DesignVariable | None:
-        """Design variable whose value differs from that of other results of a sweep."""
+        """Design variable whose value differs from other results of a sweep."""
         return DesignVariable(**self.settings.variable) if self.settings.variable else None
 
     @property
@@ -78,18 +80,18 @@ class LifeValues(EnsembleResult):
         return self.is_exact and bool(np.isfinite(self.known_lives).all())
 
     def _lives(self, name: str) -> FloatArray:
-        found = self._known_lives(name)
-        return np.asarray(np.where(found <= self.most, found, np.inf))
+        lives = self._known_lives(name)
+        return np.asarray(np.where(lives <= self.most, lives, np.inf))
 
     def _known_lives(self, name: str) -> FloatArray:
-        found = self.values(name) / self.settings.per_unit
+        lives = self.values(name) / self.settings.per_unit
         if self.law is not None:  # at the same quantile as the drawn factor
             from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
             drawn = self.values(self.settings.factor)
             chance = ndtr(self._drawn_score(drawn))
-            found = found * drawn / self.law.quantile(chance)
-        return found
+            lives = lives * drawn / self.law.quantile(chance)
+        return lives
 
     @cached_property
     def observed(self) -> BoolArray:
@@ -173,6 +175,19 @@ class LifeValues(EnsembleResult):
         inputs = {item.name: item for item in self.scenario.random}
         return inputs[self.settings.factor].scalar
 
+    @property
+    def levels(self) -> TwoLevels | None:
+        """Posterior of the wear factor that is integrated exactly, if its distribution is one."""
+        law = self.law or (self._drawn_law if self.is_exact else None)
+        return law if isinstance(law, TwoLevels) else None
+
+    @cached_property
+    def uncertain(self) -> UncertainLives | None:
+        """Lives for all medians and scatters of a wear factor with a posterior."""
+        levels, lives = self.levels, self.distribution
+        known = levels is not None and isinstance(lives, FactorMixture) and lives.is_finite.any()
+        return UncertainLives(lives, levels) if known else None  # type: ignore[arg-type]
+
     @cached_property
     def _drawn_score(self) -> ScoreFunction:
         """Normal score of the wear factor of the scenario."""
@@ -198,8 +213,8 @@ class LifeValues(EnsembleResult):
         """Angles of a cam at which each limit was reached [rad]; without those never first."""
         first, angle = self.values("first_limit"), self.values("limit_angle")
         known = self.observed & np.isfinite(angle)
-        found = {name: angle[known & (first == place)] for place, name in enumerate(self.limits)}
-        return {name: angles for name, angles in found.items() if len(angles)}
+        by_limit = {name: angle[known & (first == place)] for place, name in enumerate(self.limits)}
+        return {name: angles for name, angles in by_limit.items() if len(angles)}
 
     @property
     def are_equal(self) -> bool:
@@ -212,9 +227,9 @@ class LifeValues(EnsembleResult):
 
         Where the wear factor is integrated exactly, lives beyond the maximum are known too.
         """
-        found, has_log = self._lives_and_logs
-        ends = found[has_log].min(initial=self.most), found[has_log].max(initial=0.0)
-        return np.asarray(np.log(np.clip(found, ends[0], ends[1] or self.most)))
+        lives, has_log = self._lives_and_logs
+        ends = lives[has_log].min(initial=self.most), lives[has_log].max(initial=0.0)
+        return np.asarray(np.log(np.clip(lives, ends[0], ends[1] or self.most)))
 
     @property
     def effects_obstacle(self) -> str:
@@ -230,5 +245,5 @@ class LifeValues(EnsembleResult):
     @cached_property
     def _lives_and_logs(self) -> tuple[FloatArray, BoolArray]:
         """Lives, as far as they are known, and whether each has a logarithm."""
-        found = self.known_lives if self.is_exact else self.lives
-        return found, np.isfinite(found) & (found > 0.0)
+        lives = self.known_lives if self.is_exact else self.lives
+        return lives, np.isfinite(lives) & (lives > 0.0)

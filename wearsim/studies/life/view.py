@@ -26,7 +26,6 @@ from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.view import EXCLUDED
 from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.sensitivity.effects import SignedEffect
 from wearsim.uq.survival.lives import fewest_lives, least_survival
 from wearsim.uq.survival.rare_events import RareProbability
 
@@ -38,6 +37,7 @@ ERROR = (
 )
 
 _LIMIT_UNITS = {"volume": "mm^3", "peak_pressure": "MPa"}
+_UNKNOWN = (NOTHING, NOTHING)
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
 
@@ -64,7 +64,9 @@ class LifeView(RealisationsView[LifeResult]):
         if result.count == 0:
             return [Row("life", "no test is completed")]
         shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
-        rows = [Row(f"B{share:g}", life_text(result, share)) for share in shares]
+        rows = [
+            Row(f"B{share:g}", life_text(result, share) + self._plug_in(share)) for share in shares
+        ]
         if result.target is not None:
             name = f"P(life < {count(result.target)} {result.unit})"
             rows.append(Row(name, target_text(result)))
@@ -91,6 +93,8 @@ class LifeView(RealisationsView[LifeResult]):
         factor = f"lives are counted: {settings.reason}"
         if settings.factor:
             factor = f"{settings.factor} is integrated exactly"
+            if result.levels is not None:
+                factor += f", with its posterior given {_tests_of(result)}"
             alone = "; nothing else is random, so that one test is sufficient"
             factor += alone if settings.alone else ""
         ends = f"{count(int(result.observed.sum()))} ended by a limit"
@@ -112,15 +116,45 @@ class LifeView(RealisationsView[LifeResult]):
         result = self.result
         if not result.count:
             return []
-        tables = [lives_table([""], [result])]
-        if len(result.fits) >= 2:
-            tables.append(self._fits())
         lines = [
             [name.replace("_", " "), shown(share, "%", 3), self._angle(name)]
             for name, share in result.first_limits.items()
         ]
-        tables.append(Table("", lines, ["first limit", "share", ""]))
-        return [*tables, self._effects()]
+        return [
+            *([self._levels()] if result.uncertain is not None else []),
+            lives_table([""], [result]),
+            *([self._fits()] if len(result.fits) >= 2 else []),
+            Table("", lines, ["first limit", "share", ""]),
+            self._effects(),
+        ]
+
+    def _plug_in(self, share: float) -> str:
+        """Return the life with median and scatter of K/H taken as known; empty if they are."""
+        found = self.result.uncertain_life(share)
+        if found is None:
+            return ""
+        plug_in = rounded_lives(found.low, found.plug_in, found.high)[1]
+        return f" given {_tests_of(self.result)}; plug-in {plug_in}"
+
+    def _levels(self) -> Table:
+        """Return predictive and plug-in lives, and what would reduce their uncertainty."""
+        result, lines = self.result, []
+        for share in result.settings.shares:
+            found = result.uncertain_life(share)
+            assert found is not None
+            known = math.isfinite(found.low) and math.isfinite(found.high)
+            low, predictive, plug_in, high = rounded_lives(
+                found.low, found.predictive, found.plug_in, found.high
+            )
+            total = found.by_tests + found.by_realisations
+            parts = (found.by_tests, found.by_realisations)
+            of_total = [shown(part / total, "%", 2) if total else NOTHING for part in parts]
+            deviation = f"{math.sqrt(total):.2g}" if known else NOTHING
+            cells = (predictive, plug_in, f"{low}..{high}", deviation)
+            lines.append([f"B{share:g}", *cells, *(of_total if known else [NOTHING, NOTHING])])
+        head = f"life [{result.unit}], given {_tests_of(result)}"
+        parts_of = ["sd of ln life", "by more tests", "by more realisations"]
+        return Table("", lines, [head, "predictive", "plug-in", "95 % credible", *parts_of])
 
     def _fits(self) -> Table:
         """Return the fitted distributions, best first."""
@@ -128,8 +162,8 @@ class LifeView(RealisationsView[LifeResult]):
         for fit in result.fits:
             intervals = [fit.interval(share / 100.0) for share in shares]
             cells = [
-                "{1} ({0}..{2})".format(*rounded_lives(one.low, one.value, one.high))
-                for one in intervals
+                "{1} ({0}..{2})".format(*rounded_lives(interval.low, interval.value, interval.high))
+                for interval in intervals
             ]
             scale = f"{count(math.exp(fit.mu))} {result.unit}"
             parameters = (
@@ -162,7 +196,7 @@ class LifeView(RealisationsView[LifeResult]):
                 f"not significant, at most {shown(item.first.high, '%', 2)}"
                 if item.without_effect
                 else part_with_interval(item.first),
-                *(effect_cells(changes[item.name]) if item.name in changes else (NOTHING, NOTHING)),
+                *(map(_change, changes[item.name].factors) if item.name in changes else _UNKNOWN),
             ]
             for item in result.sensitivity("life")
         ]
@@ -206,6 +240,7 @@ class LifeView(RealisationsView[LifeResult]):
                 "lower_bound": result.lower_bound(share) if not result.is_exact else None,
                 "numerical_low": low,
                 "numerical_high": high,
+                **self._uncertain(share),
             }
         return {
             "title": result.title,
@@ -223,7 +258,7 @@ class LifeView(RealisationsView[LifeResult]):
             "probability_before_target": probability,
             "rare": self._rare(),
             "first_limits": result.first_limits,
-            "angles_deg": {name: np.degrees(found) for name, found in result.angles.items()},
+            "angles_deg": {name: np.degrees(angles) for name, angles in result.angles.items()},
             "fits": [
                 {
                     "family": fit.family,
@@ -253,10 +288,14 @@ class LifeView(RealisationsView[LifeResult]):
             "interval_method": result.method,
             "seed": result.raw.seed,
             "wall_seconds": result.raw.wall_seconds,
-            "output": str(result.path) if result.path else None,
-            "notes": list(result.notes),
+            **self.ending(),
             "warnings": list(result.warnings),
         }
+
+    def _uncertain(self, share: float) -> dict[str, Any]:
+        """Return predictive and plug-in life and their uncertainty; nothing without a posterior."""
+        found = self.result.uncertain_life(share)
+        return {} if found is None else {"given_tests": asdict(found)}
 
     def _rare(self) -> dict[str, Any] | None:
         if self.result.rare is None:
@@ -336,6 +375,12 @@ def _three_digits(result: LifeResult, share: float) -> str:
     return f"{value} {result.unit}, 95 %: {low} to {high}"
 
 
+def _tests_of(result: LifeResult) -> str:
+    """Return the wear tests of a posterior in words, "these 8 tests"."""
+    count_ = result.levels.specimens if result.levels else 0
+    return f"these {count_} specimens" if count_ else "these specimens"
+
+
 def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
     """Return lives, their intervals, and the lives with the numerical errors of the tests."""
     lines = []
@@ -363,18 +408,18 @@ def life_text(result: LifeResult, share: float) -> str:
 
 def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
     """Return the life that a percentage does not reach, and its interval, which may be empty."""
-    found, most = result.b(share), count(result.most)
-    low, value, high = rounded_lives(found.low, found.value, found.high)
-    if math.isnan(found.value):
+    life, most = result.b(share), count(result.most)
+    low, value, high = rounded_lives(life.low, life.value, life.high)
+    if math.isnan(life.value):
         fewest = fewest_lives(0.01 * share)
         if result.count < fewest and not result.is_exact:
             return f"takes {fewest} lives", ""
-        return f"above {most}", f"from {low}" if math.isfinite(found.low) else NOTHING
-    if found.low == found.high:
+        return f"above {most}", f"from {low}" if math.isfinite(life.low) else NOTHING
+    if life.low == life.high:
         ends = result.b_error(share)
-        return rounded_lives(ends[0], found.value, ends[1])[1], ""
-    if math.isfinite(found.low):
-        return value, f"{low}..{high}" if math.isfinite(found.high) else f"from {low}"
+        return rounded_lives(ends[0], life.value, ends[1])[1], ""
+    if math.isfinite(life.low):
+        return value, f"{low}..{high}" if math.isfinite(life.high) else f"from {low}"
     bound = result.lower_bound(share)  # of a small sample
     return value, f"from {rounded_lives(bound)[0]} (one-sided)" if math.isfinite(
         bound
@@ -393,14 +438,9 @@ def rounded_lives(*lives: float) -> list[str]:
     return [count(round(life / unit) * unit) if math.isfinite(life) else NOTHING for life in lives]
 
 
-def effect_cells(effect: SignedEffect) -> tuple[str, str]:
-    """Return the change of life at the 10 % and the 90 % quantile of an input, with intervals."""
-    low, high = effect.factors
-    return _change(low), _change(high)
-
-
 def _change(factor: Interval) -> str:
-    change = [100.0 * (one - 1.0) for one in (factor.value, factor.low, factor.high)]
+    """Return a change of the life by an input, with its interval."""
+    change = [100.0 * (end - 1.0) for end in (factor.value, factor.low, factor.high)]
     if not math.isfinite(factor.half_width):
         return NOTHING
     if factor.half_width == 0.0:
@@ -409,7 +449,7 @@ def _change(factor: Interval) -> str:
 
 
 def study_options(result: LifeResult) -> list[str]:
-    """Return the options of a study of lives without those of its precision and rare events."""
+    """Return the options of a study of lives but for precision and rare events."""
     shares = ",".join(f"{share:g}" for share in result.settings.shares)
     options = ["-n", str(result.settings.plain), "--seed", str(result.raw.seed), "--b", shares]
     options += ["--max", f"{result.most:.17g}"]
@@ -439,22 +479,28 @@ def target_text(result: LifeResult) -> str:
     assert result.target is not None
     if obstacle := result.probability_obstacle(result.target):
         return f"not stated: {obstacle}"
-    found = result.probability_before(result.target)
-    if not 0.0 < found.value < _SMALL:
-        return part_with_interval(found)
-    interval = f" [{found.low:.2g}, {found.high:.2g}]" if found.low < found.high else ""
-    return f"{found.value:.3g}{interval}"
+    probability = result.probability_before(result.target)
+    if not 0.0 < probability.value < _SMALL:
+        return part_with_interval(probability)
+    interval = (
+        f" [{probability.low:.2g}, {probability.high:.2g}]"
+        if probability.low < probability.high
+        else ""
+    )
+    return f"{probability.value:.3g}{interval}"
 
 
-def rare_text(found: RareProbability) -> str:
+def rare_text(estimate: RareProbability) -> str:
     """Return the probability of a rare event, or why there is none."""
-    if not found.is_reliable:
-        return f"refused, {found.obstacle}"
-    chance = found.probability
-    text = f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(found.tests)} tests"
-    text += f", variation {shown(found.variation, '%', 2)}"
-    if found.effective_size is not None:
-        text += f", effective sample size {found.effective_size:.0f}"
+    if not estimate.is_reliable:
+        return f"refused, {estimate.obstacle}"
+    chance = estimate.probability
+    text = (
+        f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(estimate.tests)} tests"
+    )
+    text += f", variation {shown(estimate.variation, '%', 2)}"
+    if estimate.effective_size is not None:
+        text += f", effective sample size {estimate.effective_size:.0f}"
     return text
 
 

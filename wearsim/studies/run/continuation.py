@@ -20,6 +20,11 @@ from wearsim.studies.run.grid import start_of_run
 from wearsim.studies.run.result import RunData
 from wearsim.units import in_engineers_unit
 
+EXTENSIONS = 10  # of a test that ends before its limit, each to twice its length
+LONGER = 4.0  # times the test, from which on a limit gives a warning
+PRESSURE = 2.0  # times the peak pressure of the fresh contact, which no groove reaches
+_DEPTHS = ("depth", "roller depth", "lift error", "clearance")
+
 
 def stored_scenario(data: RunData, passes: float | None = None) -> Scenario:
     """Return the scenario of a file, with another number of passes if given."""
@@ -96,12 +101,6 @@ def without_limit_rows(data: RunData, state: WearState) -> RunData:
         history={name: array[steps] for name, array in data.history.items()},
         records={name: array[records] for name, array in data.records.items()},
     )
-
-
-EXTENSIONS = 10  # of a test that ends before its limit, each to twice its length
-LONGER = 4.0  # times the test, from which on a limit gives a warning
-PRESSURE = 2.0  # times that of the fresh contact, which no groove reaches
-_DEPTHS = ("depth", "roller depth", "lift error", "clearance")
 
 
 def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:

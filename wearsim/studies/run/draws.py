@@ -72,8 +72,8 @@ class Draws:
             if item.name == name:
                 (path,) = item.paths
                 signed = _changes_sign(path.value)
-                found = np.abs(path.value).mean() if signed else path.mean(0.0, time)
-                sizes.append(abs(float(found)))
+                path_mean = np.abs(path.value).mean() if signed else path.mean(0.0, time)
+                sizes.append(abs(float(path_mean)))
         for random in self.passes:
             if len(random.keys) == 1 and CONTACT_FIELDS[random.keys[0]] == name:
                 values = random.scalar.quantile(_MIDPOINTS)
@@ -208,10 +208,10 @@ class Drawer:
             for item in self.items
         }
         correlations = [
-            (one, other, rank)
+            (first_name, other, rank)
             for first, second, rank in scenario.sampling.correlation
             if first in self._names and second in self._names
-            for one, other in zip(self._names[first], self._names[second], strict=True)
+            for first_name, other in zip(self._names[first], self._names[second], strict=True)
         ]
         self._sampler = Sampler(
             scenario.seed,
@@ -278,24 +278,28 @@ class Drawer:
         return Draws(
             scenario=realise(scenario, listed) if listed else scenario,
             rollers=contact_values(self.items, unlisted),
-            varying=tuple(one for found in paths.values() for one in found),
+            varying=tuple(path for of_input in paths.values() for path in of_input),
             passes=tuple(item for item in scenario.random if item.is_redrawn),
             values=values,
-            time_means={item.name: _means(scenario, item, found) for item, found in paths.items()},
+            time_means={
+                item.name: _means(scenario, item, of_input) for item, of_input in paths.items()
+            },
         )
 
     def uniforms(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the uniform numbers of consecutive realisations by name, (count, dimension)."""
-        found = self._sampler.uniforms(first, count)
+        uniforms = self._sampler.uniforms(first, count)
         for place in [k for k in range(count) if first + k in self._changes]:
             for name, numbers in self._changed(first + place).items():
-                found[name][place] = numbers
+                uniforms[name][place] = numbers
         if self._shift:
             from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
 
             for name, shift in self._shift.items():
-                found[name] = np.clip(ndtr(ndtri(found[name]) + shift), 1.0 - BELOW_ONE, BELOW_ONE)
-        return found
+                uniforms[name] = np.clip(
+                    ndtr(ndtri(uniforms[name]) + shift), 1.0 - BELOW_ONE, BELOW_ONE
+                )
+        return uniforms
 
     def _changed(self, realisation: int) -> dict[str, FloatArray]:
         """Return the uniform numbers of a realisation that is a change of others, (dimension,)."""
@@ -337,9 +341,9 @@ class Drawer:
             uniforms = self.uniforms(first + start, stop - start)
             for item in self.items:
                 for roller, name in enumerate(self._names[item.name]):
-                    found = item.values(uniforms[name])
+                    values = item.values(uniforms[name])
                     for number, key in enumerate(item.keys):
-                        columns[key].reshape(count, -1)[start:stop, roller] = found[:, number]
+                        columns[key].reshape(count, -1)[start:stop, roller] = values[:, number]
         return columns
 
 
@@ -377,16 +381,16 @@ def _paths(scenario: Scenario, item: RandomInput, realisation: int) -> list[Vary
     groups = [rollers] if item.persistence == "per-test" else [(r,) for r in rollers]
     times = process.spacing * np.arange(points, dtype=np.float64)
     stream = Stream(scenario.seed, item.name, "process")
-    found = []
+    paths = []
     for block, group in enumerate(groups):
         uniforms = partial(stream.uniforms, realisation=realisation, block=block)
         value = process.path(points, uniforms) - origin(item.name, item.mean[0])
-        found.append(Varying(CONTACT_FIELDS[item.name], group, (PiecewiseLinear(times, value),)))
-    return found
+        paths.append(Varying(CONTACT_FIELDS[item.name], group, (PiecewiseLinear(times, value),)))
+    return paths
 
 
 def _means(scenario: Scenario, item: RandomInput, paths: list[Varying]) -> FloatArray:
     """Return the mean of a process over the test, one or one for each roller [SI]."""
     start = origin(item.name, item.mean[0])
-    found = np.array([one.paths[0].mean(0.0, scenario.total_time) + start for one in paths])
-    return found if item.persistence == "per-roller" else found[0]
+    means = np.array([path.paths[0].mean(0.0, scenario.total_time) + start for path in paths])
+    return means if item.persistence == "per-roller" else means[0]

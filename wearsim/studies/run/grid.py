@@ -35,7 +35,7 @@ MOST_STRIPS = 801
 STRIPS_AT_START = 241  # at most, unless the contacts of the unworn bodies require more
 STRIPS_BEFORE_JOINING = 401  # of a growing groove
 STRIPS_OF_MANY_CONTACTS = 141  # the same where the contacts of a turn are solved together
-COARSER = 1.3  # width of strips that realisations share over that of the strips of one
+COARSER = 1.3  # width of strips that realisations share over the strips of one
 LEAST_CHOSEN = 2.5  # strips per half-width of a patch; with fewer chosen ones, strips grow
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
@@ -62,7 +62,7 @@ def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> F
 
 
 def contact_centre(scenario: Scenario, rollers: Sequence[int]) -> float:
-    """Return the middle of the strips [m]: the scenario's, or that of the contacts of rollers."""
+    """Return the middle of the strips [m]: the scenario's, or between the rollers' contacts."""
     if scenario.contact.centre is not None:
         return scenario.contact.centre
     positions = contact_positions(scenario, contact_inputs(scenario, rollers))
@@ -72,7 +72,7 @@ def contact_centre(scenario: Scenario, rollers: Sequence[int]) -> float:
 def contact_grid(scenario: Scenario, load: float) -> Grid:
     """Return the strips of the first roller's contact under `load` [N].
 
-    They are those of the scenario, those of the profile's whole width, or the choice of the model.
+    The scenario gives them, the whole width of the profile, or the choice of the model.
     """
     choice, profile = scenario.contact, scenario.cylinder.profile
     centre, half_width = contact_centre(scenario, [0]), widest_patch(scenario, load).b
@@ -304,13 +304,13 @@ def start_of(draws: Draws, shared: Grid) -> Grid:
     They must cover the contacts of the unworn bodies, and resolve them nearly as well as its own.
     """
     scenario, extent = draws.scenario, extent_of(draws)
-    own = strips_of_run(draws, extent)
-    if scenario.contact.width is not None or ends_roller(scenario, *own.edges):
-        return shared if same_strips(own, shared) else own
+    strips = strips_of_run(draws, extent)
+    if scenario.contact.width is not None or ends_roller(scenario, *strips.edges):
+        return shared if same_strips(strips, shared) else strips
     reach = abs(extent.centre - 0.5 * (shared.edges[0] + shared.edges[1])) + extent.fresh
     covers = 2.0 * reach <= shared.strips * shared.spacing
-    resolves = scenario.contact.strips or shared.spacing <= COARSER * own.spacing
-    return shared if covers and resolves else own
+    resolves = scenario.contact.strips or shared.spacing <= COARSER * strips.spacing
+    return shared if covers and resolves else strips
 
 
 def start_of_run(scenario: Scenario, draws: Draws) -> Grid:

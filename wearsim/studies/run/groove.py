@@ -19,10 +19,10 @@ from wearsim.types import ContactSolution, FloatArray
 
 
 def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None) -> HertzContact:
-    """Return the patch of the unworn bodies under `load` [N], that of Hertz.
+    """Return the patch of the unworn bodies under `load` [N] after Hertz.
 
-    Where a roller ends within it, the patch is that of a line contact as wide as the roller. The
-    relative curvature along rolling [1/m] is that of cylinder and roller unless it is given.
+    Where a roller ends within it, the patch is a line contact as wide as the roller. The
+    relative curvature along rolling [1/m] is taken from cylinder and roller unless it is given.
     """
     modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
     if curvature is None:
@@ -53,8 +53,8 @@ def hardest_patch(scenario: Scenario, load: float) -> tuple[HertzContact, float]
         return fresh_patch(scenario, load), load
     turn = turn_of(scenario)
     point = turn.at_stations(turn.stations)
-    each = zip(patches_at(scenario, point), point.normal_force.tolist(), strict=True)
-    return max(each, key=lambda pair: pair[0].peak_pressure)
+    pairs = zip(patches_at(scenario, point), point.normal_force.tolist(), strict=True)
+    return max(pairs, key=lambda pair: pair[0].peak_pressure)
 
 
 def widest_patch(scenario: Scenario, load: float) -> HertzContact:

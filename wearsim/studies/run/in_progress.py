@@ -29,7 +29,7 @@ from wearsim.plugins import ContactModelSpec, registry
 from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, station_columns
-from wearsim.studies.contact.comparison import REFERENCE, excess
+from wearsim.studies.contact.comparison import REFERENCE, error_above_tolerance
 from wearsim.studies.failures import explained, failures_explained, too_deep_failure
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
@@ -242,8 +242,8 @@ class RunInProgress:
             elif stations > 0.5 * relative:
                 remedy = "more cam.stations decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
-        for remedy, found in beyond.items():
-            names, errors_text = map(" and ".join, zip(*found, strict=True))
+        for remedy, texts in beyond.items():
+            names, errors_text = map(" and ".join, zip(*texts, strict=True))
             self.warn(
                 f"estimated error of {names}: {errors_text}, above the tolerance of"
                 f" {100.0 * tolerance:.2g} %; {remedy}"
@@ -305,16 +305,19 @@ class RunInProgress:
         passes and all are reached; `start` is the pass at the start of the step.
         """
         choice, state = self.scenario.contact, self.recorder.state
+        if choice.auto is None or choice.model == REFERENCE:
+            return
         due = start == 0.0 or any(start < part * self.stop <= self._passes for part in (0.5, 1.0))
-        known = REFERENCE in registry().names(ContactModelSpec)
-        if choice.auto is None or choice.model == REFERENCE or not (due and known):
+        if not due or REFERENCE not in registry().names(ContactModelSpec):
             return
         materials = self.scenario.cylinder.material, self.scenario.roller.material
         problem = self.present
         batch = present_batch(problem, state)
         tolerance, grid = choice.auto.tolerance, problem.grid
         factor = self.scenario.friction.creep_factor
-        if text := excess(REFERENCE, problem.model, grid, materials, batch, tolerance, factor):
+        if text := error_above_tolerance(
+            REFERENCE, problem.model, grid, materials, batch, tolerance, factor
+        ):
             self.warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
 
     def warn(self, message: str) -> None:

@@ -1,4 +1,4 @@
-"""Inputs of contacts: those of a scenario, and drawn values."""
+"""Inputs of contacts: values of a scenario, and drawn values."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def contact_values(
 def contact_inputs(
     scenario: Scenario, rollers: Sequence[int], drawn: Mapping[str, FloatArray] | None = None
 ) -> dict[str, FloatArray]:
-    """Return the inputs of the contacts of rollers: drawn values, or those of the scenario.
+    """Return the inputs of the contacts of rollers: drawn values, or the scenario's.
 
     Parameters
     ----------

@@ -117,9 +117,9 @@ def with_nodes(
         weights.append(weight)
         functions = partial(_other_wear, force=force, full_slip=full_slip)
         exact = functions(reference, others).mean(axis=1)
-        found = functions(inputs, points) @ weight
+        calibrated = functions(inputs, points) @ weight
         seen = exact > 0.0
-        error = max(error, float(np.abs(found[seen] / exact[seen] - 1.0).max(initial=0.0)))
+        error = max(error, float(np.abs(calibrated[seen] / exact[seen] - 1.0).max(initial=0.0)))
     return replace(
         problem,
         inputs=inputs,
@@ -137,8 +137,10 @@ def _full_slip_creepage(problem: WearProblem, scenario: Scenario, force: float) 
     over the stations.
     """
     curvatures = np.maximum(np.ravel(problem.kinematics.longitudinal_curvature), 1e-3)
-    each = [curvature * fresh_patch(scenario, force, curvature).a for curvature in curvatures]
-    return float(np.mean(each))
+    half_lengths = [
+        curvature * fresh_patch(scenario, force, curvature).a for curvature in curvatures
+    ]
+    return float(np.mean(half_lengths))
 
 
 def _wear(inputs: ContactInputs, part: slice, force: float, full_slip: float) -> FloatArray:
@@ -175,8 +177,8 @@ def _wear_functions(
 ) -> FloatArray:
     """Return functions of the inputs that approximate wear, shape (functions, draws)."""
     wear, tilt = _wear(inputs, part, force, full_slip), inputs.tilt[part, 0]
-    one = np.ones_like(tilt)
-    return np.array([one, wear, wear * tilt, wear * tilt**2, tilt, tilt**2, wear * tilt**3])
+    ones = np.ones_like(tilt)
+    return np.array([ones, wear, wear * tilt, wear * tilt**2, tilt, tilt**2, wear * tilt**3])
 
 
 def _calibrated(values: FloatArray, means: FloatArray) -> FloatArray:
@@ -197,7 +199,7 @@ def _calibrated(values: FloatArray, means: FloatArray) -> FloatArray:
     for count in range(len(used), 1, -1):
         rows = values[used[:count]] / scale[used[:count], None]
         missing = means[used[:count]] / scale[used[:count]] - rows @ equal
-        found: FloatArray = equal + rows.T @ (np.linalg.pinv(rows @ rows.T, 1e-10) @ missing)
-        if found.min() > LEAST_WEIGHT / nodes:
-            return found
+        weights: FloatArray = equal + rows.T @ (np.linalg.pinv(rows @ rows.T, 1e-10) @ missing)
+        if weights.min() > LEAST_WEIGHT / nodes:
+            return weights
     return equal

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from wearsim.errors import ContactError, StepError
+from wearsim.errors import ContactError, SolverError, StepError
 from wearsim.evolution.integrate import Advance
 from wearsim.evolution.observables import depth, groove_width, present_contacts, volume
 from wearsim.evolution.problem import WearProblem
@@ -127,7 +127,7 @@ class History:
     """Observables of a single test at its start and after each of its steps.
 
     Where the contacts of a state carry the present loads, nothing is solved for its observables.
-    They are then computed together with those of later states, as realisations of one problem.
+    They are then computed together with later states, as realisations of one problem.
 
     Parameters
     ----------
@@ -192,6 +192,9 @@ def _carries_loads(stepper: Stepper, problem: WearProblem, state: WearState) -> 
     """Return whether nothing is solved for the observables: the end of a step at constant load."""
     constant = problem.constant_load is not None and not problem.varying
     plain = not (problem.terms or problem.pauses or problem.has_nodes)
+    cam = problem.kinematics.cam
+    # the round-off of products of matrices depends on the number of realisations
+    plain &= cam is None or (cam.recorded is None and not cam.inertia.size)
     return constant and plain and state.past_spans is not None and not stepper.pass_by_pass
 
 
@@ -365,9 +368,13 @@ class Recorder:
             self._kept = (self._kept[0], len(self._records), *self._kept[2:])
 
     def drop_unfinished(self) -> None:
-        """Remove the rows of an interrupted `add`."""
+        """Remove the rows of an interrupted `add`, and records whose side steps fail."""
         self._history.shorten(self._kept[0])
         del self._records[self._kept[1] :]
+        try:
+            self._compute_records()
+        except SolverError:
+            del self._records[-len(self._waiting) :]
 
     @property
     def state(self) -> WearState:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import xarray
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
+_DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,8 +118,6 @@ def read_results(path: str | Path) -> RunData:
 
 
 Number: TypeAlias = float | list[float]
-
-_DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +269,7 @@ class Result(StudyResult[RunData]):
         """Estimated numerical errors after each step, by the name of the quantity [SI].
 
         They are due to steps, strips and the stations of a cam; not a number where they are not
-        estimated. That of the depth applies to either body, and that of the worn volume to both.
+        estimated. The error of the depth applies to either body, of the worn volume to both.
 
         Examples
         --------
@@ -453,14 +452,14 @@ class Result(StudyResult[RunData]):
     def _final_errors(self, last: Arrays) -> dict[str, Number]:
         """Return the estimated errors of the final state, the greatest one over the rollers."""
         variables = self.raw.schema.variables
-        found: dict[str, Number] = {}
+        errors: dict[str, Number] = {}
         for name in ESTIMATED:
             error = last.get(f"{name}_error")
             if error is not None:
                 over_rollers = "roller" in variables[name].dims
                 greatest = error.max(axis=0) if over_rollers else error
-                found[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
-        return found
+                errors[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
+        return errors
 
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
         """Return the final state of a cam, and depth and lift error per station."""

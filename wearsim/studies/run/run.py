@@ -66,7 +66,7 @@ def run(
     stop_requested : callable, optional
         Called after every step; True stops the run after a checkpoint.
     storage : Storage
-        File operations; those of the operating system, except in tests.
+        File operations, of the operating system except in tests.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def resume(
     stop_requested: Callable[[], bool] | None = None,
     storage: Storage = DISK,
 ) -> Result:
-    """Continue a run from its file; the result is bit for bit that of an unbroken one.
+    """Continue a run from its file; the result equals an unbroken one bit for bit.
 
     Parameters
     ----------

@@ -48,21 +48,37 @@ _ESTIMATED = {
     "least_wear_angle": "the angle of the least wear",
     "greatest_wear_angle": "the angle of the greatest wear",
 }
-#: their names; that of the error ends on "_error"
+#: their names; the name of the error ends on "_error"
 ESTIMATED = tuple(_ESTIMATED)
+#: ends of the names of errors, the sum first, and what they are due to
+ERROR_PARTS = {"": "", "_by_steps": " due to the steps", "_by_strips": " due to the strips"}
+_AT_STATIONS = {
+    "depth": (_TEST, "m", "greatest depth of the cam"),
+    "volume": (_TEST, "m^3", "volume worn off both bodies"),
+    "peak_pressure": (_ROLLER, "Pa", "greatest peak pressure"),
+}
+_EXTREMES = {
+    "lift_error": (_ROLLER, "m", "greatest less smallest change of the lift by wear"),
+    "depth_angle": (_TEST, "rad", "angle of the greatest depth of the cam"),
+    "peak_pressure_angle": (_ROLLER, "rad", "angle of the greatest peak pressure"),
+    "least_wear_angle": (_ROLLER, "rad", "angle of the greatest change of the lift, with its sign"),
+    "greatest_wear_angle": (
+        _ROLLER,
+        "rad",
+        "angle of the smallest change of the lift, with its sign",
+    ),
+}
+_CURVE = ("record", "station", "roller", "realisation")
 
 
 def _with_errors(variables: Iterable[Variable]) -> Iterator[Variable]:
-    """Yield variables, and those of their estimated errors."""
+    """Yield variables, and the variables of their estimated errors."""
     for item in variables:
         yield item
         if item.name in _ESTIMATED:
             text = f"estimated error of {_ESTIMATED[item.name]}"
             yield replace(item, name=f"{item.name}_error", long_name=text)
 
-
-#: ends of the names of errors, the sum first, and what they are due to
-ERROR_PARTS = {"": "", "_by_steps": " due to the steps", "_by_strips": " due to the strips"}
 
 VARIABLES: Mapping[str, Variable] = by_name(
     _with_errors(
@@ -167,23 +183,6 @@ VARIABLES: Mapping[str, Variable] = by_name(
     )
 )
 
-_AT_STATIONS = {
-    "depth": (_TEST, "m", "greatest depth of the cam"),
-    "volume": (_TEST, "m^3", "volume worn off both bodies"),
-    "peak_pressure": (_ROLLER, "Pa", "greatest peak pressure"),
-}
-_EXTREMES = {
-    "lift_error": (_ROLLER, "m", "greatest less smallest change of the lift by wear"),
-    "depth_angle": (_TEST, "rad", "angle of the greatest depth of the cam"),
-    "peak_pressure_angle": (_ROLLER, "rad", "angle of the greatest peak pressure"),
-    "least_wear_angle": (_ROLLER, "rad", "angle of the greatest change of the lift, with its sign"),
-    "greatest_wear_angle": (
-        _ROLLER,
-        "rad",
-        "angle of the smallest change of the lift, with its sign",
-    ),
-}
-_CURVE = ("record", "station", "roller", "realisation")
 #: further variables of the run of a cam
 CAM_VARIABLES: Mapping[str, Variable] = by_name(
     _with_errors(

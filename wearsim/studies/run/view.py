@@ -49,6 +49,7 @@ _RECORDS = {
     "line_load.csv": "line_load",
     "dissipation.csv": "dissipation",
 }
+_UNITS = {"volume": "mm^3", "peak_pressure": "MPa", "width": "mm"}  # the others in um
 
 
 class RunView(StudyView[Result]):
@@ -223,8 +224,8 @@ class RunView(StudyView[Result]):
     def origin(self) -> dict[str, Any]:
         """Return length, records, scenario, files, plugins and software for JSON."""
         result = self.result
-        own = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
-        return {**own, **super().origin()}
+        length = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
+        return {**length, **super().origin()}
 
     def line(self) -> str:
         """Return the footer of the run, with the estimated errors of its steps and strips."""
@@ -392,9 +393,6 @@ def _columns(
 def _last(value: Any) -> int:
     """Return the last value of a history, or the number itself."""
     return int(np.ravel(value)[-1])
-
-
-_UNITS = {"volume": "mm^3", "peak_pressure": "MPa", "width": "mm"}  # the others in um
 
 
 def limit_rows(result: Result, *, brief: bool = False) -> Rows:

@@ -22,7 +22,7 @@ _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 @dataclass(frozen=True)
-class Kernel:
+class LikelihoodMixture:
     """Likelihood of ln K as a mixture of normal densities.
 
     Parameters
@@ -44,7 +44,7 @@ class Kernel:
     effective_size: float = 1.0
 
     @classmethod
-    def of(cls, log_weight: FloatArray, centre: FloatArray, std: FloatArray) -> Kernel:
+    def of(cls, log_weight: FloatArray, centre: FloatArray, std: FloatArray) -> LikelihoodMixture:
         """Return the mixture over draws, smoothed over the distances between them.
 
         The bandwidth is Silverman's, and the draws are moved towards their mean so that the
@@ -129,7 +129,7 @@ class Kernel:
             found[row] = top + np.log(np.exp(exponent - top[:, None]).sum(axis=1))
         return scale, found
 
-    def _reduced(self) -> Kernel:
+    def _reduced(self) -> LikelihoodMixture:
         """Return the mixture with neighbouring parts merged, mean and variance kept."""
         if len(self.weight) <= _MOST_PARTS:
             return self
@@ -139,4 +139,4 @@ class Kernel:
         centre = np.add.reduceat((self.weight * self.centre)[order], starts) / weight
         second = (self.weight * (self.std**2 + self.centre**2))[order]
         square = np.add.reduceat(second, starts) / weight - centre**2
-        return Kernel(weight, centre, np.sqrt(np.maximum(square, 1e-300)))
+        return LikelihoodMixture(weight, centre, np.sqrt(np.maximum(square, 1e-300)))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wearsim.types import FloatArray
-from wearsim.uq.hierarchy.kernels import REACH, Kernel
+from wearsim.uq.hierarchy.kernels import REACH, LikelihoodMixture
 
 PRIOR_SCALE = 0.5  # of the half-normal prior of t
 GREATEST = 6.0  # t of the grid
@@ -40,7 +40,7 @@ class Hierarchy:
 
     Parameters
     ----------
-    kernels : sequence of Kernel
+    kernels : sequence of LikelihoodMixture
         Likelihood of each test; of more tests they are repeated in this order.
     t : ndarray, shape (t,)
         Grid of the scatter of ln K.
@@ -48,7 +48,9 @@ class Hierarchy:
         Number of tests, by default that of the kernels.
     """
 
-    def __init__(self, kernels: Sequence[Kernel], t: FloatArray, tests: int | None = None) -> None:
+    def __init__(
+        self, kernels: Sequence[LikelihoodMixture], t: FloatArray, tests: int | None = None
+    ) -> None:
         self.kernels, self.t = list(kernels), t
         found = [kernel.table(t) for kernel in self.kernels]
         self._scale = np.stack([scale for scale, _ in found])  # (kernels, t)
@@ -167,7 +169,7 @@ class Posterior:
     scale: float = PRIOR_SCALE
 
     @classmethod
-    def of(cls, kernels: Sequence[Kernel], count: int = 160) -> Posterior:
+    def of(cls, kernels: Sequence[LikelihoodMixture], count: int = 160) -> Posterior:
         """Return the posterior of tests with the given likelihoods."""
         grid = scatters(count)
         hierarchy = Hierarchy(kernels, grid)

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from wearsim.types import BoolArray, FloatArray
-from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import Hierarchy, ratios, scatters, upper_limits
 from wearsim.uq.sampling.sobol import Stream
 
@@ -24,13 +24,13 @@ _GREATEST = 3.0
 
 
 def simulated_centres(
-    kernels: Sequence[Kernel], tests: int, sets: int, t: float, seed: int, name: str
+    kernels: Sequence[LikelihoodMixture], tests: int, sets: int, t: float, seed: int, name: str
 ) -> FloatArray:
     """Return the apparent ln K of simulated tests, whose m is 0.
 
     Parameters
     ----------
-    kernels : sequence of Kernel
+    kernels : sequence of LikelihoodMixture
         Likelihood of each test; of more tests they are repeated in this order.
     tests, sets : int
         Number of tests of a set, and of sets.
@@ -72,7 +72,7 @@ class Design:
 
     Parameters
     ----------
-    kernels : sequence of Kernel
+    kernels : sequence of LikelihoodMixture
         Likelihood of each test; of more tests they are repeated in this order.
     tests : int, optional
         Number of tests, by default that of the kernels.
@@ -85,7 +85,7 @@ class Design:
 
     def __init__(
         self,
-        kernels: Sequence[Kernel],
+        kernels: Sequence[LikelihoodMixture],
         tests: int | None = None,
         *,
         negligible: float = NEGLIGIBLE,
@@ -145,7 +145,7 @@ class Power:
 
     def __init__(
         self,
-        kernels: Sequence[Kernel],
+        kernels: Sequence[LikelihoodMixture],
         *,
         negligible: float = NEGLIGIBLE,
         seed: int = 0,

@@ -185,7 +185,7 @@ class FactorMixture(LifeDistribution):
     @cached_property
     def middle(self) -> float:
         """A life within the distribution: that of the median wear factor."""
-        finite = self.kappa[self._is_finite]
+        finite = self.kappa[self.is_finite]
         return (
             float(np.median(finite) / math.exp(self.score.log_quantile(0.0)))
             if len(finite)
@@ -195,7 +195,7 @@ class FactorMixture(LifeDistribution):
     @property
     def steps(self) -> FloatArray:
         """Lives of the finite realisations with each value of the factor that has a probability."""
-        return np.unique(self.kappa[self._is_finite][:, None] / self.score.atoms)
+        return np.unique(self.kappa[self.is_finite][:, None] / self.score.atoms)
 
     def failed(self, life: FloatArray) -> FloatArray:
         """Return each realisation's probability of failure before `life`, (m,) to (count, m)."""
@@ -239,7 +239,7 @@ class FactorMixture(LifeDistribution):
         """Return the effective number by the fits of ln kappa."""
         from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
-        shares = float((self.kappa == 0.0).mean()), float(self._is_finite.mean())
+        shares = float((self.kappa == 0.0).mean()), float(self.is_finite.mean())
         return predicted_number(
             self._fits.values(widened),
             lambda log: np.asarray(ndtr(-self.needed_score(log, life))),
@@ -248,13 +248,14 @@ class FactorMixture(LifeDistribution):
         )
 
     @cached_property
-    def _is_finite(self) -> BoolArray:
+    def is_finite(self) -> BoolArray:
+        """Whether each realisation reaches its limit, and not at once."""
         return np.isfinite(self.kappa) & (self.kappa > 0.0)
 
     @cached_property
     def log_kappa(self) -> tuple[FloatArray, BoolArray]:
         """Finite ln kappa over the median factor given the other draws, and which are finite."""
-        chosen = self._is_finite
+        chosen = self.is_finite
         shift = np.broadcast_to(np.asarray(self.shift), self.kappa.shape)[chosen]
         moved = self.score.log_quantile(shift) - self.score.log_quantile(0.0)
         return np.log(self.kappa[chosen]) - moved, chosen

@@ -17,7 +17,7 @@ from wearsim.types import FloatArray
 
 LEAST_NUMBER = 20.0  # effective number below which no probability is stated
 _CONFIDENCE = 0.9  # of the upper limit of the spread, by which a probability is refused
-_WIDENED = 0.1, 0.01  # probabilities from which and to which the spread is widened for intervals
+_WIDENED = 0.05, 0.01  # probabilities from which and to which the spread is widened for intervals
 _FEWEST = 8  # finite values for a fit with a quadratic term
 _SCORES = np.linspace(-9.0, 9.0, 721)
 _DENSITY = np.exp(-0.5 * _SCORES**2) / np.exp(-0.5 * _SCORES**2).sum()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from wearsim_chevalier2005 import comparison_inputs as inputs
-from wearsim_chevalier2005 import comparison_spread as spread
+from wearsim_chevalier2005 import comparison_inputs as inputs, comparison_spread as spread
 from wearsim_chevalier2005.comparison_row import Row
 from wearsim_chevalier2005.study import Reproduction
 

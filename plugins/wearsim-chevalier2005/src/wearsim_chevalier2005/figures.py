@@ -20,8 +20,7 @@ from wearsim.report.panels import BLUE, GREEN, GREY, ORANGE, PRESSURE, RED
 from wearsim.report.text import PER_SI, count, shown
 from wearsim.studies.contact.panels import SLIDE, STICK
 from wearsim.types import FloatArray
-from wearsim_chevalier2005 import figure_panels as spread
-from wearsim_chevalier2005 import paper
+from wearsim_chevalier2005 import figure_panels as spread, paper
 
 if TYPE_CHECKING:
     from wearsim.studies.contact.single import ContactStudy

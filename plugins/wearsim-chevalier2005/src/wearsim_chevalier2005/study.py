@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch
+from wearsim.results.viewed import Viewed
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.contact.batch import LocalFriction
@@ -59,7 +60,7 @@ VARIANTS = tuple(
 
 
 @dataclass(frozen=True, eq=False)
-class Reproduction:
+class Reproduction(Viewed):
     """Solutions of the problems of the paper.
 
     Parameters
@@ -87,6 +88,10 @@ class Reproduction:
     printed_scenario: Scenario
     scenario: Scenario
     spread: Mapping[Variant, DissipationResult]
+
+    def __repr__(self) -> str:
+        count, mean = self.all_inputs.count, self.all_inputs.summaries["power"].mean
+        return f"<Reproduction: {count} realisations, power {mean:.4g} W>"
 
     @property
     def all_inputs(self) -> DissipationResult:

@@ -84,11 +84,11 @@ class StoredRows(Mapping[str, "Array"]):
         ResultsFileError
             If the file or a part is damaged, or was changed since it was opened.
         """
-        found = self._read(lambda file: np.asarray(file[name][(slice(start, stop), *rest)]))
+        rows = self._read(lambda file: np.asarray(file[name][(slice(start, stop), *rest)]))
         if is_row(self._schema.variables[name]):
             for part in self.parts:
-                part.put_rows(found, name, start, *rest)
-        return found
+                part.put_rows(rows, name, start, *rest)
+        return rows
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -146,7 +146,7 @@ class EnsembleData(StudyData):
     life : dict
         Settings of tests that end at a limit, see `LifeSettings`; empty for others.
     cam : bool
-        Whether the tests are those of a cam.
+        Whether the tests are of a cam.
     variables : mapping of str to ndarray
         Variables of the schema of an ensemble, and the drawn values by dotted key; those
         of a file are read on access. Rows of pending realisations are undefined, those of failed
@@ -207,7 +207,7 @@ class EnsembleData(StudyData):
         return np.flatnonzero(self.status == FAILED)
 
     def rows(self, name: str, start: int, stop: int | None, *rest: slice) -> Array:
-        """Return rows of a variable, including those of pending and failed realisations.
+        """Return rows of a variable, also of pending and failed realisations.
 
         Parameters
         ----------

@@ -95,9 +95,9 @@ class Part:
         first, last = np.searchsorted(self.numbers, (start, start + len(rows))).tolist()
         if first < last:
             chosen = (slice(first, last), *rest)
-            found = read_file(self.path, lambda file: np.asarray(file[name][chosen]))
+            stored = read_file(self.path, lambda file: np.asarray(file[name][chosen]))
             # not all profiles are kept
-            rows[self.numbers[first : first + len(found)] - start] = found
+            rows[self.numbers[first : first + len(stored)] - start] = stored
 
 
 def part_numbers(path: Path) -> list[int]:
@@ -123,7 +123,7 @@ def read_parts(path: Path, data: EnsembleData) -> list[Part]:
     Raises
     ------
     ResultsFileError
-        If parts are missing, damaged, or those of another ensemble.
+        If parts are missing, damaged, or of another ensemble.
     """
     folder = parts_folder(path)
     if not data.finished and not folder.is_dir():

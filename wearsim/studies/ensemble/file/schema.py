@@ -203,7 +203,7 @@ def ensemble_schema(
     life : mapping
         Settings of tests that end at a limit; empty for others.
     cam : bool
-        Whether the tests are those of a cam.
+        Whether the tests are of a cam.
 
     Returns
     -------

@@ -190,7 +190,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         Raises
         ------
         ValueError
-            If one is not pending, or if its values are not those of the schema. Nothing is
+            If one is not pending, or if its values differ from the schema. Nothing is
             written then.
         """
         numbers = [outcome.number for outcome in outcomes]

@@ -13,8 +13,7 @@ from wearsim.studies.run.grid import strips_of_run
 from wearsim_bench.contact.methods import DEFAULT_MODEL
 from wearsim_bench.growth.point import Workload
 from wearsim_bench.measure.measurement import Effort
-from wearsim_bench.sampling.jobs import CHEAP
-from wearsim_bench.sampling.jobs import RIG as SCATTERED
+from wearsim_bench.sampling.jobs import CHEAP, RIG as SCATTERED
 
 RIG = "rig-450min"
 STRIPS, PASSES, RECORDS = "strips", "passes", "recorded profiles"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from wearsim_bench.hard_cases.cases import hard_cases
 from wearsim_bench.hard_cases.evaluation import evaluate
-from wearsim_bench.hard_cases.friction_field import NAME as FIELD
-from wearsim_bench.hard_cases.friction_field import friction_field
+from wearsim_bench.hard_cases.friction_field import NAME as FIELD, friction_field
 from wearsim_bench.hard_cases.runs import Plan
 from wearsim_bench.hard_cases.verdict import Verdict
 from wearsim_bench.measure.measurement import Effort, OnProgress

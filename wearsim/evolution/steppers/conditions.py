@@ -1,0 +1,61 @@
+"""Load and exposure of implicit steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.evolution.contacts import at_least
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.loads import mean_force, smooth_loads
+from wearsim.types import FloatArray
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Prescribed conditions of a step.
+
+    Wear is nearly proportional to the load and the friction coefficient. Their product, integrated
+    over the passes, is the exposure; the formulas take it as independent variable, in which wear
+    is smooth also where load and friction vary.
+
+    Parameters
+    ----------
+    force : ndarray, shape (realisations,) or (stations, 1, realisations)
+        Load before feedback for the solution at the end of the step [N].
+    own, mean : ndarray, shape (realisations,)
+        Exposure per pass in these conditions, and its mean over the step.
+    """
+
+    force: FloatArray
+    own: FloatArray
+    mean: FloatArray
+
+
+def conditions_of(
+    here: WearProblem, problem: WearProblem, state: WearState, passes: FloatArray
+) -> Conditions:
+    """Return the conditions of a step; `here` is the problem with processes at their means.
+
+    The load is that at the end of the step where it varies smoothly, and else its mean.
+    """
+    if problem.constant_load is not None and not problem.varying:
+        own = exposure(here, problem, problem.constant_load)
+        return Conditions(problem.constant_load, own, own)
+    force = mean = mean_force(problem, state, passes)
+    smooth = smooth_loads(problem, state.passes, passes)
+    if smooth.any():
+        force = np.where(smooth, problem.force(problem.time(state.passes + passes)), mean)
+    return Conditions(force, exposure(here, problem, force), exposure(here, problem, mean))
+
+
+def exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> FloatArray:
+    """Return the exposure per pass for a load before feedback, shape (realisations,) [N]."""
+    if force.ndim > 1:  # of a cam
+        force = problem.mean_over_turn(force)[0, 0]
+    own = at_least(problem, force + here.inputs.mean_offset)
+    if any(item.name == "friction" for item in problem.varying):
+        own = own * here.inputs.friction.mean(axis=0)
+    return np.asarray(own)

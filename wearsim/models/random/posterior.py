@@ -1,0 +1,81 @@
+"""The distribution `posterior`: a log-normal value with an uncertain median and scatter."""
+
+from __future__ import annotations
+
+import re
+from typing import Self
+
+import numpy as np
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
+
+from wearsim.csv_tables import read_columns
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.plugins import Options, RandomInputSpec
+from wearsim.quantities import InputFile, PositiveWearFactor, Quantity
+from wearsim.uq.distributions.two_levels import TwoLevels
+
+SPECIMENS, CONTAINED = "specimens", "contained in the scatter"
+_REMARK = re.compile(r"#\s*(?P<name>[^:]+):\s*(?P<value>.*)")
+
+
+class PosteriorOptions(Options):
+    """Options of the distribution `posterior`."""
+
+    file: InputFile = Field(
+        description="CSV with weights of medians and scatters in the columns 'median [1/Pa]',"
+        " 'scatter' and 'weight', from `wearsim identify --posterior`"
+    )
+    over: PositiveWearFactor | None = Field(
+        None,
+        description="K/H by which the values are divided, for the factor of the wear factors of"
+        " both bodies: that of the cylinder or cam",
+    )
+    _levels: TwoLevels = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _read(self, info: ValidationInfo) -> Self:
+        replaced: Quantity | None = (info.context or {}).get("quantity")
+        unit = "1/Pa" if self.over is not None else replaced.kind.unit if replaced else "1"
+        self._levels = read_levels(self.file, unit, self.over or 1.0)
+        return self
+
+    @property
+    def levels(self) -> TwoLevels:
+        """The distribution [SI]."""
+        return self._levels
+
+
+def read_levels(file: InputFile, unit: str, over: float) -> TwoLevels:
+    """Return the distribution that a file holds; raise a ScenarioError for mistakes."""
+    columns = {"median": unit, "scatter": "1", "weight": "1"}
+    read = read_columns(file.text, file.path, columns)
+    mistakes = []
+    for name in columns:
+        wrong = np.flatnonzero(~(read[name] > 0.0))
+        if len(wrong):
+            got = f"{read[name][wrong[0]]:g} in row {wrong[0] + 1}"
+            mistakes.append(Mistake("", "", f"column '{name}' must be above 0", got))
+    if mistakes:
+        raise ScenarioError(file.path, mistakes)
+    found = (_REMARK.fullmatch(line.strip()) for line in file.text.splitlines())
+    remarks = {match["name"].strip(): match["value"].strip() for match in found if match}
+    count = remarks.get(SPECIMENS, "0")
+    contained = [key.strip() for key in remarks.get(CONTAINED, "").split(",") if key.strip()]
+    return TwoLevels(
+        np.log(read["median"] / over),
+        read["scatter"],
+        read["weight"],
+        int(count) if count.isdecimal() else 0,
+        contained,
+    )
+
+
+SPECS = (
+    RandomInputSpec(
+        name="posterior",
+        factory=lambda options: options.levels,
+        options=PosteriorOptions,
+        summary="log-normal with an uncertain median and scatter, from identify --posterior",
+        protocol=2,
+    ),
+)
