@@ -120,7 +120,8 @@ class ImplicitStepper(StepDoublingStepper):
         if state.past_spans is not None:
             return state
         state = with_rates(problem, state)
-        if self.forced_step is None and edges.resolves_edges(problem, state.contacts):
+        doubled = self.by_doubling or self.forced_step is not None
+        if not doubled and edges.resolves_edges(problem, state.contacts):
             state = edges.with_unresolved_edges(problem, state)
         return state
 
