@@ -244,7 +244,7 @@ def export(
     spline: Spline = False,
     force: Force = False,
 ) -> None:
-    """Write a results file as CSV with units in the headers, or the surface of a cam alone."""
+    """Write a results file as CSV with units in the headers, or the surface of a cam."""
     refuse(decimal not in {".", ","}, f"'{decimal}' is neither '.' nor ','", "--decimal")
     sampling = check_surface(
         surface, force, chord=chord, points=points, position=position, spline=spline

@@ -116,13 +116,13 @@ class ImplicitStepper(StepDoublingStepper):
         if state.past_spans is not None:
             return state
         state = with_rates(problem, state)
-        return (
-            edges.with_unresolved_edges(problem, state) if self._resolves(problem, state) else state
-        )
+        resolved = self._resolves(problem, state)
+        return edges.with_unresolved_edges(problem, state) if resolved else state
 
     def _resolves(self, problem: WearProblem, state: WearState) -> bool:
         """Return whether edges of contacts are resolved; step doubling compares whole strips."""
-        return self.forced_step is None and edges.resolves_edges(problem, state.contacts)
+        doubled = self.by_doubling or self.forced_step is not None
+        return not doubled and edges.resolves_edges(problem, state.contacts)
 
     def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the length of the first step, shape (realisations,) [passes]."""

@@ -1,8 +1,8 @@
-"""Panels of lives: survival, probability plots, effects, limits, and lives of a sweep."""
+"""Panels of lives: survival, probability plots, effects, limits, a sweep, and the overview."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,11 +26,14 @@ from wearsim.report.panels import (
     message,
     several_colours,
 )
-from wearsim.report.text import count
+from wearsim.report.text import count, shown
+from wearsim.report.view import Overview, Row, Rows
+from wearsim.studies.cam.overview import CAM_EXCLUDED, loads, picture
 from wearsim.studies.cam.panels import ANGLE
 from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.stored_settings import swept_variable
+from wearsim.studies.run.view import EXCLUDED
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.survival.fits import FAMILIES, Family
@@ -315,3 +318,46 @@ def _limits(designs: Sequence[_Design]) -> Panel:
         bars,
         "Share of the machines by the limit that they reached first.",
     )
+
+
+def life_overview(result: LifeResult, lives: Mapping[str, Rows], no_effects: str) -> Overview:
+    """Return what a page shows first: the design, its loads, limits, lives and what moves them.
+
+    Parameters
+    ----------
+    result : LifeResult
+    lives : mapping of str to list of Row
+        Rows on the lives, by their title.
+    no_effects : str
+        Why there are no effects of the inputs, or an empty text.
+    """
+    scenario, groups, excluded = result.scenario, dict[str, Rows](), list(EXCLUDED)
+    main = life_sheet(result).first if scenario.cam is None else None
+    if scenario.cam is not None:
+        groups["Loads"], main = loads(scenario), picture(scenario)
+        excluded += CAM_EXCLUDED
+    if result.count:
+        shares = (result.first_limits.get(name, 0.0) for name in scenario.limit.given)
+        groups["First limit"] = [
+            Row(name.replace("_", " "), f"the first in {shown(share, '%', 3)} of the tests")
+            for name, share in zip(scenario.limit.given, shares, strict=True)
+        ]
+        title = "What moves the life (with the input at its 10 % and 90 % quantile)"
+        groups |= {**lives, title: _movers(result, no_effects)}
+    return Overview(main, groups, excluded)
+
+
+def _movers(result: LifeResult, no_effects: str) -> Rows:
+    """Return the inputs with the greatest effects on the life, at most three."""
+    if no_effects:
+        return [Row("inputs", no_effects.replace("\n", ": "))]
+    effects = [item for item in result.sensitivity("life") if not item.without_effect]
+    effects.sort(key=lambda item: -item.first.value)
+    changes, rows = result.tornado(), list[Row]()
+    for item in effects[:3]:
+        text = f"{shown(item.first.value, '%', 2)} of the scatter"
+        if item.name in changes:
+            low, high = (one.value - 1.0 for one in changes[item.name].factors)
+            text += f"; life {100.0 * low:+.0f} %, {100.0 * high:+.0f} %"
+        rows.append(Row(item.name, text))
+    return rows or [Row("inputs", "none significantly")]

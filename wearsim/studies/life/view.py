@@ -25,7 +25,6 @@ from wearsim.results.study_view import SAMPLING
 from wearsim.studies.ensemble.view import RealisationsView
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.values import remarks
-from wearsim.studies.run.view import EXCLUDED
 from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.lives import fewest_lives, least_survival
@@ -311,47 +310,14 @@ class LifeView(RealisationsView[LifeResult]):
 
     def overview(self) -> Overview:
         """Return the design with its loads, the lives with intervals, and what moves them."""
-        result, scenario = self.result, self.result.scenario
+        from wearsim.studies.life.panels import life_overview  # noqa: PLC0415  (only of pages)
+
+        result = self.result
         groups: dict[str, Rows] = {}
-        excluded, main = list(EXCLUDED), None
-        if scenario.cam is not None:
-            from wearsim.studies.cam.overview import (  # noqa: PLC0415  (not of a cylinder)
-                CAM_EXCLUDED,
-                loads,
-                picture,
-            )
-
-            groups["Loads"], main = loads(scenario), picture(scenario)
-            excluded += CAM_EXCLUDED
         if result.count:
-            texts = limit_texts(scenario.limit.given)
-            first = (result.first_limits.get(name, 0.0) for name in scenario.limit.given)
-            groups["First limit"] = [
-                Row(text, f"the first in {shown(share, '%', 3)} of the tests")
-                for text, share in zip(texts, first, strict=True)
-            ]
-            groups["Life"] = [
-                Row(f"B{share:g}", _three_digits(result, share)) for share in result.settings.shares
-            ]
-            groups["What moves the life (with the input at its 10 % and 90 % quantile)"] = (
-                self._movers()
-            )
-        return Overview(main or self.panels().first, groups, excluded)
-
-    def _movers(self) -> Rows:
-        """Return the inputs with the greatest effects on the life, at most three."""
-        if why := self._no_effects():
-            return [Row("inputs", why.replace("\n", ": "))]
-        effects = [item for item in self.result.sensitivity("life") if not item.without_effect]
-        effects.sort(key=lambda item: -item.first.value)
-        changes, rows = self.result.tornado(), list[Row]()
-        for item in effects[:3]:
-            text = f"{shown(item.first.value, '%', 2)} of the scatter"
-            if item.name in changes:
-                low, high = (one.value - 1.0 for one in changes[item.name].factors)
-                text += f"; life {100.0 * low:+.0f} %, {100.0 * high:+.0f} %"
-            rows.append(Row(item.name, text))
-        return rows or [Row("inputs", "none significantly")]
+            shares = result.settings.shares
+            groups["Life"] = [Row(f"B{share:g}", _three_digits(result, share)) for share in shares]
+        return life_overview(result, groups, self._no_effects() if result.count else "")
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""

@@ -137,10 +137,9 @@ def _by_doubling(scenario: Scenario) -> bool:
     """Return whether step doubling estimates the errors of implicit steps.
 
     FASTSIM slips in whole elements: in partial slip the power of a strip changes by jumps, and the
-    errors of many steps add up unseen by differences. Steps that resolve edges are not doubled.
+    errors of many steps add up unseen by differences.
     """
-    elements = getattr(scenario.contact.options, "tangential", None) == "fastsim"
-    return elements and not scenario.evolution.resolve_edges
+    return getattr(scenario.contact.options, "tangential", None) == "fastsim"
 
 
 def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
