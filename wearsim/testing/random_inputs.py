@@ -44,15 +44,6 @@ PROCESS: Checks[RandomInputFixture] = Checks()
 _QUANTILE = "wearsim.plugins.Distribution.quantile"
 _DISTRIBUTION = "wearsim.plugins.Distribution"
 _VALUES = "wearsim.plugins.JointDistribution.values"
-BY_ROLE = {
-    role: Checks(ANY | checks)
-    for role, checks in (
-        ("scalar", SCALAR),
-        ("joint", JOINT),
-        ("field", FIELD),
-        ("process", PROCESS),
-    )
-}
 
 
 @dataclass(frozen=True)
@@ -302,3 +293,15 @@ def process_matches_marginal(fixture: RandomInputFixture) -> None:
     for k in (0, 59):
         _require_marginal(process.marginal, paths[:, k], f"point {k} of the path")
     _require_support(process.marginal, paths, "the path")
+
+
+# the requirements above are complete here
+BY_ROLE = {
+    role: Checks(ANY | checks)
+    for role, checks in (
+        ("scalar", SCALAR),
+        ("joint", JOINT),
+        ("field", FIELD),
+        ("process", PROCESS),
+    )
+}

@@ -16,7 +16,7 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
     flexibilities,
     one_flexibility,
 )
-from wearsim.mechanics.tangential.strip_with_spin import Motion, amended_moduli, strip_of
+from wearsim.mechanics.tangential.strip_with_spin import StripMotion, amended_moduli, strip_of
 
 PAIR = combine(STEEL, STEEL)
 SHEAR, NU = PAIR.shear_modulus, PAIR.poisson_ratio
@@ -41,7 +41,7 @@ class Ellipse:
         )
         turning = -phi * self.y
         drive = xi * self.moduli.longitudinal + turning * self.moduli.spin_along
-        self.motion = Motion(xi + turning, drive, eta, phi)
+        self.motion = StripMotion(xi + turning, drive, eta, phi)
 
     def rows(self, points=50):
         """Return force along and across, moment and adhesion of every strip."""
