@@ -360,7 +360,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, own)
     wear, energy = wear_per_pass(here, state.contacts)
-    sums = _sums_per_pass(None, energy)
+    sums = edges.sums_per_pass(None, energy)
     return state.replaced(
         **dict.fromkeys(edges.FIELDS),
         past_wear=first_differences(wear, own),
@@ -371,12 +371,6 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
         wear_exponents=np.ones((*problem.shape, problem.grid.strips)),
         stepping_error=np.zeros_like(state.stacked) if error is None else error,
     )
-
-
-def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
-    """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
-    sums = energy[None] if wear is None else np.concatenate([edges.over_strips(wear), energy[None]])
-    return np.asarray(sums[..., None])
 
 
 def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
@@ -479,7 +473,7 @@ def _step(
     rates, change = worn / worn_passes[:, None], added + worn
     rates = rates if scale is None else rates / scale
     energy_rate = energy_per_pass(problem, end.contacts)
-    sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
+    sum_rates = edges.sums_per_pass(None if parts is None else rates, energy_rate)
     sums = sums + worn_passes[:, None] * sum_rates
     if parts is not None:
         end = edges.with_volume(
