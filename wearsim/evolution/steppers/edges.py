@@ -291,3 +291,9 @@ def with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearS
     added = np.divide(missing, width, out=np.zeros_like(missing), where=width > 0.0)
     cylinder, roller = separated(end.stacked + added[..., None] * parts, len(end.cylinder_depth))
     return end.replaced(cylinder_depth=cylinder, roller_depth=roller)
+
+
+def sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
+    """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
+    sums = energy[None] if wear is None else np.concatenate([over_strips(wear), energy[None]])
+    return np.asarray(sums[..., None])

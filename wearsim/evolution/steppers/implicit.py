@@ -29,7 +29,12 @@ from wearsim.evolution.steppers.loads import (
     abrupt_loads,
     with_feedback,
 )
-from wearsim.evolution.steppers.single_step import carried_loads, energy_per_pass, wear_per_pass
+from wearsim.evolution.steppers.single_step import (
+    carried_loads,
+    energy_per_pass,
+    volumes_of,
+    wear_per_pass,
+)
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
@@ -37,6 +42,7 @@ from wearsim.mechanics.numerics.multistep import (
     MAX_ORDER,
     ROWS,
     extrapolated,
+    first_differences,
     formulas,
     new_differences,
     next_steps,
@@ -254,7 +260,7 @@ class ImplicitStepper(StepDoublingStepper):
         cover : sequence of float
             Safety factors that the errors of volume and profile of the state contain.
         """
-        volumes = _volumes(problem, state.stacked).tolist()
+        volumes = volumes_of(problem, state.stacked).tolist()
         _, *fixed = state.irreducible
         errors = (state.volume_error - fixed[0]).tolist(), (state.profile_error - fixed[1]).tolist()
         low, high = ADDED_UP
@@ -272,11 +278,6 @@ class ImplicitStepper(StepDoublingStepper):
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
         return implicit_step
-
-
-def _volumes(problem: WearProblem, depths: FloatArray) -> FloatArray:
-    """Return the volume of depths of all bodies, as `WearState.stacked`, (realisations,) [m^3]."""
-    return np.asarray((problem.volume_weights[1][:, None] * depths.sum(axis=-1)).sum(axis=0))
 
 
 def _estimates(
@@ -330,7 +331,7 @@ def _estimates(
         sizes[:2] *= OF_EDGES
     found = COVER * sizes
     found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
-    worn = _volumes(problem, depths)
+    worn = volumes_of(problem, depths)
     relative = found[1] / np.where(worn > 0.0, worn, np.inf)
     found[0] = np.maximum(found[0], OF_VOLUME[0] * relative * depths.max(axis=(0, 2)))
     found[2] = np.maximum(found[2], OF_VOLUME[1] * relative)
@@ -359,31 +360,17 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     if past_feedback is not None and problem.has_spring:
         past_feedback[1] = unloading(here, state, own)
     wear, energy = wear_per_pass(here, state.contacts)
-    sums = _sums_per_pass(None, energy)
+    sums = edges.sums_per_pass(None, energy)
     return state.replaced(
         **dict.fromkeys(edges.FIELDS),
-        past_wear=_starting(wear, own),
-        past_sums=_starting(sums, own)[..., 0],
+        past_wear=first_differences(wear, own),
+        past_sums=first_differences(sums, own)[..., 0],
         past_feedback=past_feedback,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
         wear_exponents=np.ones((*problem.shape, problem.grid.strips)),
         stepping_error=np.zeros_like(state.stacked) if error is None else error,
     )
-
-
-def _starting(rates: FloatArray, exposure: FloatArray) -> FloatArray:
-    """Return the differences of a solution with one point, from its change per pass."""
-    differences = np.zeros((ROWS, *rates.shape))
-    differences[0] = rates
-    differences[1] = rates / exposure.reshape(-1, *(1,) * (rates.ndim - 2))
-    return differences
-
-
-def _sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
-    """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
-    sums = energy[None] if wear is None else np.concatenate([edges.over_strips(wear), energy[None]])
-    return np.asarray(sums[..., None])
 
 
 def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
@@ -486,7 +473,7 @@ def _step(
     rates, change = worn / worn_passes[:, None], added + worn
     rates = rates if scale is None else rates / scale
     energy_rate = energy_per_pass(problem, end.contacts)
-    sum_rates = _sums_per_pass(None if parts is None else rates, energy_rate)
+    sum_rates = edges.sums_per_pass(None if parts is None else rates, energy_rate)
     sums = sums + worn_passes[:, None] * sum_rates
     if parts is not None:
         end = edges.with_volume(

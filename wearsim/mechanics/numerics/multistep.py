@@ -276,6 +276,14 @@ def next_steps(
     return found
 
 
+def first_differences(rates: FloatArray, exposure: FloatArray) -> FloatArray:
+    """Return the differences of a solution with one point, from its change per pass."""
+    differences = np.zeros((ROWS, *rates.shape))
+    differences[0] = rates
+    differences[1] = rates / exposure.reshape(-1, *(1,) * (rates.ndim - 2))
+    return differences
+
+
 def compile_multistep() -> None:
     """Compile the kernels of a step by a call for one solution of one value."""
     one, order = np.ones(1), np.ones(1, dtype=np.int64)
