@@ -19,10 +19,12 @@ from wearsim.plugins import Distribution, Options, RandomInputSpec, registry
 from wearsim.testing import ConformanceError, random_input_tests
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.random_inputs import BY_ROLE, RandomInputFixture
-from wearsim.units import ANGLE, FORCE
+from wearsim.units import ANGLE, FORCE, WEAR_FACTOR
 
 FILES = {"loads.csv": "value [N]\n280\n300\n300\n340\n", "table.csv":
          "probability, value [N]\n0, 250\n0.3, 290\n1, 350\n"}  # fmt: skip
+POSTERIOR = {"levels.csv": "# specimens: 8\nmedian [1/Pa], scatter, weight\n"
+             "1e-11, 0.2, 1\n1.2e-11, 0.3, 2\n1.5e-11, 0.4, 1\n"}  # fmt: skip
 LOAD = {"kind": FORCE, "files": FILES}
 FRICTION = {"marginal": ("uniform", {"low": 0.08, "high": 0.12})}
 TESTED = {
@@ -43,6 +45,7 @@ TESTED = {
     ],
     "constant": [({"value": "300 N"}, LOAD)],
     "table": [({"file": "loads.csv"}, LOAD), ({"file": "table.csv"}, LOAD)],
+    "posterior": [({"file": "levels.csv"}, {"kind": WEAR_FACTOR, "files": POSTERIOR})],
     "disc": [({"radius": "2 mrad"}, {"kind": ANGLE})],
     "white": [({}, FRICTION), ({"frame": "roller"}, FRICTION)],
     "gaussian-field": [({"correlation_length": "50 um"}, FRICTION)],
