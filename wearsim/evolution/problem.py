@@ -29,11 +29,13 @@ if TYPE_CHECKING:
     from wearsim.evolution.strips import Growth
 
 FREE = 0.075  # part of all strips that is without load on each side, at least
+UNEVEN = 3.0  # bend of a gap over its median from which it is not that of crowned bodies
 #: properties that do not depend on the inputs of contacts, or on the tilt alone
 _CONSTANTS = (
     *("shape", "body_rows", "volume_weights", "nominal_least_gap", "cylinder_share", "has_spring"),
     *("constant_load", "pauses", "greatest_load", "_wear_coefficients"),
 )
+_OF_GAP = "nominal_gap", "nominal_least_gap", "has_crowned_gap"
 
 
 @dataclass(frozen=True)
@@ -228,6 +230,16 @@ class WearProblem:
         return gap
 
     @cached_property
+    def has_crowned_gap(self) -> bool:
+        """Whether the gap before wear is that of crowned bodies in all strips.
+
+        It is not where strips reach the ends of a roller, a rounding or a chamfer, and on measured
+        profiles.
+        """
+        bend = np.diff(self.nominal_gap, 2, axis=-1)
+        return bool(((bend > 0.0) & (bend < UNEVEN * np.median(bend, -1, keepdims=True))).all())
+
+    @cached_property
     def spin(self) -> FloatArray:
         """Spin of every contact, shape (contacts, realisations) [1/m]."""
         return self.inputs.tilt / self.kinematics.roller_radius
@@ -335,7 +347,7 @@ class WearProblem:
             getattr(self, name)  # computed once, for all problems with other inputs
         found = object.__new__(WearProblem)
         tilted = not np.array_equal(inputs.tilt, self.inputs.tilt)
-        lost = {"nominal_batch", "spin", *(("nominal_gap", "nominal_least_gap") if tilted else ())}
+        lost = {"nominal_batch", "spin", *(_OF_GAP if tilted else ())}
         found.__dict__.update({n: v for n, v in self.__dict__.items() if n not in lost})
         found.__dict__.update(inputs=inputs, varying=())
         return found

@@ -43,13 +43,15 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     """Return whether steps resolve the edges of contacts within a strip once there is a groove.
 
     The contact model must return the separation, every contact must have its own body or station,
-    and load and inputs must be constant: where they vary, an edge also retreats.
+    and load and inputs must be constant: where they vary, an edge also retreats. The rise of the
+    gap across a strip must be that of crowned bodies.
     """
     stations, each, _ = problem.shape
     varies = problem.constant_load is None or len(problem.varying) > 0
     varies |= stations == 1 and (problem.has_spring or bool(problem.terms))
     apart = not problem.has_nodes and (stations == 1 or each == 1)
-    return contacts.separation is not None and apart and not varies
+    possible = contacts.separation is not None and apart and not varies
+    return possible and problem.has_crowned_gap
 
 
 def unresolved_edges(problem: WearProblem) -> dict[str, FloatArray]:
@@ -61,6 +63,14 @@ def without_edges(state: WearState) -> WearState:
     """Return a state that steps advance on whole strips."""
     assert state.past_sums is not None
     return state.replaced(**dict.fromkeys(FIELDS), past_sums=state.past_sums[:, -1:])
+
+
+def on_strips(problem: WearProblem, state: WearState) -> WearState:
+    """Return a state without edges, of first order, where strips now reach the end of a roller."""
+    if state.part is None or problem.has_crowned_gap:
+        return state
+    assert state.order is not None
+    return without_edges(state).replaced(order=np.ones_like(state.order))
 
 
 def with_unresolved_edges(problem: WearProblem, state: WearState) -> WearState:

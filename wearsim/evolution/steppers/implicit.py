@@ -138,6 +138,7 @@ class ImplicitStepper(StepDoublingStepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step, estimate its error, and choose order and length of the next one."""
+        state = edges.on_strips(problem, state)
         if state.part is None and self._resolves(problem, state):
             state = edges.with_unresolved_edges(problem, state)
         if state.part is None:
@@ -391,6 +392,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     """
     if state.past_spans is None:
         state = with_rates(problem, state)
+    state = edges.on_strips(problem, state)
     if state.part is not None:
         parts = edges.by_resolution(problem, state)
         if len(parts) > 1 or parts[0][2].part is None:
