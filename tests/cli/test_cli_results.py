@@ -201,7 +201,7 @@ def test_wrong_input_is_refused_before_an_existing_output(
 ) -> None:
     Path("rig.toml").write_text("[roller]\n")
     Path(output).write_text("kept")
-    more = ("rig.toml", "-o", output) if verb == "compare" else ()
+    more = ("other.toml", "-o", output) if verb == "compare" else ()
     refused = command(verb, "rig.toml", *more)
     assert refused.exit_code == 2
     assert "rig.toml: is not a results file" in refused.stderr

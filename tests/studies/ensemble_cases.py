@@ -31,7 +31,7 @@ def small(**changes: object) -> Scenario:
 
 def partly_failing(**changes: object) -> Scenario:
     """Return tests of which some fail, by a limit on the number of steps."""
-    return small(evolution__max_steps=33, **changes)
+    return small(evolution__max_steps=31, **changes)
 
 
 def contents(path: Path | EnsembleResult) -> dict[str, bytes]:

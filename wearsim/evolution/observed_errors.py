@@ -17,7 +17,7 @@ import numpy as np
 from wearsim.evolution.strip_errors import BACK, Course
 from wearsim.types import FloatArray
 
-COVER = 1.25  # safety factor on the greatest of the last differences
+COVER = 1.5  # safety factor on the greatest of the last differences
 
 
 def observed_errors(

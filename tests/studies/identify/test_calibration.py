@@ -82,8 +82,7 @@ def test_intervals_hold_the_truth_without_shoulders():
 def test_bow_of_a_trace_is_fitted_or_warned_of():
     rng = np.random.default_rng(31)
     fitted = seen = warned = 0
-    sets = SETS // 2
-    for _ in range(sets):
+    for _ in range(SETS):
         y, height = groove(rng, K, rng.uniform(-1e-3, 1e-3), 12e-3)
         bow = 3e-6 * (y / 12e-3) ** 2
         fitted += holds(found_in(y, height + bow, curvature=True))
@@ -92,9 +91,9 @@ def test_bow_of_a_trace_is_fitted_or_warned_of():
         assert straight.fit is not None
         seen += holds(row) or bool(row.fit.warnings)
         warned += bool(straight.fit.warnings)
-    assert_95_percent(fitted, sets)
-    assert seen >= 0.92 * sets
-    assert warned <= 0.15 * sets
+    assert_95_percent(fitted, SETS)
+    assert seen >= 0.92 * SETS
+    assert warned <= 0.15 * SETS
 
 
 @pytest.mark.slow

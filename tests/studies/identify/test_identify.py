@@ -193,7 +193,7 @@ def test_groove_of_another_rig_is_refused(tmp_path: Path):
 
 def test_bow_of_a_trace_is_fitted_where_it_is_asked_for(tmp_path: Path):
     y, height = groove(np.random.default_rng(3), half=12e-3)
-    path = write(tmp_path / "t.csv", y, height + 6e-6 * (y / 12e-3) ** 2)
+    path = write(tmp_path / "t.csv", y, height + 3e-6 * (y / 12e-3) ** 2)
     straight, curved = (wearsim.identify(rig(), [path], curvature=c) for c in (False, True))
     (low, high) = (curved.tests[0]["k_over_h_per_Pa"][end] for end in ("low", "high"))
     assert low < K < high
@@ -258,11 +258,14 @@ def test_groove_wider_than_the_trace_is_refused(tmp_path: Path):
 
 
 def test_trace_without_shoulders_knows_less(tmp_path: Path):
-    path = write(tmp_path / "t.csv", *groove(np.random.default_rng(1), half=7.2e-3))
-    (test,) = wearsim.identify(rig(), [path]).tests
-    k = test["k_over_h_per_Pa"]
+    paths = [
+        write(tmp_path / f"{half}.csv", *groove(np.random.default_rng(1), half=half))
+        for half in (7.4e-3, 12e-3)
+    ]
+    test, longer = (wearsim.identify(rig(), [path]).tests[0] for path in paths)
+    k, best = test["k_over_h_per_Pa"], longer["k_over_h_per_Pa"]
     assert k["low"] < K < k["high"]
-    assert k["high"] / k["low"] > 1.15
+    assert np.log(k["high"] / k["low"]) > 1.2 * np.log(best["high"] / best["low"])
     assert test["depth_m"] is None
     assert test["residual_ratio"] is None
 
