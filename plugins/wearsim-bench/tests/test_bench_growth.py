@@ -143,7 +143,9 @@ def test_all_sizes_are_measured():
         assert row.seconds > 0.0
         assert row.counts["file_bytes"] > 0.0
         assert 0.0 < row.errors["stated"] < 0.05  # with few strips
-    # single tests have a reference with individually solved passes
+    # single tests have a reference with individually solved passes, in which a strip carries load
+    # as a whole at the edge: it differs by the error due to the strips
     for group in topic.groups[:3]:
-        assert all(0.0 <= row.errors["depth"] < 2e-3 for row in topic.of(group))
+        for row in topic.of(group):
+            assert 0.0 <= row.errors["depth"] < 2e-3 + row.errors["stated"]
     assert any(row.default for row in topic.of("strips"))
