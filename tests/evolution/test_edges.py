@@ -109,6 +109,15 @@ def test_separate_rollers_wear_like_identical_ones() -> None:
     assert three.depth[-1] == pytest.approx(one.depth[-1], rel=1e-3)
 
 
+def test_strips_that_reach_the_ends_of_a_roller_wear_in_the_groove_only() -> None:
+    wide = {**PLAIN, "friction.coefficient": 0.12}
+    ended, endless = run({**wide, "roller.width": "20 mm"}), run(wide)
+    assert ended.y[-1] > 10e-3  # strips have grown to the ends, which the groove does not reach
+    assert ended.depth[-1] == pytest.approx(endless.depth[-1], rel=2e-4)
+    assert ended.worn_volume[-1] == pytest.approx(endless.worn_volume[-1], rel=1e-5)
+    assert not ended.profiles[-1][np.abs(ended.y) > 8e-3].any()
+
+
 def test_groove_on_strips_that_grow_keeps_its_volume() -> None:
     result = run({**PLAIN, "operation.duration": "4500 min"})
     energy = result.dissipated_energy[-1] * 1.1e-11
