@@ -72,7 +72,8 @@ def kernels_of(
     if steps and compliant and (implicit or coarse):
         names |= {"formulas", "extrapolated", "new_differences", "next_steps"}
         names |= {"linearised_wear", "wear_of_bodies"}
-        names |= {"difference_sizes" if varies else "carried_errors"}
+        doubled = varies or theory == "fastsim"
+        names |= {"difference_sizes" if doubled else "carried_errors"}
     doubled = name != "per-pass" if not (compliant and implicit) else evolution.step is not None
     if steps and (doubled or (coarse and not compliant)):
         names |= {"difference_sizes"}
