@@ -72,8 +72,8 @@ def kernels_of(
     if steps and compliant and (implicit or coarse):
         names |= {"formulas", "extrapolated", "new_differences", "next_steps"}
         names |= {"linearised_wear", "wear_of_bodies"}
-        doubled = varies or theory == "fastsim"
-        names |= {"difference_sizes" if doubled else "carried_errors"}
+        by_doubling = varies or theory == "fastsim"
+        names |= {"difference_sizes" if by_doubling else "carried_errors"}
     doubled = name != "per-pass" if not (compliant and implicit) else evolution.step is not None
     if steps and (doubled or (coarse and not compliant)):
         names |= {"difference_sizes"}
