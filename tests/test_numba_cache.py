@@ -69,6 +69,8 @@ for stepper in ("implicit", "explicit", "per-pass"):
     for name in ("rig-450min.toml", "rig-three-rollers.toml"):
         run(name, evolution__stepper=stepper)
 run(load={{"kind": "spring", "normal_force": "300 N", "stiffness": "690 N/mm"}})
+for name in ("rig-450min.toml", "rig-three-rollers.toml"):  # grooves, at whose edges strips are cut
+    run(name, wear__cylinder__k_over_h="1e-8 1/Pa")
 run(contact__tangential="fastsim")
 for model in ("hertz-fastsim", "hertz"):
     run(contact__model=model)
@@ -165,7 +167,8 @@ def test_every_kernel_has_one_signature(tmp_path: Path):
     unused = kernels() - set(counts)
     assert not unused, f"not reached by this test's runs: {unused}"
     # with and without shared bodies, friction field and fields
-    assert len(counts.pop("newton.solve_slender")) == 2
+    for name in ("solve_slender", "start_strips", "rest_contacts", "factor_contacts", "fill_steps"):
+        assert len(counts.pop(f"newton.{name}")) == 2
     assert len(counts.pop("fastsim.march_into")) == 3
     several = {name: signatures for name, signatures in counts.items() if len(signatures) > 1}
     assert not several, json.dumps(several, indent=1)

@@ -62,7 +62,8 @@ def unresolved_edges(problem: WearProblem) -> dict[str, FloatArray]:
 def without_edges(state: WearState) -> WearState:
     """Return a state that steps advance on whole strips."""
     assert state.past_sums is not None
-    return state.replaced(**dict.fromkeys(FIELDS), past_sums=state.past_sums[:, -1:])
+    sums = kernel_input(state.past_sums[:, -1:])
+    return state.replaced(**dict.fromkeys(FIELDS), past_sums=sums)
 
 
 def on_strips(problem: WearProblem, state: WearState) -> WearState:
@@ -236,7 +237,7 @@ def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArr
     assert orders is not None
     parts = np.where(crossed, 0.0, parts_of_bodies(end))
     errors = np.where(crossed, 0.0, errors)
-    sums = past[:, :-1, :, None]
+    sums = kernel_input(past[:, :-1, :, None])
     ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
     scale = np.ones(len(orders))
     next_steps(sums, spans, ones, orders, scale, 1.0, 1.0, 1, ones, of_sums, order)
