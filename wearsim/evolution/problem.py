@@ -237,6 +237,8 @@ class WearProblem:
         profiles.
         """
         bend = np.diff(self.nominal_gap, 2, axis=-1)
+        if bend.size == 0:  # fewer than three strips
+            return False
         return bool(((bend > 0.0) & (bend < UNEVEN * np.median(bend, -1, keepdims=True))).all())
 
     @cached_property
