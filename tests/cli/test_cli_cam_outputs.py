@@ -1,4 +1,4 @@
-"""What leaves `wearsim` of a cam: motion tables, surfaces, animations, and their bad names."""
+"""Outputs of cams: motion tables, surfaces and animations, and bad names of these files."""
 
 from __future__ import annotations
 

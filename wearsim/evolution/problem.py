@@ -344,7 +344,7 @@ class WearProblem:
         return self.with_inputs(replace(self.inputs, **values))
 
     def with_inputs(self, inputs: ContactInputs) -> WearProblem:
-        """Return the problem with constant inputs; what does not depend on them is kept."""
+        """Return the problem with constant inputs; values that do not depend on them are kept."""
         for name in _CONSTANTS if self.laws and self.linear_wear else ():
             getattr(self, name)  # computed once, for all problems with other inputs
         found = object.__new__(WearProblem)

@@ -166,7 +166,7 @@ def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[F
 
 
 class _Peaks(NamedTuple):
-    """Greatest value of panels, shape (panels, ...), and what it is found from.
+    """Greatest value of panels, shape (panels, ...), and the values from which it follows.
 
     Its angle phi, the second derivative of minus the value by phi, the amplitudes of cosines, the
     samples, and the number of the greatest of them.
