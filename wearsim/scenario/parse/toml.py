@@ -14,12 +14,19 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.input_files import csv_of_profile, read_input
-from wearsim.plugins import LoadSpec, MotionLawSpec, Options, RandomInputSpec
+from wearsim.plugins import (
+    AxialProfileSpec,
+    LoadSpec,
+    MotionLawSpec,
+    Options,
+    RandomInputSpec,
+)
 from wearsim.profiles import ROW_CHOICES, split_name
 from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
 from wearsim.scenario.parse.random_inputs import validate
+from wearsim.scenario.tables.axial import AxialTable, check_axial
 from wearsim.scenario.tables.bodies import (
     CylinderTable,
     RollerTable,
@@ -73,6 +80,8 @@ PROFILE = "cylinder.profile"
 PROFILE_FILE = "profile-from-python.csv"
 #: Keys that say how the file of a profile is read.
 _OF_PROFILE_FILES = ("profile_columns", "profile_units", *(f"profile_{key}" for key in ROW_CHOICES))
+AXIAL = "axial_profile"
+CROWN_KEYS = ("crown_radius", "crown_diameter")
 MAX_NESTING = 20  # a scenario has at most five levels
 TOO_DEEP = "is nested too deeply", None, f"at most {MAX_NESTING} levels of tables and lists"
 TABLES: dict[str, type[Options]] = {
@@ -172,6 +181,10 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             for group in _ALTERNATIVES.get(prefix, ()):
                 others = set(group) - {key} if key in group else set()
                 unused |= {n for n in others & {*tables[0]} if f"{prefix}.{n}" not in overrides}
+            for whole in (document, plain) if names == ["roller", AXIAL] else ():
+                for name in CROWN_KEYS:  # the key within axial_profile replaces them
+                    if f"roller.{name}" not in overrides:
+                        whole.get("roller", {}).pop(name, None)
             tables[0][key] = tables[1][key] = as_toml(value)
             for table, name in itertools.product(tables, unused):
                 del table[name]
@@ -277,6 +290,7 @@ def parse_fields(
     tables = of_follower(data)
     sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
     assemble_cam(mistakes, sections, "cam" in tables)
+    sections |= check_axial(mistakes, sections)
     check_lists(mistakes, data, sections["limit"])
     check_correlation(mistakes, sections["sampling"])
     check_contained(mistakes)
@@ -389,6 +403,10 @@ def keys_by_place() -> dict[str, set[str]]:
     for law in installed(MotionLawSpec):
         keys[f'an entry of cam.motion with law = "{law.name}"'] = set(law.options.model_fields)
     keys["an entry of cam.motion"] = set(MotionTable.model_fields)
+    for profile in installed(AxialProfileSpec):
+        place = f'axial_profile with form = "{profile.name}"'
+        keys[place] = set(profile.options.model_fields)
+    keys["axial_profile"] = set(AxialTable.model_fields)
     keys['[contact] with model = "auto"'] = {"tolerance"}
     keys["a random input"] = set(RandomInputTable.model_fields)
     return keys | {
