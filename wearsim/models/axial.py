@@ -194,7 +194,7 @@ class Logarithmic(AxialProfile):
         )
 
 
-class AxialTable(AxialProfile):
+class TableProfile(AxialProfile):
     """Profile through given points, by monotone cubic interpolation.
 
     Parameters
@@ -255,5 +255,5 @@ SPECS = (
     ),
     _spec("partial-crown", PartialCrown, PartialCrownOptions, "straight, with round ends"),
     _spec("straight", Straight, StraightOptions, "straight, without a crown"),
-    _spec("table", AxialTable, TableOptions, "profile given by points"),
+    _spec("table", TableProfile, TableOptions, "profile given by points"),
 )

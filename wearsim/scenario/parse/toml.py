@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path, PurePath
 from typing import Any
@@ -139,7 +139,9 @@ def parse_override(text: str) -> tuple[str, object]:
         return key.strip(), value.strip()
 
 
-def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> str:
+def apply_overrides(
+    text: str, file: str, overrides: Mapping[str, object], removed: Iterable[str] = ()
+) -> str:
     """Return the scenario's text with values replaced or added.
 
     A key that excludes another, as passes excludes duration, replaces it.
@@ -152,6 +154,8 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
         The scenario's file, for messages.
     overrides : mapping of str to object
         Values by dotted key.
+    removed : iterable of str
+        Dotted keys that are removed where they are given.
 
     Returns
     -------
@@ -194,6 +198,13 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             mistakes.append(Mistake("", dotted, what, as_written(value)))
     if mistakes:
         raise ScenarioError(file, mistakes)
+    for dotted in removed:
+        *names, key = dotted.split(".")
+        for whole in (document, plain):
+            table: Any = whole
+            for name in names:
+                table = table.get(name, {})
+            table.pop(key, None)
     written = tomlkit.dumps(document)
     # tables next to dotted keys are written wrongly by tomlkit; the plain text lacks comments
     with suppress(tomllib.TOMLDecodeError):
@@ -272,10 +283,10 @@ def parse_fields(
     if not isinstance(overrides, Mapping | None):
         kind = type(overrides).__name__
         raise TypeError(f"overrides must be a mapping of values by dotted key, got a {kind}")
-    data = _parse_toml(text, name)
+    data = parse_toml(text, name)
     if overrides:
         text = apply_overrides(text, name, overrides)
-        data = _parse_toml(text, name)
+        data = parse_toml(text, name)
     files: dict[str, str] = {}
     profile = (overrides or {}).get(PROFILE)
     given = profile if isinstance(profile, Profile) else None
@@ -314,7 +325,8 @@ def parse_fields(
     }
 
 
-def _parse_toml(text: str, name: str) -> dict[str, Any]:
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """Return the tables of a text; raises ScenarioError if it is not valid TOML."""
     try:
         data = tomllib.loads(text)
     except RecursionError as error:
