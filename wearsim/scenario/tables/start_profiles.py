@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.types import FloatArray, Profile
 
 _SAME_ANGLE = 1e-9  # rad
+_SIDES: tuple[Literal["left", "right"], ...] = ("left", "right")
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +26,8 @@ class StartSurface:
     Parameters
     ----------
     angle : ndarray, shape (angles,)
-        Increasing angles of the cam, within a turn [rad].
+        Angles of the cam in their order, within a turn; one that is given twice has the heights
+        before and after it, where they jump [rad].
     y : ndarray, shape (points,)
         Increasing axial positions [m].
     height : ndarray, shape (angles, points)
@@ -58,8 +61,24 @@ class StartSurface:
         rows = np.array([np.interp(y, self.y, row) for row in self.height])
         if not self.varies:
             return np.repeat(rows, len(angle), axis=0)
-        columns = [np.interp(angle, self.angle, column, period=math.tau) for column in rows.T]
-        return np.array(columns).T
+        # one turn on both sides closes the surface
+        known = np.concatenate(
+            [[self.angle[-1] - math.tau], self.angle, [self.angle[0] + math.tau]]
+        )
+        rows = np.concatenate([rows[-1:], rows, rows[:1]])
+        inside = (angle >= 0.0) & (angle <= math.tau)
+        theta = np.where(inside, angle, np.mod(angle, math.tau))
+        nearest = known[np.abs(known - theta[:, None]).argmin(axis=1)]
+        theta = np.where(np.abs(nearest - theta) < _SAME_ANGLE, nearest, theta)
+        # of two stations at one angle the first is before it, as is the end of the turn
+        before = np.append(np.diff(theta) == 0.0, False) | (theta == math.tau)
+        at_left, at_right = (np.searchsorted(known, theta, side=side) for side in _SIDES)
+        given = at_right > at_left
+        low = np.where(given, np.where(before, at_left, at_right - 1), at_right - 1)
+        high = np.where(given, low, at_right)
+        span = np.where(given, 1.0, known[high] - known[low])
+        part = np.where(given, 0.0, (theta - known[low]) / span)[:, None]
+        return np.asarray((1.0 - part) * rows[low] + part * rows[high])
 
 
 def read_roller_profiles(
@@ -98,19 +117,21 @@ def _surface(file: InputFile) -> StartSurface:
         aliases={"height": ["z"]},
         opposite={"height": "depth"},
     )
-    order = np.lexsort((columns["y"], columns["angle"]))
-    angle, y, height = (columns[name][order] for name in ("angle", "y", "height"))
-    first = np.concatenate([[True], np.diff(angle) > _SAME_ANGLE])
-    angles, count = angle[first], int(np.argmax([*first[1:], True])) + 1
-    grid = y.reshape(-1, count) if len(y) == count * len(angles) else None
-    if grid is None or count < 2 or not np.array_equal(grid, np.broadcast_to(grid[0], grid.shape)):
-        what = "needs the same positions y, at least two, at every angle"
+    angle, y, height = (columns[name] for name in ("angle", "y", "height"))
+    angle = np.where(np.abs(angle - math.tau) < _SAME_ANGLE, math.tau, angle)
+    turned = np.abs(np.diff(angle)) > _SAME_ANGLE
+    first = np.flatnonzero(np.concatenate([[True], turned | (np.diff(y) <= 0.0)]))
+    angles, count = angle[first], int(np.diff(np.append(first, len(y))).max())
+    whole = len(y) == count * len(first)
+    grid = y.reshape(-1, count) if whole else np.zeros((0, count))
+    if not whole or count < 2 or (grid != grid[0]).any():
+        what = "needs the same positions y, at least two and increasing, at every angle"
         got = f"{len(y)} rows, {len(angles)} angles"
         raise ScenarioError(file.path, [Mistake("", "column y", what, got)])
-    if (np.diff(grid[0]) <= 0.0).any():
-        raise ScenarioError(file.path, [Mistake("", "column y", "has a position twice")])
-    if angles[0] < 0.0 or angles[-1] >= math.tau:
-        got = f"{math.degrees(angles[0]):.6g} to {math.degrees(angles[-1]):.6g} deg"
-        what = "must be at least 0 and below 360 deg"
+    turns = np.diff(angles)
+    thrice = (np.abs(turns[1:]) + np.abs(turns[:-1]) < _SAME_ANGLE).any()
+    if angles[0] < 0.0 or angles[-1] > math.tau or (turns < -_SAME_ANGLE).any() or thrice:
+        got = f"{math.degrees(angles.min()):.6g} to {math.degrees(angles.max()):.6g} deg"
+        what = "must not fall from row to row, be within 0 to 360 deg and at most twice the same"
         raise ScenarioError(file.path, [Mistake("", "column angle", what, got)])
     return StartSurface(angles, grid[0], height.reshape(grid.shape))

@@ -91,8 +91,9 @@ def export_running_in(result: Result, folder: str | Path, *, force: bool = False
     names = [f"roller-{number}-worn.csv" for number in range(1, len(profiles) + 1)]
     if len({profile.height.tobytes() for profile in profiles}) == 1:
         profiles, names = profiles[:1], ["roller-worn.csv"]
-    contents |= dict(zip(names, map(_profile_text, profiles), strict=True))
-    overrides["roller.profile"] = names if len(names) > 1 else names[0]
+    if any(profile.height.any() for profile in profiles):
+        contents |= dict(zip(names, map(_profile_text, profiles), strict=True))
+        overrides["roller.profile"] = names if len(names) > 1 else names[0]
     keys = _keys_of_texts(data.scenario_text)
     for name, content in data.files.items():
         key = keys.get(name, "")
