@@ -135,7 +135,7 @@ class PartialCrown(AxialProfile):
     def drop(self, s: FloatArray) -> FloatArray:
         """Return R - (R^2 - d^2)^(1/2) at a distance d from the straight part [m].
 
-        Beyond a quarter of the circle it goes on to increase, so that the contact ends before.
+        Beyond a quarter of the circle it increases further, so that the contact ends before.
         """
         away = np.maximum(np.abs(s) - self._half, 0.0)
         inside = np.minimum(away, self._radius)

@@ -1,4 +1,4 @@
-"""Gap of two bodies along their axis, without start profiles, and what it tells of a contact."""
+"""Gap of two bodies along their axis, without start profiles, and the width of grooves in it."""
 
 from __future__ import annotations
 

@@ -243,6 +243,11 @@ class WearForecast:
         half = float(scenario.axial_gap.half_width(depth + self.elastic))
         half = min(half, 0.5 * (scenario.roller.width or np.inf))
         low, high = self._centres + np.array([-_MARGIN, _MARGIN]) * half
+        if scenario.roller.width is not None and not scenario.axial_gap.is_crowned:
+            # the lowest point may be away from the middle of the groove
+            offsets = np.array(scenario.per_roller(scenario.roller.offset))
+            low = min(low, offsets.min() - 0.5 * _MARGIN * scenario.roller.width)
+            high = max(high, offsets.max() + 0.5 * _MARGIN * scenario.roller.width)
         strips = int(min(STRIPS * (high - low) / (2.0 * _MARGIN * half), MOST_STRIPS))
         grid = grid or Grid.spanning(float(low), float(high), strips)
         problem = on_grid(self.problem, grid)

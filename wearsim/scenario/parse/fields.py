@@ -226,6 +226,11 @@ def can_be_random(name: str) -> bool:
     return (of_table and last not in _FIXED) or name == "roller.offset"
 
 
+def is_axial(name: str) -> bool:
+    """Return whether a dotted key is one of a form along the axis."""
+    return name.rpartition(".")[0] in AXIAL_TABLES
+
+
 def amount(value: float, quantity: Quantity | None) -> str:
     """Return the text of an SI value in the engineering unit of its quantity."""
     return in_engineers_unit(value, quantity.kind.unit if quantity else "1")

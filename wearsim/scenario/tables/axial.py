@@ -13,9 +13,10 @@ from wearsim.errors import ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import AxialPair, AxialProfile, AxialProfileSpec, Options, registry
 from wearsim.scenario.axial_gap import AxialGap
+from wearsim.scenario.parse.fields import amount, target_of
 from wearsim.scenario.parse.mistakes import Mistakes, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.units import QuantityError, as_written
+from wearsim.units import QuantityError
 
 if TYPE_CHECKING:
     from wearsim.scenario.tables.bodies import Cylinder, Roller
@@ -142,6 +143,11 @@ def _built(
 
 def described_form(choice: AxialChoice) -> str:
     """Return a form in words: its name and the options that are given."""
-    given = choice.options.model_dump(mode="json", exclude_unset=True)
-    texts = [f"{key} = {as_written(value)}" for key, value in given.items()]
+    texts = []
+    for key in sorted(choice.options.model_fields_set):
+        value, field = getattr(choice.options, key), type(choice.options).model_fields[key]
+        target = target_of(field)
+        if isinstance(value, float):
+            value = amount(value, target.quantity if target else None)
+        texts.append(f"{key} {getattr(value, 'path', value)}")
     return ", ".join([choice.form, *texts])

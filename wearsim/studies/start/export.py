@@ -205,6 +205,6 @@ def _notes(scenario: Scenario, data: RunData) -> Iterator[str]:
             " wear of the new test alone"
         )
     if not load.constant or scenario.load.terms:
-        yield "the load starts anew at time 0"
+        yield "the load begins again at time 0"
     if any(item.role == "process" for item in scenario.random):
-        yield "random processes start anew at time 0"
+        yield "random processes begin again at time 0"
