@@ -159,8 +159,8 @@ class AxialGap:
             most = _FIRST
             while most < _LONGEST and self._lower(np.array([most]))[0] < self._greatest:
                 most *= 2.0
-        # dense at the end, where logarithmic profiles are steep
-        places = most * np.sin(np.linspace(0.0, 0.5 * np.pi, _POINTS))
+        # dense in the middle and at the end, where logarithmic profiles are steep
+        places = 0.5 * most * (1.0 - np.cos(np.linspace(0.0, np.pi, _POINTS)))
         drops = np.maximum.accumulate(self._lower(places))
         drops = drops - drops[0]
         steps = np.diff(places) * 0.5 * (drops[1:] + drops[:-1])
