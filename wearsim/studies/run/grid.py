@@ -26,7 +26,7 @@ from wearsim.studies.roller_ends import (
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
 from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
-from wearsim.studies.start.heights import StartExtent, start_extent
+from wearsim.studies.start.heights import start_extent
 from wearsim.types import FloatArray, Grid
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
@@ -99,7 +99,7 @@ def contact_grid(scenario: Scenario, load: float) -> Grid:
     choice, profile = scenario.contact, start_extent(scenario)
     centre, half_width = contact_centre(scenario, [0]), widest_patch(scenario, load).b
     if choice.width is None and profile is not None:
-        return profile_grid(profile, half_width, choice.strips)
+        return profile_grid(profile.low, profile.high, half_width, choice.strips)
     half = 1.2 * half_width
     crowned = scenario.axial_gap.is_crowned
     default = STRIPS_OF_CONTACT if crowned else STRIPS_OF_CONTACT_OF_FORM
@@ -127,18 +127,18 @@ def suggested_grid(scenario: Scenario, load: float) -> Grid | None:
     return choice.spec.suggest_grid(choice.options, across, curvature, load, materials)
 
 
-def profile_grid(profile: StartExtent, half_width: float, strips: int | None) -> Grid:
+def profile_grid(start: float, stop: float, half_width: float, strips: int | None) -> Grid:
     """Return strips over the whole width of start profiles.
 
     Parameters
     ----------
-    profile : StartExtent
+    start, stop : float
+        Outer positions of the profiles [m].
     half_width : float
         Half-width of the initial patch [m].
     strips : int, optional
         Number of strips; by default sufficient to resolve the patch, at most `MOST_STRIPS`.
     """
-    start, stop = profile.low, profile.high
     resolving = np.ceil(PROFILE_STRIPS_PER_HALF_WIDTH * (stop - start) / half_width)
     chosen = strips or int(np.clip(resolving, FEWEST_PROFILE_STRIPS, MOST_STRIPS))
     return Grid.spanning(start, stop, chosen)
