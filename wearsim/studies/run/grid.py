@@ -41,6 +41,7 @@ LEAST_CHOSEN = 2.5  # strips per half-width of a patch; with fewer chosen ones, 
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
 STRIPS_OF_FORM = 121  # of a run on the width of a roller that is not crowned, at least
+PART_OF_FORM = 0.5  # of the patch of such bodies, which is resolved as that of a crown
 STRIPS_OF_CONTACT = 121
 STRIPS_OF_CONTACT_OF_FORM = 485  # where its ends are steep, for a peak pressure within 1 %
 DRAWN = {"scalar", "joint"}  # roles of random inputs with a range
@@ -257,7 +258,9 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
     """
     scenario, choice = draws.scenario, draws.scenario.contact
     patch, centre, shift, fresh, half, load = extent or extent_of(draws)
-    tolerance = scenario.evolution.tolerance
+    tolerance, size = scenario.evolution.tolerance, patch.b
+    if not scenario.axial_gap.is_crowned:  # loads fall to zero over the ends of the patch
+        size *= PART_OF_FORM
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
         least = strips_over(scenario.roller.width or 0.0, patch.b, tolerance)
         if not scenario.axial_gap.is_crowned:
@@ -273,12 +276,12 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
         depth = scenario.limit.depth or math.inf
         resolved = min(resolved, float(scenario.axial_gap.half_width(depth)))
     if choice.width is None:  # strips grow from here
-        per_half_width = strips_per_half_width(patch.b, tolerance, resolved)
+        per_half_width = strips_per_half_width(size, tolerance, resolved)
         at_start = STRIPS_OF_MANY_CONTACTS if many else STRIPS_AT_START
         if choice.strips is not None:
             per_half_width, at_start = LEAST_CHOSEN, choice.strips
-        width = min(width, max(2.0 * fresh, patch.b / per_half_width * at_start))
-    strips = choice.strips or strips_over(width, patch.b, tolerance, resolved)
+        width = min(width, max(2.0 * fresh, size / per_half_width * at_start))
+    strips = choice.strips or strips_over(width, size, tolerance, resolved)
     if width < 2.0 * (shift + patch.b):
         raise ScenarioError(
             scenario.file,
