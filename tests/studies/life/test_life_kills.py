@@ -33,7 +33,7 @@ def counted(stages: list[str], last: int | None = None) -> WatchedStorage:
 def study(path: Path, storage: WatchedStorage) -> LifeResult:
     """Run a study with tests for rare ends of life."""
     scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"})
-    return life(scenario, COUNT, path, target=600, rare=200, scheduler="serial", storage=storage)
+    return life(scenario, COUNT, path, target=600, rare=60, scheduler="serial", storage=storage)
 
 
 @pytest.fixture(scope="module")
