@@ -256,7 +256,7 @@ def _reopened(
     designs: Sequence[Path], target: str | None, shares: tuple[float, ...], posterior: Path | None
 ) -> tuple[list[LifeResult], list[str]]:
     """Return the results in files, and their labels: of a sweep the values of its key."""
-    from wearsim.studies.life.stored_settings import swept_variable
+    from wearsim.studies.life.comparison import swept_variable
 
     results = [_opened(path, target, shares, posterior) for path in designs]
     if swept_variable(results) is None:
