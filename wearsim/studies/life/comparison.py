@@ -123,20 +123,6 @@ def compare_lives(first: LifeValues, second: LifeValues) -> LifeComparison:
     )
 
 
-def life_ratio(first: LifeValues, second: LifeValues, share: float) -> Interval:
-    """Return the life that a share does not reach of the first design over that of the second.
-
-    Parameters
-    ----------
-    first, second : LifeValues
-        With the same unit of life.
-    share : float
-        0.1 for B10.
-    """
-    pair = _pair(first, second)
-    return quantile_ratio(*pair.distributions, share, pair.most, pair.paired)
-
-
 def swept_variable(results: Sequence[Any]) -> DesignVariable | None:
     """Return the design variable whose value differs between results of a sweep, if there is one.
 
