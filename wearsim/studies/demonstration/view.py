@@ -205,7 +205,7 @@ class DemonstrationView(View):
 
     def overview(self) -> Overview:
         """Return the specimens and the first answers."""
-        return Overview(self.panels().first, {"Demonstration": self.rows()})
+        return Overview(self.panels().first, {"Demonstration": self.rows()[1:]})
 
 
 def _cell(plan: Plan) -> str:

@@ -52,8 +52,8 @@ class FieldReturnsView(View):
         for number, label in enumerate(result.labels):
             of = f" of {label}" if len(result.labels) > 1 else ""
             before, after = (found(10.0, number) for found in (result.before, result.after))
-            rows.append(Row(f"B10 before{of}", f"{self._life(before)} {given}"))
             rows.append(Row(f"B10 after{of}", f"{self._life(after)} {given} and {units}"))
+            rows.append(Row(f"B10 before{of}", f"{self._life(before)} {given}"))
             target = result.designs[number].target
             if target is not None:
                 name = f"P(life < {count(target)} {result.unit}){of}"
@@ -270,7 +270,7 @@ class FieldReturnsView(View):
 
     def overview(self) -> Overview:
         """Return the survival and the first answers."""
-        return Overview(self.panels().first, {"Life": self.rows()})
+        return Overview(self.panels().first, {"Life": self.rows()[1:]})
 
 
 def _units(number: int) -> str:

@@ -27,7 +27,10 @@ _ENDS = np.array([0.025, 0.975])
 
 
 class Predicted(NamedTuple):
-    """Predicted numbers of failures in bands of lives, and in all: means and 95 % intervals."""
+    """Predicted numbers of failures in bands of lives, and in all: means and 95 % intervals.
+
+    They are at most the number of units.
+    """
 
     mean: FloatArray
     low: FloatArray
@@ -101,18 +104,18 @@ def check_fleet(
     return FleetCheck(
         edges,
         np.append(observed, observed.sum()),
-        _predicted(earlier, rng.poisson(earlier)),
-        _predicted(means, replicated),
+        _predicted(rng.poisson(earlier), len(fleet)),
+        _predicted(replicated, len(fleet)),
         2.0 * min(share, 1.0 - share),
         fit,
     )
 
 
-def _predicted(means: FloatArray, numbers: IntArray) -> Predicted:
-    """Return the prediction of drawn means and numbers, shapes (draws, bands)."""
-    means, numbers = (np.column_stack([item, item.sum(axis=1)]) for item in (means, numbers))
+def _predicted(numbers: IntArray, units: int) -> Predicted:
+    """Return the prediction of drawn numbers of failures, shape (draws, bands)."""
+    numbers = np.minimum(np.column_stack([numbers, numbers.sum(axis=1)]), units)
     low, high = np.quantile(numbers, _ENDS, axis=0, method="inverted_cdf")
-    return Predicted(means.mean(axis=0), low, high)
+    return Predicted(numbers.mean(axis=0), low, high)
 
 
 def _draws(levels: TwoLevels, count: int) -> Iterator[tuple[float, FloatArray, IntArray]]:
@@ -157,7 +160,7 @@ def _exposed(
                 low, high = limits[:, band, None], limits[:, band + 1, None]
                 hazards[numbers, band] += (np.clip(end, low, high) - low).sum(axis=1)
                 counts[numbers, band] += ((end >= low) & (end < high) & failed).sum(axis=1)
-    return counts, hazards
+    return counts, np.maximum(hazards, 0.0)
 
 
 def _bands(designs: Sequence[FactorMixture], levels: TwoLevels, fleet: Fleet) -> FloatArray:

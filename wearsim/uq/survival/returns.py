@@ -192,11 +192,6 @@ def update(
     spread : float
         Standard deviation of the logarithm of the life factor, whose prior median is 1; 0 for a
         life factor of 1.
-
-    Raises
-    ------
-    ValueError
-        If the returns are impossible for every m and t.
     """
     scatters, owner = _scatters_of(levels)
     weight, moved = _with_factor(levels, spread)
@@ -206,10 +201,7 @@ def update(
         grid = np.linspace(m.min() - 1e-9, m.max() + 1e-9, _COARSE)
         found = _total(designs, float(t), fleet, grid, _FEW_NODES)
         chances[owner == number] = np.interp(m, grid, found) + np.log(weight[owner == number])
-    top = float(chances.max())
-    if not math.isfinite(top) or top < -1e8:
-        raise ValueError("the returns are impossible for every median and scatter of K/H")
-    posterior = np.exp(chances - top)
+    posterior = np.exp(chances - chances.max())
     m_grid = _covering(moved.ravel(), posterior.ravel(), _MEANS)
     total = np.bincount(owner, posterior.sum(axis=1))
     t_grid = _scatter_grid(scatters, total / total.sum())
@@ -279,14 +271,12 @@ def _refined(
     """Return the posterior on a grid of m - ln L and t."""
     scatters, owner = _scatters_of(levels)
     by_scatter = [(levels.m[owner == k], levels.weight[owner == k]) for k in range(len(scatters))]
-    middles = 0.5 * (scatters[1:] + scatters[:-1])
-    widths = np.diff(np.concatenate([[0.0], middles, scatters[-1:]]))
+    overlap = _overlaps(scatters, t_grid)
     few, step = len(scatters) <= _FEW, m_grid[1] - m_grid[0]
     likelihood, parts = [], []
-    for t in t_grid:
+    for row, t in enumerate(t_grid):
         likelihood.append(_total(designs, float(t), fleet, m_grid))
-        # the prior density is linear between its scatters
-        shares = (scatters == t).astype(float) if few else _hats(scatters, float(t)) / widths
+        shares = (scatters == t).astype(float) if few else overlap[:, row]
         used = np.flatnonzero(shares > 0.0)
         m = np.concatenate([by_scatter[k][0] for k in used])
         weight = np.concatenate([shares[k] * by_scatter[k][1] for k in used])
@@ -306,8 +296,6 @@ def _refined(
         found[row] = joint.sum(axis=0)
         if spread:
             factor += np.histogram(m[:, None] - m_grid, bins, weights=joint)[0]
-    if not few:
-        found[[0, -1]] *= 0.5  # ends of the trapezoidal rule
     place = found > _LEAST_WEIGHT * found.max()
     means = np.broadcast_to(m_grid, found.shape)[place]
     scatter = np.broadcast_to(t_grid[:, None], found.shape)[place]
@@ -345,13 +333,17 @@ def _before(
     return TwoLevels(m[kept], t[kept], weight[kept], levels.specimens, levels.contained)
 
 
-def _hats(scatters: FloatArray, t: float) -> FloatArray:
-    """Return the weights of linear interpolation between scatters."""
-    place = int(np.clip(np.searchsorted(scatters, t) - 1, 0, len(scatters) - 2))
-    part = (t - scatters[place]) / (scatters[place + 1] - scatters[place])
-    found = np.zeros(len(scatters))
-    found[[place, place + 1]] = 1.0 - part, part
-    return np.maximum(found, 0.0)
+def _overlaps(scatters: FloatArray, grid: FloatArray) -> FloatArray:
+    """Return the part of the weight of each scatter that belongs to each of a finer grid.
+
+    The weight of a scatter is spread evenly up to the middles between it and its neighbours.
+    """
+    middles = 0.5 * (scatters[1:] + scatters[:-1])
+    edges = np.concatenate([scatters[:1], middles, scatters[-1:]])
+    cells = np.concatenate([[-np.inf], 0.5 * (grid[1:] + grid[:-1]), [np.inf]])
+    low = np.maximum(edges[:-1, None], cells[:-1])
+    high = np.minimum(edges[1:, None], cells[1:])
+    return np.maximum(high - low, 0.0) / np.maximum(np.diff(edges), 1e-300)[:, None]
 
 
 def _gap(m: FloatArray, step: float) -> float:
