@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,6 +14,7 @@ from wearsim.uq.survival.distributions import FactorMixture
 from wearsim.uq.survival.fleet import check_fleet, remaining_lives
 from wearsim.uq.survival.returns import FieldPosterior, Fleet, update
 from wearsim.uq.survival.scores import score_function
+from wearsim.uq.survival.two_levels import UncertainLives
 
 CENTRE, WIDTH, PRIOR = -25.2, 0.15, 0.3  # of m, and of t
 T, MEANS = np.linspace(0.03, 1.2, 40), np.linspace(CENTRE - 0.75, CENTRE + 0.75, 41)
@@ -46,7 +48,7 @@ FLEET = fleet_of(np.random.default_rng(5), -25.1, 0.35, 1.2, 40)
 
 @cache
 def posterior() -> FieldPosterior:
-    return update([KAPPA], LEVELS, FLEET, SPREAD)
+    return update([replace(KAPPA, exact=True)], LEVELS, FLEET, SPREAD)
 
 
 def likelihood(m: float, t: float) -> float:
@@ -91,14 +93,14 @@ def test_posterior_is_that_of_brute_force():
 
 def test_lives_before_and_after_are_those_of_brute_force():
     m, t, _, joint = brute_force()
-    after = posterior().lives(KAPPA, posterior().after).quantile(0.1)
+    after = posterior().lives_after(KAPPA).quantile(0.1)
 
     def failed(life: float) -> float:
         z = (np.log(life) + m[None, :, None] - np.log(KAPPA.kappa)) / t[:, None, None]
         return float((joint * ndtr(z).mean(axis=2)).sum())
 
     assert failed(after.predictive) == pytest.approx(0.1, abs=5e-4)
-    before = posterior().lives(KAPPA, posterior().before).quantile(0.1)
+    before = posterior().lives_before(KAPPA).quantile(0.1)
     assert before.low < after.low < after.predictive < after.high < before.high
     # the prior of m - ln L is wider by that of the life factor
     std = np.sqrt(posterior().before.weight @ (posterior().before.m - CENTRE) ** 2)
@@ -126,7 +128,7 @@ def test_remaining_lives_are_ratios_of_survivals():
 
 def test_life_factor_of_one_leaves_the_posterior_of_the_tests():
     none = Fleet(np.array([1.0]), np.array([np.inf]), np.zeros(1, dtype=np.int64))
-    after = update([KAPPA], LEVELS, none, 0.0).after
+    after = update([replace(KAPPA, exact=True)], LEVELS, none, 0.0).after
     assert after.weight @ after.m == pytest.approx(CENTRE, abs=2e-3)
     assert after.weight @ after.t == pytest.approx(LEVELS.weight @ LEVELS.t, abs=2e-3)
 
@@ -136,7 +138,9 @@ def test_two_designs_share_the_wear_factor():
     both = np.array([0, 1] * 20)
     factor = np.where(both == 1, 1.5, 1.0)
     fleet = Fleet(factor * FLEET.low, factor * FLEET.high, both)
-    found = update([KAPPA, longer], LEVELS, fleet, SPREAD).after
+    found = update(
+        [replace(item, exact=True) for item in (KAPPA, longer)], LEVELS, fleet, SPREAD
+    ).after
     one = posterior().after
     assert found.weight @ found.m == pytest.approx(one.weight @ one.m, abs=1e-6)
 
@@ -171,7 +175,7 @@ def test_intervals_of_fleets_hold_the_truth():
         factor = np.exp(SPREAD * rng.standard_normal())
         lives = design(60, number)
         found = update([lives], LEVELS, fleet_of(rng, m, t, factor, 40), SPREAD)
-        b10 = found.lives(lives, found.after).quantile(0.1)
+        b10 = UncertainLives(replace(lives, exact=True), found.after).quantile(0.1)
         truth = np.exp(SCALE - m + ndtri(0.1) * np.hypot(t, INPUTS)) * factor
         kept += b10.low < truth < b10.high
     assert 0.92 <= kept / fleets <= 0.98

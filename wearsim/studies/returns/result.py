@@ -107,12 +107,12 @@ class FieldReturns(Viewed):
     @cached_property
     def lives_before(self) -> list[UncertainLives]:
         """Lives of the designs in the field before the returns."""
-        return [self.posterior.lives(item, self.posterior.before) for item in self.mixtures]
+        return [self.posterior.lives_before(item) for item in self.mixtures]
 
     @cached_property
     def lives_after(self) -> list[UncertainLives]:
         """Lives of the designs in the field after the returns."""
-        return [self.posterior.lives(item, self.posterior.after) for item in self.mixtures]
+        return [self.posterior.lives_after(item) for item in self.mixtures]
 
     def before(self, percent: float, design: int = 0) -> UncertainLife:
         """Return the life that a percentage does not reach, before the returns."""

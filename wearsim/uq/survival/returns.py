@@ -172,9 +172,20 @@ class FieldPosterior:
     log_factor: FloatArray
     factor_weight: FloatArray
 
-    def lives(self, mixture: FactorMixture, levels: TwoLevels) -> UncertainLives:
-        """Return the lives of a design in the field, before or after the returns."""
-        return UncertainLives(replace(mixture, score=score_function(levels)), levels)
+    def lives_before(self, mixture: FactorMixture) -> UncertainLives:
+        """Return the lives of a design in the field before the returns."""
+        return _lives(mixture, self.before)
+
+    def lives_after(self, mixture: FactorMixture) -> UncertainLives:
+        """Return the lives of a design in the field after the returns.
+
+        The sampling error of its realisations is part of the posterior.
+        """
+        return _lives(replace(mixture, exact=True), self.after)
+
+
+def _lives(mixture: FactorMixture, levels: TwoLevels) -> UncertainLives:
+    return UncertainLives(replace(mixture, score=score_function(levels)), levels)
 
 
 def update(
@@ -192,9 +203,17 @@ def update(
     spread : float
         Standard deviation of the logarithm of the life factor, whose prior median is 1; 0 for a
         life factor of 1.
+
+    Notes
+    -----
+    Lives of a finite number of realisations are too long or too short by a common factor, whose
+    scatter is added to that of the life factor: returns make up for it. The same of the scatter of
+    the realisations is neglected.
     """
     scatters, owner = _scatters_of(levels)
-    weight, moved = _with_factor(levels, spread)
+    sampling = max(_location_error(lives) for lives in designs)
+    widened = math.hypot(spread, sampling)
+    weight, moved = _with_factor(levels, widened)
     chances = np.empty_like(moved)
     for number, t in enumerate(scatters):
         m = moved[owner == number]
@@ -205,7 +224,17 @@ def update(
     m_grid = _covering(moved.ravel(), posterior.ravel(), _MEANS)
     total = np.bincount(owner, posterior.sum(axis=1))
     t_grid = _scatter_grid(scatters, total / total.sum())
-    return _refined(designs, levels, fleet, spread, m_grid, t_grid)
+    found, factors = _refined(designs, levels, fleet, widened, m_grid, t_grid)
+    # the part of the life factor itself
+    part = (spread / widened) ** 2 if widened else 0.0
+    return FieldPosterior(_before(levels, spread), found, part * factors[0], factors[1])
+
+
+def _location_error(lives: FactorMixture) -> float:
+    """Return the standard error of the mean of ln kappa."""
+    if lives.exact or lives.count < 2:
+        return 0.0
+    return float(lives.log_kappa[0].std()) / math.sqrt(lives.count)
 
 
 def _scatters_of(levels: TwoLevels) -> tuple[FloatArray, IntArray]:
@@ -267,8 +296,8 @@ def _refined(
     spread: float,
     m_grid: FloatArray,
     t_grid: FloatArray,
-) -> FieldPosterior:
-    """Return the posterior on a grid of m - ln L and t."""
+) -> tuple[TwoLevels, tuple[FloatArray, FloatArray]]:
+    """Return the posterior on a grid of m - ln L and t, and values of ln L with their weights."""
     scatters, owner = _scatters_of(levels)
     by_scatter = [(levels.m[owner == k], levels.weight[owner == k]) for k in range(len(scatters))]
     overlap = _overlaps(scatters, t_grid)
@@ -300,24 +329,20 @@ def _refined(
     means = np.broadcast_to(m_grid, found.shape)[place]
     scatter = np.broadcast_to(t_grid[:, None], found.shape)[place]
     after = TwoLevels(means, scatter, found[place], levels.specimens, levels.contained)
-    before = _before(levels, spread, by_scatter, scatters)
     middle = 0.5 * (bins[1:] + bins[:-1])
     if not spread:
         middle, factor = np.zeros(1), np.ones(1)
-    return FieldPosterior(before, after, middle, factor / factor.sum())
+    return after, (middle, factor / factor.sum())
 
 
-def _before(
-    levels: TwoLevels,
-    spread: float,
-    by_scatter: Sequence[tuple[FloatArray, FloatArray]],
-    scatters: FloatArray,
-) -> TwoLevels:
+def _before(levels: TwoLevels, spread: float) -> TwoLevels:
     """Return the prior of m - ln L and t, on a grid of means for each scatter."""
     if not spread:
         return levels
+    scatters, owner = _scatters_of(levels)
     means, weights = [], []
-    for m, weight in by_scatter:
+    for number in range(len(scatters)):
+        m, weight = levels.m[owner == number], levels.weight[owner == number]
         moved = m[:, None] - spread * _FACTORS
         grid = np.linspace(moved.min(), moved.max(), _PRIOR_MEANS)
         place = (moved - grid[0]) / (grid[1] - grid[0])
