@@ -169,13 +169,13 @@ def test_fit_finds_another_distribution():
 
 @pytest.mark.slow
 def test_intervals_of_fleets_hold_the_truth():
-    rng, kept, fleets = np.random.default_rng(46), 0, 200
+    rng, kept, fleets = np.random.default_rng(46), 0, 100
     for number in range(fleets):
         m, t = rng.normal(CENTRE, WIDTH), abs(rng.normal(0.0, PRIOR))
         factor = np.exp(SPREAD * rng.standard_normal())
-        lives = design(60, number)
+        lives = design(40, number)
         found = update([lives], LEVELS, fleet_of(rng, m, t, factor, 40), SPREAD)
         b10 = UncertainLives(replace(lives, exact=True), found.after).quantile(0.1)
         truth = np.exp(SCALE - m + ndtri(0.1) * np.hypot(t, INPUTS)) * factor
         kept += b10.low < truth < b10.high
-    assert 0.92 <= kept / fleets <= 0.98
+    assert 0.9 <= kept / fleets <= 0.99
