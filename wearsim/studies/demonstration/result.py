@@ -26,7 +26,7 @@ from wearsim.uq.survival.demonstration import (
 )
 from wearsim.uq.survival.lives import fewest_lives
 
-DURATIONS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)  # of the test, over the life to show
+DURATIONS = (0.75, 1.0, 1.5, 2.0, 3.0, 5.0)  # of the test, over the life to show
 FAILURES = 2  # up to which tests are planned by default
 _MOST_FAILURES = 20
 _TEXT = re.compile(

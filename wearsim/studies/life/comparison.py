@@ -96,8 +96,8 @@ def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
     return CountedLives(distribution.life[places])
 
 
-def compare_lives(first: LifeValues, second: LifeValues) -> LifeComparison:
-    """Return the comparison of two designs.
+def compare_lives(first: LifeValues, second: LifeValues, share: float = 0.1) -> LifeComparison:
+    """Return the comparison of two designs; `share` is that of the lives in `b10_ratio`.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def compare_lives(first: LifeValues, second: LifeValues) -> LifeComparison:
         if first.settings.alone and second.settings.alone:  # for any wear factor
             machine = Interval(machine.value, machine.value, machine.value)
     return LifeComparison(
-        quantile_ratio(*pair.distributions, 0.1, pair.most, pair.paired),
+        quantile_ratio(*pair.distributions, share, pair.most, pair.paired),
         machine,
         two_specimens(*pair.distributions, pair.most, pair.paired),
         pair.common,

@@ -364,13 +364,15 @@ class LifeResult(LifeValues):
 
         return effects_on_life(self)
 
-    def compare(self, other: LifeResult) -> LifeComparison:
+    def compare(self, other: LifeResult, percent: float = 10.0) -> LifeComparison:
         """Compare the lives with another design's.
 
         Parameters
         ----------
         other : LifeResult
             With the same unit of life; common draws if it has the same seed.
+        percent : float
+            Percentage of the lives in ``b10_ratio``, 10 for B10.
 
         Raises
         ------
@@ -389,7 +391,7 @@ class LifeResult(LifeValues):
         """
         from wearsim.studies.life.comparison import compare_lives  # noqa: PLC0415  (rarely needed)
 
-        return compare_lives(self, other)
+        return compare_lives(self, other, percent / 100.0)
 
     def estimate_for(self, target: Target) -> Estimate:
         """Return the estimate to which a target applies.

@@ -23,12 +23,11 @@ from wearsim.report.text import (
 from wearsim.report.view import Overview, Row, Rows, Table
 from wearsim.results.study_view import SAMPLING
 from wearsim.studies.ensemble.view import RealisationsView
+from wearsim.studies.life.fits_table import fit_tables, fits_data
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.values import remarks
 from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.survival.fits import FittedLives
-from wearsim.uq.survival.goodness import anderson_darling
 from wearsim.uq.survival.lives import fewest_lives, least_survival
 from wearsim.uq.survival.rare_events import RareProbability
 
@@ -126,7 +125,7 @@ class LifeView(RealisationsView[LifeResult]):
         return [
             *([self._levels()] if result.uncertain is not None else []),
             lives_table([""], [result]),
-            *self._fits(),
+            *fit_tables(result),
             Table("", lines, ["first limit", "share", ""]),
             self._effects(),
         ]
@@ -158,43 +157,6 @@ class LifeView(RealisationsView[LifeResult]):
         head = f"life [{result.unit}], given {_tests_of(result)}"
         parts_of = ["sd of ln life", "by more tests", "by more realisations"]
         return Table("", lines, [head, "predictive", "plug-in", "95 % credible", *parts_of])
-
-    def _fits(self) -> list[Table]:
-        """Return the fitted distributions, best first, and how well the drawn lives agree."""
-        result, shares = self.result, self.result.settings.shares
-        lives = [f"B{share:g}" for share in shares]
-        tables, exact = list[Table](), result.integrated_fits
-        if exact:
-            lines = [
-                [*self._fit_cells(fit, exact[0]), shown(fit.difference, "%", 2)] for fit in exact
-            ]
-            head = f"fit to lives with exact K/H [{result.unit}]"
-            heads = [head, *lives, "AIC", "parameters", "greatest difference"]
-            tables.append(Table("", lines, heads))
-        if len(result.fits) >= 2:
-            lines = []
-            for fit in result.fits:
-                test = anderson_darling(fit)
-                text = f"{test.statistic:.2f}, p = {_chance(test.probability)}" if test else NOTHING
-                lines.append([*self._fit_cells(fit, result.fits[0]), text])
-            head = f"fit{' to drawn lives' if exact else ''} [{result.unit}]"
-            tables.append(Table("", lines, [head, *lives, "AIC", "parameters", "Anderson-Darling"]))
-        return tables
-
-    def _fit_cells(self, fit: FittedLives, best: FittedLives) -> list[str]:
-        """Return the cells of a fit: lives with intervals, AIC above the best one, parameters."""
-        cells = []
-        for share in self.result.settings.shares:
-            life = fit.interval(share / 100.0)
-            low, value, high = rounded_lives(life.low, life.value, life.high)
-            cells.append(value if life.low == life.high else f"{value} ({low}..{high})")
-        scale = f"{count(math.exp(fit.mu))} {self.result.unit}"
-        parameters = (
-            f"median {scale}, sigma {fit.sigma:.3f}"
-            if fit.family == "log-normal"
-            else f"scale {scale}, shape {1.0 / fit.sigma:.3f}"
-        )
-        return [fit.family, *cells, f"{fit.aic - best.aic:+.1f}", parameters]
 
     def _angle(self, name: str) -> str:
         """Return where on a cam a limit was reached, empty for other limits."""
@@ -280,15 +242,7 @@ class LifeView(RealisationsView[LifeResult]):
             "rare": self._rare(),
             "first_limits": result.first_limits,
             "angles_deg": {name: np.degrees(angles) for name, angles in result.angles.items()},
-            "fits": [
-                {**self._fit_data(fit), "anderson_darling": test._asdict() if test else None}
-                for fit in result.fits
-                for test in [anderson_darling(fit)]
-            ],
-            "fits_with_exact_wear_factor": [
-                {**self._fit_data(fit), "greatest_difference": fit.difference}
-                for fit in result.integrated_fits
-            ],
+            **fits_data(result),
             "sensitivity_of_life": [
                 {"input": item.name, "first_order": asdict(item.first)}
                 for item in (result.sensitivity("life") if result.count > 1 else [])
@@ -311,13 +265,6 @@ class LifeView(RealisationsView[LifeResult]):
             **self.ending(),
             "warnings": list(result.warnings),
         }
-
-    def _fit_data(self, fit: FittedLives) -> dict[str, Any]:
-        """Return a fit with its lives."""
-        shares = self.result.settings.shares
-        lives = {f"{share:g}": asdict(fit.interval(share / 100.0)) for share in shares}
-        numbers = {"aic": fit.aic, "mu": fit.mu, "sigma": fit.sigma}
-        return {"family": fit.family, **numbers, "b": lives}
 
     def _uncertain(self, share: float) -> dict[str, Any]:
         """Return predictive and plug-in life and their uncertainty; nothing without a posterior."""
@@ -418,11 +365,6 @@ def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
     return value, f"from {rounded_lives(bound)[0]} (one-sided)" if math.isfinite(
         bound
     ) else "too few lives"
-
-
-def _chance(probability: float) -> str:
-    """Return the probability of a test in words."""
-    return f"{probability:.2f}" if probability >= _SMALL else f"below {_SMALL:g}"
 
 
 def _change(factor: Interval) -> str:
