@@ -85,7 +85,7 @@ class LifeUse:
             found = {item.name: item.distribution for item in scenario.random}
             known = isinstance(found.get(settings.factor), TwoLevels)
             refuse(not known, f"{NO_LEVELS}: give --posterior", "--returns")
-            units.append(UnitsOf(label, settings.unit, settings.rate, scenario.limit.given))
+            units.append(UnitsOf(label, settings.unit, settings.rate, tuple(scenario.limit.given)))
         read_returns(self.returns, units)
 
     def view_of(self, results: Sequence[LifeResult], labels: Sequence[str]) -> View:

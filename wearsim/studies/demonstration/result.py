@@ -98,8 +98,9 @@ class Requirement(NamedTuple):
         except ValueError:
             written = re.sub(r"^[-+\d.eE\s]+", "", life)
             seconds = quantity(f"1 {written}", "s")
-            return cls(*numbers, quantity(life, "s") / seconds, written, seconds, failures)
-        return cls(*numbers, value, unit, 0.0, failures)
+            value, unit = quantity(life, "s") / seconds, written
+            return cls(numbers[0], numbers[1], value, unit, seconds, failures)
+        return cls(numbers[0], numbers[1], value, unit, 0.0, failures)
 
 
 class Plan(NamedTuple):
@@ -226,6 +227,20 @@ class Demonstration(Viewed):
         ----------
         design : int
             Its number, from 1.
+
+        Returns
+        -------
+        Interval
+            At the survival to show; of time if the requirement has a unit of time.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> faster = {"distribution": "lognormal", "median": "2.2e-11 1/Pa", "factor": 1.5}
+        >>> both = [lives, lives.with_wear_factor(faster)]
+        >>> found = wearsim.demonstration(both, "R=0.9 C=0.95 at 5e5", labels=["rig", "fast"])
+        >>> print(f"{found.acceleration(1).value:.3f}")
+        2.000
         """
         share = 1.0 - self.requirement.survival
         first, other = (self._drawn[k].log_quantile(share) for k in (0, design))
@@ -244,6 +259,17 @@ class Demonstration(Viewed):
             That are allowed.
         design : int
             Number of the conditions of the test, 0 for those of service.
+
+        Returns
+        -------
+        Plan
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> found = wearsim.demonstration(lives, "R=0.9 C=0.95 at 5e5")
+        >>> found.plan(5e5).specimens, found.plan(5e5, failures=1).specimens
+        (29, 46)
         """
         need, drawn = self.requirement, self._drawn[design]
         log = np.full(len(self._scale), math.log(duration * self._units(design)))
@@ -300,6 +326,12 @@ def demonstration(
     ------
     ValueError
         If the requirement cannot be read, or the life of the survival is not known.
+
+    Examples
+    --------
+    >>> lives = wearsim.open_results("rig-life.h5")
+    >>> wearsim.demonstration(lives, "R=0.9 C=0.95 at 5e5")
+    <Demonstration 'a wear test': R = 0.9, C = 0.95 at 500000 passes, 29 specimens>
     """
     designs = [lives] if isinstance(lives, LifeResult) else list(lives)
     need = Requirement.parse(requirement, designs[0].unit)

@@ -115,15 +115,54 @@ class FieldReturns(Viewed):
         return [self.posterior.lives_after(item) for item in self.mixtures]
 
     def before(self, percent: float, design: int = 0) -> UncertainLife:
-        """Return the life that a percentage does not reach, before the returns."""
+        r"""Return the life that a percentage does not reach, before the returns.
+
+        Parameters and return as of `after`.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> rows = ["median [1/Pa],scatter,weight", "1.0e-11,0.3,2", "1.3e-11,0.5,1"]
+        >>> _ = Path("K.csv").write_text("\n".join(rows))
+        >>> _ = Path("returns.csv").write_text("life,state\n4e5,failed\n7e5,suspended\n")
+        >>> lives = wearsim.open_results("rig-life.h5").with_posterior("K.csv")
+        >>> field = wearsim.field_returns(lives, "returns.csv")
+        >>> field.before(10).by_tests > field.after(10).by_tests
+        True
+        """
         return self.lives_before[design].quantile(percent / 100.0)
 
     def after(self, percent: float, design: int = 0) -> UncertainLife:
-        """Return the life that a percentage does not reach, after the returns."""
+        r"""Return the life that a percentage does not reach, after the returns.
+
+        Parameters
+        ----------
+        percent : float
+            10 for B10.
+        design : int
+            Number of the design, if there are several.
+
+        Returns
+        -------
+        UncertainLife
+            Predictive and plug-in life, and the credible interval.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> rows = ["median [1/Pa],scatter,weight", "1.0e-11,0.3,2", "1.3e-11,0.5,1"]
+        >>> _ = Path("K.csv").write_text("\n".join(rows))
+        >>> _ = Path("returns.csv").write_text("life,state\n4e5,failed\n7e5,suspended\n")
+        >>> lives = wearsim.open_results("rig-life.h5").with_posterior("K.csv")
+        >>> field = wearsim.field_returns(lives, "returns.csv")
+        >>> found = field.after(10)
+        >>> found.low < found.predictive < found.high
+        True
+        """
         return self.lives_after[design].quantile(percent / 100.0)
 
     def b(self, percent: float, design: int = 0) -> Interval:
-        """Return the life that a percentage does not reach, after the returns.
+        r"""Return the predictive life that a percentage does not reach, after the returns.
 
         Parameters
         ----------
@@ -135,7 +174,18 @@ class FieldReturns(Viewed):
         Returns
         -------
         Interval
-            The predictive life with its 95 % credible interval.
+            With its 95 % credible interval.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> rows = ["median [1/Pa],scatter,weight", "1.0e-11,0.3,2", "1.3e-11,0.5,1"]
+        >>> _ = Path("K.csv").write_text("\n".join(rows))
+        >>> _ = Path("returns.csv").write_text("life,state\n4e5,failed\n7e5,suspended\n")
+        >>> lives = wearsim.open_results("rig-life.h5").with_posterior("K.csv")
+        >>> field = wearsim.field_returns(lives, "returns.csv")
+        >>> field.b(10).value == field.after(10).predictive
+        True
         """
         return self.after(percent, design).interval
 
@@ -178,7 +228,25 @@ class FieldReturns(Viewed):
         return Interval(1.0, 1.0 / reach, reach)
 
     def wear_factor(self, levels: TwoLevels) -> tuple[Interval, Interval]:
-        """Return median K/H over the life factor [1/Pa] and scatter t, each with its interval."""
+        r"""Return median K/H over the life factor [1/Pa] and scatter t, each with its interval.
+
+        Parameters
+        ----------
+        levels : TwoLevels
+            ``field.posterior.before`` or ``field.posterior.after``.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> rows = ["median [1/Pa],scatter,weight", "1.0e-11,0.3,2", "1.3e-11,0.5,1"]
+        >>> _ = Path("K.csv").write_text("\n".join(rows))
+        >>> _ = Path("returns.csv").write_text("life,state\n4e5,failed\n7e5,suspended\n")
+        >>> lives = wearsim.open_results("rig-life.h5").with_posterior("K.csv")
+        >>> field = wearsim.field_returns(lives, "returns.csv")
+        >>> median, scatter = field.wear_factor(field.posterior.after)
+        >>> 5e-12 < median.value < 5e-11, 0.3 <= scatter.value <= 0.5
+        (True, True)
+        """
         scatter = weighted_quantiles(levels.t, levels.weight, _ENDS).tolist()
         return _interval(levels.m, levels.weight), Interval(scatter[1], scatter[0], scatter[2])
 
@@ -195,7 +263,7 @@ def field_returns(
     life_factor: float = LIFE_FACTOR,
     labels: Sequence[str] = (),
 ) -> FieldReturns:
-    """Return the lives of designs after returns from the field, without new tests.
+    r"""Return the lives of designs after returns from the field, without new tests.
 
     Parameters
     ----------
@@ -222,6 +290,17 @@ def field_returns(
         If the file cannot be used.
     ValueError
         If the lives have no posterior of K/H, or another argument is invalid.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> rows = ["median [1/Pa],scatter,weight", "1.0e-11,0.3,2", "1.3e-11,0.5,1"]
+    >>> _ = Path("K.csv").write_text("\n".join(rows))
+    >>> _ = Path("returns.csv").write_text("life,state\n4e5,failed\n7e5,suspended\n")
+    >>> lives = wearsim.open_results("rig-life.h5").with_posterior("K.csv")
+    >>> field = wearsim.field_returns(lives, "returns.csv")
+    >>> len(field.running), int(field.check.observed[-1])
+    (1, 1)
     """
     designs = [lives] if isinstance(lives, LifeResult) else list(lives)
     if not 1.0 <= life_factor < math.inf:

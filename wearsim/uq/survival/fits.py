@@ -83,7 +83,7 @@ class FittedLives:
         gradient = np.stack([np.full(np.shape(life), -1.0 / self.sigma), -self.score(life)])
         covariance = self.covariance
         square = np.einsum("i...,ij,j...->...", gradient, covariance, gradient)
-        return np.sqrt(np.maximum(square, 0.0))
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
 def standard_score(family: Family, probability: float) -> float:

@@ -137,7 +137,8 @@ class LifeFunctions:
 def _log_mean(log: FloatArray) -> FloatArray:
     """Return the logarithm of the mean over the second axis, at least -1e9."""
     top = np.maximum(log.max(axis=1), -1e9)
-    return np.maximum(top + np.log(np.exp(log - top[:, None]).mean(axis=1) + 1e-300), -1e9)
+    found = top + np.log(np.exp(log - top[:, None]).mean(axis=1) + 1e-300)
+    return np.asarray(np.maximum(found, -1e9))
 
 
 def _log_between(functions: LifeFunctions, first: FloatArray, last: FloatArray) -> FloatArray:
@@ -224,10 +225,10 @@ def update(
     m_grid = _covering(moved.ravel(), posterior.ravel(), _MEANS)
     total = np.bincount(owner, posterior.sum(axis=1))
     t_grid = _scatter_grid(scatters, total / total.sum())
-    found, factors = _refined(designs, levels, fleet, widened, m_grid, t_grid)
+    after, factors = _refined(designs, levels, fleet, widened, m_grid, t_grid)
     # the part of the life factor itself
     part = (spread / widened) ** 2 if widened else 0.0
-    return FieldPosterior(_before(levels, spread), found, part * factors[0], factors[1])
+    return FieldPosterior(_before(levels, spread), after, part * factors[0], factors[1])
 
 
 def _location_error(lives: FactorMixture) -> float:
@@ -275,7 +276,7 @@ def _covering(values: FloatArray, weight: FloatArray, count: int) -> FloatArray:
     order = np.argsort(values)
     ordered, below = values[order], np.cumsum(weight[order]) / weight.sum()
     low = ordered[np.searchsorted(below, _SHARE)]
-    high = ordered[min(np.searchsorted(below, 1.0 - _SHARE), len(ordered) - 1)]
+    high = ordered[min(int(np.searchsorted(below, 1.0 - _SHARE)), len(ordered) - 1)]
     margin = 0.05 * (high - low) + 1e-3
     return np.linspace(low - margin, high + margin, count)
 
@@ -368,7 +369,8 @@ def _overlaps(scatters: FloatArray, grid: FloatArray) -> FloatArray:
     cells = np.concatenate([[-np.inf], 0.5 * (grid[1:] + grid[:-1]), [np.inf]])
     low = np.maximum(edges[:-1, None], cells[:-1])
     high = np.minimum(edges[1:, None], cells[1:])
-    return np.maximum(high - low, 0.0) / np.maximum(np.diff(edges), 1e-300)[:, None]
+    widths = np.maximum(np.diff(edges), 1e-300)
+    return np.asarray(np.maximum(high - low, 0.0) / widths[:, None])
 
 
 def _gap(m: FloatArray, step: float) -> float:
