@@ -50,7 +50,7 @@ def anderson_darling(fit: LifeFit) -> AndersonDarling | None:
     >>> lives = np.exp(np.linspace(-1.0, 1.0, 40))
     >>> found = anderson_darling(fit_lives("log-normal", lives, lives > 0))
     >>> print(f"{found.statistic:.2f} {found.probability:.2f}")
-    0.43 0.31
+    0.46 0.28
     """
     sample = fit.sample
     ended, censored = sample.logs[sample.observed], sample.logs[~sample.observed]
