@@ -82,8 +82,8 @@ class LifeUse:
 
         units = []
         for label, (scenario, settings) in zip(labels, studies, strict=True):
-            found = {item.name: item.distribution for item in scenario.random}
-            known = isinstance(found.get(settings.factor), TwoLevels)
+            laws = {item.name: item.distribution for item in scenario.random}
+            known = isinstance(laws.get(settings.factor), TwoLevels)
             refuse(not known, f"{NO_LEVELS}: give --posterior", "--returns")
             units.append(UnitsOf(label, settings.unit, settings.rate, tuple(scenario.limit.given)))
         read_returns(self.returns, units)

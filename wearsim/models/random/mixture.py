@@ -20,8 +20,8 @@ def _read_component(value: object, info: ValidationInfo) -> Distribution | None:
     """
     if not isinstance(value, dict):
         raise QuantityError("is not a table", as_written(value), _TABLE)
-    found: Distribution | None = (info.context or {})["component"](value)
-    return found
+    distribution: Distribution | None = (info.context or {})["component"](value)
+    return distribution
 
 
 #: A distribution within the options of another one.

@@ -43,8 +43,8 @@ def demonstration_sheet(result: Demonstration, measured: Sequence[Measured] = ()
 
 
 def _numbers(plans: Sequence[Plan], name: str) -> FloatArray:
-    found = [getattr(plan, name) for plan in plans]
-    return np.array([np.nan if item is None else float(item) for item in found])
+    values = [getattr(plan, name) for plan in plans]
+    return np.array([np.nan if item is None else float(item) for item in values])
 
 
 def _axis(result: Demonstration) -> Axis:

@@ -171,17 +171,17 @@ class Demonstration(Viewed):
         """Specimens for the life itself, for each number of failures, without a distribution."""
         need = self.requirement
         known = np.array([need.survival])
-        found = [specimens(need.confidence, known, k) for k in range(need.failures + 1)]
-        return [int(number) for number in found if number is not None]
+        numbers = [specimens(need.confidence, known, k) for k in range(need.failures + 1)]
+        return [int(number) for number in numbers if number is not None]
 
     @cached_property
     def _drawn(self) -> list[DrawnLives]:
         """Lives of all designs with what is not known of them, in their own unit."""
-        found = []
+        drawn = []
         for design in self.designs:
             most = math.inf if design.is_known_throughout else design.most
-            found.append(drawn_lives(design.distribution, design.uncertain, most))
-        return found
+            drawn.append(drawn_lives(design.distribution, design.uncertain, most))
+        return drawn
 
     def _units(self, design: int) -> float:
         """Return the number of units of life in a unit of the requirement."""
@@ -206,8 +206,8 @@ class Demonstration(Viewed):
     @property
     def life(self) -> Interval:
         """Life of the simulated design at the survival to show, in the requirement's unit."""
-        found = self._interval(self._scale)
-        return Interval(*(self.requirement.life * math.exp(end) for end in _ends_of(found)))
+        scale = self._interval(self._scale)
+        return Interval(*(self.requirement.life * math.exp(end) for end in _ends_of(scale)))
 
     @property
     def survival(self) -> Interval:
@@ -287,13 +287,13 @@ class Demonstration(Viewed):
     @cached_property
     def plans(self) -> list[list[Plan]]:
         """Tests of all conditions, for each duration and number of failures."""
-        need, found = self.requirement, []
+        need, plans = self.requirement, []
         for design in range(len(self.designs)):
             factor = self.acceleration(design).value if design else 1.0
             durations = [need.life * ratio / factor for ratio in DURATIONS]
             failures = range(need.failures + 1)
-            found.append([self.plan(time, k, design) for time in durations for k in failures])
-        return found
+            plans.append([self.plan(time, k, design) for time in durations for k in failures])
+        return plans
 
 
 def _ends_of(interval: Interval) -> tuple[float, float, float]:
@@ -344,11 +344,11 @@ def demonstration(
         fewest = 1 if design.is_exact else fewest_lives(share)
         if design.count < fewest:
             raise ValueError(f"a survival of {need.survival:g} takes {fewest} lives")
-    found = Demonstration(tuple(designs), tuple(labels or labels_of(designs)), need)
+    result = Demonstration(tuple(designs), tuple(labels or labels_of(designs)), need)
     for number, design in enumerate(designs):
-        if not math.isfinite(found.acceleration(number).value):
+        if not math.isfinite(result.acceleration(number).value):
             raise ValueError(
-                f"the life that {100.0 * share:g} % do not reach of {found.labels[number]} is not"
+                f"the life that {100.0 * share:g} % do not reach of {result.labels[number]} is not"
                 f" known up to {design.most:,.0f} {design.unit}; give a greater --max"
             )
-    return found
+    return result

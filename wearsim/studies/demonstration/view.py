@@ -173,8 +173,8 @@ class DemonstrationView(View):
         ]
 
         def numbers(name: str) -> Any:
-            found = [getattr(plan, name) for _, plan in plans]
-            return np.array([math.nan if item is None else item for item in found])
+            values = [getattr(plan, name) for _, plan in plans]
+            return np.array([math.nan if item is None else item for item in values])
 
         passing = [plan.passing for _, plan in plans]
         return [

@@ -81,9 +81,11 @@ def _pair(first: LifeValues, second: LifeValues) -> _Pair:
             paired = False
         else:
             places = [np.searchsorted(item.numbers, common) for item in both]
-            found = zip(distributions, lives, places, strict=True)
-            (one, of_one), (other, of_other) = [(_at(d, at), of[at]) for d, of, at in found]
-            distributions, lives = (one, other), (of_one, of_other)
+            parts = zip(distributions, lives, places, strict=True)
+            (first_at, lives_of_first), (second_at, lives_of_second) = [
+                (_at(d, at), of[at]) for d, of, at in parts
+            ]
+            distributions, lives = (first_at, second_at), (lives_of_first, lives_of_second)
     return _Pair(distributions, (lives[0], lives[1]), most, paired, len(common))
 
 

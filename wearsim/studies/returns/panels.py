@@ -64,9 +64,9 @@ def _survival(result: FieldReturns) -> Panel:
             (before, _PALE, "before", 0.2),
             (after, colour, "after", 0.25),
         ):
-            each = [lives.probability_before(float(end)) for end in life]
+            chances = [lives.probability_before(float(end)) for end in life]
             low, value, high = (
-                1.0 - np.array([getattr(one, end) for one in each])
+                1.0 - np.array([getattr(chance, end) for chance in chances])
                 for end in ("high", "value", "low")
             )
             marks.append(Band(life, low, high, colour=shade, alpha=alpha))

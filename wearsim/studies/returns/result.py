@@ -198,20 +198,22 @@ class FieldReturns(Viewed):
     @cached_property
     def running(self) -> list[RunningUnit]:
         """Units in service with their remaining lives, in the order of the file."""
-        fleet, found = self.returns.fleet, dict[tuple[int, float], RemainingLife]()
+        fleet, remaining = self.returns.fleet, dict[tuple[int, float], RemainingLife]()
         target = self.designs[0].target
         for number, mixture in enumerate(self.mixtures):
             chosen = self.returns.running & (fleet.design == number)
             ages, levels = np.unique(fleet.low[chosen]), self.posterior.after
             shares = [share / 100.0 for share in SHARES]
             lives = remaining_lives(mixture, levels, ages, shares, target) if len(ages) else []
-            found |= {(number, age): one for age, one in zip(ages.tolist(), lives, strict=True)}
+            remaining |= {
+                (number, age): life for age, life in zip(ages.tolist(), lives, strict=True)
+            }
         return [
             RunningUnit(
                 self.returns.units[place],
                 int(fleet.design[place]),
                 float(fleet.low[place]),
-                found[int(fleet.design[place]), float(fleet.low[place])],
+                remaining[int(fleet.design[place]), float(fleet.low[place])],
             )
             for place in np.flatnonzero(self.returns.running)
         ]
@@ -321,13 +323,11 @@ def field_returns(
         UnitsOf(name, design.unit, design.settings.rate, design.limits)
         for name, design in zip(names, designs, strict=True)
     ]
-    found = FieldReturns(tuple(designs), names, read_returns(file, units), life_factor)
-    _ = found.posterior  # which may be impossible
-    return found
+    return FieldReturns(tuple(designs), names, read_returns(file, units), life_factor)
 
 
-def _are_equal(one: TwoLevels | None, other: TwoLevels | None) -> bool:
-    if one is None or other is None:
+def _are_equal(first: TwoLevels | None, other: TwoLevels | None) -> bool:
+    if first is None or other is None:
         return False
-    pairs = ((one.m, other.m), (one.t, other.t), (one.weight, other.weight))
+    pairs = ((first.m, other.m), (first.t, other.t), (first.weight, other.weight))
     return all(np.array_equal(first, second) for first, second in pairs)

@@ -51,7 +51,7 @@ class FieldReturnsView(View):
         units = _units(len(result.returns.fleet))
         for number, label in enumerate(result.labels):
             of = f" of {label}" if len(result.labels) > 1 else ""
-            before, after = (found(10.0, number) for found in (result.before, result.after))
+            before, after = (life(10.0, number) for life in (result.before, result.after))
             rows.append(Row(f"B10 after{of}", f"{self._life(after)} {given} and {units}"))
             rows.append(Row(f"B10 before{of}", f"{self._life(before)} {given}"))
             target = result.designs[number].target
@@ -105,13 +105,13 @@ class FieldReturnsView(View):
             for share in result.designs[number].settings.shares:
                 name = f"{label} B{share:g}" if len(result.labels) > 1 else f"B{share:g}"
                 cells = [name]
-                for found in (result.before(share, number), result.after(share, number)):
-                    low, value, high = rounded_lives(found.low, found.predictive, found.high)
-                    deviation = math.sqrt(found.by_tests + found.by_realisations)
+                for life in (result.before(share, number), result.after(share, number)):
+                    low, value, high = rounded_lives(life.low, life.predictive, life.high)
+                    deviation = math.sqrt(life.by_tests + life.by_realisations)
                     cells += [value, f"{low}..{high}", f"{deviation:.2g}"]
                 lines.append(cells)
-        each = ["95 % credible", "sd of ln life"]
-        heads = [f"life [{result.unit}]", "before", *each, "after", *each]
+        columns = ["95 % credible", "sd of ln life"]
+        heads = [f"life [{result.unit}]", "before", *columns, "after", *columns]
         return Table("", lines, heads)
 
     def _bands(self) -> Table:

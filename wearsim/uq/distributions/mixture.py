@@ -80,9 +80,9 @@ class Mixture(Distribution):
             middle = 0.5 * (low + high)
             short = self._cumulative(middle) < below
             low, high = np.where(short, middle, low), np.where(short, high, middle)
-        found = np.clip(self._restored(high), *self.support)
+        values = np.clip(self._restored(high), *self.support)
         ends = np.where(
-            below <= 0.0, self.support[0], np.where(below >= 1.0, self.support[1], found)
+            below <= 0.0, self.support[0], np.where(below >= 1.0, self.support[1], values)
         )
         return ends.reshape(probability.shape)
 
@@ -109,11 +109,11 @@ class Mixture(Distribution):
     def _cumulative(self, transformed: FloatArray) -> FloatArray:
         from scipy.special import ndtr  # noqa: PLC0415  (slow to import, and rarely needed)
 
-        found = np.zeros_like(transformed)
+        chance = np.zeros_like(transformed)
         for weight, score in zip(self.weights, self._scores, strict=True):
             at = np.interp(transformed, score.logs, score.scores, left=-math.inf, right=math.inf)
-            found += weight * ndtr(at)
-        return found
+            chance += weight * ndtr(at)
+        return chance
 
     @cached_property
     def _scores(self) -> list[ScoreFunction]:
@@ -135,5 +135,5 @@ class _Transformed(Distribution):
 
     def quantile(self, probability: FloatArray) -> FloatArray:
         """Return the quantiles of the exponential of the transformed value."""
-        found = self._mixture._transformed(np.asarray(self._component.quantile(probability)))
-        return np.exp(np.clip(found, -_GREATEST, _GREATEST))
+        values = self._mixture._transformed(np.asarray(self._component.quantile(probability)))
+        return np.exp(np.clip(values, -_GREATEST, _GREATEST))

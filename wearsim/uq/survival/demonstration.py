@@ -111,16 +111,16 @@ class DrawnLives:
 
         score = float(ndtri(probability))
         pairs = zip(self.scores, self.logs, strict=True)
-        found = np.array([np.interp(score, *pair, right=math.nan) for pair in pairs])
-        return np.where(found - self.shift <= math.log(self.most), found - self.shift, math.nan)
+        log = np.array([np.interp(score, *pair, right=math.nan) for pair in pairs])
+        return np.where(log - self.shift <= math.log(self.most), log - self.shift, math.nan)
 
     def failed(self, log: FloatArray) -> FloatArray:
         """Return the probability of a shorter life than exp(log) of each draw, shape (draws,)."""
         from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
         items = zip(log + self.shift, self.logs, self.scores, strict=True)
-        found = ndtr(np.array([np.interp(*item) for item in items]))
-        return np.where(log <= math.log(self.most), found, math.nan)
+        chance = ndtr(np.array([np.interp(*item) for item in items]))
+        return np.where(log <= math.log(self.most), chance, math.nan)
 
 
 def drawn_lives(
@@ -148,13 +148,13 @@ def drawn_lives(
         logs, failed = _curves(lives)
         rows = np.broadcast_to(logs, (draws, len(logs)))
         return DrawnLives(rows, _scores(weights @ failed), np.zeros(draws), most)
-    levels, found = uncertain.levels, []
+    levels, curves = uncertain.levels, []
     below = np.cumsum(levels.weight)
     places = np.searchsorted(below, (rng.permutation(draws) + 0.5) / draws * below[-1])
     for weight, t in zip(weights, levels.t[places], strict=True):
         logs, failed = _curves(uncertain.given(0.0, float(t)))
-        found.append((logs, _scores(weight @ failed)))
-    rows, scores = (np.array(items) for items in zip(*found, strict=True))
+        curves.append((logs, _scores(weight @ failed)))
+    rows, scores = (np.array(items) for items in zip(*curves, strict=True))
     return DrawnLives(rows, scores, levels.m[places], most)
 
 

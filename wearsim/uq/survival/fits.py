@@ -342,11 +342,11 @@ def fit_mixture(family: Family, lives: FactorMixture) -> IntegratedFit | None:
     _, _, curvature = sample.derivatives(mu, s, 0.0)
     v = (logs - mu) * math.exp(-s)
     _, first, _ = TERMS[family](v, np.ones(v.shape, dtype=np.bool_))
-    each = np.stack([-(first * math.exp(-s)) @ _SHARES, -(first * v) @ _SHARES - 1.0])
+    scores = np.stack([-(first * math.exp(-s)) @ _SHARES, -(first * v) @ _SHARES - 1.0])
     bread = np.linalg.inv(curvature)
     # with nothing else random there is no sampling error
     degrees = math.inf if lives.exact else max(count - 1.0, 1.0)
-    meat = (each @ each.T) * (0.0 if lives.exact else count / degrees)
+    meat = (scores @ scores.T) * (0.0 if lives.exact else count / degrees)
     fit = FittedLives(family, float(mu), math.exp(s), value)
     across = np.exp(np.quantile(logs, np.linspace(0.0, 1.0, _COMPARED)))
     difference = np.abs(fit.probability_before(across) - lives.failed(across).mean(axis=0)).max()

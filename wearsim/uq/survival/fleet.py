@@ -173,8 +173,8 @@ def _bands(designs: Sequence[FactorMixture], levels: TwoLevels, fleet: Fleet) ->
         for design, lives in enumerate(designs):
             functions = LifeFunctions(lives, t, _NODES)
             passed = functions.hazard(m + np.log(grid))
-            own = functions.hazard(m + np.log(ages[fleet.design == design]))
-            total += np.minimum(passed[:, None], own).sum(axis=1)
+            whole = functions.hazard(m + np.log(ages[fleet.design == design]))
+            total += np.minimum(passed[:, None], whole).sum(axis=1)
     bands = int(np.clip(total[-1] // _PER_BAND, 1, _MOST_BANDS))
     inner = np.interp(np.arange(1, bands) * total[-1] / bands, total, grid)
     return np.unique(np.concatenate([[0.0], inner, grid[-1:]]))
@@ -228,13 +228,13 @@ def remaining_lives(
         rows, functions = t == scatter, LifeFunctions(lives, float(scatter), _NODES)
         at = functions.survived(m[rows, None, None] + np.log(ends))
         ratio[rows] = np.exp(at - functions.survived(m[rows, None] + np.log(ages))[:, :, None])
-    found = []
+    remaining = []
     for place in range(len(ages)):
         curves, mean = ratio[:, place, :-1], weight @ ratio[:, place, :-1]
         stated = []
         for share in shares:
-            each = _crossings(curves, 1.0 - share, further)
-            low, high = weighted_quantiles(each, weight, _ENDS).tolist()
+            crossed = _crossings(curves, 1.0 - share, further)
+            low, high = weighted_quantiles(crossed, weight, _ENDS).tolist()
             value = float(_crossings(mean[None, :], 1.0 - share, further)[0])
             stated.append(Interval(value, min(low, value), max(high, value)))
         survival = None
@@ -243,8 +243,8 @@ def remaining_lives(
             low, high = weighted_quantiles(reached, weight, _ENDS).tolist()
             value = float(weight @ reached)
             survival = Interval(value, min(low, value), max(high, value))
-        found.append(RemainingLife(tuple(stated), survival))
-    return found
+        remaining.append(RemainingLife(tuple(stated), survival))
+    return remaining
 
 
 def _crossings(curves: FloatArray, level: float, life: FloatArray) -> FloatArray:
@@ -254,5 +254,5 @@ def _crossings(curves: FloatArray, level: float, life: FloatArray) -> FloatArray
     above, below = curves[row, place - 1], curves[row, place]
     part = np.clip((above - level) / np.maximum(above - below, 1e-300), 0.0, 1.0)
     log = np.log(life)
-    found = np.exp(log[place - 1] + part * (log[place] - log[place - 1]))
-    return np.where(curves[:, -1] > level, math.inf, found)
+    reached = np.exp(log[place - 1] + part * (log[place] - log[place - 1]))
+    return np.where(curves[:, -1] > level, math.inf, reached)

@@ -87,10 +87,10 @@ def _simulated(family: Family, count: int, end: float) -> FloatArray:
     values = np.minimum(drawn, end)
     kept = observed.sum(axis=1) >= 2
     location, scale = _fitted(family, values[kept], observed[kept])
-    found = []
+    statistics = []
     for row, seen, mu, sigma in zip(values[kept], observed[kept], location, scale, strict=True):
-        found.append(_statistic(family, (row[seen] - mu) / sigma, count, (end - mu) / sigma))
-    return np.array(found)
+        statistics.append(_statistic(family, (row[seen] - mu) / sigma, count, (end - mu) / sigma))
+    return np.array(statistics)
 
 
 def _fitted(

@@ -114,22 +114,22 @@ class LifeFunctions:
     def _value(self, number: int, log: FloatArray) -> FloatArray:
         low, high = self._ends
         inside, spline = np.clip(log, low, high), self._splines[number]
-        found = np.asarray(spline(inside))
+        value = np.asarray(spline(inside))
         if (inside != log).any():  # beyond the table the logarithm continues with its slope
-            found += (log - inside) * spline(inside, 1)
-        return found
+            value += (log - inside) * spline(inside, 1)
+        return value
 
     def likelihood(self, fleet: Fleet, m: FloatArray) -> FloatArray:
         """Return the logarithm of the likelihood of units for values of m, shape as `m`."""
         total = np.zeros(m.shape)
         known = fleet.failed & (fleet.low == fleet.high)
-        found = fleet.failed & ~known
+        inspected = fleet.failed & ~known
         for places, part in ((known, self.density), (~fleet.failed, self.survived)):
             ages, repeats = np.unique(fleet.low[places], return_counts=True)
             total += part(m[:, None] + np.log(ages)) @ repeats
-        if found.any():
+        if inspected.any():
             with np.errstate(divide="ignore"):
-                first, last = np.log(fleet.low[found]), np.log(fleet.high[found])
+                first, last = np.log(fleet.low[inspected]), np.log(fleet.high[inspected])
             total += _log_between(self, m[:, None] + first, m[:, None] + last).sum(axis=1)
         return total
 
@@ -137,8 +137,8 @@ class LifeFunctions:
 def _log_mean(log: FloatArray) -> FloatArray:
     """Return the logarithm of the mean over the second axis, at least -1e9."""
     top = np.maximum(log.max(axis=1), -1e9)
-    found = top + np.log(np.exp(log - top[:, None]).mean(axis=1) + 1e-300)
-    return np.asarray(np.maximum(found, -1e9))
+    mean = top + np.log(np.exp(log - top[:, None]).mean(axis=1) + 1e-300)
+    return np.asarray(np.maximum(mean, -1e9))
 
 
 def _log_between(functions: LifeFunctions, first: FloatArray, last: FloatArray) -> FloatArray:
@@ -219,8 +219,10 @@ def update(
     for number, t in enumerate(scatters):
         m = moved[owner == number]
         grid = np.linspace(m.min() - 1e-9, m.max() + 1e-9, _COARSE)
-        found = _total(designs, float(t), fleet, grid, _FEW_NODES)
-        chances[owner == number] = np.interp(m, grid, found) + np.log(weight[owner == number])
+        log_likelihood = _total(designs, float(t), fleet, grid, _FEW_NODES)
+        chances[owner == number] = np.interp(m, grid, log_likelihood) + np.log(
+            weight[owner == number]
+        )
     posterior = np.exp(chances - chances.max())
     m_grid = _covering(moved.ravel(), posterior.ravel(), _MEANS)
     total = np.bincount(owner, posterior.sum(axis=1))
@@ -255,13 +257,13 @@ def _total(
     designs: Sequence[FactorMixture], t: float, fleet: Fleet, m: FloatArray, nodes: int = _NODES
 ) -> FloatArray:
     """Return the logarithm of the likelihood of the units of all designs for one scatter."""
-    found = np.zeros(m.shape)
+    total = np.zeros(m.shape)
     for number, lives in enumerate(designs):
         chosen = fleet.design == number
         if chosen.any():
             units = Fleet(fleet.low[chosen], fleet.high[chosen], fleet.design[chosen])
-            found += LifeFunctions(lives, t, nodes).likelihood(units, m)
-    return found
+            total += LifeFunctions(lives, t, nodes).likelihood(units, m)
+    return total
 
 
 def _with_factor(levels: TwoLevels, spread: float) -> tuple[FloatArray, FloatArray]:
@@ -316,20 +318,20 @@ def _refined(
         )
         parts.append((m, weight, np.hypot(spread, smooth)))
     log = np.array(likelihood)
-    found = np.zeros_like(log)
+    posterior = np.zeros_like(log)
     bins = np.linspace(-5.0, 5.0, 201) * (spread or 1.0)
     factor = np.zeros(len(bins) - 1)
     top = log.max()
     for row, (m, weight, width) in enumerate(parts):
         z = (m_grid - m[:, None]) / width[:, None]
         joint = (weight / width)[:, None] * np.exp(-0.5 * z * z + log[row] - top)
-        found[row] = joint.sum(axis=0)
+        posterior[row] = joint.sum(axis=0)
         if spread:
             factor += np.histogram(m[:, None] - m_grid, bins, weights=joint)[0]
-    place = found > _LEAST_WEIGHT * found.max()
-    means = np.broadcast_to(m_grid, found.shape)[place]
-    scatter = np.broadcast_to(t_grid[:, None], found.shape)[place]
-    after = TwoLevels(means, scatter, found[place], levels.specimens, levels.contained)
+    place = posterior > _LEAST_WEIGHT * posterior.max()
+    means = np.broadcast_to(m_grid, posterior.shape)[place]
+    scatter = np.broadcast_to(t_grid[:, None], posterior.shape)[place]
+    after = TwoLevels(means, scatter, posterior[place], levels.specimens, levels.contained)
     middle = 0.5 * (bins[1:] + bins[:-1])
     if not spread:
         middle, factor = np.zeros(1), np.ones(1)
