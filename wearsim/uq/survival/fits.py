@@ -22,6 +22,7 @@ _WIDEST = 1e3  # distance in standard errors at which the search for an end stop
 _SCORES = np.linspace(-6.0, 6.0, 121)  # of the wear factor, in fits to its whole distribution
 _SHARES = np.exp(-0.5 * _SCORES**2) / np.exp(-0.5 * _SCORES**2).sum()
 _COMPARED = 401  # lives at which a fit is compared with them
+_Terms: TypeAlias = Callable[[FloatArray, BoolArray], tuple[FloatArray, FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -238,7 +239,6 @@ def _extreme(z: FloatArray, observed: BoolArray) -> tuple[FloatArray, FloatArray
     return np.where(observed, z, 0.0) - power, observed - power, -power
 
 
-_Terms: TypeAlias = Callable[[FloatArray, BoolArray], tuple[FloatArray, FloatArray, FloatArray]]
 #: log density, or log survival where censored, with two derivatives, of standardised logarithms
 TERMS: dict[Family, _Terms] = {"log-normal": _normal, "Weibull": _extreme}
 
