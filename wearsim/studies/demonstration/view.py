@@ -39,11 +39,11 @@ class DemonstrationView(View):
         self.result, self.title = result, result.title
         self.question = f"How many specimens for how long show {self._need()}?"
         self.notes = (_NO_SHAPE,)
-        obstacles = (
-            (label, design.probability_obstacle(design.b(100.0 * (1.0 - survival)).value))
+        share = 1.0 - result.requirement.survival
+        obstacles = [
+            (label, design.probability_obstacle(design.distribution.quantile_of_mean(share)))
             for label, design in zip(result.labels, result.designs, strict=True)
-            for survival in [result.requirement.survival]
-        )
+        ]
         self.warnings = tuple(
             f"the life at this survival of {label} is uncertain: {why}"
             for label, why in obstacles
