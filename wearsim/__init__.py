@@ -99,6 +99,7 @@ if TYPE_CHECKING:
     from wearsim.studies.cam.study import CamStudy, study_cam
     from wearsim.studies.comparison.compare import compare
     from wearsim.studies.contact.single import ContactStudy, solve_contact, study_contact
+    from wearsim.studies.demonstration.result import Demonstration, demonstration
     from wearsim.studies.dissipation.monte_carlo import dissipation
     from wearsim.studies.dissipation.result import DissipationResult
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
@@ -109,6 +110,7 @@ if TYPE_CHECKING:
     from wearsim.studies.life.api import life, resume_life, sweep_life
     from wearsim.studies.life.result import LifeResult
     from wearsim.studies.opening import open_dissipation, open_ensemble, open_results
+    from wearsim.studies.returns.result import FieldReturns, field_returns
     from wearsim.studies.run.result import Result
     from wearsim.studies.run.run import resume, run
     from wearsim.studies.start.export import export_running_in
@@ -129,10 +131,12 @@ _NAMES = {
         "WearsimError",
         "WorkerError",
     ],
+    "wearsim.studies.demonstration.result": ["Demonstration", "demonstration"],
     "wearsim.studies.dissipation.result": ["DissipationResult"],
     "wearsim.studies.ensemble.result": ["EnsembleResult"],
     "wearsim.studies.identify.result": ["IdentificationResult"],
     "wearsim.studies.life.result": ["LifeResult"],
+    "wearsim.studies.returns.result": ["FieldReturns", "field_returns"],
     "wearsim.studies.run.result": ["Result"],
     "wearsim.studies.opening": ["open_dissipation", "open_ensemble", "open_results"],
     "wearsim.scenario": ["Scenario", "load_scenario"],
@@ -155,17 +159,21 @@ __all__ = [
     "CamStudy",
     "ContactSolution",
     "ContactStudy",
+    "Demonstration",
     "DissipationResult",
     "EnsembleResult",
+    "FieldReturns",
     "IdentificationResult",
     "LifeResult",
     "Profile",
     "Result",
     "Scenario",
     "compare",
+    "demonstration",
     "dissipation",
     "ensemble",
     "export_running_in",
+    "field_returns",
     "identify",
     "life",
     "load_scenario",
