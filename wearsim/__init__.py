@@ -3,6 +3,8 @@
 Scenarios
     load_scenario(path, overrides)      read a scenario from a TOML file
     Scenario                            all inputs of a test: from_toml, from_dict, changed
+    scenario_schema()                   its JSON Schema, with the installed plugins
+    explore(scenario)                   a page on which its values are changed
     Profile(y, height)                  a measured profile of the cylinder
 
 One contact
@@ -38,6 +40,7 @@ Results
     LifeResult                          of a study of lives: b, survival, compare
     ContactSolution, ContactStudy       of one contact: dissipation, line_load, approach, ...
     CamStudy                            of a cam: kinematics, loads and contact at its stations
+    save_report(results, path)          one page on results for a browser
     to_dataframe(), to_xarray(), plot() of every result of a test or a study
 
 Errors
@@ -96,6 +99,7 @@ if TYPE_CHECKING:
         WorkerError as WorkerError,
     )
     from wearsim.scenario import Scenario, load_scenario
+    from wearsim.scenario.examples import scenario_schema
     from wearsim.studies.cam.study import CamStudy, study_cam
     from wearsim.studies.comparison.compare import compare
     from wearsim.studies.contact.single import ContactStudy, solve_contact, study_contact
@@ -104,11 +108,17 @@ if TYPE_CHECKING:
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
     from wearsim.studies.ensemble.result import EnsembleResult
     from wearsim.studies.ensemble.sweep import sweep
+    from wearsim.studies.exploration import explore
     from wearsim.studies.identify.api import identify
     from wearsim.studies.identify.result import IdentificationResult
     from wearsim.studies.life.api import life, resume_life, sweep_life
     from wearsim.studies.life.result import LifeResult
-    from wearsim.studies.opening import open_dissipation, open_ensemble, open_results
+    from wearsim.studies.opening import (
+        open_dissipation,
+        open_ensemble,
+        open_results,
+        save_report,
+    )
     from wearsim.studies.run.result import Result
     from wearsim.studies.run.run import resume, run
     from wearsim.types import ContactSolution, Profile
@@ -133,8 +143,10 @@ _NAMES = {
     "wearsim.studies.identify.result": ["IdentificationResult"],
     "wearsim.studies.life.result": ["LifeResult"],
     "wearsim.studies.run.result": ["Result"],
-    "wearsim.studies.opening": ["open_dissipation", "open_ensemble", "open_results"],
+    "wearsim.studies.exploration": ["explore"],
+    "wearsim.studies.opening": ["open_dissipation", "open_ensemble", "open_results", "save_report"],
     "wearsim.scenario": ["Scenario", "load_scenario"],
+    "wearsim.scenario.examples": ["scenario_schema"],
     "wearsim.studies.cam.study": ["CamStudy", "study_cam"],
     "wearsim.studies.dissipation.monte_carlo": ["dissipation"],
     "wearsim.studies.contact.single": ["ContactStudy", "solve_contact", "study_contact"],
@@ -163,6 +175,7 @@ __all__ = [
     "compare",
     "dissipation",
     "ensemble",
+    "explore",
     "identify",
     "life",
     "load_scenario",
@@ -173,6 +186,8 @@ __all__ = [
     "resume_ensemble",
     "resume_life",
     "run",
+    "save_report",
+    "scenario_schema",
     "solve_contact",
     "study_cam",
     "study_contact",
