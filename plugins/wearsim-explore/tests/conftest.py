@@ -9,37 +9,6 @@ import pytest
 
 FOLDER = Path(__file__).parent
 collect_ignore_glob = [] if find_spec("wearsim_explore") else ["*"]
-RIG = """
-title = "a short test"
-
-[roller]
-radius = "20 mm"          # of the rig
-crown_radius = "500 mm"
-material = "steel"
-[cylinder]
-radius = "25 mm"
-material = "steel"
-[operation]
-speed = "1000 rpm"
-duration = "3 min"        # short
-[load]
-kind = "constant"
-normal_force = "300 N"
-[friction]
-coefficient = 0.1
-[creepage]
-longitudinal = 1e-3
-[contact]
-model = "slender"
-[wear]
-law = "archard-dissipation"
-[wear.cylinder]
-k_over_h = "1.1e-11 1/Pa" # measured
-[wear.roller]
-k_over_h = "0 1/Pa"
-[outputs]
-records = 3
-"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -52,5 +21,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def rig(tmp_path: Path) -> Path:
     """Return the file of a short test in an empty folder."""
     path = tmp_path / "rig.toml"
-    path.write_text(RIG)
+    path.write_text((FOLDER / "rig.toml").read_text())
     return path

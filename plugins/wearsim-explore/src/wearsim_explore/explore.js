@@ -333,7 +333,7 @@
       catch { el("message").textContent = "the link holds no changes"; }
       history.replaceState(null, "", location.pathname + location.search);
     }
-    document.body.dataset.ready = "yes";
+    if (!fields.length) send({do: "show"});  // a later reply has replaced the one with the fields
   };
   document.addEventListener("DOMContentLoaded", () => { connect(); ready(); });
 })();

@@ -172,7 +172,7 @@ class Page:
                 raise ValueError(f"'{action}' is no action")
         if session.number != before:
             self._changed = received
-            self._received = {session.number: received}
+            self._received[session.number] = received
             self._stage, self._tests = "first", 0
             self._ask("first")
         if action in {"undo", "reset", "restore", "show"} or self._fields != self._fields_now():
@@ -242,7 +242,9 @@ class Page:
             self._show_panels()
         self._reply()
         if request.stage == "first" and request.number in self._received:
-            self.server_times.append(time.perf_counter() - self._received.pop(request.number))
+            self.server_times.append(time.perf_counter() - self._received[request.number])
+            later = {n: then for n, then in self._received.items() if n > request.number}
+            self._received = later
         self.finals += request.stage == "final"
         if request.number == self.session.number and not content.complaints:
             self._follow(request, content)

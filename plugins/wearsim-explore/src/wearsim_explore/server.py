@@ -105,7 +105,7 @@ class Exploration:
     port : int
         The port that is open.
     pages : list of Page
-        The pages that were opened.
+        The pages that are open.
 
     Raises
     ------
@@ -174,10 +174,9 @@ class Exploration:
             self._loop.run_until_complete(self._start(port, workers))
         except OSError as error:
             self._error = error
-            self._ready.set()
-            return
         self._ready.set()
-        self._loop.run_forever()
+        if self._error is None:
+            self._loop.run_forever()
         self._loop.close()
 
     async def _start(self, port: int, workers: int | None) -> None:
@@ -191,7 +190,9 @@ class Exploration:
             count += 1
             name = f"page{count}"
             scratch = Path(self._scratch.name)
-            self.pages.append(Page(document, self.design, schema, self.pool, scratch, name))
+            page = Page(document, self.design, schema, self.pool, scratch, name)
+            self.pages.append(page)
+            document.on_session_destroyed(lambda _: self.pages.remove(page))
 
         self.port = _free_port(self.host, port)
         with warnings.catch_warnings():
