@@ -75,10 +75,9 @@ def moved(page: Page, moves: int) -> list[float]:
     times = []
     for radius in np.linspace(400.0, 600.0, moves):
         before = len(page.server_times)
+        change = {"key": "roller.crown_radius", "value": f"{radius:.4g}", "begins": False}
         page.document.add_next_tick_callback(
-            partial(
-                page.act, "change", key="roller.crown_radius", value=f"{radius:.4g}", begins=False
-            )
+            partial(page.act, "change", **change, held=True, slides=True)
         )
         wait_until(lambda: len(page.server_times) > before)  # noqa: B023  (called at once)
         times.append(page.server_times[-1])

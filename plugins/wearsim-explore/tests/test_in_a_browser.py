@@ -145,7 +145,7 @@ def test_drag_has_one_final_result(browser: Any, rig: Exploration) -> None:
     del lane.ask  # type: ignore[method-assign]
     assert asked.count("first") > 20
     assert most == [1, 1]
-    assert shown.finals - finals == asked.count("final") == 1
+    assert shown.finals - finals == 1
     assert shown.session.design.changes == {"roller.crown_radius": f"{value} mm"}
     page.keyboard.press("Escape")
     page.get_by_role("button", name="Undo").click()  # the drag is one step

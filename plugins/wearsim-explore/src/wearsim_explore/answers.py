@@ -14,7 +14,7 @@ from wearsim_explore.design import Design
 
 Stage: TypeAlias = Literal["first", "final", "lives", "report"]
 #: what the first answer takes: the greatest tolerance there is, and no second test on wider strips
-COARSE = {"evolution.tolerance": 0.1, "evolution.strip_error": False}
+COARSE: dict[str, Any] = {"evolution.tolerance": 0.1, "evolution.strip_error": False}
 FIRST_TESTS, MOST_TESTS = 16, 1024  # of a study of lives
 _NUMBER = re.compile(
     r"(-?[\d,]*\.?\d+(?:e[+-]?\d+)?)(?: ± \S+)? ?([^\d\[,;]*(?:\^\d)?)(?: ± \S+ ?\2)?(?:\[.*\])?"
@@ -165,12 +165,10 @@ def answer(
 
 def _test(request: Request, stop_requested: Callable[[], bool]) -> Answer:
     """Return the wear test of a scenario, or its cam or contact if it has no test."""
-    scenario = request.design.scenario()
     coarse = request.stage == "first"
+    scenario = request.design.scenario(_coarser(request.design) if coarse else None)
     views: list[Any] = []
     if scenario.wear is not None and scenario.has_length:
-        if coarse and scenario.evolution.tolerance < COARSE["evolution.tolerance"]:
-            scenario = scenario.changed(COARSE)
         views.append(wearsim.run(scenario, stop_requested=stop_requested).view)
     if scenario.cam is not None:
         views.append(wearsim.study_cam(scenario).view)
@@ -192,6 +190,14 @@ def _test(request: Request, stop_requested: Callable[[], bool]) -> Answer:
         frames = [] if coarse else frames
         panels = {"turning": Drawn(panel, record(panel), tuple(frames)), **panels}
     return _answer(views, panels, steps)
+
+
+def _coarser(design: Design) -> dict[str, object] | None:
+    """Return what a first answer changes, if the tolerance is a smaller one without a mistake."""
+    table = design.tables.get("evolution", {})
+    tolerance = table.get("tolerance", 0.0) if isinstance(table, dict) else None
+    is_smaller = isinstance(tolerance, float) and 0.0 <= tolerance < COARSE["evolution.tolerance"]
+    return dict(COARSE) if is_smaller else None
 
 
 def _without_text(panel: Panel) -> Panel:

@@ -7,13 +7,19 @@ import tomllib
 from collections.abc import Iterable, Mapping, MutableMapping, MutableSequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
 import tomlkit
 
 from wearsim import Scenario
+
+
+@lru_cache(maxsize=16)
+def _parsed(text: str) -> dict[str, Any]:
+    """Return the tables of a text, which must not be changed."""
+    return tomllib.loads(text)
 
 
 @dataclass(frozen=True)
@@ -37,14 +43,14 @@ class Design:
     def with_change(self, key: str, value: object) -> Design:
         """Return a design with another value; one that equals that of the file is no change."""
         changes = {name: kept for name, kept in self.changes.items() if name != key}
-        if _value_at(tomllib.loads(self.text), key) != value:
+        if _value_at(_parsed(self.text), key) != value:
             changes[key] = value
         return replace(self, changes=changes)
 
     @cached_property
     def tables(self) -> dict[str, Any]:
         """The changed scenario as TOML holds it."""
-        tables = tomllib.loads(self.text)
+        tables = deepcopy(_parsed(self.text))
         for key, value in self.changes.items():
             _set(tables, key, value)
         return tables

@@ -23,9 +23,10 @@
     : (value - slider.low) / (slider.high - slider.low)));
 
   // at most one change of a slider is sent in a frame of the screen
-  const change = (key, value, begins) => {
-    if (waiting) { waiting.key === key ? (waiting.value = value, waiting.begins ||= begins) : (flush(), change(key, value, begins)); return; }
-    waiting = {key, value, begins};
+  const change = (key, value, begins, held) => {
+    if (waiting && waiting.key !== key) flush();
+    if (waiting) { Object.assign(waiting, {value, held, begins: waiting.begins || begins}); return; }
+    waiting = {key, value, begins, held, slides: true};
     requestAnimationFrame(flush);
   };
   const flush = () => { if (waiting) send({do: "change", ...waiting}); waiting = null; };
@@ -65,13 +66,15 @@
     if (field.slider) {
       const range = make("input", {type: "range", min: 0, max: places, step: 1});
       range.setAttribute("aria-label", `${field.table} ${field.label}, slider`);
-      let begins = true;
+      let begins = true, held = false;
+      range.addEventListener("pointerdown", () => { held = true; });
+      range.addEventListener("change", () => { if (held) { held = false; flush(); send({do: "release"}); } });
       for (const event of ["pointerdown", "focus"]) range.addEventListener(event, () => { begins = true; });
       range.addEventListener("input", () => {
         const value = value_at(+range.value, field.slider);
         input.value = String(value);
         range.setAttribute("aria-valuetext", `${value} ${field.unit}`.trim());
-        change(field.key, input.value, begins);
+        change(field.key, input.value, begins, held);
         begins = false;
       });
       node.append(range);

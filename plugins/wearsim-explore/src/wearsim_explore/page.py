@@ -9,7 +9,7 @@ import os
 import re
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -28,7 +28,7 @@ from wearsim_explore.design import Design
 from wearsim_explore.pool import Pool
 from wearsim_explore.session import MOST_PINS, Session
 
-REST = 0.3  # s without a change, after which the result is refined
+REST, REST_HELD = 0.3, 1.5  # s without a change, after which the result is refined; held: longer
 SLOTS = 26  # figures of a page, at most
 _NAME = re.compile(r"\w[\w .-]*\.toml")
 _KEPT = 1000  # server times that are kept
@@ -89,6 +89,7 @@ class Page:
         self._received: dict[int, float] = {}
         self._changed = time.perf_counter()
         self._timer: asyncio.TimerHandle | None = None
+        self._held, self._answered = False, -1
         self._fill(design)
         pool.listeners[name] = self._listen
         pool.listeners[f"{name}.report"] = self._listen
@@ -133,7 +134,8 @@ class Page:
         Parameters
         ----------
         action : str
-            "change", "undo", "reset", "restore", "pin", "unpin", "save", "report" or "show".
+            "change", "release", "undo", "reset", "restore", "pin", "unpin", "save", "report" or
+            "show".
         **values
             What belongs to it.
 
@@ -148,7 +150,14 @@ class Page:
         before = session.number
         match action:
             case "change":
-                session.change(str(values["key"]), str(values["value"]), begins=values["begins"])
+                slides = bool(values.get("slides"))
+                session.change(
+                    str(values["key"]), str(values["value"]), begins=values["begins"], slides=slides
+                )
+                self._held = bool(values.get("held"))
+            case "release":
+                self._held = False
+                self._refine_at_rest()
             case "undo":
                 session.undo()
             case "reset":
@@ -175,8 +184,11 @@ class Page:
             self._received[session.number] = received
             self._stage, self._tests = "first", 0
             self._ask("first")
-        if action in {"undo", "reset", "restore", "show"} or self._fields != self._fields_now():
+        if action in {"undo", "reset", "restore", "show"}:
             self._reply(fields=True)
+        elif action == "change" and not values.get("slides"):
+            if self._fields != self._fields_now():
+                self._reply(fields=True)
         elif action in {"pin", "unpin"}:
             self._reply()
 
@@ -252,7 +264,8 @@ class Page:
     def _follow(self, request: Request, content: Answer) -> None:
         """Ask for what follows an answer: a refined result, then lives of more and more tests."""
         if request.stage == "first":
-            self._after_rest(partial(self._ask_if, request.number, "final"))
+            self._answered = request.number
+            self._refine_at_rest()
         elif request.stage == "final" and has_lives(request.design):
             self._tests = 0
             self._ask("lives")
@@ -262,15 +275,18 @@ class Page:
             self._ask("lives")
             self._reply(progress=request.tests)
 
-    def _ask_if(self, number: int, stage: Stage) -> None:
-        if number == self.session.number:
-            self._ask(stage)
-
-    def _after_rest(self, call: Callable[[], None]) -> None:
+    def _refine_at_rest(self) -> None:
+        """Refine the first answer as soon as the hand rests."""
         if self._timer is not None:
             self._timer.cancel()
-        wait = max(0.0, self._changed + REST - time.perf_counter())
-        self._timer = asyncio.get_running_loop().call_later(wait, call)
+        if self._answered == self.session.number and self._stage == "first":
+            rest = REST_HELD if self._held else REST
+            wait = max(0.0, self._changed + rest - time.perf_counter())
+            self._timer = asyncio.get_running_loop().call_later(wait, self._refine)
+
+    def _refine(self) -> None:
+        if self._answered == self.session.number:
+            self._ask("final")
 
     # what is shown
 

@@ -64,18 +64,21 @@ class Session:
     def __post_init__(self) -> None:
         file = fields_of(self.schema, replace(self.design, changes={}).tables)
         self._start = {one.key: one for one in file}
+        self._last: tuple[Design | None, list[Field]] = (None, [])  # design and its fields
 
     def fields_of(self, design: Design) -> list[Field]:
         """Return the fields of a design; ranges of sliders lie around the values of the file."""
-        now = fields_of(self.schema, design.tables)
-        return [_with_range(one, self._start.get(one.key)) for one in now]
+        if self._last[0] is not design:
+            now = fields_of(self.schema, design.tables)
+            self._last = design, [_with_range(one, self._start.get(one.key)) for one in now]
+        return self._last[1]
 
     @property
     def can_undo(self) -> bool:
         """Whether there is a former state."""
         return bool(self._before)
 
-    def change(self, key: str, text: str, *, begins: bool = False) -> None:
+    def change(self, key: str, text: str, *, begins: bool = False, slides: bool = False) -> None:
         """Change a value; changes of one key are undone together.
 
         Parameters
@@ -86,13 +89,16 @@ class Session:
             What was typed or chosen.
         begins : bool
             Whether this is the start of a further change of the same key.
+        slides : bool
+            Whether a slider moves, which changes no other field: the known ones are used.
 
         Raises
         ------
         KeyError
             If there is no such field.
         """
-        item = next((one for one in self.fields_of(self.design) if one.key == key), None)
+        known = self._last[1] if slides and self._last[1] else self.fields_of(self.design)
+        item = next((one for one in known if one.key == key), None)
         if item is None:
             raise KeyError(key)
         if begins or key != self._last_key:
