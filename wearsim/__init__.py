@@ -100,6 +100,7 @@ if TYPE_CHECKING:
     )
     from wearsim.scenario import Scenario, load_scenario
     from wearsim.scenario.examples import scenario_schema
+    from wearsim.scenario.exploration import explore
     from wearsim.studies.cam.study import CamStudy, study_cam
     from wearsim.studies.comparison.compare import compare
     from wearsim.studies.contact.single import ContactStudy, solve_contact, study_contact
@@ -108,7 +109,6 @@ if TYPE_CHECKING:
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
     from wearsim.studies.ensemble.result import EnsembleResult
     from wearsim.studies.ensemble.sweep import sweep
-    from wearsim.studies.exploration import explore
     from wearsim.studies.identify.api import identify
     from wearsim.studies.identify.result import IdentificationResult
     from wearsim.studies.life.api import life, resume_life, sweep_life
@@ -144,7 +144,7 @@ _NAMES = {
     "wearsim.studies.identify.result": ["IdentificationResult"],
     "wearsim.studies.life.result": ["LifeResult"],
     "wearsim.studies.run.result": ["Result"],
-    "wearsim.studies.exploration": ["explore"],
+    "wearsim.scenario.exploration": ["explore"],
     "wearsim.studies.opening": ["open_dissipation", "open_ensemble", "open_results", "save_report"],
     "wearsim.scenario": ["Scenario", "load_scenario"],
     "wearsim.scenario.examples": ["scenario_schema"],

@@ -119,17 +119,17 @@ def test_numbers_are_those_of_run_by_keyboard_alone(browser: Any, rig: Explorati
 def test_drag_has_one_final_result(browser: Any, rig: Exploration) -> None:
     page = opened(browser, rig.address)
     shown = rig.pages[-1]
-    lane, asked, most = rig.pool.lanes["quick"], [], [0, 0]
-    ask = lane.ask
+    schedule, asked, most = rig.pool.schedules["quick"], [], [0, 0]
+    ask = schedule.ask
 
     def counted(request: Any) -> None:
         ask(request)
         asked.append(request.stage)
-        running = [one for one in lane.running.values() if one.session == request.session]
-        waiting = [one for name, one in lane.waiting.items() if name == request.session]
+        running = [one for one in schedule.running.values() if one.session == request.session]
+        waiting = [one for name, one in schedule.waiting.items() if name == request.session]
         most[:] = max(most[0], len(running)), max(most[1], len(waiting))
 
-    lane.ask = counted  # type: ignore[method-assign]
+    schedule.ask = counted  # type: ignore[method-assign]
     finals = shown.finals
     slider = page.get_by_label(SLIDER)
     box = slider.bounding_box()
@@ -142,7 +142,7 @@ def test_drag_has_one_final_result(browser: Any, rig: Exploration) -> None:
     value = field(page, "roller.crown_radius").input_value()
     page.wait_for_selector('#status[data-stage=final]:not([data-number="0"])', timeout=120_000)
     page.wait_for_timeout(1000)  # in which nothing more is to come
-    del lane.ask  # type: ignore[method-assign]
+    del schedule.ask  # type: ignore[method-assign]
     assert asked.count("first") > 20
     assert most == [1, 1]
     assert shown.finals - finals == 1

@@ -10,9 +10,9 @@ import pytest
 
 import wearsim
 from wearsim.report import Axis, Line, Panel, Records
-from wearsim_explore.answers import Answer, Complaint, Drawn, Quantity, Request, answer
+from wearsim_explore.answers import Answer, Drawn, FieldMistake, Quantity, Request, answer
 from wearsim_explore.design import Design
-from wearsim_explore.session import Session, key_of, with_ghosts
+from wearsim_explore.session import Session, key_of, with_pinned
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_mistakes_stand_beside_their_fields_in_the_words_of_check(session: Sessi
     session.receive(computed(session), lives=False)
     with pytest.raises(wearsim.ScenarioError) as caught:
         session.design.scenario()
-    beside, others = session.mistakes()
+    beside, others = session.beside_fields()
     assert set(beside) == {"friction.coefficient", "roller.radius"}
     assert sorted(beside.values()) == sorted(map(str, caught.value.mistakes))
     assert not others
@@ -122,7 +122,7 @@ def test_mistakes_stand_beside_their_fields_in_the_words_of_check(session: Sessi
 def test_mistake_is_found_at_its_field(table: str, key: str, field: str) -> None:
     keys = ["title", "roller.radius", "cam.motion.0.law", "cam.motion.1.law", "cam.motion.1.rise"]
     keys.append("wear.cylinder.k_over_h")
-    assert key_of(Complaint(table, key, ""), keys) == field
+    assert key_of(FieldMistake(table, key, ""), keys) == field
 
 
 def panel(height: float) -> Panel:
@@ -136,13 +136,13 @@ def panel(height: float) -> Panel:
 
 
 def test_pinned_design_lies_below_as_a_line() -> None:
-    below, *above = with_ghosts(panel(1.0), [("A", panel(2.0))]).marks
+    below, *above = with_pinned(panel(1.0), [("A", panel(2.0))]).marks
     assert isinstance(below, Line)
     assert below.label == "pinned A"
     np.testing.assert_array_equal(below.y, [2.0, 2.0, 2.0])
     assert len(above) == 3
     other = Panel("other", Axis("y", "deg"), Axis(), panel(2.0).marks)
-    assert len(with_ghosts(panel(1.0), [("A", other)]).marks) == 3
+    assert len(with_pinned(panel(1.0), [("A", other)]).marks) == 3
 
 
 def test_table_compares_with_pinned_designs(session: Session) -> None:

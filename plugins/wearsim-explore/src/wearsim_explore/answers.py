@@ -66,7 +66,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Complaint:
+class FieldMistake:
     """A mistake of the scenario: table and key, empty for others, and the text of `check`."""
 
     table: str
@@ -96,7 +96,7 @@ class Answer:
     panels : mapping of str to Drawn
     steps : tuple of str
         Texts of the time slider.
-    complaints : tuple of Complaint
+    mistakes : tuple of FieldMistake
         Mistakes; there is nothing else then.
     tests : int
         Tests of a study of lives that are done.
@@ -113,7 +113,7 @@ class Answer:
     remarks: tuple[str, ...] = ()
     panels: dict[str, Drawn] | None = None
     steps: tuple[str, ...] = ()
-    complaints: tuple[Complaint, ...] = ()
+    mistakes: tuple[FieldMistake, ...] = ()
     tests: int = 0
     is_last: bool = False
     page: str = ""
@@ -155,12 +155,12 @@ def answer(
     except wearsim.Interrupted:
         raise
     except wearsim.ScenarioError as error:
-        found = [Complaint(one.table, one.key, str(one)) for one in error.mistakes]
-        return Answer(complaints=tuple(found))
+        found = [FieldMistake(one.table, one.key, str(one)) for one in error.mistakes]
+        return Answer(mistakes=tuple(found))
     except wearsim.WearsimError as error:
-        return Answer(complaints=(Complaint("", "", str(error)),))
+        return Answer(mistakes=(FieldMistake("", "", str(error)),))
     except (ValueError, TypeError) as error:  # arguments that the scenario does not allow
-        return Answer(complaints=(Complaint("", "", str(error)),))
+        return Answer(mistakes=(FieldMistake("", "", str(error)),))
 
 
 def _test(request: Request, stop_requested: Callable[[], bool]) -> Answer:

@@ -238,7 +238,7 @@ class Page:
         """
         if request.stage == "report":
             if isinstance(content, Answer):
-                texts = [one.text for one in content.complaints]
+                texts = [one.text for one in content.mistakes]
                 self._reply(page=content.page, message="\n".join(texts))
             return
         if isinstance(content, int):
@@ -247,10 +247,10 @@ class Page:
             return
         self.session.receive(content, lives=request.stage == "lives")
         if request.number != self.session.number:  # a newer change waits
-            self.session.complaints = ()
+            self.session.mistakes = ()
         else:
-            self._stage = "failed" if content.complaints else request.stage
-        if not content.complaints:
+            self._stage = "failed" if content.mistakes else request.stage
+        if not content.mistakes:
             self._show_panels()
         self._reply()
         if request.stage == "first" and request.number in self._received:
@@ -258,7 +258,7 @@ class Page:
             later = {n: then for n, then in self._received.items() if n > request.number}
             self._received = later
         self.finals += request.stage == "final"
-        if request.number == self.session.number and not content.complaints:
+        if request.number == self.session.number and not content.mistakes:
             self._follow(request, content)
 
     def _follow(self, request: Request, content: Answer) -> None:
@@ -323,7 +323,7 @@ class Page:
 
     def _reply(self, *, fields: bool = False, **further: Any) -> None:
         session = self.session
-        beside, others = session.mistakes()
+        beside, others = session.beside_fields()
         content: dict[str, Any] = {
             "count": next(self._replies),
             "seen": self._seen,

@@ -11,17 +11,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from wearsim_explore.answers import Answer, Complaint, Request
-from wearsim_explore.lane import Lane
+from wearsim_explore.answers import Answer, FieldMistake, Request
+from wearsim_explore.schedule import Schedule
 from wearsim_explore.worker import LENGTH, message_of
 
 _LIMIT = 2**24  # bytes that are read ahead
-_GRACE = 3.0  # s, after which a worker that was told to stop is ended
+_GRACE = 3.0  # s, after which a worker that was asked to stop is ended
 
 
 @dataclass
 class _Worker:
-    """A process, and its index in its lane."""
+    """A process, and its index in its schedule."""
 
     process: asyncio.subprocess.Process
     reading: asyncio.Task[None]
@@ -43,7 +43,7 @@ class Pool:
 
     def __init__(self, workers: int | None = None) -> None:
         count = workers or os.cpu_count() or 1
-        self.lanes = {"quick": Lane(count), "slow": Lane(1)}
+        self.schedules = {"quick": Schedule(count), "slow": Schedule(1)}
         self.listeners: dict[str, Callable[[Request, Answer | int], None]] = {}
         self._workers: dict[tuple[str, int], _Worker] = {}
         self._starting = asyncio.Lock()
@@ -52,14 +52,14 @@ class Pool:
     def ask(self, request: Request) -> None:
         """Compute an answer as soon as a worker is free."""
         slow = request.stage == "lives"
-        self.lanes["slow" if slow else "quick"].ask(request)
+        self.schedules["slow" if slow else "quick"].ask(request)
         if not slow:
             self.outdate(request.session, request.number)
         self._go_on()
 
     def outdate(self, session: str, number: int) -> None:
         """Stop what a session has in flight for older states of its design."""
-        slow = self.lanes["slow"]
+        slow = self.schedules["slow"]
         waiting = slow.waiting.get(session)
         if waiting is not None and waiting.number != number:
             slow.drop(session)
@@ -69,14 +69,14 @@ class Pool:
     def forget(self, session: str) -> None:
         """Stop everything of a session that has ended."""
         self.listeners.pop(session, None)
-        for lane in self.lanes.values():
-            lane.forget(session)
+        for schedule in self.schedules.values():
+            schedule.forget(session)
         self._go_on()
 
     async def warm_up(self) -> None:
         """Start all workers, so that the first answer does not wait for it."""
-        for name, lane in self.lanes.items():
-            for index in range(lane.workers):
+        for name, schedule in self.schedules.items():
+            for index in range(schedule.workers):
                 await self._worker(name, index)
 
     async def close(self) -> None:
@@ -93,12 +93,12 @@ class Pool:
     def _go_on(self) -> None:
         if self._closed:
             return
-        for name, lane in self.lanes.items():
-            for index in lane.to_stop():
+        for name, schedule in self.schedules.items():
+            for index in schedule.to_stop():
                 self._tell(name, index, None)
                 loop = asyncio.get_running_loop()
-                loop.call_later(_GRACE, self._end, name, index, lane.running[index])
-            for index, request in lane.to_start():
+                loop.call_later(_GRACE, self._end, name, index, schedule.running[index])
+            for index, request in schedule.to_start():
                 self._tell(name, index, request)
 
     def _tell(self, name: str, index: int, message: Request | None) -> None:
@@ -144,23 +144,23 @@ class Pool:
             except asyncio.IncompleteReadError:
                 content = RuntimeError("the computation ended unexpectedly")
                 self._workers.pop((name, index), None)
-            if index in self.lanes[name].running:
+            if index in self.schedules[name].running:
                 self._receive(name, index, content)
             if (name, index) not in self._workers:
                 return
 
     def _receive(self, name: str, index: int, content: Any) -> None:
-        lane = self.lanes[name]
-        request = lane.running[index]
+        schedule = self.schedules[name]
+        request = schedule.running[index]
         listener = self.listeners.get(request.session)
         if isinstance(content, int):
-            if listener is not None and index not in lane.stopping:
+            if listener is not None and index not in schedule.stopping:
                 listener(request, content)
             return
-        stopped = content is None or (isinstance(content, Exception) and index in lane.stopping)
-        wanted = lane.finished(index, complete=not stopped)
+        stopped = content is None or (isinstance(content, Exception) and index in schedule.stopping)
+        wanted = schedule.finished(index, complete=not stopped)
         if isinstance(content, Exception):
-            content = Answer(complaints=(Complaint("", "", str(content)),))
+            content = Answer(mistakes=(FieldMistake("", "", str(content)),))
         try:
             if wanted and listener is not None:
                 listener(request, content)
@@ -170,6 +170,6 @@ class Pool:
     def _end(self, name: str, index: int, request: Request) -> None:
         """End a worker that has not stopped; another one is started when it is needed."""
         worker = self._workers.get((name, index))
-        if worker is not None and self.lanes[name].running.get(index) is request:
+        if worker is not None and self.schedules[name].running.get(index) is request:
             with contextlib.suppress(ProcessLookupError):
                 worker.process.kill()

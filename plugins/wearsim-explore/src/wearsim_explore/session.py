@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from wearsim.report import Line, Panel, Records
-from wearsim_explore.answers import Answer, Complaint, Quantity
+from wearsim_explore.answers import Answer, FieldMistake, Quantity
 from wearsim_explore.design import Design, unknown_keys
 from wearsim_explore.fields import Field, fields_of
 
@@ -46,7 +46,7 @@ class Session:
         Number of the present state, which rises with every change.
     test, lives : Answer, optional
         The last answers without mistakes.
-    complaints : tuple of Complaint
+    mistakes : tuple of FieldMistake
         Mistakes of the present state, as far as they are known.
     pins : list of Pin
     """
@@ -56,7 +56,7 @@ class Session:
     number: int = 0
     test: Answer | None = None
     lives: Answer | None = None
-    complaints: tuple[Complaint, ...] = ()
+    mistakes: tuple[FieldMistake, ...] = ()
     pins: list[Pin] = field(default_factory=list)
     _before: list[Design] = field(default_factory=list)
     _last_key: str = ""
@@ -138,7 +138,7 @@ class Session:
 
     def _renew(self) -> None:
         self.number += 1
-        self.complaints = ()
+        self.mistakes = ()
 
     def pin(self, name: str = "") -> None:
         """Keep the present design for comparison, up to `MOST_PINS` of them."""
@@ -156,12 +156,12 @@ class Session:
 
     def receive(self, answer: Answer, *, lives: bool) -> None:
         """Take an answer; mistakes leave the last good one."""
-        if answer.complaints:
-            self.complaints = answer.complaints
+        if answer.mistakes:
+            self.mistakes = answer.mistakes
         elif lives:
             self.lives = answer if answer.rows else None
         else:
-            self.test, self.complaints = answer, ()
+            self.test, self.mistakes = answer, ()
 
     @property
     def panels(self) -> dict[str, Any]:
@@ -169,22 +169,22 @@ class Session:
         shown: dict[str, Any] = {}
         for answer in (self.test, self.lives):
             for name, drawn in (answer.drawn if answer else {}).items():
-                ghosts = [
+                pinned = [
                     (pin.name, other.drawn[name].panel)
                     for pin in self.pins
                     for other in pin.answers
                     if name in other.drawn
                 ]
-                panel = drawn.panel if drawn.frames else with_ghosts(drawn.panel, ghosts)
+                panel = drawn.panel if drawn.frames else with_pinned(drawn.panel, pinned)
                 shown[name] = drawn if panel is drawn.panel else panel
         return shown
 
-    def mistakes(self) -> tuple[dict[str, str], list[str]]:
+    def beside_fields(self) -> tuple[dict[str, str], list[str]]:
         """Return the mistakes by the field that they stand beside, and all others."""
-        keys = [one.key for one in self.fields_of(self.design)] if self.complaints else []
+        keys = [one.key for one in self.fields_of(self.design)] if self.mistakes else []
         beside: dict[str, str] = {}
         others = []
-        for one in self.complaints:
+        for one in self.mistakes:
             key = key_of(one, keys)
             if key:
                 beside[key] = "\n".join(filter(None, (beside.get(key), one.text)))
@@ -234,15 +234,15 @@ def _with_range(item: Field, start: Field | None) -> Field:
     return replace(item, slider=slider)
 
 
-def key_of(complaint: Complaint, keys: Sequence[str]) -> str:
+def key_of(mistake: FieldMistake, keys: Sequence[str]) -> str:
     """Return the key beside which a mistake stands, or an empty text.
 
     A mistake on one of several keys stands beside the first of them, one on a part of a list
     beside that part.
     """
-    match = _ENTRY.fullmatch(complaint.key)
-    name, entry = (match[1], match[2]) if match else (complaint.key, None)
-    table = complaint.table
+    match = _ENTRY.fullmatch(mistake.key)
+    name, entry = (match[1], match[2]) if match else (mistake.key, None)
+    table = mistake.table
     known = set(keys)
     for word in re.split(r" (?:or|and) ", name):
         place = ".".join(filter(None, (table, word)))
@@ -259,17 +259,17 @@ def key_of(complaint: Complaint, keys: Sequence[str]) -> str:
     return ""
 
 
-def with_ghosts(panel: Panel, ghosts: Sequence[tuple[str, Panel]]) -> Panel:
+def with_pinned(panel: Panel, pinned: Sequence[tuple[str, Panel]]) -> Panel:
     """Return a panel with the curves of other designs below its own, at their last record.
 
     Parameters
     ----------
     panel : Panel
-    ghosts : sequence of (str, Panel)
+    pinned : sequence of (str, Panel)
         Names and panels of the other designs.
     """
     below: list[Any] = []
-    for number, (name, other) in enumerate(ghosts):
+    for number, (name, other) in enumerate(pinned):
         if other.x.unit != panel.x.unit or other.x.log != panel.x.log or other.y.log != panel.y.log:
             continue
         style: dict[str, Any] = {"colour": _GREYS[number % len(_GREYS)], "width": 1.0}

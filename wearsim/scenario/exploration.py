@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from wearsim.errors import PluginError
-from wearsim.scenario import Scenario
+from wearsim.scenario.scenario import Scenario
 
 GROUP, NAME = "wearsim.functions", "explore"
 

@@ -12,7 +12,7 @@ _PATIENCE = 2.0  # s; a first answer that takes longer is stopped for a newer on
 
 
 @dataclass
-class Lane:
+class Schedule:
     """Computations that share some workers.
 
     A request replaces the one that its session has waiting. A first answer goes before refined
@@ -32,7 +32,7 @@ class Lane:
     running : dict of int to Request
         By worker.
     stopping : set of int
-        Workers that have been told to stop.
+        Workers that have been asked to stop.
     """
 
     workers: int
@@ -78,7 +78,7 @@ class Lane:
         return started
 
     def to_stop(self) -> list[int]:
-        """Return workers that are now to be told to stop."""
+        """Return workers that are now to be asked to stop."""
         stop = set(self._outdated)
         request = self._next()
         if request and request.stage == "first" and not (self.stopping | stop):
