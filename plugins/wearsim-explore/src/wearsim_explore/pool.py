@@ -9,6 +9,7 @@ import pickle
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from wearsim_explore.answers import Answer, FieldMistake, Request
@@ -32,6 +33,8 @@ class Pool:
 
     Parameters
     ----------
+    scratch : Path
+        Folder for files of computations, which workers remove if the server was killed.
     workers : int, optional
         Number of quick workers; by default the number of processors.
 
@@ -41,7 +44,8 @@ class Pool:
         Functions that receive the answers of a session, and the progress as a number of tests.
     """
 
-    def __init__(self, workers: int | None = None) -> None:
+    def __init__(self, scratch: Path, workers: int | None = None) -> None:
+        self._scratch = scratch
         count = workers or os.cpu_count() or 1
         self.schedules = {"quick": Schedule(count), "slow": Schedule(1)}
         self.listeners: dict[str, Callable[[Request, Answer | int], None]] = {}
@@ -122,7 +126,7 @@ class Pool:
         return self._workers.get((name, index))
 
     async def _start(self, name: str, index: int) -> None:
-        command = [sys.executable, "-m", "wearsim_explore.worker"]
+        command = [sys.executable, "-m", "wearsim_explore.worker", str(self._scratch)]
         process = await asyncio.create_subprocess_exec(
             *command,
             *(["--slow"] if name == "slow" else []),

@@ -182,7 +182,7 @@ class Exploration:
     async def _start(self, port: int, workers: int | None) -> None:
         logging.getLogger("bokeh").setLevel(logging.ERROR)
         logging.getLogger("tornado.access").setLevel(logging.CRITICAL)
-        self.pool = Pool(workers)
+        self.pool = Pool(Path(self._scratch.name), workers)
         schema, count = wearsim.scenario_schema(), 0
 
         def fill(document: Document) -> None:

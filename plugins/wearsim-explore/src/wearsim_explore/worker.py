@@ -1,12 +1,14 @@
 """Process that computes answers: requests come on its standard input, answers go to the output.
 
-It ends when its standard input is closed, so that nothing is left of a server that was killed.
+It ends when its standard input is closed, and then removes the folder that is its argument, so that
+nothing is left of a server that was killed.
 """
 
 from __future__ import annotations
 
 import os
 import pickle
+import shutil
 import signal
 import struct
 import sys
@@ -46,6 +48,7 @@ def main() -> None:
             try:
                 message = read_message(sys.stdin.buffer)
             except (EOFError, OSError):
+                shutil.rmtree(sys.argv[1], ignore_errors=True)
                 os._exit(0)
             if message is None:
                 stop.set()
