@@ -74,6 +74,6 @@ def test_equal_courses_have_no_error() -> None:
     passes = np.array([10.0, 100.0, 1000.0])
     sizes = np.array([passes**0.7, 0.5 * passes**0.7, passes])
     grid, profiles = Grid.spanning(-1.0, 1.0, 5), np.ones((2, 5))
-    course = Course(passes.tolist(), list(sizes.T), [np.zeros(3)] * 3, profiles, grid)
+    course = Course(passes.tolist(), list(sizes.T), profiles, grid)
     np.testing.assert_allclose(strip_errors(course, passes, sizes, course), 0.0, atol=1e-12)
     assert np.isnan(strip_errors(None, passes, sizes, course)).all()

@@ -60,12 +60,10 @@ OF_VOLUME = 0.33, 0.5
 KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 # safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
-EDGES, OF_EDGES = 8.0, 5.0
-# safety factors of volume and profile, also those of step doubling, whose error of the volume is a
-# sum of absolute changes
-OF_STEPS = COVER[1:, 0].tolist()
-OF_STEPS_WITH_EDGES = [OF_EDGES * OF_STEPS[0], OF_STEPS[1]]
-DOUBLED = math.inf, COVER_OF_DOUBLING
+EDGES, OF_EDGES = 8.0, 3.0
+# factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
+# of the volume, which do not add up
+OF_STEPS, DOUBLED = (1.0, float(COVER[2, 0])), (math.inf, COVER_OF_DOUBLING)
 # the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
 # number, to a least part of itself at the second one
 ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
@@ -168,8 +166,7 @@ class ImplicitStepper(StepDoublingStepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        factors = OF_STEPS if state.part is None else OF_STEPS_WITH_EDGES
-        left = self._left(problem, state, stop, factors)
+        left = self._left(problem, state, stop, OF_STEPS)
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
             *(
@@ -331,7 +328,11 @@ def _estimates(
         sizes[2] = np.hypot(sizes[2], edges.relative_size(at_edges, depths))
         sizes[:2] *= OF_EDGES
     found = COVER * sizes
-    found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
+    # of the errors before the step the sum counts, since the error may cross zero. What it shifts
+    # along the course of the test changes as the rate does: it decays where a spring unloads
+    rates = [np.asarray(state.past_sums)[0, -1] for state in (start, end)]
+    kept = np.divide(rates[1], rates[0], out=np.ones_like(rates[0]), where=rates[0] > 0.0)
+    found[1] += kept * (start.volume_error - start.irreducible[1])
     worn = volumes_of(problem, depths)
     relative = found[1] / np.where(worn > 0.0, worn, np.inf)
     found[0] = np.maximum(found[0], OF_VOLUME[0] * relative * depths.max(axis=(0, 2)))

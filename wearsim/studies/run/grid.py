@@ -361,11 +361,15 @@ def growth_of(
 
 
 def coarse_grid(scenario: Scenario, grid: Grid) -> Grid:
-    """Return strips of about twice the width over the same range; ends of a roller are edges."""
+    """Return strips of about twice the width over the same range; ends of a roller are edges.
+
+    Their number is odd where that of the strips is: all are then in the middle of strips.
+    """
     if ends_roller(scenario, *grid.edges) and scenario.contact.width is None:
         strips = math.ceil(0.5 * (scenario.roller.width or 0.0) / grid.spacing - _MARGIN)
         return roller_grid(scenario, strips + 2 * STRIPS_BEYOND)
     strips, middle = math.ceil(0.5 * grid.strips), 0.5 * (grid.edges[0] + grid.edges[1])
+    strips += grid.strips % 2 and 1 - strips % 2
     half = strips * grid.spacing
     return Grid.spanning(middle - half, middle + half, strips)
 
