@@ -328,11 +328,7 @@ def _estimates(
         sizes[2] = np.hypot(sizes[2], edges.relative_size(at_edges, depths))
         sizes[:2] *= OF_EDGES
     found = COVER * sizes
-    # of the errors before the step the sum counts, since the error may cross zero. What it shifts
-    # along the course of the test changes as the rate does: it decays where a spring unloads
-    rates = [np.asarray(state.past_sums)[0, -1] for state in (start, end)]
-    kept = np.divide(rates[1], rates[0], out=np.ones_like(rates[0]), where=rates[0] > 0.0)
-    found[1] += kept * (start.volume_error - start.irreducible[1])
+    found[1] += start.volume_error - start.irreducible[1]  # the error may cross zero
     worn = volumes_of(problem, depths)
     relative = found[1] / np.where(worn > 0.0, worn, np.inf)
     found[0] = np.maximum(found[0], OF_VOLUME[0] * relative * depths.max(axis=(0, 2)))
