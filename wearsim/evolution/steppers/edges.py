@@ -24,7 +24,8 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.loads import descents, elastic_approaches
+from wearsim.evolution.steppers.loads import descents, elastic_approaches, with_feedback
+from wearsim.evolution.steppers.single_step import carried_loads
 from wearsim.mechanics.numerics.edge_strips import SETTLED, EdgeStrips, start_edges
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
@@ -34,6 +35,7 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
 YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
+LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
@@ -43,12 +45,13 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     """Return whether steps resolve the edges of contacts within a strip once there is a groove.
 
     The contact model must return the separation, every contact must have its own body or station,
-    and load and inputs must be constant: where they vary, an edge also retreats. The rise of the
-    gap across a strip must be that of crowned bodies.
+    and load and inputs must be constant: where they vary, an edge also retreats. The load of a
+    spring falls, and wear advances the edge until the spring has almost no load, see `_unloaded`.
+    The rise of the gap across a strip must be that of crowned bodies.
     """
     stations, each, _ = problem.shape
     varies = problem.constant_load is None or len(problem.varying) > 0
-    varies |= stations == 1 and (problem.has_spring or bool(problem.terms))
+    varies |= stations == 1 and bool(problem.terms)
     apart = not problem.has_nodes and (stations == 1 or each == 1)
     possible = contacts.separation is not None and apart and not varies
     return possible and problem.has_crowned_gap
@@ -99,9 +102,15 @@ def by_resolution(
     every = np.arange(len(state.passes))
     if state.part is None:
         return [(every, problem, state)]
-    whole = unresolved(state)
-    if whole.any():
-        state = _with_new_edges(problem, state, whole)
+    whole, low = unresolved(state), _unloaded(problem, state)
+    if (low & ~whole).any():
+        assert state.order is not None
+        fields = unresolved_edges(problem)
+        ended = {n: np.where(low[:, None], one, getattr(state, n)) for n, one in fields.items()}
+        state = state.replaced(**ended, order=np.where(low & ~whole, 1, state.order))
+        whole = unresolved(state)
+    if (whole & ~low).any():
+        state = _with_new_edges(problem, state, whole & ~low)
         whole = unresolved(state)
     parts = []
     for kind in (False, True):
@@ -110,6 +119,15 @@ def by_resolution(
             part = state.at(places)
             parts.append((places, problem.at(places), without_edges(part) if kind else part))
     return parts
+
+
+def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
+    """Return which tests have a roller whose spring has lost most of its load."""
+    if not problem.has_spring or problem.shape[0] > 1:
+        return np.zeros(len(state.passes), dtype=np.bool_)
+    force = problem.force(problem.time(state.passes))
+    free = with_feedback(problem, force, np.zeros(()), ())
+    return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
