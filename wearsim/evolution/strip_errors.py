@@ -95,16 +95,13 @@ def sizes_of(problem: WearProblem, state: WearState, between: bool = False) -> F
 
 def _peaks(depths: FloatArray) -> FloatArray:
     """Return the greatest depths between strips, the last axis, by parabolas."""
-    place = depths.argmax(axis=-1)[..., None]
-    last = depths.shape[-1] - 1
-    before, top, after = (
-        np.take_along_axis(depths, np.clip(place + shift, 0, last), axis=-1)[..., 0]
-        for shift in (-1, 0, 1)
-    )
+    rows = depths.reshape(-1, depths.shape[-1])
+    each, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
+    top, inner = rows[each, place], (place > 0) & (place < last)
+    before, after = rows[each, place - inner], rows[each, place + inner]
     curvature = 2.0 * top - before - after
     rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
-    inner = (place[..., 0] > 0) & (place[..., 0] < last)
-    return np.asarray(top + np.where(inner, rise, 0.0))
+    return np.asarray((top + rise).reshape(depths.shape[:-1]))
 
 
 def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:

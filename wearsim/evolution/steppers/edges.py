@@ -235,11 +235,20 @@ def young_strips(state: WearState) -> BoolArray | None:
     if state.whole_steps is None or state.part is None or state.past_wear is None:
         return None
     assert state.order is not None
-    touching, stations = state.part > 0.0, len(state.part)
-    young, ahead = touching & (state.whole_steps < state.order[:, None]), ~touching
+    return state.computed_once(
+        _young_strips, state.whole_steps, state.part, state.past_wear, state.order
+    )
+
+
+def _young_strips(
+    whole_steps: FloatArray, part: FloatArray, past_wear: FloatArray, order: IntArray
+) -> BoolArray:
+    """Return `young_strips` from the fields of a state."""
+    touching, stations = part > 0.0, len(part)
+    young, ahead = touching & (whole_steps < order[:, None]), ~touching
     found = [(young.any(axis=axis) | ahead.all(axis=axis)) for axis in (1, 0)]
     if stations > 1:
-        unworn = ~(state.past_wear[0][stations:] > 0.0).any(axis=(0, 2))
+        unworn = ~(past_wear[0][stations:] > 0.0).any(axis=(0, 2))
         found = [one & unworn[:, None] for one in found]
     return np.concatenate(found)
 
