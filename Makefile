@@ -14,7 +14,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test test-slow lint bench bench-docs bench-ensembles validate docs linkcheck clean
+.PHONY: demo test test-slow style lint bench bench-docs bench-ensembles validate docs linkcheck clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -22,18 +22,24 @@ demo: $(VENV)/.installed
 	$(BIN)/wearsim run scenarios/rig-450min.toml -o out/rig-450min.h5 --force
 	$(BIN)/wearsim plot out/rig-450min.h5 -o out/rig-450min.png --force
 
-# threads of BLAS in each of the test processes would wait for each other
+# threads of BLAS in each of the test processes would wait for each other; bytecode of the tests is
+# kept for the processes that start later, also where PYTHONDONTWRITEBYTECODE is set
 test test-slow: export OPENBLAS_NUM_THREADS = 1
+test test-slow: export PYTHONDONTWRITEBYTECODE =
 
-test: lint
-	$(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow"
+# mypy, which takes one core for a minute, runs beside the tests
+test: style
+	$(BIN)/mypy & types=$$!; $(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow"; tests=$$?; \
+		wait $$types && exit $$tests
 
 test-slow: $(VENV)/.installed-dev
 	$(BIN)/pytest -n $(JOBS) --dist worksteal -m slow
 
-lint: $(VENV)/.installed-dev
+style: $(VENV)/.installed-dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+
+lint: style
 	$(BIN)/mypy
 
 # a topic that fails leaves the file of the last measurement; references do not depend on the stepper
@@ -48,6 +54,7 @@ bench-docs: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.report -o $(MEASURED)/report.json
 	$(BIN)/python -m tests.benchmarks.models -o $(MEASURED)/models.json
 	$(BIN)/python -m tests.benchmarks.model_choice -o $(MEASURED)/model-choice.json
+	$(BIN)/python -m tests.benchmarks.axial_profiles -o $(MEASURED)/axial-profiles.json
 
 bench: $(VENV)/.installed-dev
 	mkdir -p out
