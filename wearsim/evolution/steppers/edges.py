@@ -235,34 +235,27 @@ def young_strips(state: WearState) -> BoolArray | None:
     if state.whole_steps is None or state.part is None or state.past_wear is None:
         return None
     assert state.order is not None
-    return state.computed_once(
-        _young_strips, state.whole_steps, state.part, state.past_wear, state.order
-    )
-
-
-def _young_strips(
-    whole_steps: FloatArray, part: FloatArray, past_wear: FloatArray, order: IntArray
-) -> BoolArray:
-    """Return `young_strips` from the fields of a state."""
-    touching, stations = part > 0.0, len(part)
-    young, ahead = touching & (whole_steps < order[:, None]), ~touching
+    touching, stations = state.part > 0.0, len(state.part)
+    young, ahead = touching & (state.whole_steps < state.order[:, None]), ~touching
     found = [(young.any(axis=axis) | ahead.all(axis=axis)) for axis in (1, 0)]
     if stations > 1:
-        unworn = ~(past_wear[0][stations:] > 0.0).any(axis=(0, 2))
+        unworn = ~(state.past_wear[0][stations:] > 0.0).any(axis=(0, 2))
         found = [one & unworn[:, None] for one in found]
     return np.concatenate(found)
 
 
-def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
+def with_sum(
+    end: WearState, errors: FloatArray, crossed: BoolArray, parts: FloatArray
+) -> FloatArray:
     """Return errors of the depths that a step adds, which agree with those of their sums.
 
-    `with_volume` keeps the sums.
+    `with_volume` keeps the sums; `parts` are those of `parts_of_bodies`.
     """
     past, spans, orders = end.past_sums, end.past_spans, end.order
     assert past is not None
     assert spans is not None
     assert orders is not None
-    parts = np.where(crossed, 0.0, parts_of_bodies(end))
+    parts = np.where(crossed, 0.0, parts)
     errors = np.where(crossed, 0.0, errors)
     sums = kernel_input(past[:, :-1, :, None])
     ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
@@ -284,14 +277,13 @@ def relative_size(errors: FloatArray, depths: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(size / np.where(whole > 0.0, whole, np.inf)))
 
 
-def parts_of_bodies(state: WearState) -> FloatArray:
+def parts_of_bodies(state: WearState, young: BoolArray | None) -> FloatArray:
     """Return the part of each strip's error that counts, as `WearState.stacked`.
 
     The formulas also continue the separation of strips that are not in contact. Those that the edge
-    has just crossed are not smooth enough for an estimate, which is too great, see
-    `first_order_errors`.
+    has just crossed, the `young_strips`, are not smooth enough for an estimate, which is too great,
+    see `first_order_errors`.
     """
-    young = young_strips(state)
     if young is None:
         return np.ones(state.stacked.shape)
     assert state.part is not None
@@ -300,10 +292,9 @@ def parts_of_bodies(state: WearState) -> FloatArray:
     return np.where(state.past_wear[0] > 0.0, np.where(young, YOUNG * parts, parts), 0.0)
 
 
-def first_order_errors(end: WearState) -> FloatArray:
+def first_order_errors(end: WearState, young: BoolArray) -> FloatArray:
     """Return the errors that a step adds to young strips in contact, as `WearState.stacked` [m]."""
-    young, past, spans = young_strips(end), end.past_wear, end.past_spans
-    assert young is not None
+    past, spans = end.past_wear, end.past_spans
     assert past is not None
     assert spans is not None
     factor = spans[0] / (1.0 / spans[0] + 1.0 / spans[1])

@@ -167,6 +167,8 @@ class ImplicitStepper(StepDoublingStepper):
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
         left = self._left(problem, state, stop, OF_STEPS)
+        young = edges.young_strips(end)
+        parts = edges.parts_of_bodies(end, young)
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
             *(
@@ -179,7 +181,7 @@ class ImplicitStepper(StepDoublingStepper):
                 KEEP,
                 edges.most(end),
             ),
-            *(edges.parts_of_bodies(end), own, order),
+            *(parts, own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
         if step.min() <= WHOLE_PASSES:
@@ -195,7 +197,7 @@ class ImplicitStepper(StepDoublingStepper):
             passes=passes,
             steps=state.steps + 1,
             order=order,
-            **_estimates(problem, state, end, depths, own, step, displaced),
+            **_estimates(problem, state, end, depths, own, step, displaced, young, parts),
             **others,
         )
         return Attempt((end,), over, ratio)
@@ -224,7 +226,7 @@ class ImplicitStepper(StepDoublingStepper):
                 1.0,
                 edges.most(end),
             ),
-            *(edges.parts_of_bodies(end), own, order),
+            *(np.ones_like(depths), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
@@ -286,6 +288,8 @@ def _estimates(
     added: FloatArray,
     passes: FloatArray,
     displaced: FloatArray | None,
+    young: BoolArray | None,
+    parts: FloatArray,
 ) -> dict[str, FloatArray]:
     """Return the error estimates at the end of a step, by their names in `WearState`.
 
@@ -300,6 +304,8 @@ def _estimates(
         Length of the step.
     displaced : ndarray, shape (realisations,), optional
         Displacement of a roller that the error of its load corresponds to [m].
+    young, parts : ndarray
+        Strips that take steps of first order, where edges are resolved, and `parts_of_bodies`.
     """
     contacts, shape = end.contacts, end.contacts.line_load.shape
     stiffness = np.zeros(shape[0])
@@ -308,7 +314,7 @@ def _estimates(
     crossed = edges.crossed_strips(end)
     errors, sizes = carried_errors(
         np.asarray(start.stepping_error),
-        added if crossed is None else edges.with_sum(end, added, crossed),
+        added if crossed is None else edges.with_sum(end, added, crossed, parts),
         contacts.line_load,
         problem.wear_parts(contacts, passes).reshape(2, *shape),
         np.asarray(end.wear_exponents).reshape(shape),
@@ -323,8 +329,8 @@ def _estimates(
     if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
-    if crossed is not None:
-        at_edges = EDGES * (np.where(crossed, added, 0.0) + edges.first_order_errors(end))
+    if crossed is not None and young is not None:
+        at_edges = EDGES * (np.where(crossed, added, 0.0) + edges.first_order_errors(end, young))
         sizes[2] = np.hypot(sizes[2], edges.relative_size(at_edges, depths))
         sizes[:2] *= OF_EDGES
     found = COVER * sizes

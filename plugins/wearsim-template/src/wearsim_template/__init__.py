@@ -82,8 +82,21 @@ SPEC = ws.ContactModelSpec(
     protocol=2,
 )
 
+KIND = ws.StudyKind(
+    *("winkler-approach", "approach of the bodies by normal force"),
+    result="wearsim_template.study:Approach",
+    view="wearsim_template.study:ApproachView",
+    protocol=2,
+)
+
 
 @ws.hookimpl
 def wearsim_contact_models():
     """Yield the contact model."""
     yield SPEC
+
+
+@ws.hookimpl
+def wearsim_study_kinds():
+    """Yield the kind of study."""
+    yield KIND
