@@ -37,6 +37,9 @@ EDGE_ORDER = 3
 YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
 LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
+# part of a contact that adheres up to which edges are resolved: where most of it adheres, wear is
+# greatest at the edge, and the line load is not uniform up to the layer in which it falls
+MOST_ADHESION = 0.5
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
 
@@ -139,6 +142,8 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
     worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
     separation = state.contacts.separation.reshape(shape)
     begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3))
+    adhering = problem.values_of(state.contacts, "adhesion_fraction")
+    begins &= adhering.max(axis=(0, 1)) <= MOST_ADHESION
     begins &= sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
     if not begins.any():
         return state
