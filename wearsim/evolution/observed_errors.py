@@ -34,6 +34,8 @@ def observed_errors(
     observed : mapping of str to ndarray, shape (points, ...)
         Observables of the test by name; angles end on "angle" [rad].
     """
+    if not observed:
+        return {}
     if coarse is None:
         return {name: np.full(values.shape, np.nan) for name, values in observed.items()}
     steps = np.array([0.0, *coarse.passes])
