@@ -24,7 +24,8 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.loads import descents, elastic_approaches
+from wearsim.evolution.steppers.loads import descents, elastic_approaches, with_feedback
+from wearsim.evolution.steppers.single_step import carried_loads
 from wearsim.mechanics.numerics.edge_strips import SETTLED, EdgeStrips, start_edges
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
@@ -34,7 +35,11 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
 YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
+LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
+# part of a contact that adheres up to which edges are resolved: where most of it adheres, wear is
+# greatest at the edge, and the line load is not uniform up to the layer in which it falls
+MOST_ADHESION = 0.5
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
 
@@ -43,12 +48,13 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     """Return whether steps resolve the edges of contacts within a strip once there is a groove.
 
     The contact model must return the separation, every contact must have its own body or station,
-    and load and inputs must be constant: where they vary, an edge also retreats. The rise of the
-    gap across a strip must be that of crowned bodies.
+    and load and inputs must be constant: where they vary, an edge also retreats. The load of a
+    spring falls, and wear advances the edge until the spring has almost no load, see `_unloaded`.
+    The rise of the gap across a strip must be that of crowned bodies.
     """
     stations, each, _ = problem.shape
     varies = problem.constant_load is None or len(problem.varying) > 0
-    varies |= stations == 1 and (problem.has_spring or bool(problem.terms))
+    varies |= stations == 1 and bool(problem.terms)
     apart = not problem.has_nodes and (stations == 1 or each == 1)
     possible = contacts.separation is not None and apart and not varies
     return possible and problem.has_crowned_gap
@@ -99,9 +105,15 @@ def by_resolution(
     every = np.arange(len(state.passes))
     if state.part is None:
         return [(every, problem, state)]
-    whole = unresolved(state)
-    if whole.any():
-        state = _with_new_edges(problem, state, whole)
+    whole, low = unresolved(state), _unloaded(problem, state)
+    if (low & ~whole).any():
+        assert state.order is not None
+        fields = unresolved_edges(problem)
+        ended = {n: np.where(low[:, None], one, getattr(state, n)) for n, one in fields.items()}
+        state = state.replaced(**ended, order=np.where(low & ~whole, 1, state.order))
+        whole = unresolved(state)
+    if (whole & ~low).any():
+        state = _with_new_edges(problem, state, whole & ~low)
         whole = unresolved(state)
     parts = []
     for kind in (False, True):
@@ -110,6 +122,15 @@ def by_resolution(
             part = state.at(places)
             parts.append((places, problem.at(places), without_edges(part) if kind else part))
     return parts
+
+
+def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
+    """Return which tests have a roller whose spring has lost most of its load."""
+    if not problem.has_spring or problem.shape[0] > 1:
+        return np.zeros(len(state.passes), dtype=np.bool_)
+    force = problem.force(problem.time(state.passes))
+    free = with_feedback(problem, force, np.zeros(()), ())
+    return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
@@ -121,6 +142,8 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
     worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
     separation = state.contacts.separation.reshape(shape)
     begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3))
+    adhering = problem.values_of(state.contacts, "adhesion_fraction")
+    begins &= adhering.max(axis=(0, 1)) <= MOST_ADHESION
     begins &= sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
     if not begins.any():
         return state
@@ -226,16 +249,18 @@ def young_strips(state: WearState) -> BoolArray | None:
     return np.concatenate(found)
 
 
-def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
+def with_sum(
+    end: WearState, errors: FloatArray, crossed: BoolArray, parts: FloatArray
+) -> FloatArray:
     """Return errors of the depths that a step adds, which agree with those of their sums.
 
-    `with_volume` keeps the sums.
+    `with_volume` keeps the sums; `parts` are those of `parts_of_bodies`.
     """
     past, spans, orders = end.past_sums, end.past_spans, end.order
     assert past is not None
     assert spans is not None
     assert orders is not None
-    parts = np.where(crossed, 0.0, parts_of_bodies(end))
+    parts = np.where(crossed, 0.0, parts)
     errors = np.where(crossed, 0.0, errors)
     sums = kernel_input(past[:, :-1, :, None])
     ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
@@ -257,14 +282,13 @@ def relative_size(errors: FloatArray, depths: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(size / np.where(whole > 0.0, whole, np.inf)))
 
 
-def parts_of_bodies(state: WearState) -> FloatArray:
+def parts_of_bodies(state: WearState, young: BoolArray | None) -> FloatArray:
     """Return the part of each strip's error that counts, as `WearState.stacked`.
 
     The formulas also continue the separation of strips that are not in contact. Those that the edge
-    has just crossed are not smooth enough for an estimate, which is too great, see
-    `first_order_errors`.
+    has just crossed, the `young_strips`, are not smooth enough for an estimate, which is too great,
+    see `first_order_errors`.
     """
-    young = young_strips(state)
     if young is None:
         return np.ones(state.stacked.shape)
     assert state.part is not None
@@ -273,10 +297,9 @@ def parts_of_bodies(state: WearState) -> FloatArray:
     return np.where(state.past_wear[0] > 0.0, np.where(young, YOUNG * parts, parts), 0.0)
 
 
-def first_order_errors(end: WearState) -> FloatArray:
+def first_order_errors(end: WearState, young: BoolArray) -> FloatArray:
     """Return the errors that a step adds to young strips in contact, as `WearState.stacked` [m]."""
-    young, past, spans = young_strips(end), end.past_wear, end.past_spans
-    assert young is not None
+    past, spans = end.past_wear, end.past_spans
     assert past is not None
     assert spans is not None
     factor = spans[0] / (1.0 / spans[0] + 1.0 / spans[1])
