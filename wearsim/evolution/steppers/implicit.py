@@ -174,16 +174,7 @@ class ImplicitStepper(StepDoublingStepper):
         parts = edges.parts_of_bodies(end, young)
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
-            *(
-                past.wear,
-                past.spans,
-                depths,
-                past.order,
-                part,
-                aim,
-                KEEP,
-                edges.most(end),
-            ),
+            *(past.wear, past.spans, depths, past.order, part, aim, KEEP, edges.most(end)),
             *(parts, own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
@@ -219,16 +210,7 @@ class ImplicitStepper(StepDoublingStepper):
         part = (end.passes / stop) ** PART_EXPONENT / left
         scale = part / (DOUBLED_SHARE * self.tolerance)
         over, ratio = next_steps(
-            *(
-                past.wear,
-                past.spans,
-                depths,
-                past.order,
-                scale,
-                1.0,
-                1.0,
-                edges.most(end),
-            ),
+            *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, edges.most(end)),
             *(np.ones_like(depths), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
