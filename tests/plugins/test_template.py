@@ -14,7 +14,7 @@ from plugin_examples import Point, rig
 
 import wearsim
 from wearsim.plugins.template import clash, renamed, template_folder, write_plugin
-from wearsim.testing import contact_model_tests
+from wearsim.testing import axial_profile_tests, contact_model_tests
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
@@ -34,6 +34,7 @@ def load_template():
 
 
 test_winkler = contact_model_tests(load_template().SPEC)
+test_winkler_quartic = axial_profile_tests(load_template().FORM, {"length": "10 mm"})
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ def test_template_imports_public_modules_only(path):
 
 
 def test_template_is_short():
-    assert len(MODULE.read_text().splitlines()) < 115
+    assert len(MODULE.read_text().splitlines()) < 145
 
 
 def test_kind_of_study_of_the_template_has_about_twenty_statements():
@@ -79,6 +80,7 @@ def test_template_tests_use_one_line_of_the_kit():
     text = (FOLDER / "tests" / "test_winkler.py").read_text()
     assert "test_winkler_approach = study_kind_tests(KIND, small_study)\n" in text
     assert "test_winkler = contact_model_tests(SPEC)\n" in text
+    assert 'test_winkler_quartic = axial_profile_tests(FORM, {"length": "10 mm"})\n' in text
 
 
 @pytest.fixture

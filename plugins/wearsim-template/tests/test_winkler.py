@@ -1,15 +1,17 @@
-"""Requirements on the contact model and the kind of study, and the modulus of the README."""
+"""Requirements on contact model, axial profile and kind of study; the modulus of the README."""
 
 import numpy as np
 import pytest
-from wearsim_template import KIND, SPEC
+from wearsim_template import FORM, KIND, SPEC
 from wearsim_template.study import Approach
 
-from wearsim.testing import STEEL, contact_model_tests, study_kind_tests
+from wearsim.testing import STEEL, axial_profile_tests, contact_model_tests, study_kind_tests
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 test_winkler = contact_model_tests(SPEC)
 test_softer_winkler = contact_model_tests(SPEC, {"foundation_modulus": "500 GPa/mm"})
+
+test_winkler_quartic = axial_profile_tests(FORM, {"length": "10 mm"})
 
 
 def small_study():
