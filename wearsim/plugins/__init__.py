@@ -30,6 +30,7 @@ from wearsim.plugins.specs import (
     RandomInputSpec,
     Spec,
     StudyKind,
+    TableSpec,
     Uniforms,
     WearLaw,
     WearLawSpec,
@@ -47,8 +48,9 @@ from wearsim.quantities import (
     PositiveWearFactor,
     Quantity,
     Value,
+    quantity,
 )
-from wearsim.units import Kind, QuantityError
+from wearsim.units import Kind, QuantityError, kind_of
 
 __all__ = [
     "BODIES",
@@ -91,11 +93,14 @@ __all__ = [
     "SingleContactModel",
     "Spec",
     "StudyKind",
+    "TableSpec",
     "Uniforms",
     "Value",
     "WearLaw",
     "WearLawSpec",
     "hookimpl",
+    "kind_of",
+    "quantity",
     "refuse_unclaimed",
     "registry",
 ]

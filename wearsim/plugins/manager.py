@@ -20,6 +20,7 @@ from wearsim.plugins.specs import (
     RandomInputSpec,
     Spec,
     StudyKind,
+    TableSpec,
     WearLawSpec,
 )
 
@@ -36,6 +37,7 @@ _HOOKS: dict[type[Spec], str] = {
     RandomInputSpec: "wearsim_random_inputs",
     MotionLawSpec: "wearsim_motion_laws",
     StudyKind: "wearsim_study_kinds",
+    TableSpec: "wearsim_tables",
 }
 #: modules of wearsim that implement hooks; they need no entry point
 _BUILT_IN = {"builtin": "wearsim.models", "studies": "wearsim.studies.kinds"}
@@ -282,6 +284,32 @@ class HookSpecs:
                     holds="depths of several grooves, from `wearsim survey`",
                     protocol=2,
                 )
+        """
+
+    @hookspec
+    def wearsim_tables(self) -> Iterable[TableSpec]:  # type: ignore[empty-body]
+        """Yield tables of the scenario that the plugin owns.
+
+        The requirements are documented in `TableSpec`.
+
+        Returns
+        -------
+        iterable of TableSpec
+
+        Examples
+        --------
+        .. code-block:: python
+
+            from wearsim.plugins import Options, PositiveLength, TableSpec, hookimpl
+
+
+            class SurveyOptions(Options):
+                spacing: PositiveLength = 1e-3  # between the grooves
+
+
+            @hookimpl
+            def wearsim_tables():
+                yield TableSpec("survey", SurveyOptions, "grooves of a survey", protocol=2)
         """
 
 

@@ -10,6 +10,7 @@ from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.plugins import Options
 from wearsim.profiles import split_name
 from wearsim.scenario.parse.fields import RandomInput
 from wearsim.scenario.parse.toml import flat, parse_fields, reader_in
@@ -71,6 +72,8 @@ class Scenario:
         The random inputs, in the order of their names.
     drawn : mapping of str to float or tuple of float
         Values that replace random inputs, by dotted key, in SI; a tuple has one value per roller.
+    tables : mapping of str to Options
+        Tables that belong to plugins, by name.
 
     Examples
     --------
@@ -103,6 +106,7 @@ class Scenario:
     notes: tuple[str, ...] = ()
     random: tuple[RandomInput, ...] = ()
     drawn: Mapping[str, Drawn] = field(default_factory=dict)
+    tables: Mapping[str, Options] = field(default_factory=dict)
 
     def _repr_html_(self) -> str:
         from wearsim.scenario.display import scenario_html  # noqa: PLC0415  (of notebooks)
@@ -196,7 +200,8 @@ class Scenario:
         Parameters
         ----------
         overrides : mapping of str to object
-            Values by dotted key, {"load.normal_force": "350 N"}.
+            Values by dotted key, {"load.normal_force": "350 N"}; an entry of a list has its number,
+            {"cam.motion.2.law": "modified-sine"}.
 
         Returns
         -------
