@@ -132,9 +132,9 @@ def resume(
         given = {"--until": until, "--allow-deep": allow_deep}
         given |= {"--failed": failed, "--realisations": realisations}
         refuse_options(given, f"has no meaning for a file that holds {kind.holds}")
-        with watching(PartWatcher, open_study(file, kind), quiet, PARTS) as watch:
+        with watching(PartWatcher, open_study(file, kind), quiet, PARTS) as parts:
             hands = {"workers": workers, "scheduler": chosen}
-            result = kind.load("resume")(file, **hands, **watch.callbacks)
+            result = kind.load("resume")(file, **hands, **parts.callbacks)
         show_view(result.view, json=json, files={"results file": result.path})
         return
     refuse(until is not None, "only wear tests can be extended", "--until")

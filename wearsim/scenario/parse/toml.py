@@ -234,7 +234,7 @@ def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, 
             raise ValueError(f"cannot be set, since '{name}' is not a table")
     if not isinstance(table, MutableMapping):
         raise ValueError(f"cannot be set, since '{key}' is not a key of an entry")
-    return table  # type: ignore[return-value]
+    return table
 
 
 def flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +65,7 @@ class CamView(View):
         depth = shown(harmonic_depth(turn), "um", 2)
         p, q = study.winding_ratio
         sweeps = "" if study.sweeps is None else f", {study.sweeps:.4g} sweeps around the roller"
+        never = study.jump_speed is None
         forces = {"least_normal_force": (least, "N"), "greatest_normal_force": (greatest, "N")}
         rows = [
             stated("perimeter", "perimeter", study.perimeter, "mm", 6),
@@ -77,7 +79,11 @@ class CamView(View):
                 shown(study.min_radius_of_curvature, "mm"),
                 answers={"undercut_margin": (turn.margins["undercut_margin"], "mm")},
             ),
-            stated("jump_speed", "speed at which the follower jumps", study.jump_speed, "rpm"),
+            Row(
+                "speed at which the follower jumps",
+                shown(study.jump_speed, "rpm"),
+                answers={"jump_speed": (math.inf if never else study.jump_speed, "rpm")},
+            ),
             Row(f"harmonic limit at {depth} of wear", shown(study.harmonic_limit, "1", 3)),
             Row(
                 "winding number",

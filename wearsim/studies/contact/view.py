@@ -64,7 +64,9 @@ class ContactView(View):
             Row("longitudinal creepage", solution.longitudinal_creepage),
             Row("lateral creepage", point.creepage.lateral),
             Row("spin", spin),
-            stated("patch length 2a", "patch_length", 2.0 * float(solution.half_length.max()), "mm"),
+            stated(
+                "patch length 2a", "patch_length", 2.0 * float(solution.half_length.max()), "mm"
+            ),
             Row("patch width", width, answers={"patch_width": (self._width, "mm")}),
             stated("peak pressure", "peak_pressure", solution.peak_pressure, "MPa"),
             stated("approach", "approach", solution.approach, "um"),

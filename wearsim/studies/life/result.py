@@ -379,13 +379,15 @@ class LifeResult(LifeValues):
         by_input |= effects(logs, scores)
         return dict(sorted(by_input.items(), key=lambda item: -item[1].size))
 
-    def compare(self, other: LifeResult) -> LifeComparison:
+    def compare(self, other: LifeResult, percent: float = 10.0) -> LifeComparison:
         """Compare the lives with another design's.
 
         Parameters
         ----------
         other : LifeResult
             With the same unit of life; common draws if it has the same seed.
+        percent : float
+            Percentage of the lives in ``b10_ratio``, 10 for B10.
 
         Raises
         ------
@@ -440,7 +442,7 @@ class LifeResult(LifeValues):
         if machine and all(item.settings.alone for item in both):  # for any wear factor
             machine = Interval(machine.value, machine.value, machine.value)
         return LifeComparison(
-            quantile_ratio(first, second, 0.1, most, paired),
+            quantile_ratio(first, second, percent / 100.0, most, paired),
             machine,
             two_specimens(first, second, most, paired),
             len(common),
