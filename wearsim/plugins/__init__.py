@@ -14,6 +14,9 @@ from wearsim.plugins.contact_model import (
 from wearsim.plugins.manager import hookimpl, registry
 from wearsim.plugins.specs import (
     BODIES,
+    AxialPair,
+    AxialProfile,
+    AxialProfileSpec,
     Body,
     ContactModelSpec,
     Distribution,
@@ -54,6 +57,9 @@ from wearsim.units import Kind, QuantityError, kind_of
 
 __all__ = [
     "BODIES",
+    "AxialPair",
+    "AxialProfile",
+    "AxialProfileSpec",
     "Body",
     "Capabilities",
     "CapabilityError",

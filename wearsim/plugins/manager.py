@@ -14,6 +14,7 @@ import pluggy
 from wearsim.errors import PluginError, described
 from wearsim.plugins.specs import (
     PROTOCOL,
+    AxialProfileSpec,
     ContactModelSpec,
     LoadSpec,
     MotionLawSpec,
@@ -36,6 +37,7 @@ _HOOKS: dict[type[Spec], str] = {
     LoadSpec: "wearsim_loads",
     RandomInputSpec: "wearsim_random_inputs",
     MotionLawSpec: "wearsim_motion_laws",
+    AxialProfileSpec: "wearsim_axial_profiles",
     StudyKind: "wearsim_study_kinds",
     TableSpec: "wearsim_tables",
 }
@@ -250,6 +252,54 @@ class HookSpecs:
                     factory=Cosine,
                     options=Options,
                     summary="half a period of a cosine",
+                    protocol=2,
+                )
+        """
+
+    @hookspec
+    def wearsim_axial_profiles(self) -> Iterable[AxialProfileSpec]:  # type: ignore[empty-body]
+        """Yield forms of bodies along their axis, selected by ``form`` in ``axial_profile``.
+
+        The requirements are documented in `AxialProfile` and tested by
+        `wearsim.testing.axial_profile_tests`.
+
+        Returns
+        -------
+        iterable of AxialProfileSpec
+
+        Examples
+        --------
+        .. code-block:: python
+
+            from wearsim.plugins import (
+                AxialProfile,
+                AxialProfileSpec,
+                Options,
+                PositiveLength,
+                hookimpl,
+            )
+
+
+            class QuarticOptions(Options):
+                length: PositiveLength
+                drop: PositiveLength
+
+
+            class Quartic(AxialProfile):
+                def __init__(self, options, pair):
+                    self.length, self.end = options.length, options.drop
+
+                def drop(self, s):
+                    return self.end * (2.0 * s / self.length) ** 4
+
+
+            @hookimpl
+            def wearsim_axial_profiles():
+                yield AxialProfileSpec(
+                    name="quartic",
+                    factory=Quartic,
+                    options=QuarticOptions,
+                    summary="drop with the fourth power of the distance from the middle",
                     protocol=2,
                 )
         """

@@ -1,7 +1,8 @@
-"""Base classes of wear and motion laws, loads and random inputs, and the specs of all hooks."""
+"""Base classes of wear and motion laws, loads, axial profiles and random inputs; all specs."""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -124,6 +125,55 @@ class MotionLaw(ABC):
         ndarray, shape (3, points)
             Lift above that at the segment's start [m, or rad of a swinging arm], and its first and
             second derivative by the angle.
+        """
+
+
+@dataclass(frozen=True)
+class AxialPair:
+    """Pair of bodies for which an axial profile is designed.
+
+    Parameters
+    ----------
+    width : float or None
+        Width of the roller, if the scenario gives it [m].
+    contact_modulus : float
+        E* of the materials [Pa].
+    curvature : float
+        Relative curvature along rolling, on the base circle of a cam [1/m].
+    """
+
+    width: float | None
+    contact_modulus: float
+    curvature: float
+
+
+class AxialProfile(ABC):
+    """Form of a body along its axis, without its measured start profile.
+
+    Attributes
+    ----------
+    length : float
+        Length of the body, which ends at a distance of half of it from the middle [m].
+    crown_radius : float or None
+        R of a circular crown, whose drop is s^2/(2 R) [m]; infinite for a straight body.
+    """
+
+    length: float = math.inf
+    crown_radius: float | None = None
+
+    @abstractmethod
+    def drop(self, s: FloatArray) -> FloatArray:
+        """Return the distance of the surface below its highest line.
+
+        Parameters
+        ----------
+        s : ndarray
+            Axial distance from the middle of the body, within its length [m].
+
+        Returns
+        -------
+        ndarray
+            Same shape; not negative [m].
         """
 
 
@@ -344,6 +394,21 @@ class MotionLawSpec(Spec):
 
     factory: Callable[[Any, float, float, str], MotionLaw] = field(kw_only=True)
     rise: Literal["required", "none", "own"] = "required"
+
+
+@dataclass(frozen=True)
+class AxialProfileSpec(Spec):
+    """Spec of an axial profile, selected by the key `form` of a table ``axial_profile``.
+
+    Parameters
+    ----------
+    factory : callable
+        ``factory(options, pair)`` returns an AxialProfile for an `AxialPair`.
+    """
+
+    kind: ClassVar[str] = "axial profile"
+
+    factory: Callable[[Any, AxialPair], AxialProfile] = field(kw_only=True)
 
 
 @dataclass(frozen=True)

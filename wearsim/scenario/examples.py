@@ -10,7 +10,13 @@ from pydantic import BaseModel, Field, RootModel, create_model
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
-from wearsim.plugins import MotionLawSpec, Options, RandomInputSpec, TableSpec
+from wearsim.plugins import (
+    AxialProfileSpec,
+    MotionLawSpec,
+    Options,
+    RandomInputSpec,
+    TableSpec,
+)
 from wearsim.scenario.parse.fields import (
     FRICTION,
     RandomInputTable,
@@ -21,6 +27,7 @@ from wearsim.scenario.parse.fields import (
 from wearsim.scenario.parse.mistakes import installed
 from wearsim.scenario.parse.toml import REQUIRED, TABLES
 from wearsim.scenario.scenario import Scenario, load_scenario
+from wearsim.scenario.tables.axial import AxialTable
 from wearsim.scenario.tables.cam_motion import MotionTable
 from wearsim.scenario.tables.plain import TopTable
 from wearsim.scenario.tables.plugin import AUTO, PLUGIN_TABLES, AutoTable
@@ -99,6 +106,9 @@ def scenario_schema() -> dict[str, Any]:
             kind: Any = tuple[laws, ...]  # type: ignore[valid-type]
             keys |= {"motion": (kind, described)} if laws else {}
             keys = keys if laws else {key: kept for key, kept in keys.items() if key != "motion"}
+        if "axial_profile" in keys:
+            described = Field(None, description=model.model_fields["axial_profile"].description)
+            keys["axial_profile"] = str | _axial_profiles(table, random), described
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
         kind = kind or _model(table, model.__doc__, keys)
         needed = table in REQUIRED and table != "cylinder"  # a cam may replace it
@@ -128,6 +138,16 @@ def _motion_laws() -> Any:
             del fields["rise"]
         models.append(_model(f"motion {spec.name}", spec.summary, fields))
     return _one_of("MotionLaw", models)
+
+
+def _axial_profiles(table: str, random: RandomInputs) -> Any:
+    """Return the model of the table `axial_profile` of a body, for each form."""
+    named, models = AxialTable.model_fields["form"], []
+    for spec in installed(AxialProfileSpec):
+        fields = _fields(spec.options, f"{table}.axial_profile", random)
+        fields["form"] = Literal[spec.name], Field(..., description=named.description)
+        models.append(_model(f"{table} {spec.name}", spec.summary, fields))
+    return _one_of(f"{table} axial profile", models)
 
 
 def _model(name: str, description: str | None, fields: dict[str, Any]) -> Model:

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from wearsim.errors import PluginError, WearsimError, described
 from wearsim.plugins import (
+    AxialProfileSpec,
     ContactModelSpec,
     LoadSpec,
     MotionLawSpec,
@@ -29,7 +30,15 @@ from wearsim.types import FloatArray
 from wearsim.units import Kind
 
 F = TypeVar("F")
-S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec)
+S = TypeVar(
+    "S",
+    ContactModelSpec,
+    WearLawSpec,
+    LoadSpec,
+    RandomInputSpec,
+    MotionLawSpec,
+    AxialProfileSpec,
+)
 
 
 class ConformanceError(AssertionError):

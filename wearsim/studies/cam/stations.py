@@ -50,7 +50,9 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
         return found
     if moves(turn, found):
         found = _movable(found, turn)
-    return found if found.inertia.size else joined(found)
+    start = turn.scenario.cylinder.start_surface
+    differ = start is not None and start.varies
+    return found if found.inertia.size or differ else joined(found)
 
 
 def moves(turn: CamTurn, stations: CamStations) -> bool:

@@ -12,10 +12,15 @@ from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
+from wearsim.scenario.axial_gap import AxialGap
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
+from wearsim.studies.start.heights import start_extent
 from wearsim.types import ContactSolution, FloatArray
+
+_BISECTIONS = 40
+LINE_APPROACH = 12.0  # of a line contact, roughly, over q/(pi E*)
 
 
 def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None) -> HertzContact:
@@ -28,14 +33,49 @@ def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None)
     if curvature is None:
         curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
     along = 0.5 * curvature
-    patch = hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
     half = 0.5 * (scenario.roller.width or math.inf)
+    gap = scenario.axial_gap
+    radius = gap.crown_radius if gap.is_crowned else _equivalent_radius(gap, along, load, modulus)
+    if radius is None:
+        return _line_contact(along, load, modulus, half)
+    patch = hertz(along, 0.5 / radius, load, modulus)
     if patch.b <= half:
         return patch
+    line = _line_contact(along, load, modulus, half)
+    pressure = max(line.peak_pressure, patch.peak_pressure)
+    return replace(patch, a=line.a, b=half, peak_pressure=pressure)
+
+
+def _line_contact(along: float, load: float, modulus: float, half: float) -> HertzContact:
+    """Return the line contact of a half-width [m] under a uniform line load."""
     line_load = load / (2.0 * half)
     half_length = math.sqrt(2.0 * line_load / (math.pi * modulus * along))
     pressure = 2.0 * line_load / (math.pi * half_length)
-    return replace(patch, a=half_length, b=half, peak_pressure=max(pressure, patch.peak_pressure))
+    approach = LINE_APPROACH * line_load / (math.pi * modulus)
+    return HertzContact(half_length, half, pressure, approach, load)
+
+
+def _equivalent_radius(gap: AxialGap, along: float, load: float, modulus: float) -> float | None:
+    """Return the radius of the crown whose patch ends where the gap of that crown is the same.
+
+    None where the patch is as wide as the roller.
+    """
+    low, high = 0.0, gap.greatest_half_width
+    if _patch_is_wider(gap, along, load, modulus, high):
+        return None
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        wider = _patch_is_wider(gap, along, load, modulus, middle)
+        low, high = (middle, high) if wider else (low, middle)
+    return gap.radius_at(high)
+
+
+def _patch_is_wider(
+    gap: AxialGap, along: float, load: float, modulus: float, half_width: float
+) -> bool:
+    """Return whether the crown with the same gap at a half-width has a wider patch."""
+    radius = gap.radius_at(half_width)
+    return math.isinf(radius) or hertz(along, 0.5 / radius, load, modulus).b > half_width
 
 
 def patches_at(scenario: Scenario, point: Point) -> list[HertzContact]:
@@ -70,9 +110,10 @@ def predicted_half_width(draws: Draws, load: float, full_slip: bool = True) -> f
     """Return half the final width of the groove predicted for full slip [m].
 
     Rigid bodies in full slip wear to a depth d = [(3/4) c N n / sqrt(2 R)]^(2/3) and a width
-    2 sqrt(2 R d), where c is the depth per pass and load of both bodies. For a nonlinear wear law c
-    is the greater value of the initial contact and the final groove. Without `full_slip` the
-    slip is less by the adhesion in the initial patch, after Carter.
+    2 sqrt(2 R d), where c is the depth per pass and load of both bodies; with another form than a
+    circular crown, to the depth of a conformal groove with the same cross-section. For a nonlinear
+    wear law c is the greater value of the initial contact and the final groove. Without `full_slip`
+    the slip is less by the adhesion in the initial patch, after Carter.
     """
     scenario, creepage = draws.scenario, draws.scenario.creepage
     if scenario.wear is None:
@@ -91,22 +132,23 @@ def predicted_half_width(draws: Draws, load: float, full_slip: bool = True) -> f
         for name, given in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
     )
     curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius if differs else 0.0
-    crown, profile = 2.0 * roller.crown_radius, scenario.cylinder.profile
+    gap, profile = scenario.axial_gap, start_extent(scenario)
     slipping = 1.0
     if not full_slip:
         saturated = friction * patch.a * (1.0 / roller.radius + 1.0 / scenario.cylinder.radius)
         saturated /= scenario.friction.creep_factor
         ratio = min(float(np.hypot(longitudinal, yaw)) / saturated, 1.0)
         slipping = ratio * (2.0 - ratio)
-    start = 0.0 if profile is None else float(np.ptp(profile.height))
+    start = 0.0 if profile is None else profile.relief
     half = patch.b
     for _ in range(20):  # the slip at the sides of the groove depends weakly on its width
-        along = longitudinal + tilt / roller.radius * half + half**2 / crown * curvature
+        rise = half**2 / (2.0 * gap.radius_at(half))
+        along = longitudinal + tilt / roller.radius * half + rise * curvature
         line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
         sliding = slipping * friction * float(np.hypot(along, yaw))
         per_load = wear_per_load(scenario, law, line_loads, sliding)
-        depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
-        before, half = half, float(np.sqrt(crown * (depth + start)))
+        depth = gap.depth_of(per_load * load * scenario.total_passes)
+        before, half = half, float(gap.half_width(depth + start))
         if half == before:
             break
     return half
