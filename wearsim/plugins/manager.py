@@ -338,13 +338,7 @@ class HookSpecs:
 
     @hookspec
     def wearsim_tables(self) -> Iterable[TableSpec]:  # type: ignore[empty-body]
-        """Yield tables of the scenario that the plugin owns.
-
-        The requirements are documented in `TableSpec`.
-
-        Returns
-        -------
-        iterable of TableSpec
+        """Yield tables of the scenario that the plugin owns; see `TableSpec`.
 
         Examples
         --------

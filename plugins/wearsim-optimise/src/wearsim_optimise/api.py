@@ -71,7 +71,8 @@ def optimise(
         The scenario, or its file; its values are the first design.
     vary : sequence of str
         Variables: "cam.base_radius=35mm:60mm"; whole numbers "operation.rollers=1:4"; a list
-        "cam.material=steel,bronze". Keys with one value are joined, "roller.radius+cam.base_radius".
+        "cam.material=steel,bronze". Keys with one value are joined by a plus sign, and an entry of
+        a list has its number, "cam.motion.2.law+cam.motion.4.law=cycloidal,modified-sine".
     output : path, optional
         Results file; without it the result is kept in memory only.
     maximise, minimise : str or sequence of str
@@ -223,8 +224,8 @@ def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
     objectives += [(name, -1) for name in given["minimise"]]
     if not 1 <= len(objectives) <= 2:
         raise ValueError(
-            f"one objective or two are needed, got {len(objectives)}; name a quantity to maximise or"
-            " minimise, such as life.b10"
+            f"one objective or two are needed, got {len(objectives)}; name a quantity to maximise"
+            " or minimise, such as life.b10"
         )
     if len({name for name, _ in objectives}) < len(objectives):
         raise ValueError(f"'{objectives[0][0]}' is given as two objectives; delete one of them")

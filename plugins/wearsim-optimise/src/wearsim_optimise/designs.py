@@ -13,7 +13,7 @@ from wearsim import Scenario
 from wearsim.errors import Interrupted
 from wearsim_optimise.evaluation import CHEAP, Evaluation, Limits
 from wearsim_optimise.goals import TIGHTER, Goals
-from wearsim_optimise.solvers import violation
+from wearsim_optimise.solvers import Answer, violation
 from wearsim_optimise.variables import Variable, Vector, numbers_at, overrides, places_of
 
 Results = Callable[[Evaluation, Any], Any]
@@ -217,15 +217,7 @@ class Designs:
         return places_of(self.variables, design.numbers)
 
 
-@dataclass(frozen=True)
-class Told:
-    """Loss and slacks of a design for a search, all of them finite."""
-
-    loss: float
-    slacks: Vector
-
-
-def completed(designs: Designs, chosen: Design, loss: Callable[[Design], float]) -> Told:
+def completed(designs: Designs, chosen: Design, loss: Callable[[Design], float]) -> Answer:
     """Return loss and slacks of a design, those that are not known from similar designs.
 
     A design that violates a limit before wear by far is not run, and one that fails has no values:
@@ -251,7 +243,7 @@ def completed(designs: Designs, chosen: Design, loss: Callable[[Design], float])
                 wanted[0] = max(float(rows[:, 0].max()), wanted[0]) + 0.1
         wanted[~np.isfinite(wanted)] = 1.0
     slacks = wanted[1:]
-    return Told(float(wanted[0]), slacks - TIGHTER if len(slacks) else slacks)
+    return Answer(float(wanted[0]), slacks - TIGHTER if len(slacks) else slacks)
 
 
 def _interpolated(places: Vector, rows: Vector, place: Vector) -> Vector:

@@ -1,7 +1,7 @@
-"""The phases of an optimisation: starts, search, second choice, front, and what follows the optimum.
+"""The phases of an optimisation: starts, search, second choice and front.
 
 Each phase asks `Designs` for rounds of designs and decides by their outcomes alone. A resumed
-optimisation repeats the phases with the outcomes that its file holds, and so equals an unbroken one.
+optimisation repeats the phases with the outcomes that its file holds, and equals an unbroken one.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import WearsimError
-from wearsim_optimise.designs import Design, Designs, Told, completed
+from wearsim_optimise.designs import Design, Designs, completed
 from wearsim_optimise.goals import ONE_PERCENT, TIGHTER, Constraint, Goals
 from wearsim_optimise.solvers import (
     RADIUS,
+    Answer,
     Cobyqa,
     Evolution,
     Search,
@@ -163,7 +164,7 @@ class Way:
     """A search with the designs that it has asked for, and what it is told of them."""
 
     search: Search
-    told: Callable[[Design], Told]
+    told: Callable[[Design], Answer]
     found: list[Design]
 
 
@@ -198,7 +199,7 @@ class Runner:
         """
         half = self.designs.runs + (budget - self.designs.runs) // 2
 
-        def told(design: Design) -> Told:
+        def told(design: Design) -> Answer:
             return completed(self.designs, design, loss)
 
         def narrowed(ways: list[Way]) -> list[Way]:
@@ -213,7 +214,7 @@ class Runner:
     def way(
         self,
         start: Design,
-        told: Callable[[Design], Told],
+        told: Callable[[Design], Answer],
         radius: float = RADIUS,
         further: int = 0,
     ) -> Way:
@@ -319,9 +320,9 @@ def _then(runner: Runner, best: Design, budget: int) -> None:
         value = design.values.get(goals.then, math.nan)
         return goals.scaled(goals.then, value)
 
-    def told(design: Design) -> Told:
+    def told(design: Design) -> Answer:
         found, main = (completed(designs, design, each) for each in (loss, objective(0)))
-        return Told(found.loss, np.append(found.slacks, limit - main.loss))
+        return Answer(found.loss, np.append(found.slacks, limit - main.loss))
 
     runner.run([runner.way(best, told, SECOND, 1)], budget, "then")
 
@@ -353,11 +354,11 @@ def _beyond(level: float, design: Design) -> tuple[float, float]:
     return over, design.losses[0]
 
 
-def _at_level(designs: Designs, level: float, design: Design) -> Told:
+def _at_level(designs: Designs, level: float, design: Design) -> Answer:
     """Return the first loss of a design, with the second one as a constraint."""
     first = completed(designs, design, objective(0))
     second = completed(designs, design, objective(1))
-    return Told(first.loss, np.append(first.slacks, level - second.loss))
+    return Answer(first.loss, np.append(first.slacks, level - second.loss))
 
 
 def pareto_first(told: Sequence[Any]) -> list[float]:
@@ -437,7 +438,8 @@ def _least_violated(designs: Designs) -> str:
         name = goals.constraints[place].name
         value = goals.shown(name, nearest.values[name])
     else:
-        value = f"{nearest.outcome['margins'][goals.margin_names[place - len(goals.constraints)]]:.4g} in SI"
+        name = goals.margin_names[place - len(goals.constraints)]
+        value = f"{nearest.outcome['margins'][name]:.4g} in SI units"
     return (
         f"no feasible design found in {runs}: the least violated constraint is"
         f" '{goals.slack_names[place]}', with {value} at {described(designs, nearest)};"

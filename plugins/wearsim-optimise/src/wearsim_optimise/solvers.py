@@ -1,6 +1,6 @@
 """Searches that are asked for a design and told its loss: COBYQA, and an evolution strategy.
 
-Several starts and the phases of an optimisation share one list of designs, and each round of designs
+Several starts and the phases of an optimisation share one list of designs, and each round of them
 is evaluated by any number of workers with the same result. COBYQA: Ragonneau, Model-Based
 Derivative-Free Optimization Methods and Software (2022), chapter 7.
 """
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,7 +22,25 @@ FINAL = 1e-4  # last one
 _MOST = 10_000  # evaluations of one search; the budget ends it before
 
 
+#: weight of the squared violation of a limit, over it, in the loss: COBYQA may otherwise end where
+#: no limit is kept, if all its first designs violate one; it is zero and flat at a feasible optimum
+PENALTY = 10.0
+
+
 class Told(Protocol):
+    """Loss and slacks of a design."""
+
+    @property
+    def loss(self) -> float:
+        """Number to be made small."""
+
+    @property
+    def slacks(self) -> Vector:
+        """How far the design is within its limits."""
+
+
+@dataclass(frozen=True)
+class Answer:
     """Loss and slacks of a design."""
 
     loss: float
@@ -80,7 +99,9 @@ class Cobyqa:
     def tell(self, told: Sequence[Told]) -> None:
         """Take loss and slacks of the design."""
         assert self._next is not None
-        self._known[self._next.tobytes()] = told[0]
+        beyond = min(violation(told[0]), 1.0)
+        loss = told[0].loss + PENALTY * beyond**2
+        self._known[self._next.tobytes()] = Answer(loss, told[0].slacks)
 
     def _at(self, place: Vector) -> Told:
         place = np.clip(np.asarray(place, dtype=np.float64), 0.0, 1.0)
