@@ -31,7 +31,7 @@ def test_best_design_is_printed_kept_and_runs(command, tmp_path):
     assert "active" in shown.stdout
     assert command("resume", "cam-cycloidal-optimise.h5").exit_code == 0
     again = command("optimise", CAM, *VARY, *GOAL, *FAST)
-    assert again.exit_code == 1
+    assert again.exit_code == 2
     assert "--force" in again.stderr
     exported = command("export", "cam-cycloidal-optimise.h5", "-o", "csv")
     assert exported.exit_code == 0

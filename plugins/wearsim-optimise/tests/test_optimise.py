@@ -23,7 +23,7 @@ CONTACT = {"contact.strips": 41, "operation.rollers": 1}
 CROWN = ["roller.crown_radius=300mm:900mm"]
 LIMIT = "peak_pressure < 650 MPa"
 ALONE: dict[str, Any] = {
-    **CONTACT,
+    "operation.rollers": 1,
     "wear.cylinder.k_over_h": {
         "distribution": "lognormal",
         "median": "1.1e-11 1/Pa",
@@ -76,8 +76,8 @@ def test_sqrt_law_of_the_crown_radius_gives_the_closed_form():
     options |= {"subject_to": ["life.width < 14 mm"], "evaluations": 9, "confirm": False}
     found = optimise(scenario, ["roller.crown_radius=300mm:900mm"], scheduler="serial", **options)
     closed = 14e-3**2 / (8.0 * (50e-6 - scenario.outputs.width_threshold))
-    # elasticity, and strips of a third of a millimetre
-    assert 1e-3 * found.best.numbers[0] == pytest.approx(closed, rel=0.02)
+    # the bodies are elastic
+    assert 1e-3 * found.best.numbers[0] == pytest.approx(closed, rel=0.01)
     # the width is as the root of the radius, which is then within 0.1 % of the crossing
     assert found.best.values["life.width"] == pytest.approx(14e-3, rel=5e-4)
 
@@ -167,7 +167,7 @@ def test_failed_designs_are_kept_with_their_reason():
     )
     failed = [design for design in found.designs if design.status == "failed"]
     assert failed
-    assert "friction" in failed[0].outcome["reason"]
+    assert "the roller rolls nowhere" in failed[0].outcome["reason"]
     assert any("designs failed" in text for text in found.warnings)
 
 

@@ -179,7 +179,7 @@ def confirmation(designs: Designs, first: Design, best: Design) -> list[dict[str
     """Return each objective of the optimum over that of the first design, with fresh draws."""
     goals = designs.goals
     assert goals is not None
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name, _ in goals.objectives:
         if not first.is_evaluated:
             rows.append({"name": name, "why": f"the first design: {first.outcome['reason']}"})
@@ -189,9 +189,10 @@ def confirmation(designs: Designs, first: Design, best: Design) -> list[dict[str
             continue
         verb = goals.named[name]["verb"]
         random = verb in {"life", "ensemble"}
-        gain = {"values": [d.values[name] for d in (best, first)], "fresh": random}
+        values = [design.values[name] for design in (best, first)]
+        gain: dict[str, Any] = {"values": values, "fresh": random}
         if not random:
-            ratio = gain["values"][0] / gain["values"][1]
+            ratio = values[0] / values[1] if values[1] else math.nan
             rows.append({"name": name, **gain, "ratio": ratio, "low": ratio, "high": ratio})
             continue
         pair = [overrides(designs.variables, design.numbers) for design in (best, first)]

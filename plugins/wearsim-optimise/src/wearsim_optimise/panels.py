@@ -66,17 +66,23 @@ def _shares(designs: Sequence[Design]) -> dict[str, list[Design]]:
     }
 
 
-def _points(result: OptimisationResult, x: Any, y: Any, best: bool = True) -> list[Mark]:
+def _array(of: Any, designs: Sequence[Design]) -> Any:
+    """Return a value of each design."""
+    return np.array([of(design) for design in designs])
+
+
+def _points(result: OptimisationResult, x: Any, y: Any) -> list[Mark]:
     """Return the designs as points of two of their values, the best with a mark of its own."""
     marks: list[Mark] = []
     for (label, designs), colour in zip(_shares(result.designs).items(), (BLUE, GREY), strict=True):
         if designs:
-            places = [np.array([of(design) for design in designs]) for of in (x, y)]
-            more = {"design": (np.array([float(design.number) for design in designs]), "1")}
-            marks.append(dots(*places, label=label, colour=colour, alpha=0.7, more=more))
-    if best:
-        point = [np.array([of(result.best)]) for of in (x, y)]
-        marks.append(dots(*point, marker="D", label="best", colour=RED, size=7.0))
+            style: Any = {"label": label, "colour": colour, "alpha": 0.7}
+            numbers = np.array([float(design.number) for design in designs])
+            more = {"design": (numbers, "1")}
+            marks.append(dots(_array(x, designs), _array(y, designs), more=more, **style))
+    best = [result.best]
+    point = _array(x, best), _array(y, best)
+    marks.append(dots(point[0], point[1], "D", label="best", colour=RED, size=7.0))
     return marks
 
 
@@ -104,9 +110,9 @@ def _scatter(result: OptimisationResult, variable: Variable) -> Panel:
 def _front(result: OptimisationResult) -> Panel:
     """Return the front of two objectives."""
     (first, _), (second, _) = result.goals.objectives
-    of_front = [np.array([_value(name)(d) for d in result.front]) for name in (first, second)]
     marks = _points(result, _value(first), _value(second))
-    marks.insert(0, Line(*of_front, steps=False, label="front", colour=ORANGE))
+    front = [_array(_value(name), result.front) for name in (first, second)]
+    marks.insert(0, Line(front[0], front[1], label="front", colour=ORANGE))
     axes = _axis_of(result, first), _axis_of(result, second)
     caption = f"Designs by {first} and {second}. No other design is better than one of the front"
     return Panel("Front of two objectives", *axes, marks, f"{caption} in both.")

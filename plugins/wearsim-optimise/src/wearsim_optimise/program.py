@@ -250,12 +250,14 @@ class Runner:
         self, start: Design, budget: int, order: Callable[[Sequence[Any]], Sequence[float]]
     ) -> None:
         """Search by the evolution strategy until the budget of runs is spent."""
-        places = places_of(self.designs.variables, start.numbers)
-        search = Evolution(self.designs.variables, self.plan.seed, order, places)
+        first = places_of(self.designs.variables, start.numbers)
+        search = Evolution(self.designs.variables, self.plan.seed, order, first)
         same = 0
         while self.left(budget) and same < 3:
-            before = self.designs.runs
-            new = self.designs.at(search.ask(), "search")
+            before, places = self.designs.runs, search.ask()
+            if not places:
+                return
+            new = self.designs.at(places, "search")
             self.asked += len(new)
             search.tell(new)
             same = same + 1 if self.designs.runs == before else 0
@@ -366,7 +368,7 @@ def pareto_first(told: Sequence[Any]) -> list[float]:
     order = np.array(feasible_first(told))
     feasible = [n for n, item in enumerate(told) if item.is_feasible]
     if not feasible:
-        return order.tolist()
+        return list(map(float, order))
     losses = np.array([told[n].losses for n in feasible])
     spread = np.ptp(losses, axis=0)
     scaled = losses / np.where(spread > 0.0, spread, 1.0)
@@ -377,7 +379,7 @@ def pareto_first(told: Sequence[Any]) -> list[float]:
     for n, row in enumerate(scaled):
         apart = np.sort(np.abs(scaled - row).sum(axis=1))[1] if len(scaled) > 1 else 1.0
         order[feasible[n]] = dominated[n] - 0.5 * min(float(apart), 1.0) - 1e6
-    return order.tolist()
+    return list(map(float, order))
 
 
 def front_of(designs: Designs) -> list[Design]:

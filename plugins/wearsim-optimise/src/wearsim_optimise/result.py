@@ -125,8 +125,8 @@ def columns_of(
         values = np.array([design.numbers[number] for design in designs], dtype=float)
         columns[variable.name] = values * variable.size
     for name in goals.named if goals else ():
-        values = [design.values.get(name, math.nan) for design in designs]
-        columns[name] = np.array(values, dtype=float)
+        known = [design.values.get(name, math.nan) for design in designs]
+        columns[name] = np.array(known, dtype=float)
     return columns
 
 

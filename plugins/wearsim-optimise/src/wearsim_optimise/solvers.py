@@ -116,8 +116,13 @@ class Cobyqa:
         if self._count:
             limits = NonlinearConstraint(lambda x: self._at(x).slacks, 0.0, np.inf)
         size = len(self._start)
-        options = {"initial_tr_radius": self._radius, "final_tr_radius": FINAL, "maxfev": _MOST}
-        minimize(
+        options: Any = {
+            "initial_tr_radius": self._radius,
+            "final_tr_radius": FINAL,
+            "maxfev": _MOST,
+        }
+        minimise: Any = minimize
+        minimise(
             lambda x: self._at(x).loss,
             self._start,
             method="COBYQA",
@@ -179,9 +184,11 @@ class Evolution:
         return int(self._solver.population_size)
 
     def ask(self) -> list[Vector]:
-        """Return the designs of a generation."""
+        """Return the designs of a generation; none once they have become equal."""
         self._solutions = [self._solver.ask() for _ in range(self.size)]
-        return [self._place(solution) for solution in self._solutions]
+        places = [self._place(solution) for solution in self._solutions]
+        is_narrow = float(np.ptp(np.array(places), axis=0).max()) < FINAL
+        return [] if is_narrow else places
 
     def _place(self, solution: Any) -> Vector:
         real, whole, chosen = iter(_or(solution.x)), iter(_or(solution.z)), iter(_or(solution.c))

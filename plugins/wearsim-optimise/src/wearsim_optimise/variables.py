@@ -139,7 +139,8 @@ def parse_variable(text: str) -> Variable:
             " exchange them"
         )
     is_whole = not unit and all(_WHOLE.fullmatch(end) for end in (low, high))
-    return Variable(keys, "integer" if is_whole else "continuous", *numbers, unit)
+    kind: Literal["continuous", "integer"] = "integer" if is_whole else "continuous"
+    return Variable(keys, kind, numbers[0], numbers[1], unit)
 
 
 def _parts(values: str) -> list[str]:
