@@ -129,7 +129,7 @@ def profile_grid(tilt: str, strips: int, points: int) -> float:
     scenario, peaks = roller(tilt, strips), []
     axes = (np.geomspace(0.5, 4.0, points), np.linspace(0.2, 1.0, points))
     for k1, k2, drop in itertools.product(*axes, np.geomspace(3.0, 60.0, points)):
-        values = {"k1": float(k1), "k2": float(k2), "drop": f"{drop!r} um"}
+        values = {"k1": float(k1), "k2": float(k2), "drop": f"{float(drop)!r} um"}
         tried = scenario.changed({f"{FORM}.{key}": value for key, value in values.items()})
         peaks.append(wearsim.solve_contact(tried).peak_pressure)
     return float(min(peaks))

@@ -26,9 +26,10 @@ from wearsim_optimise.solvers import (
     feasible_first,
     violation,
 )
-from wearsim_optimise.variables import Vector, places_of, start_of
+from wearsim_optimise.variables import Vector, start_of
 
 CANDIDATES = 32  # designs among which a feasible start is looked for
+EVOLVED = 0.5  # part of the designs of the evolution strategy; the rest refines its best design
 LEVELS = 5  # of the second objective between the ends of a front
 SECOND = 0.05  # first trust region of a search from a known design
 TIMES = 4  # designs asked for over evaluations, at most
@@ -220,7 +221,9 @@ class Runner:
     ) -> Way:
         """Return a search by COBYQA from a design, with further slacks than the constraints."""
         places = self.designs.places(start)
-        return Way(Cobyqa(places, len(start.slacks) + further, radius), told, [start])
+        fixed = [variable.kind != "continuous" for variable in self.designs.variables]
+        search = Cobyqa(places, len(start.slacks) + further, radius, fixed)
+        return Way(search, told, [start])
 
     def run(
         self,
@@ -246,12 +249,9 @@ class Runner:
                 way.search.tell([way.told(design) for design in new])
         return [way for way, more in asked if more]
 
-    def evolve(
-        self, start: Design, budget: int, order: Callable[[Sequence[Any]], Sequence[float]]
-    ) -> None:
+    def evolve(self, budget: int, order: Callable[[Sequence[Any]], Sequence[float]]) -> None:
         """Search by the evolution strategy until the budget of runs is spent."""
-        first = places_of(self.designs.variables, start.numbers)
-        search = Evolution(self.designs.variables, self.plan.seed, order, first)
+        search = Evolution(self.designs.variables, self.plan.seed, order)
         same = 0
         while self.left(budget) and same < 3:
             before, places = self.designs.runs, search.ask()
@@ -299,7 +299,15 @@ def optimum(designs: Designs, plan: Plan) -> Design:
     budget = plan.evaluations
     if evolves:
         order = feasible_first if len(plan.objectives) == 1 else pareto_first
-        runner.evolve(first, budget, order)
+        share = round(EVOLVED * budget) if len(plan.objectives) == 1 else budget
+        runner.evolve(share, order)
+        best = best_of(designs.all, main)
+        if (
+            best
+            and len(plan.objectives) == 1
+            and any(v.kind == "continuous" for v in designs.variables)
+        ):
+            runner.search([best], budget, main, "search")
     elif len(plan.objectives) == 2:
         _front(runner, starts_of(designs, plan, first))
     else:

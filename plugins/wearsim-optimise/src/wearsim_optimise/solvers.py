@@ -80,10 +80,20 @@ class Cobyqa:
         Number of slacks, not below zero in a feasible design.
     radius : float
         First trust region.
+    fixed : sequence of bool
+        Variables that keep their places; by default none.
     """
 
-    def __init__(self, start: Vector, constraints: int, radius: float = RADIUS) -> None:
+    def __init__(
+        self,
+        start: Vector,
+        constraints: int,
+        radius: float = RADIUS,
+        fixed: Sequence[bool] = (),
+    ) -> None:
         self._start, self._count, self._radius = start, constraints, radius
+        kept = np.array(fixed or [False] * len(start))
+        self._low, self._high = np.where(kept, start, 0.0), np.where(kept, start, 1.0)
         self._known: dict[bytes, Told] = {}
         self._next: Vector | None = None
 
@@ -104,7 +114,7 @@ class Cobyqa:
         self._known[self._next.tobytes()] = Answer(loss, told[0].slacks)
 
     def _at(self, place: Vector) -> Told:
-        place = np.clip(np.asarray(place, dtype=np.float64), 0.0, 1.0)
+        place = np.clip(np.asarray(place, dtype=np.float64), self._low, self._high)
         if place.tobytes() not in self._known:
             raise _Asked(place)
         return self._known[place.tobytes()]
@@ -115,7 +125,6 @@ class Cobyqa:
         limits: Any = ()
         if self._count:
             limits = NonlinearConstraint(lambda x: self._at(x).slacks, 0.0, np.inf)
-        size = len(self._start)
         options: Any = {
             "initial_tr_radius": self._radius,
             "final_tr_radius": FINAL,
@@ -126,7 +135,7 @@ class Cobyqa:
             lambda x: self._at(x).loss,
             self._start,
             method="COBYQA",
-            bounds=Bounds(np.zeros(size), np.ones(size)),
+            bounds=Bounds(self._low, self._high),
             constraints=limits,
             options={**options, "feasibility_tol": 0.0},
         )
@@ -144,8 +153,6 @@ class Evolution:
     seed : int
     order : callable
         Returns a key of a design by which it is sorted; the smallest is the best.
-    start : ndarray, shape (variables,), optional
-        Places of the start.
     """
 
     def __init__(
@@ -153,7 +160,6 @@ class Evolution:
         variables: Sequence[Variable],
         seed: int,
         order: Callable[[Sequence[Told]], Sequence[float]],
-        start: Vector,
     ) -> None:
         try:
             from cmaes import CatCMAwM  # noqa: PLC0415  (an extra)
@@ -166,14 +172,11 @@ class Evolution:
         real = [v for v in variables if v.kind == "continuous"]
         whole = [v for v in variables if v.kind == "integer"]
         lists = [v for v in variables if v.kind == "list"]
-        places = dict(zip([v.name for v in variables], start, strict=True))
-        mean = [places[v.name] for v in real] + [v.number(places[v.name]) for v in whole]
+        # from the centre of the bounds, with their width
         self._solver = CatCMAwM(
             x_space=[[0.0, 1.0]] * len(real) or None,
             z_space=[[v.low + n for n in range(v.count)] for v in whole] or None,
             c_space=[v.count for v in lists] or None,
-            mean=np.array(mean) if mean else None,
-            sigma=0.25 if real and not whole else None,
             seed=seed % 2**32,
         )
         self._solutions: list[Any] = []
