@@ -387,7 +387,7 @@ class LifeResult(LifeValues):
         other : LifeResult
             With the same unit of life; common draws if it has the same seed.
         percent : float
-            Percentage of the lives in ``b10_ratio``, 10 for B10.
+            Of the lives in ``b10_ratio``.
 
         Raises
         ------
@@ -415,13 +415,10 @@ class LifeResult(LifeValues):
                 f"{self.title} is in {self.unit} and {other.title} in {other.unit}; their lives"
                 " cannot be compared"
             )
+        both, most = (self, other), math.inf
         # kappa is known beyond the maximum, and with it the survival
-        both = (self, other)
-        most = (
-            math.inf
-            if all(item.is_known_throughout for item in both)
-            else min(item.most for item in both)
-        )
+        if not all(item.is_known_throughout for item in both):
+            most = min(item.most for item in both)
         paired = self.raw.seed == other.raw.seed
         first, second = self.distribution, other.distribution
         name = "known_lives" if math.isinf(most) else "lives"

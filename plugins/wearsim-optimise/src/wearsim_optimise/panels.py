@@ -59,7 +59,7 @@ def _axis_of(result: OptimisationResult, name: str) -> Axis:
 
 
 def _shares(designs: Sequence[Design]) -> dict[str, list[Design]]:
-    """Return designs that are drawn alike: within the constraints, or not."""
+    """Return designs by how they are drawn: within the constraints, or not."""
     return {
         "feasible": [design for design in designs if design.is_feasible],
         "violates a constraint": [d for d in designs if d.is_evaluated and not d.is_feasible],
@@ -72,7 +72,7 @@ def _array(of: Any, designs: Sequence[Design]) -> Any:
 
 
 def _points(result: OptimisationResult, x: Any, y: Any) -> list[Mark]:
-    """Return the designs as points of two of their values, the best with a mark of its own."""
+    """Return the designs as points of two of their values, the best with another mark."""
     marks: list[Mark] = []
     for (label, designs), colour in zip(_shares(result.designs).items(), (BLUE, GREY), strict=True):
         if designs:

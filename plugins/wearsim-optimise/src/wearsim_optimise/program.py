@@ -162,10 +162,10 @@ def _known_violation(design: Design) -> float:
 
 @dataclass
 class Way:
-    """A search with the designs that it has asked for, and what it is told of them."""
+    """A search with the designs that it has asked for, and how they are rated for it."""
 
     search: Search
-    told: Callable[[Design], Answer]
+    rated: Callable[[Design], Answer]
     found: list[Design]
 
 
@@ -200,7 +200,7 @@ class Runner:
         """
         half = self.designs.runs + (budget - self.designs.runs) // 2
 
-        def told(design: Design) -> Answer:
+        def rated(design: Design) -> Answer:
             return completed(self.designs, design, loss)
 
         def narrowed(ways: list[Way]) -> list[Way]:
@@ -209,13 +209,13 @@ class Runner:
             ranks = [min(_rank(design, loss) for design in way.found) for way in ways]
             return [ways[ranks.index(min(ranks))]]
 
-        ways = [self.way(start, told, radius) for start in starts]
+        ways = [self.way(start, rated, radius) for start in starts]
         self.run(ways, budget, purpose, narrowed)
 
     def way(
         self,
         start: Design,
-        told: Callable[[Design], Answer],
+        rated: Callable[[Design], Answer],
         radius: float = RADIUS,
         further: int = 0,
     ) -> Way:
@@ -223,7 +223,7 @@ class Runner:
         places = self.designs.places(start)
         fixed = [variable.kind != "continuous" for variable in self.designs.variables]
         search = Cobyqa(places, len(start.slacks) + further, radius, fixed)
-        return Way(search, told, [start])
+        return Way(search, rated, [start])
 
     def run(
         self,
@@ -246,7 +246,7 @@ class Runner:
             new = [next(designs) for _ in more]
             way.found += new
             if new:
-                way.search.tell([way.told(design) for design in new])
+                way.search.tell([way.rated(design) for design in new])
         return [way for way, more in asked if more]
 
     def evolve(self, budget: int, order: Callable[[Sequence[Any]], Sequence[float]]) -> None:
@@ -330,11 +330,11 @@ def _then(runner: Runner, best: Design, budget: int) -> None:
         value = design.values.get(goals.then, math.nan)
         return goals.scaled(goals.then, value)
 
-    def told(design: Design) -> Answer:
+    def rated(design: Design) -> Answer:
         found, main = (completed(designs, design, each) for each in (loss, objective(0)))
         return Answer(found.loss, np.append(found.slacks, limit - main.loss))
 
-    runner.run([runner.way(best, told, SECOND, 1)], budget, "then")
+    runner.run([runner.way(best, rated, SECOND, 1)], budget, "then")
 
 
 def _front(runner: Runner, starts: list[Design]) -> None:
@@ -371,13 +371,13 @@ def _at_level(designs: Designs, level: float, design: Design) -> Answer:
     return Answer(first.loss, np.append(first.slacks, level - second.loss))
 
 
-def pareto_first(told: Sequence[Any]) -> list[float]:
+def pareto_first(rated: Sequence[Any]) -> list[float]:
     """Return the order of designs by two objectives: fronts, and within them the lonely first."""
-    order = np.array(feasible_first(told))
-    feasible = [n for n, item in enumerate(told) if item.is_feasible]
+    order = np.array(feasible_first(rated))
+    feasible = [n for n, item in enumerate(rated) if item.is_feasible]
     if not feasible:
         return list(map(float, order))
-    losses = np.array([told[n].losses for n in feasible])
+    losses = np.array([rated[n].losses for n in feasible])
     spread = np.ptp(losses, axis=0)
     scaled = losses / np.where(spread > 0.0, spread, 1.0)
     dominated = [

@@ -1,4 +1,4 @@
-"""Searches that are asked for a design and told its loss: COBYQA, and an evolution strategy.
+"""Searches that are asked for designs and take their losses: COBYQA, and an evolution strategy.
 
 Several starts and the phases of an optimisation share one list of designs, and each round of them
 is evaluated by any number of workers with the same result. COBYQA: Ragonneau, Model-Based
@@ -27,7 +27,7 @@ _MOST = 10_000  # evaluations of one search; the budget ends it before
 PENALTY = 10.0
 
 
-class Told(Protocol):
+class Rated(Protocol):
     """Loss and slacks of a design."""
 
     @property
@@ -48,12 +48,12 @@ class Answer:
 
 
 class Search(Protocol):
-    """A search that is asked for designs, and told them."""
+    """A search that is asked for designs, and takes their losses and slacks."""
 
     def ask(self) -> list[Vector]:
         """Return the next designs as places of the unit cube; none if the search has ended."""
 
-    def tell(self, told: Sequence[Told]) -> None:
+    def tell(self, rated: Sequence[Rated]) -> None:
         """Take the losses and slacks of the designs asked for."""
 
 
@@ -94,7 +94,7 @@ class Cobyqa:
         self._start, self._count, self._radius = start, constraints, radius
         kept = np.array(fixed or [False] * len(start))
         self._low, self._high = np.where(kept, start, 0.0), np.where(kept, start, 1.0)
-        self._known: dict[bytes, Told] = {}
+        self._known: dict[bytes, Rated] = {}
         self._next: Vector | None = None
 
     def ask(self) -> list[Vector]:
@@ -106,14 +106,14 @@ class Cobyqa:
             return [asked.place]
         return []
 
-    def tell(self, told: Sequence[Told]) -> None:
+    def tell(self, rated: Sequence[Rated]) -> None:
         """Take loss and slacks of the design."""
         assert self._next is not None
-        beyond = min(violation(told[0]), 1.0)
-        loss = told[0].loss + PENALTY * beyond**2
-        self._known[self._next.tobytes()] = Answer(loss, told[0].slacks)
+        beyond = min(violation(rated[0]), 1.0)
+        loss = rated[0].loss + PENALTY * beyond**2
+        self._known[self._next.tobytes()] = Answer(loss, rated[0].slacks)
 
-    def _at(self, place: Vector) -> Told:
+    def _at(self, place: Vector) -> Rated:
         place = np.clip(np.asarray(place, dtype=np.float64), self._low, self._high)
         if place.tobytes() not in self._known:
             raise _Asked(place)
@@ -159,7 +159,7 @@ class Evolution:
         self,
         variables: Sequence[Variable],
         seed: int,
-        order: Callable[[Sequence[Told]], Sequence[float]],
+        order: Callable[[Sequence[Rated]], Sequence[float]],
     ) -> None:
         try:
             from cmaes import CatCMAwM  # noqa: PLC0415  (an extra)
@@ -205,9 +205,9 @@ class Evolution:
                 places.append(variable.place(float(np.argmax(next(chosen)))))
         return np.array(places)
 
-    def tell(self, told: Sequence[Told]) -> None:
+    def tell(self, rated: Sequence[Rated]) -> None:
         """Take the generation, ordered."""
-        ranks = np.argsort(np.argsort(self._order(told), kind="stable"), kind="stable")
+        ranks = np.argsort(np.argsort(self._order(rated), kind="stable"), kind="stable")
         self._solver.tell(list(zip(self._solutions, ranks.astype(float).tolist(), strict=True)))
 
 
@@ -215,12 +215,12 @@ def _or(values: Any) -> Any:
     return [] if values is None else values
 
 
-def feasible_first(told: Sequence[Told]) -> list[float]:
+def feasible_first(rated: Sequence[Rated]) -> list[float]:
     """Return the order of designs: feasible ones by loss, after them the others by violation."""
-    losses = [item.loss for item in told if violation(item) == 0.0 and math.isfinite(item.loss)]
+    losses = [item.loss for item in rated if violation(item) == 0.0 and math.isfinite(item.loss)]
     worst = max(losses, default=0.0)
     found = []
-    for item in told:
+    for item in rated:
         beyond = violation(item)
         if beyond == 0.0 and math.isfinite(item.loss):
             found.append(item.loss)
@@ -229,9 +229,9 @@ def feasible_first(told: Sequence[Told]) -> list[float]:
     return found
 
 
-def violation(told: Told) -> float:
+def violation(rated: Rated) -> float:
     """Return the greatest violation of a constraint, over its limit; 0 for a feasible design."""
-    if not len(told.slacks):
+    if not len(rated.slacks):
         return 0.0
-    worst = float(np.min(told.slacks))
+    worst = float(np.min(rated.slacks))
     return math.inf if math.isnan(worst) else max(-worst, 0.0)
