@@ -32,7 +32,9 @@ for name, cases in TESTED.items():
 
 
 def test_all_installed_axial_profiles_are_tested():
-    assert set(TESTED) == set(registry().names(AxialProfileSpec))
+    names = registry().names(AxialProfileSpec)
+    found = {name: registry().registered(AxialProfileSpec, name) for name in names}
+    assert set(TESTED) == {name for name, item in found.items() if item.distribution == "wearsim"}
 
 
 def mutant(drop=lambda s: s * s, **members):

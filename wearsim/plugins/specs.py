@@ -24,6 +24,11 @@ BODIES: tuple[Body, ...] = ("cylinder", "roller")
 _NO_TIMES: FloatArray = np.zeros((0, 2))
 _NO_TIMES.flags.writeable = False
 PROTOCOL = 2  # version of the plugin interface; docs/plugins.md describes the changes
+Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
+#: uniform random numbers of one stream, by first index and count; reproducible by index
+Uniforms: TypeAlias = Callable[[int, int], FloatArray]
+Materials: TypeAlias = tuple[Material, Material]
+SuggestGrid: TypeAlias = Callable[[Any, float, float, float, Materials], Grid | None]
 
 
 class WearLaw(ABC):
@@ -177,12 +182,6 @@ class AxialProfile(ABC):
         """
 
 
-Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
-
-#: uniform random numbers of one stream, by first index and count; reproducible by index
-Uniforms: TypeAlias = Callable[[int, int], FloatArray]
-
-
 class JointDistribution(ABC):
     """Joint distribution of several random numbers, such as the misalignment angles of a roller.
 
@@ -279,10 +278,6 @@ class Process(ABC):
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the validity, for the user."""
         return self.marginal.warnings
-
-
-Materials: TypeAlias = tuple[Material, Material]
-SuggestGrid: TypeAlias = Callable[[Any, float, float, float, Materials], Grid | None]
 
 
 class Options(BaseModel):

@@ -128,7 +128,7 @@ def write_files(
         raise ResultsFileError(
             f"{', '.join(existing)}: already exists",
             python="choose another folder, or force=True",
-            shell="choose another folder with -o, or --force",
+            shell="choose another folder, or --force",
         )
     for name, content in contents.items():
         parent = (folder / name).parent

@@ -121,6 +121,12 @@ class AxialGap:
         places, drops, _ = self._table
         return float(np.interp(half_width, places, drops))
 
+    def mean_drop(self, half_width: float) -> float:
+        """Return the mean of the gap over a half-width [m]."""
+        places, drops, areas = self._table
+        level = float(np.interp(half_width, places, drops))
+        return level - float(np.interp(half_width, places, areas)) / (2.0 * half_width)
+
     def shift(self, tilt: FloatArray, half_width: float) -> FloatArray:
         """Return the axial distance by which tilt moves a contact from the apex [m].
 

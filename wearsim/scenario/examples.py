@@ -36,6 +36,8 @@ _PACKAGE = Path(__file__).parents[1]
 
 # inside an installed package; next to the package in the source tree
 _FOLDERS = (_PACKAGE / "scenarios", _PACKAGE.parent / "scenarios")
+Model: TypeAlias = type[BaseModel]
+RandomInputs: TypeAlias = tuple[Model | None, Model | None, Model | None]
 
 
 def shipped_scenario(name: str, overrides: Mapping[str, object] | None = None) -> Scenario:
@@ -64,10 +66,6 @@ def shipped_scenario(name: str, overrides: Mapping[str, object] | None = None) -
 def starter_scenario(name: Literal["starter", "starter_cam"] = "starter") -> str:
     """Return the TOML of a complete scenario, of a cam if named so, with alternatives."""
     return Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
-
-
-Model: TypeAlias = type[BaseModel]
-RandomInputs: TypeAlias = tuple[Model | None, Model | None, Model | None]
 
 
 class _ScenarioSchema(GenerateJsonSchema):

@@ -16,6 +16,7 @@ from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.tables.axial import described_form, pair_of
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
+from wearsim.studies.run.groove import fresh_patch
 
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
 LOAD, LENGTH = 5000.0, 10e-3
@@ -208,6 +209,16 @@ def test_tabulated_gap_agrees_with_the_closed_forms_of_a_crown():
     assert gap.radius_at(2e-3) == pytest.approx(0.5, rel=1e-4)
     tilt = np.array([-1e-3, 0.0, 2e-4, 1e-3])
     assert gap.shift(tilt, 1e-3) == pytest.approx(-0.5 * tilt, rel=1e-4, abs=1e-8)
+
+
+def test_estimated_patch_is_near_the_contact():
+    form = {"k1": 1.5, "k2": 0.6, "drop": "40 um"}
+    for force in (300.0, 1000.0, 5000.0):
+        scenario = line(**form).changed({"load.normal_force": f"{force} N"})
+        patch, solution = fresh_patch(scenario, force), wearsim.solve_contact(scenario)
+        width = np.ptp(solution.y[solution.line_load > 0.0])
+        assert 2.0 * patch.b == pytest.approx(width, rel=0.15)
+        assert patch.peak_pressure == pytest.approx(solution.peak_pressure, rel=0.1)
 
 
 @pytest.mark.parametrize("model", ["hertz", "hertz-fastsim", "semi-hertzian"])

@@ -52,6 +52,8 @@ _ROLES: dict[Role, type] = {
     "field": FrictionField,
     "process": Process,
 }
+Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass", "per-turn"]
+Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
 
 
 def _parts(annotation: Any) -> list[Any]:
@@ -197,10 +199,6 @@ def target_of(field: FieldInfo) -> RandomTarget | None:
                 limits["gt" if quantity.bound == "positive" else "ge"] = 0.0
             return RandomTarget(quantity, limits)
     return None
-
-
-Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass", "per-turn"]
-Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
 
 
 class RandomInputTable(Options):

@@ -204,10 +204,10 @@ def apply_overrides(
     for dotted in removed:
         *names, key = dotted.split(".")
         for whole in (document, plain):
-            table: Any = whole
+            holder: Any = whole
             for name in names:
-                table = table.get(name, {})
-            table.pop(key, None)
+                holder = holder.get(name, {})
+            holder.pop(key, None)
     written = tomlkit.dumps(document)
     # tables next to dotted keys are written wrongly by tomlkit; the plain text lacks comments
     with suppress(tomllib.TOMLDecodeError):

@@ -26,7 +26,7 @@ from wearsim.studies.roller_ends import (
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
 from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
-from wearsim.studies.start.heights import StartExtent, start_extent
+from wearsim.studies.start.heights import start_extent
 from wearsim.types import FloatArray, Grid
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
@@ -41,6 +41,7 @@ LEAST_CHOSEN = 2.5  # strips per half-width of a patch; with fewer chosen ones, 
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
 STRIPS_OF_FORM = 121  # of a run on the width of a roller that is not crowned, at least
+PART_OF_FORM = 0.5  # of the patch of such bodies, which is resolved as that of a crown
 STRIPS_OF_CONTACT = 121
 STRIPS_OF_CONTACT_OF_FORM = 485  # where its ends are steep, for a peak pressure within 1 %
 DRAWN = {"scalar", "joint"}  # roles of random inputs with a range
@@ -99,7 +100,7 @@ def contact_grid(scenario: Scenario, load: float) -> Grid:
     choice, profile = scenario.contact, start_extent(scenario)
     centre, half_width = contact_centre(scenario, [0]), widest_patch(scenario, load).b
     if choice.width is None and profile is not None:
-        return profile_grid(profile, half_width, choice.strips)
+        return profile_grid(profile.low, profile.high, half_width, choice.strips)
     half = 1.2 * half_width
     crowned = scenario.axial_gap.is_crowned
     default = STRIPS_OF_CONTACT if crowned else STRIPS_OF_CONTACT_OF_FORM
@@ -127,18 +128,18 @@ def suggested_grid(scenario: Scenario, load: float) -> Grid | None:
     return choice.spec.suggest_grid(choice.options, across, curvature, load, materials)
 
 
-def profile_grid(profile: StartExtent, half_width: float, strips: int | None) -> Grid:
+def profile_grid(start: float, stop: float, half_width: float, strips: int | None) -> Grid:
     """Return strips over the whole width of start profiles.
 
     Parameters
     ----------
-    profile : StartExtent
+    start, stop : float
+        Outer positions of the profiles [m].
     half_width : float
         Half-width of the initial patch [m].
     strips : int, optional
         Number of strips; by default sufficient to resolve the patch, at most `MOST_STRIPS`.
     """
-    start, stop = profile.low, profile.high
     resolving = np.ceil(PROFILE_STRIPS_PER_HALF_WIDTH * (stop - start) / half_width)
     chosen = strips or int(np.clip(resolving, FEWEST_PROFILE_STRIPS, MOST_STRIPS))
     return Grid.spanning(start, stop, chosen)
@@ -257,7 +258,9 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
     """
     scenario, choice = draws.scenario, draws.scenario.contact
     patch, centre, shift, fresh, half, load = extent or extent_of(draws)
-    tolerance = scenario.evolution.tolerance
+    tolerance, size = scenario.evolution.tolerance, patch.b
+    if not scenario.axial_gap.is_crowned:  # loads fall to zero over the ends of the patch
+        size *= PART_OF_FORM
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
         least = strips_over(scenario.roller.width or 0.0, patch.b, tolerance)
         if not scenario.axial_gap.is_crowned:
@@ -273,12 +276,12 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
         depth = scenario.limit.depth or math.inf
         resolved = min(resolved, float(scenario.axial_gap.half_width(depth)))
     if choice.width is None:  # strips grow from here
-        per_half_width = strips_per_half_width(patch.b, tolerance, resolved)
+        per_half_width = strips_per_half_width(size, tolerance, resolved)
         at_start = STRIPS_OF_MANY_CONTACTS if many else STRIPS_AT_START
         if choice.strips is not None:
             per_half_width, at_start = LEAST_CHOSEN, choice.strips
-        width = min(width, max(2.0 * fresh, patch.b / per_half_width * at_start))
-    strips = choice.strips or strips_over(width, patch.b, tolerance, resolved)
+        width = min(width, max(2.0 * fresh, size / per_half_width * at_start))
+    strips = choice.strips or strips_over(width, size, tolerance, resolved)
     if width < 2.0 * (shift + patch.b):
         raise ScenarioError(
             scenario.file,

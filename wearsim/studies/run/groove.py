@@ -33,41 +33,44 @@ def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None)
     if curvature is None:
         curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
     along = 0.5 * curvature
-    half = 0.5 * (scenario.roller.width or math.inf)
-    gap = scenario.axial_gap
-    radius = gap.crown_radius if gap.is_crowned else _equivalent_radius(gap, along, load, modulus)
-    if radius is None:
-        return _line_contact(along, load, modulus, half)
-    patch = hertz(along, 0.5 / radius, load, modulus)
+    half, gap = 0.5 * (scenario.roller.width or math.inf), scenario.axial_gap
+    if not gap.is_crowned:
+        return _patch_of_form(gap, along, load, modulus)
+    patch = hertz(along, 0.5 / gap.radius_at(half), load, modulus)
     if patch.b <= half:
         return patch
-    line = _line_contact(along, load, modulus, half)
-    pressure = max(line.peak_pressure, patch.peak_pressure)
-    return replace(patch, a=line.a, b=half, peak_pressure=pressure)
-
-
-def _line_contact(along: float, load: float, modulus: float, half: float) -> HertzContact:
-    """Return the line contact of a half-width [m] under a uniform line load."""
     line_load = load / (2.0 * half)
     half_length = math.sqrt(2.0 * line_load / (math.pi * modulus * along))
     pressure = 2.0 * line_load / (math.pi * half_length)
+    return replace(patch, a=half_length, b=half, peak_pressure=max(pressure, patch.peak_pressure))
+
+
+def _patch_of_form(gap: AxialGap, along: float, load: float, modulus: float) -> HertzContact:
+    """Return the approximate patch of bodies that are not circular crowns.
+
+    It is as wide as that of the crown with the same gap at its ends. The line loads are those of a
+    foundation that yields by the gap there, or by the approach of a line contact if that is more.
+    """
+    half = _half_width(gap, along, load, modulus)
+    line_load = load / (2.0 * half)
     approach = LINE_APPROACH * line_load / (math.pi * modulus)
+    level = max(gap.depth_at(half), approach)
+    greatest = line_load * level / (level - gap.mean_drop(half))
+    half_length = math.sqrt(2.0 * greatest / (math.pi * modulus * along))
+    pressure = 2.0 * greatest / (math.pi * half_length)
     return HertzContact(half_length, half, pressure, approach, load)
 
 
-def _equivalent_radius(gap: AxialGap, along: float, load: float, modulus: float) -> float | None:
-    """Return the radius of the crown whose patch ends where the gap of that crown is the same.
-
-    None where the patch is as wide as the roller.
-    """
+def _half_width(gap: AxialGap, along: float, load: float, modulus: float) -> float:
+    """Return the half-width of the patch of a crown with the same gap there [m]."""
     low, high = 0.0, gap.greatest_half_width
     if _patch_is_wider(gap, along, load, modulus, high):
-        return None
+        return high
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         wider = _patch_is_wider(gap, along, load, modulus, middle)
         low, high = (middle, high) if wider else (low, middle)
-    return gap.radius_at(high)
+    return high
 
 
 def _patch_is_wider(
