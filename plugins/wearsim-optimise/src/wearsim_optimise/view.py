@@ -46,7 +46,7 @@ class OptimisationView(StudyView[OptimisationResult]):
         """Return the best design: variables, objectives, gains and constraints."""
         result = self.result
         if not result.raw.best:
-            return [Row("best design", "unfinished; continue with `wearsim resume`")]
+            return [Row("best design", self._so_far())]
         best, goals = result.best, result.goals
         rows = [
             Row(variable.name, variable.shown(number) + self._at_bound(number, variable))
@@ -67,6 +67,22 @@ class OptimisationView(StudyView[OptimisationResult]):
         if (near := result.raw.robustness) is not None:
             rows.append(Row("within the tolerances", self._robustness(near)))
         return rows
+
+    def _so_far(self) -> str:
+        """Return the best feasible design of an unfinished optimisation."""
+        text = "unfinished; continue with `wearsim resume`"
+        feasible = [design for design in self.result.designs if design.is_feasible]
+        if not feasible:
+            return text
+        best = min(feasible, key=lambda design: (design.loss, design.number))
+        name = self.result.goals.objectives[0][0]
+        pairs = zip(self.result.design_variables, best.numbers, strict=True)
+        values = ", ".join(
+            f"{variable.name} {variable.shown(number)}" for variable, number in pairs
+        )
+        return (
+            f"{name} {self.result.goals.shown(name, best.values[name])} so far ({values}); {text}"
+        )
 
     def _answer(self, name: str, best: Design) -> dict[str, tuple[float | None, str]]:
         return {name: (best.values[name], self.result.goals.unit(name))}
