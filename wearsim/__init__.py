@@ -31,6 +31,10 @@ Lives
     resume_life(file)                   continue or extend a study of lives from its file
     sweep_life(scenario, key, values)   lives for several values of one key
 
+Designs, of the extra ``wearsim[optimise]``
+    optimise(scenario, vary)            best values of design variables
+    resume_optimise(file)               continue an optimisation from its file
+
 Results
     open_results(file)                  open a results file of any kind
     Result                              of a wear test: depth, profiles, normal_force, ...
@@ -165,6 +169,11 @@ _NAMES = {
     "wearsim.types": ["ContactSolution", "Profile"],
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
+# names of first-party distributions: module and extra
+_OF_PLUGINS = {
+    "optimise": ("wearsim_optimise.api", "optimise"),
+    "resume_optimise": ("wearsim_optimise.api", "optimise"),
+}
 
 # without the errors, which fill pages of `help(wearsim)`
 __all__ = [
@@ -212,6 +221,17 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version  # noqa: PLC0415
 
         return version("wearsim")
+    if name in _OF_PLUGINS:
+        module, extra = _OF_PLUGINS[name]
+        try:
+            return getattr(import_module(module), name)
+        except ModuleNotFoundError as error:
+            if error.name != module.partition(".")[0]:
+                raise
+            raise AttributeError(
+                f"wearsim.{name} is part of wearsim-{extra}, which is not installed:"
+                f" pip install 'wearsim[{extra}]'"
+            ) from error
     if name not in _MODULES:
         known = "" if name.startswith("_") else f"; it has {', '.join(sorted(_MODULES))}"
         raise AttributeError(f"module 'wearsim' has no attribute '{name}'{known}")

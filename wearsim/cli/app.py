@@ -32,6 +32,7 @@ GROUP = "wearsim.commands"
 FIRST_PARTY = {
     "bench": "wearsim-bench",
     "explore": "wearsim-explore",
+    "optimise": "wearsim-optimise",
     "reproduce": "wearsim-chevalier2005",
     "validate": "wearsim-validation",
 }

@@ -67,11 +67,17 @@ class LifeView(RealisationsView[LifeResult]):
             return [Row("life", "no test is completed")]
         shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
         rows = [
-            Row(f"B{share:g}", life_text(result, share) + self._plug_in(share)) for share in shares
+            Row(
+                f"B{share:g}",
+                life_text(result, share) + self._plug_in(share),
+                answers={f"b{share:g}": (result.b(share).value, "1")},
+            )
+            for share in shares
         ]
         if result.target is not None:
             name = f"P(life < {count(result.target)} {result.unit})"
-            rows.append(Row(name, target_text(result)))
+            chance = result.probability_before(result.target).value
+            rows.append(Row(name, target_text(result), answers={"probability": (chance, "%")}))
             obstacle = result.probability_obstacle(result.target)
             if obstacle and result.rare is None and not result.settings.alone:
                 command = f"`{rare_command(result)}`"
@@ -127,6 +133,7 @@ class LifeView(RealisationsView[LifeResult]):
             lives_table([""], [result]),
             *fit_tables(result),
             Table("", lines, ["first limit", "share", ""]),
+            self.observables_table("at the end of the life"),
             self._effects(),
         ]
 
