@@ -13,6 +13,7 @@ from wearsim.cli.app import app
 from wearsim.errors import PluginError, ScenarioError
 from wearsim.plugins import (
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     Options,
@@ -167,6 +168,7 @@ def test_spec_of_another_protocol_is_listed_and_refused_when_selected(
         ("wearsim_loads", LoadSpec),
         ("wearsim_random_inputs", RandomInputSpec),
         ("wearsim_motion_laws", MotionLawSpec),
+        ("wearsim_fatigue_laws", FatigueLawSpec),
     ],
 )
 def test_every_kind_of_spec_has_a_protocol(hook, spec):

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from wearsim.models import loads, motion, wear
+from wearsim.models import fatigue, loads, motion, wear
 from wearsim.models.contact import hertz as hertz_model, hertz_fastsim, slender, strip_model
 from wearsim.models.random import distributions, posterior, varying
 from wearsim.plugins import (
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     RandomInputSpec,
@@ -45,3 +46,9 @@ def wearsim_random_inputs() -> Iterable[RandomInputSpec]:
 def wearsim_motion_laws() -> Iterable[MotionLawSpec]:
     """Yield the built-in motion laws of cams."""
     return motion.SPECS
+
+
+@hookimpl
+def wearsim_fatigue_laws() -> Iterable[FatigueLawSpec]:
+    """Yield the built-in fatigue laws."""
+    return fatigue.SPECS

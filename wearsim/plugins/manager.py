@@ -15,6 +15,7 @@ from wearsim.errors import PluginError, described
 from wearsim.plugins.specs import (
     PROTOCOL,
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     RandomInputSpec,
@@ -35,6 +36,7 @@ _HOOKS: dict[type[Spec], str] = {
     LoadSpec: "wearsim_loads",
     RandomInputSpec: "wearsim_random_inputs",
     MotionLawSpec: "wearsim_motion_laws",
+    FatigueLawSpec: "wearsim_fatigue_laws",
     StudyKind: "wearsim_study_kinds",
 }
 #: modules of wearsim that implement hooks; they need no entry point
@@ -248,6 +250,47 @@ class HookSpecs:
                     factory=Cosine,
                     options=Options,
                     summary="half a period of a cosine",
+                    protocol=2,
+                )
+        """
+
+    @hookspec
+    def wearsim_fatigue_laws(self) -> Iterable[FatigueLawSpec]:  # type: ignore[empty-body]
+        """Yield fatigue laws, selected by ``law`` of a body in the table ``[fatigue]``.
+
+        The requirements are documented in `FatigueLaw` and tested by
+        `wearsim.testing.fatigue_law_tests`.
+
+        Returns
+        -------
+        iterable of FatigueLawSpec
+
+        Examples
+        --------
+        .. code-block:: python
+
+            from wearsim.plugins import FatigueLaw, FatigueLawSpec, Options, hookimpl
+
+
+            class PairOptions(Options):
+                passes: float = 1e6  # life at a pressure of 1 GPa
+
+
+            class NinthPower(FatigueLaw):
+                def __init__(self, options, contact_modulus):
+                    self.passes = options.passes
+
+                def damage_per_pass(self, pressure):
+                    return (pressure / 1e9) ** 9 / self.passes
+
+
+            @hookimpl
+            def wearsim_fatigue_laws():
+                yield FatigueLawSpec(
+                    name="ninth-power",
+                    factory=NinthPower,
+                    options=PairOptions,
+                    summary="life that falls as the ninth power of the pressure",
                     protocol=2,
                 )
         """

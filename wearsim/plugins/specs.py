@@ -1,4 +1,4 @@
-"""Base classes of wear and motion laws, loads and random inputs, and the specs of all hooks."""
+"""Base classes of laws, loads and random inputs that plugins add, and the specs of all hooks."""
 
 from __future__ import annotations
 
@@ -104,6 +104,25 @@ class LoadTerm(ABC):
         The compiled per-pass loop supports first-order lags only; other terms need Python.
         """
         return None
+
+
+class FatigueLaw(ABC):
+    """Rolling-contact fatigue of one body: damage by an overrolling as a function of pressure."""
+
+    @abstractmethod
+    def damage_per_pass(self, pressure: FloatArray) -> FloatArray:
+        """Return the damage that an overrolling adds, one over the life at its pressure.
+
+        Parameters
+        ----------
+        pressure : ndarray, any shape
+            Greatest pressure along each strip [Pa]; 0 where the bodies do not touch.
+
+        Returns
+        -------
+        ndarray
+            Same shape; 0 without pressure, and never less at a greater one.
+        """
 
 
 class MotionLaw(ABC):
@@ -325,6 +344,22 @@ class LoadSpec(Spec):
 
     factory: Callable[[Any], Load | LoadTerm] = field(kw_only=True)
     role: Literal["base", "term"] = "base"
+
+
+@dataclass(frozen=True)
+class FatigueLawSpec(Spec):
+    """Spec of a fatigue law, selected by the key `law` of a body in the table [fatigue].
+
+    Parameters
+    ----------
+    factory : callable
+        ``factory(options, contact_modulus)`` returns a FatigueLaw for bodies with the contact
+        modulus E* [Pa].
+    """
+
+    kind: ClassVar[str] = "fatigue law"
+
+    factory: Callable[[Any, float], FatigueLaw] = field(kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, RootModel, create_model
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
-from wearsim.plugins import MotionLawSpec, Options, RandomInputSpec
+from wearsim.plugins import BODIES, FatigueLawSpec, MotionLawSpec, Options, RandomInputSpec
 from wearsim.scenario.parse.fields import (
     FRICTION,
     RandomInputTable,
@@ -22,6 +22,7 @@ from wearsim.scenario.parse.mistakes import installed
 from wearsim.scenario.parse.toml import REQUIRED, TABLES
 from wearsim.scenario.scenario import Scenario, load_scenario
 from wearsim.scenario.tables.cam_motion import MotionTable
+from wearsim.scenario.tables.fatigue import FatigueOfBody
 from wearsim.scenario.tables.plain import TopTable
 from wearsim.scenario.tables.plugin import AUTO, PLUGIN_TABLES, AutoTable
 
@@ -99,6 +100,10 @@ def scenario_schema() -> dict[str, Any]:
             kind: Any = tuple[laws, ...]  # type: ignore[valid-type]
             keys |= {"motion": (kind, described)} if laws else {}
             keys = keys if laws else {key: kept for key, kept in keys.items() if key != "motion"}
+        if table == "fatigue":
+            fatigue = _fatigue_laws()
+            given = {body: model.model_fields[body].description for body in BODIES}
+            keys |= {body: (fatigue, Field(None, description=t)) for body, t in given.items()}
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
         kind = kind or _model(table, model.__doc__, keys)
         needed = table in REQUIRED and table != "cylinder"  # a cam may replace it
@@ -125,6 +130,16 @@ def _motion_laws() -> Any:
             del fields["rise"]
         models.append(_model(f"motion {spec.name}", spec.summary, fields))
     return _one_of("MotionLaw", models)
+
+
+def _fatigue_laws() -> Any:
+    """Return the model of a body in the table [fatigue], for each fatigue law."""
+    named, models = FatigueOfBody.model_fields["law"], []
+    for spec in installed(FatigueLawSpec):
+        fields = {**_fields(FatigueOfBody), **_fields(spec.options)}
+        fields["law"] = Literal[spec.name], Field(..., description=named.description)
+        models.append(_model(f"fatigue {spec.name}", spec.summary, fields))
+    return _one_of("FatigueLaw", models)
 
 
 def _model(name: str, description: str | None, fields: dict[str, Any]) -> Model:

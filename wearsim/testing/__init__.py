@@ -9,6 +9,7 @@ from wearsim.testing.checks import Check, Checks, ConformanceError
 from wearsim.testing.contact_fixtures import STEEL, ContactCase
 from wearsim.testing.kit import (
     contact_model_tests,
+    fatigue_law_tests,
     load_tests,
     motion_law_tests,
     random_input_tests,
@@ -24,6 +25,7 @@ __all__ = [
     "ConformanceError",
     "ContactCase",
     "contact_model_tests",
+    "fatigue_law_tests",
     "load_tests",
     "motion_law_tests",
     "random_input_tests",

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from wearsim.errors import PluginError, WearsimError, described
 from wearsim.plugins import (
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     Options,
@@ -29,7 +30,9 @@ from wearsim.types import FloatArray
 from wearsim.units import Kind
 
 F = TypeVar("F")
-S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec)
+S = TypeVar(
+    "S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec, FatigueLawSpec
+)
 
 
 class ConformanceError(AssertionError):
