@@ -62,9 +62,7 @@ def fatigue_of(problem: WearProblem) -> Fatigue:
     return problem.fatigue
 
 
-def damage_per_pass(
-    problem: WearProblem, contacts: ContactBatchSolution, factor: FloatArray | float = 1.0
-) -> FloatArray:
+def damage_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
     """Return the damage of all bodies by a roller pass, shape (stations + rollers, N, strips).
 
     Parameters
@@ -72,12 +70,10 @@ def damage_per_pass(
     problem : WearProblem
     contacts : ContactBatchSolution
         In the problem's order.
-    factor : float or ndarray, shape (stations, contacts, realisations)
-        Factor of the pressures.
     """
     load, length = (problem.values_of(contacts, name) for name in ("line_load", "half_length"))
     pressure = np.divide(load, length, out=np.zeros_like(load), where=length > 0.0)
-    pressure *= 2.0 / math.pi * np.asarray(factor)[..., None]
+    pressure *= 2.0 / math.pi
     laws, shares = fatigue_of(problem).laws, problem.wear_shares
     parts = [
         shares[body] * laws[body].damage_per_pass(pressure)

@@ -9,8 +9,11 @@ import numpy as np
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray
 
-#: depth of the greatest shear stress below a line contact, over its half-length
-SHEAR_DEPTH = 0.786
+#: depth of the greatest shear stress below a line contact, over its half-length: the root of
+#: u^2 + u - 1 for its square u
+SHEAR_DEPTH = math.sqrt(0.5 * (math.sqrt(5.0) - 1.0))
+ORTHOGONAL = 0.25, 0.5  # greatest orthogonal shear stress over p0, and its depth over a
+_DEPTHS = np.linspace(0.0, 3.0, 3001)  # over the half-length, of which one has the greatest stress
 PARABOLA = 1.0 / 6.0  # integral of x (1 - x) between 0 and 1
 PART = 0.5  # error of the parabola over what it differs from the line
 BEND = 2.0  # greatest coefficient of the parabola, where the damage per pass is not smooth
@@ -110,3 +113,27 @@ def damage_of_step(
                 sums[1, b] += (kept + added) ** slope
                 sums[2, b] += (kept + added + error) ** slope
     return damage, sums
+
+
+def greatest_von_mises(poisson_ratio: float) -> tuple[float, float]:
+    """Return the greatest stress of von Mises below a line contact without traction.
+
+    Parameters
+    ----------
+    poisson_ratio : float
+        Of the body.
+
+    Returns
+    -------
+    (float, float)
+        The stress over the greatest pressure, and its depth over the half-length. In plane strain
+        it is in the middle plane (Johnson, Contact Mechanics, eqs. 4.46).
+    """
+    depth = _DEPTHS
+    root = np.sqrt(1.0 + depth**2)
+    along, normal = 2.0 * depth - (1.0 + 2.0 * depth**2) / root, -1.0 / root
+    across = poisson_ratio * (along + normal)
+    differences = (along - normal) ** 2 + (normal - across) ** 2 + (across - along) ** 2
+    stress = np.sqrt(0.5 * differences)
+    place = int(stress.argmax())
+    return float(stress[place]), float(depth[place])

@@ -1,15 +1,15 @@
 """Damage by fatigue that a step adds, and the error of its integral over the passes.
 
-Where the load varies, both contacts have their pressures at the mean load of the step, in
-proportion to the root of the load, which is exact on a worn profile, where the width of the contact
-stays. The scatter of the load within the step counts by two loads of the same mean and standard
-deviation.
+Where the load varies within a step, damage per pass is not that at the mean load: the contacts are
+solved under three loads with the mean and the variance of the load, on the profiles at the start
+and at the end of the step.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.fatigue import (
     damage_per_pass,
     effective_of_rows,
@@ -21,11 +21,12 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import displacement_at, mean_force, with_feedback
-from wearsim.evolution.steppers.single_step import carried_loads
 from wearsim.mechanics.fatigue import damage_of_step
 from wearsim.types import FloatArray
 
-_FARTHEST = 0.9  # greatest deviation of a load, over its mean
+_NORMAL = 3.0**0.5  # distance of the outer nodes from the mean, over the standard deviation
+_LEAST = 1e-3  # load over its mean, at least: a contact without load has no solution
+_ROUND_OFF = 1e-9
 # error that a step may add, over the tolerance: a part of the damage that it adds, and of all
 OF_STEP, OF_ALL = 1.0, 0.02
 
@@ -114,19 +115,60 @@ def _of_varying_load(
     here = problem.at_time(*times)
     displacement = displacement_at(here, [state.depths], np.zeros(()))
     force = mean_force(here, start, passes)
-    mean = np.maximum(with_feedback(here, force, displacement, state.terms), 0.0)
-    carried = carried_loads(problem, state.contacts)
-    ratio = np.where(carried > 0.0, mean / np.where(carried > 0.0, carried, 1.0), 0.0)
-    variance = np.square(values_between([load.deviation for load in problem.loads], *times))
+    mean = with_feedback(here, force, displacement, state.terms)
+    cam = problem.kinematics.cam
+    factor = 1.0 if cam is None else cam.load_factor
+    found = np.zeros(np.shape(start.stacked))
+    for offset, weight in _load_nodes(problem, *times):
+        if not weight.any():
+            continue
+        loads = mean + factor * offset
+        loads = np.maximum(loads, _LEAST * np.abs(mean))
+        batch = contact_batch(here, here.gap(*state.depths), loads, *state.depths)
+        contacts = here.model.solve(batch, warm=state.contacts)
+        found += weight[:, None] * damage_per_pass(here, contacts)
+    return found
+
+
+def _load_nodes(
+    problem: WearProblem, start: FloatArray, stop: FloatArray
+) -> list[tuple[FloatArray, FloatArray]]:
+    """Return three loads with the mean and the variance of the load between two times.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    start, stop : ndarray, shape (realisations,)
+        Times [s].
+
+    Returns
+    -------
+    list of tuple
+        Load less the mean [N], and its weight, shape (realisations,) both. The outer loads are root
+        three times the standard deviation away, as in Gauss's quadrature of a normal distribution,
+        but within the extremes; a load of two levels has these two.
+    """
+    each = zip(problem.loads, start.tolist(), stop.tolist(), strict=True)
+    values = [(load.mean(*t), load.deviation(*t), *load.extremes(*t)) for load, *t in each]
+    mean, deviation, low, high = np.array(values).T
+    variance, below, above = np.square(deviation), mean - low, high - mean
     for item in problem.varying:
         if item.name == "normal_force_offset":
-            own = values_between([path.deviation for path in item.paths], *times)
-            acts = np.isin(problem.roller, item.rollers)[:, None]
-            variance = variance + np.where(acts, np.square(own), 0.0)
-    relative = np.sqrt(variance) / np.where(mean > 0.0, mean, np.inf)
-    relative = np.minimum(relative, _FARTHEST)
-    low, high = (
-        damage_per_pass(problem, state.contacts, np.sqrt(ratio * (1.0 + sign * relative)))
-        for sign in (-1.0, 1.0)
-    )
-    return np.asarray(0.5 * (low + high))
+            own = values_between([path.deviation for path in item.paths], start, stop)
+            variance, reach = variance + np.square(own), _NORMAL * own
+            below, above = below + reach, above + reach
+    varies = (variance > 0.0) & (below > 0.0) & (above > 0.0)
+    variance = np.where(varies, variance, 0.0)
+    below, above = (np.where(varies, side, 1.0) for side in (below, above))
+    normal = _NORMAL * np.sqrt(np.where(varies, variance, 1.0))
+    left = np.minimum(below, normal)
+    right = np.minimum(above, np.maximum(normal, variance / left))
+    left = np.minimum(below, np.maximum(left, variance / right))
+    weights = [variance / (side * (left + right)) for side in (left, right)]
+    middle = np.maximum(1.0 - variance / (left * right), 0.0)
+    # round-off of two levels leaves no third one
+    middle = np.where(middle < _ROUND_OFF, 0.0, middle)
+    total = weights[0] + weights[1] + middle
+    zero = np.zeros_like(left)
+    nodes = [(-left, weights[0]), (zero, middle), (right, weights[1])]
+    return [(offset, weight / total) for offset, weight in nodes]
