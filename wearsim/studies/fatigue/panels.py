@@ -49,4 +49,4 @@ def pitting_panel(result: Result) -> Panel:
         f" pitting {shown(float(chance[-1]), '%', 3)}."
     )
     x = Axis(name, per_si=1.0 / size)
-    return Panel("Effective damage, and pitting", x, DAMAGE, marks, text, legend="upper left")
+    return Panel("Effective damage, and pitting", x, DAMAGE, marks, text, legend="lower right")
