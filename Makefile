@@ -22,8 +22,11 @@ demo: $(VENV)/.installed
 	$(BIN)/wearsim run scenarios/rig-450min.toml -o out/rig-450min.h5 --force
 	$(BIN)/wearsim plot out/rig-450min.h5 -o out/rig-450min.png --force
 
-# threads of BLAS in each of the test processes would wait for each other
+# threads of BLAS in each of the test processes would wait for each other; bytecode of the tests is
+# kept for the processes that start later, also where PYTHONDONTWRITEBYTECODE is set
 test test-slow: export OPENBLAS_NUM_THREADS = 1
+test test-slow: export PYTHONDONTWRITEBYTECODE =
+lint: export MYPY_NUM_WORKERS = $(JOBS)
 
 test: lint
 	$(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow"

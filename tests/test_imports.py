@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
-
-import pytest
 
 SLOW = {"numpy", "numba", "h5py", "pint", "pydantic", "matplotlib", "scipy"}
 RIG = Path(__file__).parents[1] / "scenarios" / "rig-450min.toml"
@@ -14,12 +13,14 @@ READ = f"wearsim.load_scenario({str(RIG)!r})"
 HELP = """
 import contextlib, io, sys
 from wearsim.cli.app import app
-with contextlib.redirect_stdout(io.StringIO()) as output, contextlib.suppress(SystemExit):
-    app({arguments!r}, prog_name="wearsim")
-assert "wearsim" in output.getvalue(), output.getvalue()
+for arguments in {arguments!r}:
+    with contextlib.redirect_stdout(io.StringIO()) as output, contextlib.suppress(SystemExit):
+        app(arguments, prog_name="wearsim")
+    assert "wearsim" in output.getvalue(), output.getvalue()
 """
 
 
+@cache
 def modules_after(code: str, *, whole: bool = False) -> set[str]:
     """Return the modules loaded by `code` in a separate process, by the first or `whole` name."""
     tail = "\nimport sys\nsys.stderr.write('\\n'.join(sys.modules))"
@@ -41,35 +42,32 @@ def test_public_name_is_loaded_at_its_first_use():
     assert modules_after("import wearsim\nwearsim.load_scenario") >= {"pydantic", "numpy"}
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"]], ids=" ".join)
-def test_help_loads_nothing_slow(arguments: list[str]):
-    assert not modules_after(HELP.format(arguments=arguments)) & SLOW
+def test_help_loads_nothing_slow():
+    assert not modules_after(HELP.format(arguments=[["--help"], ["--version"]])) & SLOW
 
 
-@pytest.mark.parametrize("verb", ["check", "run", "resume", "show", "plot"])
-def test_help_of_a_verb_loads_nothing_slow(verb: str):
+def test_help_of_a_verb_loads_nothing_slow():
     # typer itself loads pydantic to read the type of some parameters
-    loaded = modules_after(HELP.format(arguments=[verb, "--help"]))
-    assert not loaded & (SLOW - {"pydantic"})
+    verbs = [[verb, "--help"] for verb in ("check", "run", "resume", "show", "plot")]
+    assert not modules_after(HELP.format(arguments=verbs)) & (SLOW - {"pydantic"})
 
 
-@pytest.mark.parametrize("name", ["open_results", "run", "ensemble", "solve_contact"])
-def test_numba_is_not_loaded_before_a_kernel_is_called(name: str):
-    assert not modules_after(f"import wearsim\nwearsim.{name}\n{READ}") & {"numba", "h5py"}
+STUDIES = "wearsim.open_results, wearsim.run, wearsim.ensemble, wearsim.solve_contact"
+LOADED = f"import wearsim\n{STUDIES}\n{READ}"
+
+
+def test_numba_is_not_loaded_before_a_kernel_is_called():
+    assert not modules_after(LOADED) & {"numba", "h5py"}
+
+
+def test_reading_a_scenario_loads_no_display():
+    assert not modules_after(LOADED) & {"matplotlib", "typer", "rich"}
 
 
 def test_a_run_loads_neither_ensembles_nor_the_json_schema():
     loaded = modules_after(f"import wearsim.cli.progress\nwearsim.run\n{READ}", whole=True)
     unused = "execution", "ensemble.result", "uq.estimation.estimates", "csv_export", "examples"
     assert not {name for name in loaded if name.startswith("wearsim.") and name.endswith(unused)}
-
-
-def test_reading_a_scenario_does_not_load_matplotlib():
-    assert not modules_after("import wearsim\nwearsim.load_scenario\nwearsim.run") & {
-        "matplotlib",
-        "typer",
-        "rich",
-    }
 
 
 def test_command_and_module_give_the_same_help():

@@ -6,37 +6,18 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import pytest
 
-from wearsim.mechanics.numerics import jit
-from wearsim.mechanics.numerics.jit import kernel, subroutine
-from wearsim.studies.kernels import compilation_counted
-
-SCENARIOS = Path(__file__).parents[2] / "scenarios"
-
-CODE = """
-import json, sys
 import wearsim
 from wearsim.mechanics.numerics import jit
-from wearsim.mechanics.numerics.jit import compilation_reported, ready_kernels
-from wearsim.studies.kernels import kernels_of
-file, study, fields, overrides = json.loads(sys.argv[1])
-compiled = []
-jit._call_elsewhere = lambda function: None  # compile all of them in this process
-with compilation_reported(compiled.append):
-    scenario = wearsim.load_scenario(file, overrides)
-    if study == "test":
-        wearsim.run(scenario)
-    elif study == "contacts":
-        wearsim.dissipation(scenario, 4)
-    else:
-        wearsim.study_contact(scenario, with_fields=fields)
-print(json.dumps([sorted(kernels_of(scenario, study, fields)), compiled, sorted(ready_kernels())]))
-"""
+from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.studies.kernels import compilation_counted, kernels_of
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 MARGINAL = {"distribution": "uniform", "low": 0.09, "high": 0.11}
 FIELD = {"distribution": "gaussian-field", "correlation_length": "300 um", "marginal": MARGINAL}
@@ -59,35 +40,66 @@ CASES: list[tuple[str, str, bool, dict[str, Any]]] = [
 ]
 
 
-def kernels(
-    case: tuple[str, str, bool, dict[str, Any]], **environment: str
-) -> Sequence[Sequence[str]]:
-    """Return the expected, the compiled and the ready kernels of a study in a new process."""
+def called_by(name: str) -> set[str]:
+    """Return a kernel and those that it calls, also by subroutines, all by name."""
+    named = {item.__name__: item for item in jit._KERNELS}
+    names: set[str] = set()
+    functions = [named[name]._function]
+    seen: list[Any] = []
+    while functions:
+        function = functions.pop()
+        seen.append(function)
+        for item in map(function.__globals__.get, function.__code__.co_names):
+            callee = item._function if isinstance(item, jit.Kernel) else item
+            module = str(getattr(callee, "__module__", ""))
+            if isinstance(callee, FunctionType) and module.startswith("wearsim.mechanics."):
+                names |= {item.__name__} if isinstance(item, jit.Kernel) else set()
+                functions += [] if callee in seen else [callee]
+    return names | {name}
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_expected_kernels_are_those_that_are_called(case, monkeypatch: pytest.MonkeyPatch):
     name, study, fields, overrides = case
     short = {"operation.duration": "0.1 min"} if study == "test" else {}
-    arguments = str(SCENARIOS / f"{name}.toml"), study, fields, overrides | short
+    scenario = wearsim.load_scenario(SCENARIOS / f"{name}.toml", overrides | short)
+    for item in jit._KERNELS:  # as in a new process
+        monkeypatch.setattr(item, "_dispatcher", None)
+    if study == "test":
+        wearsim.run(scenario)
+    elif study == "contacts":
+        wearsim.dissipation(scenario, 4)
+    else:
+        wearsim.study_contact(scenario, with_fields=fields)
+    # a kernel from the cache contains those that it calls
+    called = set().union(*map(called_by, jit.ready_kernels()))
+    assert called == kernels_of(scenario, study, fields)
+
+
+COMPILED = """
+import json, sys
+import wearsim
+from wearsim.mechanics.numerics.jit import compilation_reported
+from wearsim.studies.kernels import kernels_of
+compiled = []
+with compilation_reported(compiled.append):
+    scenario = wearsim.load_scenario(sys.argv[1])
+    wearsim.study_contact(scenario, with_fields=True)
+print(json.dumps([compiled, sorted(kernels_of(scenario, "contact", True))]))
+"""
+
+
+@pytest.mark.slow
+def test_expected_kernels_are_those_that_are_compiled(tmp_path: Path):
     process = subprocess.run(
-        [sys.executable, "-P", "-c", CODE, json.dumps(arguments)],
-        env=os.environ | environment,
+        [sys.executable, "-P", "-c", COMPILED, str(SCENARIOS / "mean-contact.toml")],
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
         capture_output=True,
         text=True,
         check=True,
     )
-    return json.loads(process.stdout)  # type: ignore[no-any-return]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", CASES, ids=str)
-def test_expected_kernels_are_those_that_are_compiled(case, tmp_path: Path):
-    expected, compiled, _ = kernels(case, NUMBA_CACHE_DIR=str(tmp_path))
-    assert sorted(set(compiled)) == expected
-
-
-def test_kernels_that_a_run_calls_are_expected():
-    expected, _, ready = kernels(CASES[0])
-    # a kernel from the cache contains those that it calls
-    assert set(expected) - set(ready) <= {"factor_in_place", "solve_factored"}
-    assert set(ready) <= set(expected)
+    compiled, expected = json.loads(process.stdout)
+    assert sorted(compiled) == expected
 
 
 @pytest.fixture
