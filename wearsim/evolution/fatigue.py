@@ -18,11 +18,12 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import sum_in_order
+from wearsim.evolution.quantities import sum_along, sum_in_order
 from wearsim.mechanics.fatigue import SHEAR_DEPTH
 from wearsim.plugins import BODIES, Body, FatigueLaw
 from wearsim.types import FloatArray
 
+_TINY = 1e-300  # half-length of a strip without contact, which has no load
 FARTHEST = 1e200  # scale of the passes of a test without wear
 
 
@@ -72,17 +73,17 @@ def damage_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> Flo
         In the problem's order.
     """
     load, length = (problem.values_of(contacts, name) for name in ("line_load", "half_length"))
-    pressure = np.divide(load, length, out=np.zeros_like(load), where=length > 0.0)
+    pressure = load / np.maximum(length, _TINY)
     pressure *= 2.0 / math.pi
-    laws, shares = fatigue_of(problem).laws, problem.wear_shares
-    parts = [
-        shares[body] * laws[body].damage_per_pass(pressure)
-        if body in laws
-        else np.zeros_like(pressure)
-        for body in BODIES
-    ]
-    cylinder, roller = problem.sum_of_parts(parts[0], parts[1])
-    return np.concatenate([cylinder[:, 0], roller[0]])
+    laws, shares, stations = fatigue_of(problem).laws, problem.wear_shares, problem.shape[0]
+    found = np.zeros((stations + problem.rollers, *load.shape[2:]))
+    for body, law in laws.items():
+        part = shares[body] * law.damage_per_pass(pressure)
+        if body == "cylinder":
+            found[:stations] = sum_along(part, axis=1)[:, 0]
+        else:
+            found[stations:] = problem.sum_of_parts(part, part)[1][0]
+    return found
 
 
 def layer_thickness(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:

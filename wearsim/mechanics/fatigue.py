@@ -24,8 +24,11 @@ NODE, WEIGHT = 0.5 * math.sqrt(0.6), 5.0 / 18.0
 @kernel
 def damage_of_step(
     old: FloatArray,
-    rates: FloatArray,
+    first_rates: FloatArray,
+    last_rates: FloatArray,
     removed: FloatArray,
+    start: FloatArray,
+    lengths: FloatArray,
     points: FloatArray,
     slope: float,
 ) -> tuple[FloatArray, FloatArray]:
@@ -39,17 +42,18 @@ def damage_of_step(
 
     Parameters
     ----------
-    old : ndarray, shape (3, bodies, strips)
-        Damage, its error, and damage per pass at the point before the step; row number
+    old : ndarray, shape (4, bodies, strips)
+        Damage, its error, and damage per pass, last at the point before the step; row number
         b * realisations + v.
-    rates : ndarray, shape (2, bodies, strips)
+    first_rates, last_rates : ndarray, shape (bodies, strips)
         Damage per pass at the start and at the end of the step.
     removed : ndarray, shape (bodies, strips)
         Worn depth of the step over the thickness of the damaged layer; without rows if wear takes
         no damage.
-    points : ndarray, shape (4, realisations)
-        Passes at the start of the step, of the step, at the point before, not a number if there is
-        none, and the constant.
+    start, lengths : ndarray, shape (realisations,)
+        Passes at the start of the step, and of the step.
+    points : ndarray, shape (2, realisations)
+        Passes at the point before, not a number if there is none, and the constant.
     slope : float
         Exponent of the damage in the sums of the strips; 0 for the greatest damage instead.
 
@@ -65,7 +69,7 @@ def damage_of_step(
     damage, sums = np.empty((4, bodies, strips)), np.empty((3, bodies))
     for b in range(bodies):
         v = b % realisations
-        done, passes, past, scale = points[0, v], points[1, v], points[2, v], points[3, v]
+        done, passes, past, scale = start[v], lengths[v], points[0, v], points[1, v]
         behind, low, middle, high = 0.0, 0.0, 0.5, 1.0
         if passes > 0.0:
             span = math.log1p(passes / (done + scale))
@@ -77,21 +81,21 @@ def damage_of_step(
         for k in range(3):
             sums[k, b] = 0.0
         for i in range(strips):
-            before, first, last = old[2, b, i], rates[0, b, i], rates[1, b, i]
+            before, first, last = old[3, b, i], first_rates[b, i], last_rates[b, i]
             mean = 0.5 * (first + last)
             error = 0.5 * abs(last - first)
             if first > 0.0 and last > 0.0:
-                start, change, bend = math.log(first), math.log(last / first), 0.0
+                begin, change, bend = math.log(first), math.log(last / first), 0.0
                 curved = before > 0.0 and behind > 0.0
                 if curved:
                     bend = (change - math.log(first / before) / behind) / (1.0 + behind)
                     bend = min(max(bend, -BEND), BEND)
                 ends = mean
                 mean = WEIGHT * (
-                    math.exp(start + low * (change + bend * (low - 1.0)))
-                    + math.exp(start + high * (change + bend * (high - 1.0)))
+                    math.exp(begin + low * (change + bend * (low - 1.0)))
+                    + math.exp(begin + high * (change + bend * (high - 1.0)))
                 )
-                middle_rate = math.exp(start + middle * (change + bend * (middle - 1.0)))
+                middle_rate = math.exp(begin + middle * (change + bend * (middle - 1.0)))
                 mean += (1.0 - 2.0 * WEIGHT) * middle_rate
                 error = PART * PARABOLA * abs(bend) * mean if curved else abs(mean - ends)
             added, error, kept = passes * mean, passes * error, old[0, b, i]

@@ -37,14 +37,18 @@ class PressureLife(FatigueLaw):
     """Life N_ref (p_ref/p)^m, infinite up to an endurance pressure."""
 
     def __init__(self, options: PressureLifeOptions, contact_modulus: float) -> None:
-        self._options, self._endurance = options, options.endurance_pressure or 0.0
+        self._exponent, self._endurance = options.exponent, options.endurance_pressure
+        self._per_reference, self._damage = (
+            1.0 / options.reference_pressure,
+            1.0 / options.reference_passes,
+        )
 
     def damage_per_pass(self, pressure: FloatArray) -> FloatArray:
         """Return the damage that an overrolling adds, shape as `pressure` [Pa]."""
-        options = self._options
-        damage = (pressure / options.reference_pressure) ** options.exponent
-        damage = np.where(pressure > self._endurance, damage, 0.0)
-        return np.asarray(damage / options.reference_passes)
+        damage = self._damage * (self._per_reference * pressure) ** self._exponent
+        if self._endurance is not None:
+            damage = np.where(pressure > self._endurance, damage, 0.0)
+        return np.asarray(damage)
 
 
 class LoadStressFactorOptions(Options):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -231,19 +231,15 @@ class Stepper(ABC):
 
     def with_damage(self, problem: WearProblem, state: WearState, tried: Attempt) -> Attempt:
         """Return a trial step from `state` with the damage by fatigue, and its error."""
-        path, excess = [state], np.zeros(len(state.passes))
+        path, excess = [state], np.array(0.0)
         for end in tried.path:
             damaged, effective = with_damage(problem, path[-1], end)
             path.append(damaged)
             excess = np.maximum(excess, damage_excess(effective, self.tolerance))
         with np.errstate(divide="ignore"):  # the error of the integral grows as the step cubed
             ratio = np.minimum(GROW, SAFETY * excess ** (-1.0 / 3.0))
-        return replace(
-            tried,
-            path=tuple(path[1:]),
-            excess=np.maximum(tried.excess, excess),
-            ratio=np.minimum(tried.ratio, ratio),
-        )
+        most, least = np.maximum(tried.excess, excess), np.minimum(tried.ratio, ratio)
+        return Attempt(tuple(path[1:]), most, least, tried.warning)
 
     def side_step(self, problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
         """Return the state `passes` passes later in one step, for a record between two steps.

@@ -22,6 +22,7 @@ from wearsim.evolution.quantities import values_between
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import displacement_at, mean_force, with_feedback
 from wearsim.mechanics.fatigue import damage_of_step
+from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.types import FloatArray
 
 _NORMAL = 3.0**0.5  # distance of the outer nodes from the mean, over the standard deviation
@@ -54,14 +55,13 @@ def with_damage(
     assert damage is not None
     assert points is not None
     passes = end.passes - start.passes
-    before, scale = points
     varies = problem.constant_load is None or len(problem.varying) > 0
     if varies:
         first, last = (_of_varying_load(problem, start, one, passes) for one in (start, end))
     else:
         first, last = damage[2], damage_per_pass(problem, end.contacts)
     if varies or problem.pauses:
-        before = np.full_like(before, np.nan)
+        points = np.stack([np.full_like(points[0], np.nan), points[1]])
     if problem.pauses:
         passes = np.where(at_rest(problem, start.passes), 0.0, passes)
     strips = damage.shape[-1]
@@ -69,15 +69,18 @@ def with_damage(
     if fatigue.remove:
         removed = (end.stacked - start.stacked) / layer_thickness(problem, end.contacts)
     added, sums = damage_of_step(
-        np.stack([damage[0], damage[1], damage[3]]).reshape(3, -1, strips),
-        np.stack([first, last]).reshape(2, -1, strips),
+        kernel_input(damage).reshape(4, -1, strips),
+        kernel_input(first).reshape(-1, strips),
+        kernel_input(last).reshape(-1, strips),
         removed.reshape(-1, strips),
-        np.stack([start.passes, passes, before, scale]),
+        kernel_input(start.passes),
+        kernel_input(passes),
+        points,
         0.0 if fatigue.reference_area is None else fatigue.slope,
     )
-    end = end.replaced(
-        damage=added.reshape(damage.shape), damage_points=np.stack([start.passes, scale])
-    )
+    points = points.copy()
+    points[0] = start.passes
+    end = end.replaced(damage=added.reshape(damage.shape), damage_points=points)
     return end, effective_of_rows(problem, sums.reshape(3, -1, len(passes)))
 
 
