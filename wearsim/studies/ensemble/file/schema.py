@@ -142,6 +142,7 @@ LIFE = by_name(
 )
 
 
+_COURSE = Axis("course", "point of the course of a test with fatigue to its limit", 0)
 #: Further ones of tests with fatigue.
 LIFE_FATIGUE = by_name(
     (
@@ -215,7 +216,6 @@ ENSEMBLE = Schema(
             Axis("record", "record of a test; record 0 is the start of the run", 0),
             Axis("roller", "roller; identical rollers are merged"),
             Axis("kept", "realisation whose worn profile is stored", 0),
-            Axis("course", "point of the course of a test with fatigue to its limit", 0),
         )
     ),
     {**STATIC, "quantile": _QUANTILE, **_OUTCOMES, **OBSERVABLES, **STATISTICS},
@@ -255,7 +255,8 @@ def ensemble_schema(
         last |= {**CAM_OBSERVABLES, **CAM_STATISTICS}
     if fatigue:
         last |= {**FATIGUE_OBSERVABLES, **FATIGUE_STATISTICS, **(LIFE_FATIGUE if life else {})}
-    return replace(schema, variables={**schema.variables, **last})
+    axes = {**schema.axes, **({_COURSE.name: _COURSE} if fatigue and life else {})}
+    return replace(schema, axes=axes, variables={**schema.variables, **last})
 
 
 def is_row(variable: Variable) -> bool:
