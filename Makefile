@@ -14,7 +14,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test test-slow lint bench bench-docs bench-ensembles validate docs linkcheck clean
+.PHONY: demo test test-slow style lint bench bench-docs bench-ensembles validate docs linkcheck clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -26,17 +26,20 @@ demo: $(VENV)/.installed
 # kept for the processes that start later, also where PYTHONDONTWRITEBYTECODE is set
 test test-slow: export OPENBLAS_NUM_THREADS = 1
 test test-slow: export PYTHONDONTWRITEBYTECODE =
-lint: export MYPY_NUM_WORKERS = $(JOBS)
 
-test: lint
-	$(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow"
+# mypy, which takes one core for a minute, runs beside the tests
+test: style
+	$(BIN)/mypy & types=$$!; $(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow"; tests=$$?; \
+		wait $$types && exit $$tests
 
 test-slow: $(VENV)/.installed-dev
 	$(BIN)/pytest -n $(JOBS) --dist worksteal -m slow
 
-lint: $(VENV)/.installed-dev
+style: $(VENV)/.installed-dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+
+lint: style
 	$(BIN)/mypy
 
 # a topic that fails leaves the file of the last measurement; references do not depend on the stepper
@@ -51,6 +54,7 @@ bench-docs: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.report -o $(MEASURED)/report.json
 	$(BIN)/python -m tests.benchmarks.models -o $(MEASURED)/models.json
 	$(BIN)/python -m tests.benchmarks.model_choice -o $(MEASURED)/model-choice.json
+	$(BIN)/python -m tests.benchmarks.axial_profiles -o $(MEASURED)/axial-profiles.json
 
 bench: $(VENV)/.installed-dev
 	mkdir -p out

@@ -111,6 +111,7 @@ if TYPE_CHECKING:
     from wearsim.studies.opening import open_dissipation, open_ensemble, open_results
     from wearsim.studies.run.result import Result
     from wearsim.studies.run.run import resume, run
+    from wearsim.studies.start.export import export_running_in
     from wearsim.types import ContactSolution, Profile
 
 # names by the module that defines them
@@ -144,6 +145,7 @@ _NAMES = {
     "wearsim.studies.identify.api": ["identify"],
     "wearsim.studies.life.api": ["life", "resume_life", "sweep_life"],
     "wearsim.studies.run.run": ["resume", "run"],
+    "wearsim.studies.start.export": ["export_running_in"],
     "wearsim.types": ["ContactSolution", "Profile"],
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
@@ -163,6 +165,7 @@ __all__ = [
     "compare",
     "dissipation",
     "ensemble",
+    "export_running_in",
     "identify",
     "life",
     "load_scenario",

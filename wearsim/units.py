@@ -50,6 +50,8 @@ _FACTOR = re.compile(
 )
 #: Time from which texts state hours instead of minutes [s].
 LONG = 3.6e5
+Bound: TypeAlias = Literal["any", "positive", "not negative"]
+Dimensions: TypeAlias = frozenset[tuple[str, str]]
 
 
 class QuantityError(ValueError):
@@ -99,8 +101,6 @@ class Kind:
         limit = {"any": "", "positive": " above zero", "not negative": " of zero or more"}[bound]
         return f'{self.name}{limit} such as "{self.example}"'
 
-
-Bound: TypeAlias = Literal["any", "positive", "not negative"]
 
 LENGTH = Kind("a length", "m", "20 mm")
 
@@ -177,9 +177,6 @@ def _unknown_name(name: str) -> str:
     near = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=cutoff)
     hint = f" (did you mean '{by_lower[near[0]]}'?)" if near else ""
     return f"unknown unit '{name}'{hint}"
-
-
-Dimensions: TypeAlias = frozenset[tuple[str, str]]
 
 
 @cache

@@ -18,6 +18,7 @@ HOOKS = (
     "wearsim_random_inputs",
     "wearsim_motion_laws",
     "wearsim_fatigue_laws",
+    "wearsim_axial_profiles",
     "wearsim_study_kinds",
 )
 RIG = (

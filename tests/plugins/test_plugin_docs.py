@@ -18,6 +18,7 @@ import wearsim
 from wearsim.cli.app import app as cli_app
 from wearsim.errors import CapabilityError, PluginError
 from wearsim.plugins import (
+    AxialProfileSpec,
     Capabilities,
     ContactModelSpec,
     FatigueLawSpec,
@@ -28,8 +29,9 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
-from wearsim.plugins.manager import HookSpecs
+from wearsim.plugins.hooks import HookSpecs
 from wearsim.testing import random_inputs
+from wearsim.testing.axial_profiles import AXIAL_PROFILE, AxialProfileFixture
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
@@ -172,6 +174,17 @@ def test_documented_fatigue_law_passes_the_checks(documented):
     spec = registry().get(FatigueLawSpec, law.law)
     options = {"passes": 1e7, "knee": "1 GPa"}
     run_checks(FATIGUE_LAW, FatigueLawFixture(ConfiguredSpec(spec, options)))
+
+
+def test_documented_axial_profile_passes_the_checks_and_runs(documented):
+    tables = documented("wearsim_axial_profiles")
+    (key,) = [line for line in tables["roller"].splitlines() if line.startswith("axial")]
+    form = tomllib.loads(key)["axial_profile"]
+    options = {name: value for name, value in form.items() if name != "form"}
+    spec = registry().get(AxialProfileSpec, "power")
+    run_checks(AXIAL_PROFILE, AxialProfileFixture(ConfiguredSpec(spec, options)))
+    scenario = rig({"roller.axial_profile": form})
+    assert wearsim.solve_contact(scenario).power > 0.0
 
 
 def rig_with(tables: str):

@@ -16,6 +16,7 @@ from plugin_examples import HOOKS, Point, rig
 import wearsim
 from wearsim.errors import ScenarioError
 from wearsim.plugins import (
+    AxialProfileSpec,
     FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
@@ -24,9 +25,10 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
-from wearsim.plugins.manager import HookSpecs
+from wearsim.plugins.hooks import HookSpecs
 from wearsim.results.viewed import study_kinds
 from wearsim.testing import random_inputs
+from wearsim.testing.axial_profiles import AXIAL_PROFILE, AxialProfileFixture
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
 from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
@@ -164,6 +166,19 @@ def test_example_of_a_fatigue_law_passes_the_checks(example):
     fixture = FatigueLawFixture(ConfiguredSpec(registry().get(FatigueLawSpec, "ninth-power")))
     for check in FATIGUE_LAW.values():
         check(fixture)
+
+
+def test_example_of_an_axial_profile_runs(example):
+    example("wearsim_axial_profiles")
+    options = {"length": "8 mm", "drop": "20 um"}
+    spec = registry().get(AxialProfileSpec, "quartic")
+    fixture = AxialProfileFixture(ConfiguredSpec(spec, options))
+    for check in AXIAL_PROFILE.values():
+        check(fixture)
+    form = {"form": "quartic", **options}
+    scenario = rig({"roller.axial_profile": form, "contact.strips": 61})
+    assert scenario.roller.width == 8e-3
+    assert wearsim.solve_contact(scenario).peak_pressure > 0.0
 
 
 def test_example_of_a_study_kind_is_found_by_its_format(example):

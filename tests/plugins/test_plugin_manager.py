@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from wearsim.cli.app import app
 from wearsim.errors import PluginError, ScenarioError
 from wearsim.plugins import (
+    AxialProfileSpec,
     ContactModelSpec,
     FatigueLawSpec,
     LoadSpec,
@@ -48,7 +49,10 @@ def test_every_kind_of_spec_is_registered():
             return lambda: [kind("new", summary="new", result="a:B", view="a:C", protocol=2)]
         return lambda: [kind("new", Options, "new", factory=lambda options: None, protocol=2)]
 
-    specs = ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec, StudyKind
+    specs = (
+        *(ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec),
+        *(AxialProfileSpec, StudyKind),
+    )
     kinds = dict(zip(HOOKS, specs, strict=True))
     plugins = Registry([Point(module(**{hook: of(kind) for hook, kind in kinds.items()}))])
     for kind in kinds.values():
@@ -169,6 +173,7 @@ def test_spec_of_another_protocol_is_listed_and_refused_when_selected(
         ("wearsim_random_inputs", RandomInputSpec),
         ("wearsim_motion_laws", MotionLawSpec),
         ("wearsim_fatigue_laws", FatigueLawSpec),
+        ("wearsim_axial_profiles", AxialProfileSpec),
     ],
 )
 def test_every_kind_of_spec_has_a_protocol(hook, spec):

@@ -14,15 +14,17 @@ from plugin_examples import Point, rig
 
 import wearsim
 from wearsim.plugins.template import clash, renamed, template_folder, write_plugin
-from wearsim.testing import contact_model_tests
+from wearsim.testing import axial_profile_tests, contact_model_tests
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
 from wearsim.testing.kit import CONTACT_MODEL
+from wearsim.testing.study_kinds import STUDY_KIND, StudyKindFixture
 
 FOLDER = template_folder()
 MODULE = FOLDER / "src" / "wearsim_template" / "__init__.py"
 ALLOWED = {"numpy", "scipy", "pytest", "wearsim.plugins", "wearsim.testing", "wearsim.types"}
+ALLOWED |= {"wearsim.report.panels", "wearsim.report.view", "wearsim.results.viewed"}
 
 
 def load_template():
@@ -33,10 +35,12 @@ def load_template():
 
 
 test_winkler = contact_model_tests(load_template().SPEC)
+test_winkler_quartic = axial_profile_tests(load_template().FORM, {"length": "10 mm"})
 
 
 def test_fatigue_law_of_the_readme_conforms():
-    code = (FOLDER / "README.md").read_text().split("```python\n")[1].split("```")[0]
+    blocks = (FOLDER / "README.md").read_text().split("```python\n")[1:]
+    (code,) = [block.split("```")[0] for block in blocks if "class NinthPower" in block]
     names = {"ws": wearsim.plugins}
     exec(code, names)
     (spec,) = names["wearsim_fatigue_laws"]()
@@ -65,19 +69,45 @@ def imported(path: Path) -> set[str]:
 
 @pytest.mark.parametrize("path", sorted(FOLDER.rglob("*.py")), ids=lambda path: path.name)
 def test_template_imports_public_modules_only(path):
-    own = {"wearsim_template"} if path != MODULE else set()
+    own = {"wearsim_template", "wearsim_template.study"} if path != MODULE else set()
     standard = set(sys.stdlib_module_names)
     for name in imported(path) - own:
         assert name in ALLOWED or name.split(".")[0] in (standard | {"numpy", "scipy"}), name
 
 
 def test_template_is_short():
-    assert len(MODULE.read_text().splitlines()) < 100
+    assert len(MODULE.read_text().splitlines()) < 145
+
+
+def test_kind_of_study_of_the_template_has_about_twenty_statements():
+    body = ast.parse((MODULE.parent / "study.py").read_text()).body
+    classes = [item for item in body if isinstance(item, ast.ClassDef)]
+    nodes = [node for item in classes for node in ast.walk(item)]
+    # without docstrings, which are expressions
+    count = sum(isinstance(node, ast.stmt) and not isinstance(node, ast.Expr) for node in nodes)
+    assert count <= 22
 
 
 def test_template_tests_use_one_line_of_the_kit():
     text = (FOLDER / "tests" / "test_winkler.py").read_text()
+    assert "test_winkler_approach = study_kind_tests(KIND, small_study)\n" in text
     assert "test_winkler = contact_model_tests(SPEC)\n" in text
+    assert 'test_winkler_quartic = axial_profile_tests(FORM, {"length": "10 mm"})\n' in text
+
+
+@pytest.fixture
+def study(template, monkeypatch):
+    """Return the kind of study of the template, installed, and a small result."""
+    monkeypatch.syspath_prepend(MODULE.parents[1])
+    monkeypatch.setattr(sys.modules["wearsim_template"], "__path__", [str(MODULE.parent)], False)
+    made = runpy.run_path(str(FOLDER / "tests" / "test_winkler.py"))
+    yield StudyKindFixture(made["KIND"], made["small_study"]())
+    sys.modules.pop("wearsim_template.study", None)
+
+
+def test_kind_of_study_meets_the_requirements(study):
+    for check in STUDY_KIND.values():
+        check(study)
 
 
 @pytest.mark.usefixtures("template")
@@ -133,7 +163,7 @@ def test_name_containing_a_template_name_is_replaced_once(name):
 def test_plugin_with_an_awkward_name_is_imported_and_solves(name, tmp_path, monkeypatch):
     written = write_plugin(name, tmp_path)
     code = [ast.parse(path.read_text()) for path in written if path.suffix == ".py"]
-    assert len(code) == 2
+    assert len(code) == 3
     under = name.replace("-", "_")
     monkeypatch.syspath_prepend(tmp_path / f"wearsim-{name}" / "src")
     monkeypatch.delitem(sys.modules, f"wearsim_{under}", raising=False)

@@ -25,14 +25,14 @@ rig.toml: [roller] radius: needs a unit, got 20, expected a length above zero su
 rig.toml: [roller] diameter: wrong dimension, got "20 MPa" (a pressure), expected a length above zero such as "20 mm"
 rig.toml: [roller] radus: unknown key (did you mean 'radius'?)
 rig.toml: [roller] speed: unknown key (it belongs in [operation])
-rig.toml: [roller] foo: unknown key (known here: chamfer, chamfer_angle, crown_diameter, crown_radius, diameter, edge_radius, inertia, material, offset, radius, width)""",
+rig.toml: [roller] foo: unknown key (known here: axial_profile, chamfer, chamfer_angle, crown_diameter, crown_radius, diameter, edge_radius, inertia, material, offset, profile, radius, width)""",
     ),
     "no radius": (
         'radius = "20 mm"\ncrown_radius = "500 mm"\n',
         "",
         """\
 rig.toml: [roller] radius or diameter: exactly one is needed, got none
-rig.toml: [roller] crown_radius or crown_diameter: exactly one is needed, got none""",
+rig.toml: [roller] crown_radius or crown_diameter or axial_profile: exactly one is needed, got none""",
     ),
     "an unknown material": (
         '   # not the diameter\nmaterial = "steel"',

@@ -10,7 +10,10 @@ from scenario_examples import FORCE_LINE, MU, RIG, XI, K, Parse
 from wearsim.errors import ScenarioError
 from wearsim.scenario import load_scenario
 
-PLACES = "a value; only the values of [load], [friction], [creepage] and [wear], and roller.offset can be random"
+PLACES = (
+    "a value; only the values of [load], [friction], [creepage] and [wear], roller.offset, and those"
+    " of axial_profile except its length can be random"
+)
 CONTACT = "load.normal_force, friction.coefficient, creepage.longitudinal, creepage.bearing_torque, creepage.yaw, creepage.tilt, creepage.misalignment"
 MISTAKES = {
     "an unknown distribution": (

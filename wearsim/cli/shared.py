@@ -22,96 +22,6 @@ if TYPE_CHECKING:
 
 
 _WIDTH = 110  # columns of a table in a file or a pipe
-
-
-def console(*, err: bool = False) -> Console:
-    """Return a console without markup and highlighting."""
-    from rich.console import Console
-
-    made = Console(stderr=err, markup=False, highlight=False, emoji=False)
-    if not made.is_terminal:
-        made.width = _WIDTH
-    return made
-
-
-def write_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
-    """Write a table with the columns name and value to stdout."""
-    from rich import box
-    from rich.table import Table
-
-    screen = console()
-    table = Table(title=title, title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
-    table.min_width = min(len(title), screen.width)  # keeps a long title on one line
-    table.add_column(no_wrap=True)
-    table.add_column(overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    screen.print(table)
-
-
-def write_list(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Write rows to stdout, one line each, in columns aligned under their heads."""
-    lines = [heads, *rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(heads))]
-    for line in lines:
-        cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
-        typer.echo("  ".join(cells).rstrip())
-
-
-def write_json(data: Mapping[str, Any]) -> None:
-    """Write one JSON object to stdout; numbers that are not finite become null."""
-    from wearsim.report.text import plain
-
-    typer.echo(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
-
-
-def note(text: str) -> None:
-    """Write a line to stderr."""
-    typer.echo(text, err=True)
-
-
-def write_notes(notes: Iterable[str], warnings: Iterable[str] = ()) -> None:
-    """Write notes and warnings on a scenario or a study to stderr."""
-    for text in (*(f"note: {text}" for text in notes), *(f"warning: {text}" for text in warnings)):
-        note(text)
-
-
-def refuse(condition: object, text: str, option: str) -> None:
-    """Raise a usage error of an option or an argument if a condition holds.
-
-    Raises
-    ------
-    typer.BadParameter
-        With the text.
-    """
-    if condition:
-        raise typer.BadParameter(text, param_hint=option)
-
-
-def refuse_options(given: Mapping[str, object], text: str) -> None:
-    """Raise a usage error if one of several options is given, which are listed by name.
-
-    Raises
-    ------
-    typer.BadParameter
-        For the first one.
-    """
-    for option, value in given.items():
-        refuse(value not in (None, False), text, option)
-
-
-def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
-    """Refuse to overwrite the file named by an option.
-
-    Raises
-    ------
-    ResultsFileError
-        If the file exists and `force` is false.
-    """
-    if path.exists() and not force:
-        raise ResultsFileError(f"{path} exists; choose another name with {option}, or --force")
-
-
 ScenarioFile: TypeAlias = Annotated[
     Path, typer.Argument(metavar="SCENARIO", help="Scenario, a TOML file.", show_default=False)
 ]
@@ -205,8 +115,6 @@ Scheduler: TypeAlias = Annotated[
         show_default=False,
     ),
 ]
-
-
 Columns: TypeAlias = Annotated[
     str | None,
     typer.Option(
@@ -244,6 +152,94 @@ At: TypeAlias = Annotated[
         show_default=False,
     ),
 ]
+
+
+def console(*, err: bool = False) -> Console:
+    """Return a console without markup and highlighting."""
+    from rich.console import Console
+
+    made = Console(stderr=err, markup=False, highlight=False, emoji=False)
+    if not made.is_terminal:
+        made.width = _WIDTH
+    return made
+
+
+def write_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
+    """Write a table with the columns name and value to stdout."""
+    from rich import box
+    from rich.table import Table
+
+    screen = console()
+    table = Table(title=title, title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
+    table.min_width = min(len(title), screen.width)  # keeps a long title on one line
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    screen.print(table)
+
+
+def write_list(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Write rows to stdout, one line each, in columns aligned under their heads."""
+    lines = [heads, *rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(len(heads))]
+    for line in lines:
+        cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        typer.echo("  ".join(cells).rstrip())
+
+
+def write_json(data: Mapping[str, Any]) -> None:
+    """Write one JSON object to stdout; numbers that are not finite become null."""
+    from wearsim.report.text import plain
+
+    typer.echo(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def note(text: str) -> None:
+    """Write a line to stderr."""
+    typer.echo(text, err=True)
+
+
+def write_notes(notes: Iterable[str], warnings: Iterable[str] = ()) -> None:
+    """Write notes and warnings on a scenario or a study to stderr."""
+    for text in (*(f"note: {text}" for text in notes), *(f"warning: {text}" for text in warnings)):
+        note(text)
+
+
+def refuse(condition: object, text: str, option: str) -> None:
+    """Raise a usage error of an option or an argument if a condition holds.
+
+    Raises
+    ------
+    typer.BadParameter
+        With the text.
+    """
+    if condition:
+        raise typer.BadParameter(text, param_hint=option)
+
+
+def refuse_options(given: Mapping[str, object], text: str) -> None:
+    """Raise a usage error if one of several options is given, which are listed by name.
+
+    Raises
+    ------
+    typer.BadParameter
+        For the first one.
+    """
+    for option, value in given.items():
+        refuse(value not in (None, False), text, option)
+
+
+def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
+    """Refuse to overwrite the file named by an option.
+
+    Raises
+    ------
+    ResultsFileError
+        If the file exists and `force` is false.
+    """
+    if path.exists() and not force:
+        raise ResultsFileError(f"{path} exists; choose another name with {option}, or --force")
 
 
 def profile_choice(

@@ -83,8 +83,9 @@ def unworn_contacts(problem: WearProblem) -> ContactBatch:
 
 def _rolling_radius(problem: WearProblem, roller_depth: FloatArray) -> FloatArray:
     """Return the rolling radius of free rollers, shape (all contacts, strips) [m]."""
-    kinematics, s = problem.kinematics, problem.from_apex[problem.roller]
-    radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius) - roller_depth
+    assert problem.roller_drop is not None  # of free rollers
+    drop = problem.roller_drop[problem.roller]
+    radius = problem.kinematics.roller_radius - drop - roller_depth
     return _of_contacts(problem, radius)
 
 
@@ -99,7 +100,7 @@ def _creepage_variation(
     if problem.slip_profile is None:
         return None
     variation: FloatArray = (
-        problem.slip_profile[problem.roller]
+        problem.at_contacts(problem.slip_profile)
         + roller_depth / problem.kinematics.roller_radius
         - _per_radius(problem, cylinder_depth)
     )

@@ -77,7 +77,11 @@ class WearProblem:
         A tilt moves the contact over the crown.
     free : bool
         The creepage of the rollers follows from the bearing torque.
-    slip_profile : ndarray, shape (rollers, realisations or 1, strips), optional
+    roller_drop : ndarray, shape (rollers, realisations or 1, strips), optional
+        Radius of the unworn rollers below their rolling radius [m]; only of free rollers.
+    crowned : bool
+        Whether the forms of the bodies along the axis are circular crowns.
+    slip_profile : ndarray, shape (stations or 1, rollers, realisations or 1, strips), optional
         Differential slip of the unworn bodies without tilt, to which worn depth adds. If absent,
         creepage varies with spin alone.
     varying : sequence of Varying
@@ -108,6 +112,8 @@ class WearProblem:
     weight: FloatArray
     tilt_shifts: bool = True
     free: bool = False
+    roller_drop: FloatArray | None = None
+    crowned: bool = True
     slip_profile: FloatArray | None = None
     varying: tuple[Varying, ...] = ()
     iteration_tolerance: float = 1e-8
@@ -173,7 +179,8 @@ class WearProblem:
             flat_gap=np.take(self.flat_gap, realisations, axis=2),
             from_apex=part(self.from_apex, 1),
             inputs=self.inputs.at(realisations, axis=1),
-            slip_profile=None if self.slip_profile is None else part(self.slip_profile, 1),
+            roller_drop=None if self.roller_drop is None else part(self.roller_drop, 1),
+            slip_profile=None if self.slip_profile is None else part(self.slip_profile, 2),
             varying=tuple(
                 replace(item, paths=tuple(item.paths[number] for number in numbers))
                 for item in self.varying
@@ -237,9 +244,11 @@ class WearProblem:
     def has_crowned_gap(self) -> bool:
         """Whether the gap before wear is that of crowned bodies in all strips.
 
-        It is not where strips reach the ends of a roller, a rounding or a chamfer, and on measured
-        profiles.
+        It is not where strips reach the ends of a roller, a rounding or a chamfer, on measured
+        profiles, and with other forms along the axis than circular crowns.
         """
+        if not self.crowned:
+            return False
         bend = np.diff(self.nominal_gap, 2, axis=-1)
         if bend.size == 0:  # fewer than three strips
             return False

@@ -270,7 +270,7 @@ class Kinematics:
 
     Parameters
     ----------
-    cylinder_radius, roller_radius, crown_radius : float
+    cylinder_radius, roller_radius : float
         Radii [m]; that of the base circle of a cam.
     rolling_speed : float
         Rolling velocity V [m/s]; on a cam that of the base circle.
@@ -282,7 +282,6 @@ class Kinematics:
 
     cylinder_radius: float
     roller_radius: float
-    crown_radius: float
     rolling_speed: float
     multiplicity: FloatArray
     cam: CamStations | None = None

@@ -17,6 +17,7 @@ from wearsim.evolution.quantities import CamStations
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.loads import displacement_at
 from wearsim.evolution.steppers.single_step import recovery_at, solve_at_record
+from wearsim.evolution.strips import with_surfaces
 from wearsim.mechanics.cam import moved_stations
 from wearsim.types import FloatArray, IntArray
 
@@ -101,8 +102,11 @@ def _differ(one: FloatArray, other: FloatArray) -> bool:
 
 def _at_stations(problem: WearProblem, cam: CamStations) -> WearProblem:
     """Return the problem at other stations of its cam."""
+    moved = replace(problem, kinematics=replace(problem.kinematics, cam=cam))
+    if any(one.by_angle for one in problem.growth):
+        return with_surfaces(moved)
     flat_gap = np.broadcast_to(problem.flat_gap[:1], (len(cam.angle), *problem.flat_gap.shape[1:]))
-    return replace(problem, kinematics=replace(problem.kinematics, cam=cam), flat_gap=flat_gap)
+    return replace(moved, flat_gap=flat_gap)
 
 
 def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamStations) -> WearState:

@@ -34,14 +34,17 @@ class Surfaces(NamedTuple):
 
     Parameters
     ----------
-    gap, from_apex : ndarray, shape (rollers, 1, strips)
-        Gap of rollers without tilt before wear, and distance from their apexes [m].
-    slip_profile : ndarray, shape (rollers, 1, strips), optional
+    gap : ndarray, shape (stations or 1, rollers, 1, strips)
+        Gap of rollers without tilt before wear [m].
+    from_apex : ndarray, shape (rollers, 1, strips)
+        Distance from their apexes [m].
+    roller_drop, slip_profile : ndarray, optional
         As in `WearProblem`.
     """
 
     gap: FloatArray
     from_apex: FloatArray
+    roller_drop: FloatArray | None
     slip_profile: FloatArray | None
 
 
@@ -54,7 +57,7 @@ class Growth:
     model : callable
         Returns the contact model for strips.
     surfaces : callable
-        Returns the surfaces on strips.
+        Returns the surfaces on strips, at the angles of the stations of a cam.
     coarse : callable
         Returns strips of about twice the width over the same range.
     most : int
@@ -66,15 +69,18 @@ class Growth:
         Strips over the whole width of rollers that have ends, which grow no further.
     least_loaded : int
         Strips of each contact after joining, at least.
+    by_angle : bool
+        Whether the surfaces differ along the angle of a cam before wear.
     """
 
     model: Callable[[Grid], ContactModel]
-    surfaces: Callable[[Grid], Surfaces]
+    surfaces: Callable[[Grid, FloatArray | None], Surfaces]
     coarse: Callable[[Grid], Grid]
     most: int
     margin: float = 0.0
     last: Grid | None = None
     least_loaded: int = LEAST_LOADED
+    by_angle: bool = False
 
 
 def next_grids(
@@ -133,19 +139,27 @@ def identical_strips(one: Grid, other: Grid) -> bool:
 
 def on_grid(problem: WearProblem, grid: Grid) -> WearProblem:
     """Return a problem on other strips."""
-    parts = [one.surfaces(grid) for one in problem.growth]
-    gap = np.concatenate([part.gap for part in parts], axis=1)
-    slip, shared = parts[0].slip_profile, problem.from_apex.shape[1] == 1
-    if slip is not None and not shared:
-        slip = np.concatenate([np.asarray(part.slip_profile) for part in parts], axis=1)
-    apexes = [part.from_apex for part in parts]
+    return with_surfaces(replace(problem, grid=grid, model=problem.growth[0].model(grid)))
+
+
+def with_surfaces(problem: WearProblem) -> WearProblem:
+    """Return a problem with the surfaces of the unworn bodies on its strips, at its stations."""
+    cam, grid = problem.kinematics.cam, problem.grid
+    angles = None if cam is None else cam.angle[:, 0, 0]
+    parts = [one.surfaces(grid, angles) for one in problem.growth]
+    gap = np.concatenate([part.gap for part in parts], axis=2)
+    stations, shared = 1 if angles is None else len(angles), problem.from_apex.shape[1] == 1
+
+    def joined(name: str, axis: int) -> FloatArray | None:
+        arrays = [getattr(part, name) for part in parts]
+        return arrays[0] if shared or arrays[0] is None else np.concatenate(arrays, axis=axis)
+
     return replace(
         problem,
-        grid=grid,
-        model=problem.growth[0].model(grid),
-        flat_gap=np.broadcast_to(gap, (problem.shape[0], *gap.shape)),
-        from_apex=apexes[0] if shared else np.concatenate(apexes, axis=1),
-        slip_profile=slip,
+        flat_gap=np.broadcast_to(gap, (stations, *gap.shape[1:])),
+        from_apex=np.asarray(joined("from_apex", 1)),
+        roller_drop=joined("roller_drop", 1),
+        slip_profile=joined("slip_profile", 2),
     )
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from wearsim.models import fatigue, loads, motion, wear
+from wearsim.models import axial, fatigue, loads, motion, wear
 from wearsim.models.contact import hertz as hertz_model, hertz_fastsim, slender, strip_model
 from wearsim.models.random import distributions, posterior, varying
 from wearsim.plugins import (
+    AxialProfileSpec,
     ContactModelSpec,
     FatigueLawSpec,
     LoadSpec,
@@ -52,3 +53,9 @@ def wearsim_motion_laws() -> Iterable[MotionLawSpec]:
 def wearsim_fatigue_laws() -> Iterable[FatigueLawSpec]:
     """Yield the built-in fatigue laws."""
     return fatigue.SPECS
+
+
+@hookimpl
+def wearsim_axial_profiles() -> Iterable[AxialProfileSpec]:
+    """Yield the built-in forms of bodies along their axis."""
+    return axial.SPECS

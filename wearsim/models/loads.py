@@ -26,6 +26,11 @@ from wearsim.quantities import (
 from wearsim.types import FloatArray
 from wearsim.units import FORCE, TORQUE, TORSIONAL_STIFFNESS
 
+GAP = 10.0  # usual intervals between samples
+FEWEST_SAMPLES = 10  # with fewer, a file is a schedule without a usual interval
+ZERO_DRIFT = 0.01  # part of the greatest load by which a log may be below zero in a pause
+_PAPER = ("Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",)
+
 
 class ConstantOptions(Options):
     """Options of the load `constant`."""
@@ -186,11 +191,6 @@ class ConstantLoad(Load):
         return self._force
 
 
-GAP = 10.0  # usual intervals between samples
-FEWEST_SAMPLES = 10  # with fewer, a file is a schedule without a usual interval
-ZERO_DRIFT = 0.01  # part of the greatest load by which a log may be below zero in a pause
-
-
 @lru_cache(maxsize=4)  # a log may have millions of rows, and a study builds its load several times
 def _read_log(
     text: str, path: str, gaps: str, names: tuple[str, str] | None
@@ -300,8 +300,6 @@ class ThermalTerm(LoadTerm):
         """Return gain [N/W] and time constant [s]."""
         return self.gain, self.time_constant
 
-
-_PAPER = ("Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",)
 
 SPECS = (
     LoadSpec(

@@ -36,6 +36,30 @@ _MODIFIED_TRAPEZOID = (
     (0.625, -1.0, 0.0, _HALF),
     (0.875, 1.0, 4.0 * math.pi, 3.0 * _HALF),
 )
+FEWEST_ROWS = 8
+#: Other names of the columns of angle and lift.
+ANGLE_NAMES = (
+    *("cam angle", "rotation", "theta", "phi", "winkel", "drehwinkel", "nockenwinkel"),
+    "kurvenwinkel",
+)
+LIFT_NAMES = (
+    *(
+        "rise",
+        "displacement",
+        "follower",
+        "s",
+        "psi",
+        "hub",
+        "erhebung",
+        "stößelhub",
+        "stoesselhub",
+    ),
+    *("rollenhub", "schwenkwinkel", "hebelwinkel"),
+)
+_FLOOR = 6.0  # standard deviations of the noise, below which a jump is not seen
+_BLUNT = 0.05  # part of the greatest slope by which noise may hide a corner
+_WIDEST = math.radians(2.0)  # of the spacing of means of a noisy table
+_NORTON = ("Norton, Cam Design and Manufacturing Handbook (2009)", "VDI 2143")
 
 
 class Dwell(MotionLaw):
@@ -267,31 +291,6 @@ class LiftSpline:
         return np.stack([part(np.asarray(angle)) for part in self._parts])
 
 
-FEWEST_ROWS = 8
-#: Other names of the columns of angle and lift.
-ANGLE_NAMES = (
-    *("cam angle", "rotation", "theta", "phi", "winkel", "drehwinkel", "nockenwinkel"),
-    "kurvenwinkel",
-)
-LIFT_NAMES = (
-    *(
-        "rise",
-        "displacement",
-        "follower",
-        "s",
-        "psi",
-        "hub",
-        "erhebung",
-        "stößelhub",
-        "stoesselhub",
-    ),
-    *("rollenhub", "schwenkwinkel", "hebelwinkel"),
-)
-_FLOOR = 6.0  # standard deviations of the noise, below which a jump is not seen
-_BLUNT = 0.05  # part of the greatest slope by which noise may hide a corner
-_WIDEST = math.radians(2.0)  # of the spacing of means of a noisy table
-
-
 def read_lift(text: str, path: str, unit: str) -> tuple[FloatArray, FloatArray]:
     """Return angles [rad] and lifts [`unit`] of a CSV file.
 
@@ -381,9 +380,6 @@ def refuse_kinks(
         expected = f"a {name} without corners, or more points where it turns sharply"
         what = f"the slope of the {name} jumps at"
         raise ScenarioError(path, [Mistake("", "", what, got, expected)])
-
-
-_NORTON = ("Norton, Cam Design and Manufacturing Handbook (2009)", "VDI 2143")
 
 
 def _spec(

@@ -21,6 +21,12 @@ from wearsim.units import WEAR_FACTOR, Kind, QuantityError, as_written
 SPECIFIC = Quantity(Kind("a specific wear rate", "m^3/(N m)", "1e-5 mm^3/(N m)"), "not negative")
 _OF_A_TEST = "specific_wear_rate", "measured_friction"
 _EITHER = "k_over_h, or specific_wear_rate with measured_friction"
+RATE = Quantity(
+    Kind("a mass per rolled distance and contact area", "kg/m^3", "55 ug/(m mm^2)"), "positive"
+)
+INDEX = Quantity(
+    Kind("an energy per rolled distance and contact area", "Pa", "77.2 N/mm^2"), "positive"
+)
 
 
 class BodyWear(Options):
@@ -109,14 +115,6 @@ class ArchardDissipation(WearLaw):
     def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float:
         """Return K/(H V), depth per pass over dissipation [m/(W/m)]."""
         return self._wear_factor[body] / rolling_speed
-
-
-RATE = Quantity(
-    Kind("a mass per rolled distance and contact area", "kg/m^3", "55 ug/(m mm^2)"), "positive"
-)
-INDEX = Quantity(
-    Kind("an energy per rolled distance and contact area", "Pa", "77.2 N/mm^2"), "positive"
-)
 
 
 class Regimes(Options):

@@ -11,13 +11,15 @@ from wearsim.plugins.contact_model import (
     SingleContactModel,
     refuse_unclaimed,
 )
-from wearsim.plugins.manager import hookimpl, registry
+from wearsim.plugins.hooks import hookimpl
+from wearsim.plugins.laws import BODIES, Body, FatigueLaw, MotionLaw, WearLaw
+from wearsim.plugins.manager import registry
 from wearsim.plugins.specs import (
-    BODIES,
-    Body,
+    AxialPair,
+    AxialProfile,
+    AxialProfileSpec,
     ContactModelSpec,
     Distribution,
-    FatigueLaw,
     FatigueLawSpec,
     Frame,
     FrictionField,
@@ -25,7 +27,6 @@ from wearsim.plugins.specs import (
     Load,
     LoadSpec,
     LoadTerm,
-    MotionLaw,
     MotionLawSpec,
     Options,
     Process,
@@ -33,7 +34,6 @@ from wearsim.plugins.specs import (
     Spec,
     StudyKind,
     Uniforms,
-    WearLaw,
     WearLawSpec,
 )
 from wearsim.quantities import (
@@ -54,6 +54,9 @@ from wearsim.units import Kind, QuantityError
 
 __all__ = [
     "BODIES",
+    "AxialPair",
+    "AxialProfile",
+    "AxialProfileSpec",
     "Body",
     "Capabilities",
     "CapabilityError",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,31 +13,18 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from wearsim.plugins.contact_model import Capabilities, ContactModel
-from wearsim.types import ContactSolution, FloatArray, Grid, Material
+from wearsim.plugins.laws import FatigueLaw, MotionLaw, WearLaw
+from wearsim.types import FloatArray, Grid, Material
 from wearsim.uq.distributions.base import Distribution as Distribution  # noqa: PLC0414  (exported)
-
-Body: TypeAlias = Literal["cylinder", "roller"]
-
-BODIES: tuple[Body, ...] = ("cylinder", "roller")
-
 
 _NO_TIMES: FloatArray = np.zeros((0, 2))
 _NO_TIMES.flags.writeable = False
 PROTOCOL = 2  # version of the plugin interface; docs/plugins.md describes the changes
-
-
-class WearLaw(ABC):
-    """Wear of both bodies as a function of a solved contact."""
-
-    @abstractmethod
-    def depth_per_pass(
-        self, body: Body, solution: ContactSolution, rolling_speed: float
-    ) -> FloatArray:
-        """Return the depth worn off `body` in one pass, shape (strips,) [m]."""
-
-    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float | None:
-        """Return depth per pass over dissipation [m/(W/m)], or None if the law is not linear."""
-        return None
+Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
+#: uniform random numbers of one stream, by first index and count; reproducible by index
+Uniforms: TypeAlias = Callable[[int, int], FloatArray]
+Materials: TypeAlias = tuple[Material, Material]
+SuggestGrid: TypeAlias = Callable[[Any, float, float, float, Materials], Grid | None]
 
 
 class Load(ABC):
@@ -106,50 +94,53 @@ class LoadTerm(ABC):
         return None
 
 
-class FatigueLaw(ABC):
-    """Rolling-contact fatigue of one body: damage by an overrolling as a function of pressure."""
+@dataclass(frozen=True)
+class AxialPair:
+    """Pair of bodies for which an axial profile is designed.
+
+    Parameters
+    ----------
+    width : float or None
+        Width of the roller, if the scenario gives it [m].
+    contact_modulus : float
+        E* of the materials [Pa].
+    curvature : float
+        Relative curvature along rolling, on the base circle of a cam [1/m].
+    """
+
+    width: float | None
+    contact_modulus: float
+    curvature: float
+
+
+class AxialProfile(ABC):
+    """Form of a body along its axis, without its measured start profile.
+
+    Attributes
+    ----------
+    length : float
+        Length of the body, which ends at a distance of half of it from the middle [m].
+    crown_radius : float or None
+        R of a circular crown, whose drop is s^2/(2 R) [m]; infinite for a straight body.
+    """
+
+    length: float = math.inf
+    crown_radius: float | None = None
 
     @abstractmethod
-    def damage_per_pass(self, pressure: FloatArray) -> FloatArray:
-        """Return the damage that an overrolling adds, one over the life at its pressure.
+    def drop(self, s: FloatArray) -> FloatArray:
+        """Return the distance of the surface below its highest line.
 
         Parameters
         ----------
-        pressure : ndarray, any shape
-            Greatest pressure along each strip [Pa]; 0 where the bodies do not touch.
+        s : ndarray
+            Axial distance from the middle of the body, within its length [m].
 
         Returns
         -------
         ndarray
-            Same shape; 0 without pressure, and never less at a greater one.
+            Same shape; not negative [m].
         """
-
-
-class MotionLaw(ABC):
-    """Motion of a follower over one segment of a cam's turn.
-
-    `breaks` are the angles from the segment's start [rad] where a derivative above the second
-    jumps; the second derivative is continuous within a segment.
-    """
-
-    breaks: tuple[float, ...] = ()
-
-    @abstractmethod
-    def lift(self, angle: FloatArray) -> FloatArray:
-        """Return lift and derivatives at angles from the segment's start [rad], shape (points,).
-
-        Returns
-        -------
-        ndarray, shape (3, points)
-            Lift above that at the segment's start [m, or rad of a swinging arm], and its first and
-            second derivative by the angle.
-        """
-
-
-Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
-
-#: uniform random numbers of one stream, by first index and count; reproducible by index
-Uniforms: TypeAlias = Callable[[int, int], FloatArray]
 
 
 class JointDistribution(ABC):
@@ -248,10 +239,6 @@ class Process(ABC):
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the validity, for the user."""
         return self.marginal.warnings
-
-
-Materials: TypeAlias = tuple[Material, Material]
-SuggestGrid: TypeAlias = Callable[[Any, float, float, float, Materials], Grid | None]
 
 
 class Options(BaseModel):
@@ -379,6 +366,21 @@ class MotionLawSpec(Spec):
 
     factory: Callable[[Any, float, float, str], MotionLaw] = field(kw_only=True)
     rise: Literal["required", "none", "own"] = "required"
+
+
+@dataclass(frozen=True)
+class AxialProfileSpec(Spec):
+    """Spec of an axial profile, selected by the key `form` of a table ``axial_profile``.
+
+    Parameters
+    ----------
+    factory : callable
+        ``factory(options, pair)`` returns an AxialProfile for an `AxialPair`.
+    """
+
+    kind: ClassVar[str] = "axial profile"
+
+    factory: Callable[[Any, AxialPair], AxialProfile] = field(kw_only=True)
 
 
 @dataclass(frozen=True)

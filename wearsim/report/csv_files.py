@@ -7,7 +7,7 @@ import io
 import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal
 
@@ -83,13 +83,6 @@ def write_csv(
     """
     if decimal not in {".", ","}:
         raise ValueError(f"the decimal sign is {decimal!r}, expected '.' or ','")
-    folder = Path(folder)
-    if folder.exists() and not folder.is_dir():
-        raise ResultsFileError(
-            f"{folder}: is a file; tables are written to a folder, which is created if it does not"
-            " exist",
-            shell="name one with -o",
-        )
     contents: dict[str, Iterable[str]] = {
         name: _with_decimal_comma(table_text(columns)) if decimal == "," else table_text(columns)
         for name, columns in view.columns().items()
@@ -97,13 +90,45 @@ def write_csv(
     scenario, *files = view.stored_files()
     contents["scenario.toml"] = [scenario[1]]
     for name, text in files:
-        contents[_path_in_folder(name, contents)] = [text]
+        contents[path_in_folder(name, contents)] = [text]
+    return write_files(Path(folder), contents, force=force)
+
+
+def write_files(
+    folder: Path, contents: Mapping[str, Iterable[str]], *, force: bool = False
+) -> list[Path]:
+    """Write files into a folder, which is created if it does not exist.
+
+    Parameters
+    ----------
+    folder : Path
+    contents : mapping of str to iterable of str
+        Text of each file, in pieces, by path in the folder.
+    force : bool
+        Overwrite existing files.
+
+    Returns
+    -------
+    list of Path
+        The written files.
+
+    Raises
+    ------
+    ResultsFileError
+        As `write_csv`.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ResultsFileError(
+            f"{folder}: is a file; tables are written to a folder, which is created if it does not"
+            " exist",
+            shell="name one with -o",
+        )
     existing = [str(folder / name) for name in contents if (folder / name).exists()]
     if existing and not force:
         raise ResultsFileError(
             f"{', '.join(existing)}: already exists",
             python="choose another folder, or force=True",
-            shell="choose another folder with -o, or --force",
+            shell="choose another folder, or --force",
         )
     for name, content in contents.items():
         parent = (folder / name).parent
@@ -116,7 +141,7 @@ def write_csv(
     return [folder / name for name in contents]
 
 
-def _path_in_folder(path: str, used: Iterable[str]) -> str:
+def path_in_folder(path: str, used: Iterable[str]) -> str:
     """Return the path of an input file as in the scenario, or another inside the folder."""
     pure = PurePosixPath(path.replace("\\", "/"))
     inside = not pure.is_absolute() and ".." not in pure.parts and ":" not in path and pure.name

@@ -20,6 +20,7 @@ CHORD = 1e-6  # m, by default
 ENDINGS = (".csv", ".dxf")
 _MM = 1e3
 _MILLIMETRES = 4  # code of the unit in a DXF file
+_DEGREE = 3
 
 
 @dataclass(frozen=True)
@@ -151,9 +152,6 @@ def _dxf(surface: Surface, spline: bool) -> str:
     text = io.StringIO()
     drawing.write(text)
     return text.getvalue()
-
-
-_DEGREE = 3
 
 
 def closed_spline(points: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -27,6 +27,8 @@ CHECKPOINT, INPUTS = "checkpoint", "inputs"
 #: Texts in the group of the inputs: the attributes, the scenario and its files.
 ABOUT, SCENARIO, FILES = "about", "scenario", "files"
 ERRORS = "surrogatepass"  # so that every Python string can be stored
+Array: TypeAlias = npt.NDArray[Any]
+Arrays: TypeAlias = dict[str, Array]
 
 
 @dataclass(frozen=True)
@@ -161,10 +163,6 @@ def axis_lengths(arrays: Arrays, table: Mapping[str, Variable]) -> dict[str, int
             if lengths.setdefault(dim, length) != length:
                 raise ValueError(f"{name} has {length} along {dim}, others have {lengths[dim]}")
     return lengths
-
-
-Array: TypeAlias = npt.NDArray[Any]
-Arrays: TypeAlias = dict[str, Array]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -48,14 +48,15 @@ def _value(value: object) -> str:
 
 def _bodies(scenario: Scenario) -> Panel:
     """Return the surfaces of cylinder and roller across the track before wear."""
-    crown, width = scenario.roller.crown_radius, scenario.roller.width
+    gap, width = scenario.axial_gap, scenario.roller.width
     profile = scenario.cylinder.profile
-    half = np.sqrt(2.0 * crown * 50e-6)  # where the crown is 50 um away
+    half = float(gap.half_width(50e-6))  # where the bodies are 50 um apart
     half = min(half, 0.5 * width) if width else half
     y = np.linspace(-half, half, 201)
     ground = np.zeros_like(y) if profile is None else np.interp(y, profile.y, profile.height)
+    ground = ground - gap.cylinder_drop(y)
     marks = [
-        Line(y, y**2 / (2.0 * crown), colour="#0072b2", label="roller"),
+        Line(y, gap.roller_drop(y), colour="#0072b2", label="roller"),
         Line(y, ground, colour="#b35900", label="cylinder"),
     ]
     caption = "Heights of cylinder and roller across the track before wear."

@@ -10,7 +10,14 @@ from pydantic import BaseModel, Field, RootModel, create_model
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
-from wearsim.plugins import BODIES, FatigueLawSpec, MotionLawSpec, Options, RandomInputSpec
+from wearsim.plugins import (
+    BODIES,
+    AxialProfileSpec,
+    FatigueLawSpec,
+    MotionLawSpec,
+    Options,
+    RandomInputSpec,
+)
 from wearsim.scenario.parse.fields import (
     FRICTION,
     RandomInputTable,
@@ -21,6 +28,7 @@ from wearsim.scenario.parse.fields import (
 from wearsim.scenario.parse.mistakes import installed
 from wearsim.scenario.parse.toml import REQUIRED, TABLES
 from wearsim.scenario.scenario import Scenario, load_scenario
+from wearsim.scenario.tables.axial import AxialTable
 from wearsim.scenario.tables.cam_motion import MotionTable
 from wearsim.scenario.tables.fatigue import FatigueOfBody
 from wearsim.scenario.tables.plain import TopTable
@@ -30,6 +38,8 @@ _PACKAGE = Path(__file__).parents[1]
 
 # inside an installed package; next to the package in the source tree
 _FOLDERS = (_PACKAGE / "scenarios", _PACKAGE.parent / "scenarios")
+Model: TypeAlias = type[BaseModel]
+RandomInputs: TypeAlias = tuple[Model | None, Model | None, Model | None]
 
 
 def shipped_scenario(name: str, overrides: Mapping[str, object] | None = None) -> Scenario:
@@ -58,10 +68,6 @@ def shipped_scenario(name: str, overrides: Mapping[str, object] | None = None) -
 def starter_scenario(name: Literal["starter", "starter_cam"] = "starter") -> str:
     """Return the TOML of a complete scenario, of a cam if named so, with alternatives."""
     return Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
-
-
-Model: TypeAlias = type[BaseModel]
-RandomInputs: TypeAlias = tuple[Model | None, Model | None, Model | None]
 
 
 class _ScenarioSchema(GenerateJsonSchema):
@@ -104,6 +110,9 @@ def scenario_schema() -> dict[str, Any]:
             fatigue = _fatigue_laws()
             given = {body: model.model_fields[body].description for body in BODIES}
             keys |= {body: (fatigue, Field(None, description=t)) for body, t in given.items()}
+        if "axial_profile" in keys:
+            described = Field(None, description=model.model_fields["axial_profile"].description)
+            keys["axial_profile"] = str | _axial_profiles(table, random), described
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
         kind = kind or _model(table, model.__doc__, keys)
         needed = table in REQUIRED and table != "cylinder"  # a cam may replace it
@@ -140,6 +149,16 @@ def _fatigue_laws() -> Any:
         fields["law"] = Literal[spec.name], Field(..., description=named.description)
         models.append(_model(f"fatigue {spec.name}", spec.summary, fields))
     return _one_of("FatigueLaw", models)
+
+
+def _axial_profiles(table: str, random: RandomInputs) -> Any:
+    """Return the model of the table `axial_profile` of a body, for each form."""
+    named, models = AxialTable.model_fields["form"], []
+    for spec in installed(AxialProfileSpec):
+        fields = _fields(spec.options, f"{table}.axial_profile", random)
+        fields["form"] = Literal[spec.name], Field(..., description=named.description)
+        models.append(_model(f"{table} {spec.name}", spec.summary, fields))
+    return _one_of(f"{table} axial profile", models)
 
 
 def _model(name: str, description: str | None, fields: dict[str, Any]) -> Model:

@@ -10,6 +10,7 @@ from pydantic import BaseModel
 
 from wearsim.scenario.parse.mistakes import Mistakes, replace_numbers
 from wearsim.scenario.scenario import Drawn, Scenario
+from wearsim.scenario.tables.axial import check_axial
 from wearsim.scenario.tables.plain import check_angles, check_lists
 from wearsim.scenario.tables.plugin import LoadChoice, check_load
 
@@ -54,6 +55,8 @@ def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
             place = place.setdefault(table, {})
         place[last] = tuple(map(float, value)) if isinstance(value, tuple) else float(value)
     mistakes = Mistakes(scenario.file, scenario.files.__getitem__)
+    bodies = _with_forms(mistakes, scenario, numbers)
+    scenario = replace(scenario, **bodies) if bodies else scenario
     sections = {
         table: _replaced(mistakes, getattr(scenario, table), keys, table)
         for table, keys in sorted(numbers.items())
@@ -64,6 +67,9 @@ def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
         check_angles(mistakes, sections["creepage"])
     if "load" in sections:
         check_load(mistakes, sections["load"])
+    if bodies:
+        names = ("roller", "cylinder", "cam")
+        check_axial(mistakes, {name: getattr(scenario, name) for name in names})
     mistakes.raise_any()
     return replace(
         scenario,
@@ -71,6 +77,28 @@ def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
         random=tuple(item for item in scenario.random if item.keys[0] not in values),
         drawn={**scenario.drawn, **values},
     )
+
+
+def _with_forms(
+    mistakes: Mistakes, scenario: Scenario, numbers: dict[str, dict[str, Any]]
+) -> dict[str, Any]:
+    """Return the bodies with drawn numbers in their axial profiles, taken out of `numbers`."""
+    found: dict[str, Any] = {}
+    for table in ("roller", "cylinder", "cam"):
+        drawn = numbers.get(table, {}).pop("axial_profile", None)
+        if drawn is None:
+            continue
+        if not numbers[table]:
+            del numbers[table]
+        name = "roller" if table == "roller" else "cylinder"  # the base circle of a cam
+        body: Any = getattr(scenario, name)
+        choice = body.axial_profile
+        options = replace_numbers(mistakes, choice.options, drawn, f"{table}.axial_profile")
+        mistakes.raise_any()
+        changed = {"axial_profile": replace(choice, options=options)}
+        isolated = isinstance(body, BaseModel)
+        found[name] = body.model_copy(update=changed) if isolated else replace(body, **changed)
+    return found
 
 
 def _replaced(mistakes: Mistakes, section: Any, numbers: dict[str, Any], table: str) -> Any:

@@ -6,13 +6,16 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.profiles import split_name
+from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import RandomInput
 from wearsim.scenario.parse.toml import flat, parse_fields, reader_in
+from wearsim.scenario.tables.axial import axial_gap
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.cam import Cam, LubricantTable
 from wearsim.scenario.tables.fatigue import FatigueChoice
@@ -261,6 +264,11 @@ class Scenario:
         """Whether a duration or a number of passes or turns is given."""
         operation = self.operation
         return bool(operation.passes or operation.turns or operation.duration)
+
+    @cached_property
+    def axial_gap(self) -> AxialGap:
+        """Gap of roller and cylinder along the axis, without start profiles."""
+        return axial_gap(self.roller, self.cylinder)
 
     @property
     def rolling_speed(self) -> float:

@@ -10,6 +10,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import Load
 from wearsim.scenario import Cylinder, RandomInput, Scenario, described_model
+from wearsim.scenario.tables.axial import described_form
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.contact.single import study_contact
@@ -58,6 +59,7 @@ def dry_run(scenario: Scenario) -> Data:
     scenario, load = with_chosen_model(scenario, is_run), scenario.load.build()
     low, high = load_range(scenario, load, scenario.total_time if is_run else 0.0)
     roller, cylinder = scenario.roller, scenario.cylinder
+    crowned = roller.axial_profile.form == "crown"
     pair = combine(cylinder.material, roller.material)
     patch, patch_load = hardest_patch(scenario, high)
     random = {key for item in scenario.random for key in item.keys}
@@ -67,13 +69,19 @@ def dry_run(scenario: Scenario) -> Data:
         "file": scenario.file,
         "roller": {
             "radius_m": roller.radius,
-            "crown_radius_m": roller.crown_radius,
+            "crown_radius_m": roller.crown_radius if crowned else None,
+            "axial_profile": None if crowned else described_form(roller.axial_profile),
             "width_m": roller.width,
             "edge_radius_m": roller.edge_radius,
             "chamfer_m": roller.chamfer,
             "offset_m": None if "roller.offset" in random else scenario.per_roller(roller.offset),
         },
-        "cylinder": {"radius_m": cylinder.radius},
+        "cylinder": {
+            "radius_m": cylinder.radius,
+            "axial_profile": described_form(cylinder.axial_profile)
+            if scenario.axial_gap.has_crowned_cylinder
+            else None,
+        },
         "cam": _cam(scenario),
         "profile": profile_data(cylinder, scenario.files),
         "contact_modulus_Pa": pair.contact_modulus,

@@ -19,7 +19,7 @@ _LIMIT_UNITS = {"volume": ("mm^3", 1e-9), "peak_pressure": ("MPa", 1e6), "width"
 def plan(data: Data) -> TableRows:
     """Return the description from `dry_run` as rows of name and value, in engineering units."""
     roller, patch = data["roller"], data["initial_patch"]
-    radii = [*_fields(roller, *_RADII, digits=6), *_fields(roller, "offset_m")]
+    radii = [*_fields(roller, *_RADII, digits=6), *_fields(roller, "offset_m"), *_form(roller)]
     size = (
         f"{1e3 * patch['length_m']:.4g} x {1e3 * patch['width_m']:.4g} mm,"
         f" peak pressure {patch['peak_pressure_Pa'] / 1e6:.4g} MPa at {patch['load_N']:.4g} N"
@@ -62,10 +62,18 @@ def _body_row(data: Data) -> tuple[str, str]:
     """Return the row of the cylinder or the cam."""
     cam = data["cam"]
     if cam is None:
-        return "cylinder", ", ".join(_fields(data["cylinder"], "radius_m", digits=6))
+        cylinder = data["cylinder"]
+        texts = [*_fields(cylinder, "radius_m", digits=6), *_form(cylinder)]
+        return "cylinder", ", ".join(texts)
     kind = f"{cam['follower']} follower" + (" in a groove" if cam["groove"] else "")
     stations = f"{len(cam['stations']['angle_rad'])} stations"
-    return "cam", ", ".join([*_fields(cam, "base_radius_m", digits=6), kind, stations])
+    texts = [*_fields(cam, "base_radius_m", digits=6), *_form(data["cylinder"]), kind, stations]
+    return "cam", ", ".join(texts)
+
+
+def _form(body: Data) -> list[str]:
+    """Return the form along the axis of a body whose crown radius does not say it."""
+    return [f"axial profile {body['axial_profile']}"] if body["axial_profile"] else []
 
 
 def _speed_text(data: Data) -> str:

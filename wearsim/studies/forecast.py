@@ -104,7 +104,7 @@ class WearForecast:
         rise = problem.nominal_gap - problem.nominal_least_gap[..., None]
         self.loaded_strips = int(loaded.sum(axis=-1).min())
         half_strip = 0.5 * problem.grid.spacing  # where strips are wider than the contact
-        least = half_strip**2 / (2.0 * self._scout.roller.crown_radius)
+        least = half_strip**2 / (2.0 * self._scout.axial_gap.radius_at(half_strip))
         self.elastic = float(rise.max(initial=least, where=loaded))
         lowest = problem.nominal_gap.argmin(axis=-1)
         self._centres = problem.grid.y[[lowest.min(), lowest.max()]]
@@ -240,9 +240,14 @@ class WearForecast:
         if depth == 0.0:
             return self.problem, self._fresh
         scenario, last = self._scout, self._rates[-1]
-        half = np.sqrt(2.0 * scenario.roller.crown_radius * (depth + self.elastic))
+        half = float(scenario.axial_gap.half_width(depth + self.elastic))
         half = min(half, 0.5 * (scenario.roller.width or np.inf))
         low, high = self._centres + np.array([-_MARGIN, _MARGIN]) * half
+        if scenario.roller.width is not None and not scenario.axial_gap.is_crowned:
+            # the lowest point may be away from the middle of the groove
+            offsets = np.array(scenario.per_roller(scenario.roller.offset))
+            low = min(low, offsets.min() - 0.5 * _MARGIN * scenario.roller.width)
+            high = max(high, offsets.max() + 0.5 * _MARGIN * scenario.roller.width)
         strips = int(min(STRIPS * (high - low) / (2.0 * _MARGIN * half), MOST_STRIPS))
         grid = grid or Grid.spanning(float(low), float(high), strips)
         problem = on_grid(self.problem, grid)

@@ -170,9 +170,12 @@ def _of_width(scenario: Scenario, load: Load) -> Iterator[str]:
     if scenario.contact.width or scenario.roller.width or force <= 0.0:
         return
     half_width = widest_patch(scenario, force).b
+    crown = scenario.roller.crown_radius
     if half_width > WIDEST * radius:
+        form = "" if math.isnan(crown) else f" of {crown * 1e3:.4g} mm"
+        key = "axial_profile" if math.isnan(crown) else "crown_radius"
         yield (
-            f"roller.crown_radius: a crown of {scenario.roller.crown_radius * 1e3:.4g} mm makes a"
+            f"roller.{key}: a crown{form} makes a"
             f" contact {2e3 * half_width:.4g} mm wide, and nothing ends it; set roller.width"
         )
 

@@ -22,6 +22,9 @@ from wearsim.types import FloatArray
 
 MOST_RECORDS = 500  # of a prolonged test
 _ROUND_OFF = 1e-9
+#: A record in or at the end of a step: the last state before or at it, by its number on the path;
+#: the place of its test; its passes.
+Due: TypeAlias = tuple[int, int, float]
 
 
 @dataclass(frozen=True)
@@ -130,11 +133,6 @@ class RecordSchedule:
         """Return the passes of the first record after `passes`, whole if `pass_by_pass`."""
         due = self.next_record(passes)
         return float(math.ceil(due)) if pass_by_pass else due
-
-
-#: A record in or at the end of a step: the last state before or at it, by its number on the path;
-#: the place of its test; its passes.
-Due: TypeAlias = tuple[int, int, float]
 
 
 def due_records(

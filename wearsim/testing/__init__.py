@@ -8,6 +8,7 @@ numbers, the requirement and the dotted name of the class or method that specifi
 from wearsim.testing.checks import Check, Checks, ConformanceError
 from wearsim.testing.contact_fixtures import STEEL, ContactCase
 from wearsim.testing.kit import (
+    axial_profile_tests,
     contact_model_tests,
     fatigue_law_tests,
     load_tests,
@@ -24,6 +25,7 @@ __all__ = [
     "Checks",
     "ConformanceError",
     "ContactCase",
+    "axial_profile_tests",
     "contact_model_tests",
     "fatigue_law_tests",
     "load_tests",

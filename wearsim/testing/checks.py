@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from wearsim.errors import PluginError, WearsimError, described
 from wearsim.plugins import (
+    AxialProfileSpec,
     ContactModelSpec,
     FatigueLawSpec,
     LoadSpec,
@@ -31,7 +32,14 @@ from wearsim.units import Kind
 
 F = TypeVar("F")
 S = TypeVar(
-    "S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec, FatigueLawSpec
+    "S",
+    ContactModelSpec,
+    WearLawSpec,
+    LoadSpec,
+    RandomInputSpec,
+    MotionLawSpec,
+    AxialProfileSpec,
+    FatigueLawSpec,
 )
 
 

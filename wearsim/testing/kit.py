@@ -7,6 +7,8 @@ from functools import cache
 from typing import Any, TypeVar
 
 from wearsim.plugins import (
+    AxialPair,
+    AxialProfileSpec,
     ContactModelSpec,
     FatigueLawSpec,
     LoadSpec,
@@ -17,6 +19,7 @@ from wearsim.plugins import (
 )
 from wearsim.scenario.parse.fields import WITH_MARGINAL
 from wearsim.testing import random_inputs
+from wearsim.testing.axial_profiles import AXIAL_PROFILE, PAIR, AxialProfileFixture
 from wearsim.testing.checks import Check, Checks, ConfiguredSpec, resolve, spec_checks
 from wearsim.testing.contact_behaviour import BEHAVIOUR
 from wearsim.testing.contact_capabilities import CAPABILITIES
@@ -250,6 +253,38 @@ def motion_law_tests(
     return build_tests(
         MOTION_LAW,
         lambda: MotionLawFixture(ConfiguredSpec(resolved, options, files=files), angle, rise),
+        without,
+    )
+
+
+def axial_profile_tests(
+    spec: AxialProfileSpec | str,
+    options: Mapping[str, object] = NOTHING,
+    *,
+    files: Mapping[str, str] = NOTHING,
+    pair: AxialPair = PAIR,
+    without: Mapping[str, str] = NOTHING,
+) -> Tests[AxialProfileFixture]:
+    """Return tests of an axial profile, one item per requirement.
+
+    Parameters
+    ----------
+    spec, options, without
+        See `contact_model_tests`.
+    files : mapping of str to str
+        Content of the files that the options name.
+    pair : AxialPair
+        The bodies, by default of steel, with a roller 10 mm wide.
+
+    Returns
+    -------
+    callable
+        See `contact_model_tests`.
+    """
+    resolved = resolve(AxialProfileSpec, spec)
+    return build_tests(
+        AXIAL_PROFILE,
+        lambda: AxialProfileFixture(ConfiguredSpec(resolved, options, files=files), pair),
         without,
     )
 

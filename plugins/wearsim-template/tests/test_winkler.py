@@ -1,14 +1,27 @@
-"""Requirements on the contact model, and the foundation modulus of its README."""
+"""Requirements on contact model, axial profile and kind of study; the modulus of the README."""
 
 import numpy as np
 import pytest
-from wearsim_template import SPEC
+from wearsim_template import FORM, KIND, SPEC
+from wearsim_template.study import Approach
 
-from wearsim.testing import STEEL, contact_model_tests
+from wearsim.testing import STEEL, axial_profile_tests, contact_model_tests, study_kind_tests
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 test_winkler = contact_model_tests(SPEC)
 test_softer_winkler = contact_model_tests(SPEC, {"foundation_modulus": "500 GPa/mm"})
+
+test_winkler_quartic = axial_profile_tests(FORM, {"length": "10 mm"})
+
+
+def small_study():
+    """Return the approach of a crowned roller under two forces."""
+    grid = Grid.spanning(-3e-3, 3e-3, 41)
+    model = SPEC.factory(SPEC.options(), grid, (STEEL, STEEL))
+    return Approach(model, [100.0, 300.0], 5.0 * grid.y**2, 90.0)
+
+
+test_winkler_approach = study_kind_tests(KIND, small_study)
 
 
 def test_strip_of_the_half_length_has_its_hertzian_load():

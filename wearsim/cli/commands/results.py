@@ -242,15 +242,32 @@ def export(
         ),
     ] = None,
     spline: Spline = False,
+    running_in: Annotated[
+        Path | None,
+        typer.Option(
+            "--running-in",
+            metavar="DIR",
+            help="Folder for a scenario that starts from the worn profiles of the run, which are"
+            " written as CSV.",
+            show_default=False,
+        ),
+    ] = None,
     force: Force = False,
 ) -> None:
-    """Write a results file as CSV with units in the headers, or the surface of a cam."""
+    """Write a results file as CSV with units in the headers, or what is worn as a new start."""
     refuse(decimal not in {".", ","}, f"'{decimal}' is neither '.' nor ','", "--decimal")
     sampling = check_surface(
         surface, force, chord=chord, points=points, position=position, spline=spline
     )
     from wearsim.studies.opening import export_csv
 
+    if running_in is not None:
+        written = wearsim.export_running_in(wearsim.open_results(file), running_in, force=force)
+        for path in written.paths:
+            typer.echo(str(path))
+        write_notes(written.notes)
+        if output is None and surface is None:
+            return
     if surface is not None and sampling is not None:
         refuse_inputs(surface, [file], "the surface", option="--surface")
         found = wearsim.open_results(file).view.surface(sampling)

@@ -24,6 +24,13 @@ from wearsim.cli.shared import (
 )
 
 _HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities", "summary")
+new = typer.Typer(
+    name="new",
+    help="Create a new plugin, scenario or cam.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+NewScenario = Annotated[Path, typer.Argument(metavar="[FILE]", help="Name of the new file.")]
 
 
 def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False) -> None:
@@ -49,16 +56,6 @@ def schema() -> None:
     from wearsim.scenario.examples import scenario_schema
 
     write_json(scenario_schema())
-
-
-new = typer.Typer(
-    name="new",
-    help="Create a new plugin, scenario or cam.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-)
-
-NewScenario = Annotated[Path, typer.Argument(metavar="[FILE]", help="Name of the new file.")]
 
 
 @new.command("plugin")

@@ -167,7 +167,11 @@ def _slip_base(problem: WearProblem) -> tuple[FloatArray, FloatArray, FloatArray
     if problem.slip_profile is None:
         return zeros, np.repeat(problem.grid.y[None], len(zeros), axis=0), np.zeros(2)
     rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
-    return np.array(problem.slip_profile[:, 0]), zeros if problem.tilt_shifts else from_apex, rates
+    return (
+        np.array(problem.slip_profile[0, :, 0]),
+        zeros if problem.tilt_shifts else from_apex,
+        rates,
+    )
 
 
 def run_compiled(

@@ -41,6 +41,17 @@ from wearsim.types import (
 
 _WIDTH = 1.2  # of the grid, over that of the Hertzian patch
 _STRIPS = 121
+Variant = Literal["kik-piotrowski", "ayasse-chollet", "analyn"]
+_VARIANTS: dict[Variant, int] = {
+    "kik-piotrowski": kernels.KIK_PIOTROWSKI,
+    "ayasse-chollet": kernels.AYASSE_CHOLLET,
+    "analyn": kernels.ANALYN,
+}
+_FAILURE = {
+    TOO_FINE: f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths",
+    NO_CONVERGENCE: "the contact and the gap that its wear opens did not converge",
+    NOT_FINITE: "a value is not finite, or the load is not positive",
+}
 
 
 class StripModel(ContactModel):
@@ -202,21 +213,6 @@ def normal_failure(kind: str, what: str, too_fine: bool, state: Mapping[str, Any
     message = f"the {kind} contact failed: {what}"
     remedy, cause = ("lower contact.strips", "too fine") if too_fine else ("", "")
     return ContactError(message, dict(state), remedy=remedy, cause=cause)
-
-
-Variant = Literal["kik-piotrowski", "ayasse-chollet", "analyn"]
-
-_VARIANTS: dict[Variant, int] = {
-    "kik-piotrowski": kernels.KIK_PIOTROWSKI,
-    "ayasse-chollet": kernels.AYASSE_CHOLLET,
-    "analyn": kernels.ANALYN,
-}
-
-_FAILURE = {
-    TOO_FINE: f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths",
-    NO_CONVERGENCE: "the contact and the gap that its wear opens did not converge",
-    NOT_FINITE: "a value is not finite, or the load is not positive",
-}
 
 
 class SemiHertzianOptions(TangentialOptions):

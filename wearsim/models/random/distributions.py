@@ -19,6 +19,12 @@ from wearsim.uq.distributions.base import MaxentDistribution, Uniform
 from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
 from wearsim.uq.distributions.truncated_normal import TruncatedNormal, cut_normal
 
+_LARGEST_SCORE = 40.0  # above the normal score of any floating-point number below 1
+_ENTROPY = (
+    "Jaynes, Physical Review 106 (1957), DOI 10.1103/PhysRev.106.620",
+    "Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",
+)
+
 
 class TableOptions(Options):
     """Options of the distribution `table`."""
@@ -100,9 +106,6 @@ class TableDistribution(Distribution):
         low, high = self._value[:-1] - self.mean, self._value[1:] - self.mean
         squares = (low * low + low * high + high * high) / 3.0
         return float(np.sqrt(np.dot(np.diff(self._probability), squares)))
-
-
-_LARGEST_SCORE = 40.0  # above the normal score of any floating-point number below 1
 
 
 class DiscOptions(Options):
@@ -277,11 +280,6 @@ class Lognormal(Distribution):
         """Exact standard deviation."""
         return self.mean * math.sqrt(math.expm1(self._spread**2))
 
-
-_ENTROPY = (
-    "Jaynes, Physical Review 106 (1957), DOI 10.1103/PhysRev.106.620",
-    "Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",
-)
 
 SPECS = (
     RandomInputSpec(

@@ -26,6 +26,9 @@ _CELLS = 2  # lattice spacings per correlation length
 # cells are drawn in tiles that are long across the track, as contacts are, for fewer draws
 _TILE_ROWS, _TILE_COLUMNS = 64, 16
 _TILES = 2**26  # to either side of the origin; two tile numbers and a cell number make 64 bits
+_STEPS = 20  # per correlation time, unless a spacing is given
+_FEWEST_STEPS = 4
+_LEVEL_AT = 1 << 40  # index of the uniform number of the level, beyond that of any path
 
 
 class WhiteOptions(Options):
@@ -143,11 +146,6 @@ def _noise(rows: range, columns: range, uniforms: Uniforms) -> FloatArray:
     )
     top, left = rows.start % _TILE_ROWS, columns.start % _TILE_COLUMNS
     return np.asarray(ndtri(drawn[top : top + len(rows), left : left + len(columns)]))
-
-
-_STEPS = 20  # per correlation time, unless a spacing is given
-_FEWEST_STEPS = 4
-_LEVEL_AT = 1 << 40  # index of the uniform number of the level, beyond that of any path
 
 
 class OrnsteinUhlenbeckOptions(Options):

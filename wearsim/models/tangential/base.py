@@ -16,6 +16,9 @@ from wearsim.mechanics.hertz.ellipse import HertzContact
 from wearsim.mechanics.tangential.kalker_coefficients import Flexibilities, one_flexibility
 from wearsim.types import ContactFields, ContactSolution, FloatArray, OperatingPoint
 
+# below this coverage the load of a strip is round-off and the square of its half-length zero
+_SLIVER = 1e-12
+
 
 @dataclass(frozen=True)
 class Strips:
@@ -270,10 +273,6 @@ def complete(
         longitudinal_creepage=longitudinal,
         iterations=strips.iterations,
     )
-
-
-# below this coverage the load of a strip is round-off and the square of its half-length zero
-_SLIVER = 1e-12
 
 
 @dataclass(frozen=True)

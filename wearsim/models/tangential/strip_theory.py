@@ -26,6 +26,9 @@ from wearsim.plugins import Options
 from wearsim.types import BoolArray, ContactFields, FloatArray
 from wearsim.units import QuantityError, as_written
 
+# the theories that use each of the other options
+_USED_BY = {"mx": ("fastrip", "fastsim"), "bound": ("fastsim",), "flexibility": ("fastsim",)}
+
 
 def _along(
     s: FloatArray,
@@ -172,10 +175,6 @@ class StripTheory(TangentialTheory):
             solved,
         )
         return solved
-
-
-# the theories that use each of the other options
-_USED_BY = {"mx": ("fastrip", "fastsim"), "bound": ("fastsim",), "flexibility": ("fastsim",)}
 
 
 class TangentialOptions(Options):

@@ -39,14 +39,21 @@ OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
 #: roles of the distributions that need a marginal distribution
 WITH_MARGINAL = ("field", "process")
 #: last parts of keys in these tables whose values cannot be random
-_FIXED = ("creep_factor", "specific_wear_rate", "measured_friction")
-RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
+_FIXED = ("creep_factor", "specific_wear_rate", "measured_friction", "length")
+#: tables of the forms along the axis
+AXIAL_TABLES = tuple(f"{body}.axial_profile" for body in ("roller", "cylinder", "cam"))
+RANDOM_PLACES = (
+    "the values of [load], [friction], [creepage] and [wear], roller.offset, and those of"
+    " axial_profile except its length"
+)
 _ROLES: dict[Role, type] = {
     "scalar": Distribution,
     "joint": JointDistribution,
     "field": FrictionField,
     "process": Process,
 }
+Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass", "per-turn"]
+Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
 
 
 def _parts(annotation: Any) -> list[Any]:
@@ -194,10 +201,6 @@ def target_of(field: FieldInfo) -> RandomTarget | None:
     return None
 
 
-Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass", "per-turn"]
-Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
-
-
 class RandomInputTable(Options):
     """Random input given for a value; the other keys are options of the distribution."""
 
@@ -216,8 +219,14 @@ class RandomInputTable(Options):
 def can_be_random(name: str) -> bool:
     """Return whether the value at a dotted key can be random."""
     tables = {"load", "friction", "creepage", "wear"}
-    of_table = name.split(".", maxsplit=1)[0] in tables and name.rsplit(".", 1)[-1] not in _FIXED
-    return of_table or name == "roller.offset"
+    inner, _, last = name.rpartition(".")
+    of_table = inner in AXIAL_TABLES or name.split(".", maxsplit=1)[0] in tables
+    return (of_table and last not in _FIXED) or name == "roller.offset"
+
+
+def is_axial(name: str) -> bool:
+    """Return whether a dotted key is one of a form along the axis."""
+    return name.rpartition(".")[0] in AXIAL_TABLES
 
 
 def amount(value: float, quantity: Quantity | None) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import suppress
 from pathlib import Path, PurePath
 from typing import Any
@@ -14,12 +14,20 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.input_files import csv_of_profile, read_input
-from wearsim.plugins import FatigueLawSpec, LoadSpec, MotionLawSpec, Options, RandomInputSpec
+from wearsim.plugins import (
+    AxialProfileSpec,
+    FatigueLawSpec,
+    LoadSpec,
+    MotionLawSpec,
+    Options,
+    RandomInputSpec,
+)
 from wearsim.profiles import ROW_CHOICES, split_name
 from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
 from wearsim.scenario.parse.random_inputs import validate
+from wearsim.scenario.tables.axial import AxialTable, check_axial
 from wearsim.scenario.tables.bodies import (
     CylinderTable,
     RollerTable,
@@ -74,6 +82,8 @@ PROFILE = "cylinder.profile"
 PROFILE_FILE = "profile-from-python.csv"
 #: Keys that say how the file of a profile is read.
 _OF_PROFILE_FILES = ("profile_columns", "profile_units", *(f"profile_{key}" for key in ROW_CHOICES))
+AXIAL = "axial_profile"
+CROWN_KEYS = ("crown_radius", "crown_diameter")
 MAX_NESTING = 20  # a scenario has at most five levels
 TOO_DEEP = "is nested too deeply", None, f"at most {MAX_NESTING} levels of tables and lists"
 TABLES: dict[str, type[Options]] = {
@@ -133,7 +143,9 @@ def parse_override(text: str) -> tuple[str, object]:
         return key.strip(), value.strip()
 
 
-def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> str:
+def apply_overrides(
+    text: str, file: str, overrides: Mapping[str, object], removed: Iterable[str] = ()
+) -> str:
     """Return the scenario's text with values replaced or added.
 
     A key that excludes another, as passes excludes duration, replaces it.
@@ -146,6 +158,8 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
         The scenario's file, for messages.
     overrides : mapping of str to object
         Values by dotted key.
+    removed : iterable of str
+        Dotted keys that are removed where they are given.
 
     Returns
     -------
@@ -175,6 +189,10 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             for group in _ALTERNATIVES.get(prefix, ()):
                 others = set(group) - {key} if key in group else set()
                 unused |= {n for n in others & {*tables[0]} if f"{prefix}.{n}" not in overrides}
+            for whole in (document, plain) if names == ["roller", AXIAL] else ():
+                for name in CROWN_KEYS:  # the key within axial_profile replaces them
+                    if f"roller.{name}" not in overrides:
+                        whole.get("roller", {}).pop(name, None)
             tables[0][key] = tables[1][key] = as_toml(value)
             for table, name in itertools.product(tables, unused):
                 del table[name]
@@ -184,6 +202,13 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             mistakes.append(Mistake("", dotted, what, as_written(value)))
     if mistakes:
         raise ScenarioError(file, mistakes)
+    for dotted in removed:
+        *names, key = dotted.split(".")
+        for whole in (document, plain):
+            holder: Any = whole
+            for name in names:
+                holder = holder.get(name, {})
+            holder.pop(key, None)
     written = tomlkit.dumps(document)
     # tables next to dotted keys are written wrongly by tomlkit; the plain text lacks comments
     with suppress(tomllib.TOMLDecodeError):
@@ -262,10 +287,10 @@ def parse_fields(
     if not isinstance(overrides, Mapping | None):
         kind = type(overrides).__name__
         raise TypeError(f"overrides must be a mapping of values by dotted key, got a {kind}")
-    data = _parse_toml(text, name)
+    data = parse_toml(text, name)
     if overrides:
         text = apply_overrides(text, name, overrides)
-        data = _parse_toml(text, name)
+        data = parse_toml(text, name)
     files: dict[str, str] = {}
     profile = (overrides or {}).get(PROFILE)
     given = profile if isinstance(profile, Profile) else None
@@ -280,6 +305,7 @@ def parse_fields(
     tables = of_follower(data)
     sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
     assemble_cam(mistakes, sections, "cam" in tables)
+    sections |= check_axial(mistakes, sections)
     check_lists(mistakes, data, sections["limit"])
     check_correlation(mistakes, sections["sampling"])
     check_contained(mistakes)
@@ -303,7 +329,8 @@ def parse_fields(
     }
 
 
-def _parse_toml(text: str, name: str) -> dict[str, Any]:
+def parse_toml(text: str, name: str) -> dict[str, Any]:
+    """Return the tables of a text; raises ScenarioError if it is not valid TOML."""
     try:
         data = tomllib.loads(text)
     except RecursionError as error:
@@ -395,6 +422,10 @@ def keys_by_place() -> dict[str, set[str]]:
         keys[f'a body of [fatigue] with law = "{spec.name}"'] = set(spec.options.model_fields)
     keys["a body of [fatigue]"] = set(FatigueOfBody.model_fields)
     keys["an entry of cam.motion"] = set(MotionTable.model_fields)
+    for profile in installed(AxialProfileSpec):
+        place = f'axial_profile with form = "{profile.name}"'
+        keys[place] = set(profile.options.model_fields)
+    keys["axial_profile"] = set(AxialTable.model_fields)
     keys['[contact] with model = "auto"'] = {"tolerance"}
     keys["a random input"] = set(RandomInputTable.model_fields)
     return keys | {

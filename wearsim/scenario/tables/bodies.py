@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
@@ -32,7 +32,16 @@ from wearsim.quantities import (
 )
 from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.parse.random_inputs import validate
+from wearsim.scenario.tables.axial import (
+    DESCRIPTION,
+    AxialChoice,
+    AxialKey,
+    crown,
+    read_axial,
+    straight,
+)
 from wearsim.scenario.tables.plugin import ContactChoice
+from wearsim.scenario.tables.start_profiles import StartSurface, read_roller_profiles
 from wearsim.types import FloatArray, Material, Profile
 from wearsim.units import ANGLE, INERTIA, QuantityError, as_written
 
@@ -89,7 +98,7 @@ ChamferAngle: TypeAlias = Annotated[float, Quantity(ANGLE, "positive")]
 
 
 class RollerTable(Options):
-    """Rollers: crowned, all of the same shape."""
+    """Rollers, all of the same shape before wear."""
 
     radius: PositiveLength | None = Field(
         default=None, description="Rolling radius; either it or the diameter is needed."
@@ -100,6 +109,14 @@ class RollerTable(Options):
         description="Radius of the crown across the track; or give its diameter.",
     )
     crown_diameter: PositiveLength | None = Field(default=None, description="Crown diameter.")
+    axial_profile: AxialKey | None = Field(
+        default=None, description=f"{DESCRIPTION} Instead of a crown."
+    )
+    profile: PerRoller[InputFile] | None = Field(
+        default=None,
+        description="Start profile, measured or worn: a CSV file with columns y, from the apex, and"
+        " height, or depth; one for all rollers or one per roller.",
+    )
     offset: PerRoller[Length] = Field(
         default=0.0,
         description="Axial position of the apex: one value for all rollers or one per roller.",
@@ -132,6 +149,9 @@ class CylinderTable(Options):
     )
     diameter: PositiveLength | None = Field(default=None, description="Diameter.")
     material: MaterialField = Field(description="Name of a material, or a table of its constants.")
+    axial_profile: AxialKey | None = Field(
+        default=None, description=f"{DESCRIPTION} By default straight."
+    )
     profile: InputFile | None = Field(
         default=None,
         description="Initial surface: a CSV file with columns y and height above the nominal shape,"
@@ -162,7 +182,7 @@ class Roller(Options):
     """Geometry and material of the rollers."""
 
     radius: float = Field(description="Rolling radius [m].")
-    crown_radius: float = Field(description="Radius of the crown across the track [m].")
+    axial_profile: AxialChoice = Field(description="Form along the axis.")
     offset: PerRoller[Length] = Field(
         description="Axial position of the apex, one for all rollers or one per roller [m]."
     )
@@ -172,6 +192,17 @@ class Roller(Options):
     chamfer: float = Field(0.0, description="Width of the chamfers, or 0 [m].")
     chamfer_angle: float = Field(0.0, description="Angle of the chamfers to the axis [rad].")
     inertia: float = Field(0.0, description="Moment of inertia about its pin [kg m^2].")
+    profiles: tuple[Profile, ...] = Field(
+        (), description="Start profiles: none, one for all rollers or one per roller."
+    )
+
+    @property
+    def crown_radius(self) -> float:
+        """Radius of a circular crown across the track [m]; not a number of other forms."""
+        form = self.axial_profile
+        return (
+            float(getattr(form.options, "radius", math.nan)) if form.form == "crown" else math.nan
+        )
 
     @property
     def edge(self) -> float:
@@ -219,6 +250,10 @@ class Cylinder:
         Name of the file that it was read from, as in `Scenario.files`.
     profile_filter : float, optional
         Cutoff wavelength of the filter that has been applied to it [m].
+    axial_profile : AxialChoice
+        Form along the axis.
+    start_surface : StartSurface, optional
+        Initial height of a cam's surface above its nominal shape.
     """
 
     radius: float
@@ -226,6 +261,8 @@ class Cylinder:
     profile: Profile | None = None
     profile_file: str = ""
     profile_filter: float | None = None
+    axial_profile: AxialChoice = field(default_factory=straight)
+    start_surface: StartSurface | None = None
 
 
 def _radius(radius: float | None, diameter: float | None) -> float:
@@ -240,9 +277,17 @@ def read_roller(mistakes: Mistakes, raw: Mapping[str, object]) -> Roller | None:
         return None
     radius = _radius(table.radius, table.diameter)
     _check_edges(mistakes, table, radius)
+    form = crown(_radius(table.crown_radius, table.crown_diameter))
+    profiles = read_roller_profiles(mistakes, table.profile)
+    if table.axial_profile is not None:
+        found = read_axial(mistakes, table.axial_profile, "roller")
+        if found is None:
+            return None
+        form = found
     return Roller.model_construct(
         radius=radius,
-        crown_radius=_radius(table.crown_radius, table.crown_diameter),
+        axial_profile=form,
+        profiles=profiles,
         offset=table.offset,
         material=table.material,
         width=table.width,
@@ -285,11 +330,15 @@ def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | N
     table = validate(mistakes, CylinderTable, raw, "cylinder")
     if table is None:
         return None
+    form = read_axial(mistakes, table.axial_profile, "cylinder")
+    if form is None:
+        return None
+    radius = _radius(table.radius, table.diameter)
     if table.profile is None:
         for key in raw:
             if key.startswith("profile_"):
                 mistakes.add("cylinder", key, "has no meaning without profile")
-        return Cylinder(_radius(table.radius, table.diameter), table.material)
+        return Cylinder(radius, table.material, axial_profile=form)
     choice = ProfileChoice(table.profile_columns, table.profile_units)
     try:
         profile = read_profile(table.profile.text, table.profile.path, choice)
@@ -303,13 +352,7 @@ def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | N
         return None
     if sign := sign_note(profile, choice, table.profile.path):
         mistakes.notes.append(sign)
-    return Cylinder(
-        _radius(table.radius, table.diameter),
-        table.material,
-        profile,
-        table.profile.path,
-        table.profile_filter,
-    )
+    return Cylinder(radius, table.material, profile, table.profile.path, table.profile_filter, form)
 
 
 def dundurs_note(roller: Roller, cylinder: Cylinder, contact: ContactChoice) -> list[str]:

@@ -12,9 +12,11 @@ from wearsim.mechanics.cam import Follower, Motion
 from wearsim.plugins import Options
 from wearsim.quantities import InputFile, Length, PositiveLength, Quantity
 from wearsim.scenario.parse.mistakes import Mistakes
+from wearsim.scenario.tables.axial import DESCRIPTION, AxialKey, read_axial
 from wearsim.scenario.tables.bodies import Cylinder, MaterialField, Roller
 from wearsim.scenario.tables.cam_motion import SHAPES, read_motion
 from wearsim.scenario.tables.cam_points import MeasuredPoints
+from wearsim.scenario.tables.start_profiles import read_start_surface
 from wearsim.units import COMPRESSIBILITY, INERTIA, MASS, VISCOSITY, as_written
 
 _WAYS = ("motion", "lift", "profile", "shape")
@@ -63,6 +65,14 @@ class CamTable(Options):
     )
     flank_radius: PositiveLength | None = Field(
         default=None, description="Radius of the convex flanks; for shape = three-arc."
+    )
+    axial_profile: AxialKey | None = Field(
+        default=None, description=f"{DESCRIPTION} By default straight."
+    )
+    start_profile: InputFile | None = Field(
+        default=None,
+        description="Worn surface at the start: a CSV file with columns 'angle [deg]', 'y [mm]' and"
+        " 'height [um]', or depth, of the same positions y at every angle; or without angle.",
     )
     stations: Literal["auto"] | int = Field(
         default="auto",
@@ -222,7 +232,12 @@ def read_cam(
         stations,
         measured,
     )
-    return Cylinder(table.base_radius, table.material), cam
+    form = read_axial(mistakes, table.axial_profile, "cam")
+    start = read_start_surface(mistakes, table.start_profile)
+    if form is None:
+        return None
+    body = Cylinder(table.base_radius, table.material, axial_profile=form, start_surface=start)
+    return body, cam
 
 
 def _check_shape(mistakes: Mistakes, table: CamTable) -> None:

@@ -28,10 +28,12 @@ from wearsim.uq.sampling.sampler import GaussianCopula
 DEFAULT_TOLERANCE = 1e-3
 DEFAULT_RECORDS = 20
 LARGEST_ANGLE = 0.1  # rad; slip and shift are linear in the angles
+#: keys that hold one value for all rollers, or one per roller
+_LISTS = (("roller", "offset"), ("roller", "profile"), ("creepage", "yaw"), ("creepage", "tilt"))
 CADENCES = ("records", "every_passes", "every")
 #: keys of which at most one may be given; exactly one of a radius and a diameter
 ALTERNATIVES = {
-    "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
+    "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter", "axial_profile")),
     "cylinder": (("radius", "diameter"),),
     "operation": (("duration", "passes", "turns"),),
     "outputs": (CADENCES,),
@@ -327,7 +329,7 @@ def check_lists(
             mistakes.add("limit", key, what, as_written(getattr(limits, key)), remedy)
     tables = {table: keys for table, keys in data.items() if isinstance(keys, dict)}
     rollers = tables.get("operation", {}).get("rollers", 1)
-    for table, key in (("roller", "offset"), ("creepage", "yaw"), ("creepage", "tilt")):
+    for table, key in _LISTS:
         value: Any = tables.get(table, {}).get(key)
         listed = isinstance(value, list | tuple) and isinstance(rollers, int)
         if listed and len(value) != rollers:

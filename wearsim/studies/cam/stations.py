@@ -20,6 +20,11 @@ from wearsim.types import FloatArray
 
 FEWEST_HARMONICS = 3
 FOLLOWED = 0.8  # demand of friction on the unworn cam from which skids are followed through a run
+_COMPARED = (
+    *("rolling_speed", "longitudinal_curvature", "surface_curvature", "load_factor", "load_rest"),
+    *("stiffness", "inertia_torque", "skid"),
+)
+_PLACES = ("angle", "segment", "pressure_angle")
 
 
 def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
@@ -50,7 +55,9 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
         return found
     if moves(turn, found):
         found = _movable(found, turn)
-    return found if found.inertia.size else joined(found)
+    start = turn.scenario.cylinder.start_surface
+    differ = start is not None and start.varies
+    return found if found.inertia.size or differ else joined(found)
 
 
 def moves(turn: CamTurn, stations: CamStations) -> bool:
@@ -87,12 +94,6 @@ def _relocated(turn: CamTurn, change: FloatArray) -> CamStations:
     return replace(_movable(found, turn), recorded=matrix)
 
 
-_COMPARED = (
-    *("rolling_speed", "longitudinal_curvature", "surface_curvature", "load_factor", "load_rest"),
-    *("stiffness", "inertia_torque", "skid"),
-)
-
-
 def joined(stations: CamStations) -> CamStations:
     """Return the stations with equal ones joined: those of a dwell, or of a rise and its return."""
     columns = [getattr(stations, name).ravel() for name in _COMPARED]
@@ -111,9 +112,6 @@ def joined(stations: CamStations) -> CamStations:
         total = np.bincount(places, weights=getattr(stations, name).ravel())
         arrays[name] = total[:, None, None]
     return replace(stations, **arrays, places=places, whole=stations)
-
-
-_PLACES = ("angle", "segment", "pressure_angle")
 
 
 def _values(

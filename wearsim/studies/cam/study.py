@@ -216,11 +216,19 @@ def _film(turn: CamTurn, point: Point) -> FloatArray | None:
         turn.speed * point.kinematics.travel,
         point.normal_force,
         point.kinematics.relative_curvature,
-        1.0 / scenario.roller.crown_radius,
+        _across(scenario, point),
         combine(scenario.cylinder.material, scenario.roller.material).contact_modulus,
         lubricant.viscosity,
         lubricant.pressure_viscosity,
     )
+
+
+def _across(scenario: Scenario, point: Point) -> float:
+    """Return the relative curvature across the track for films, the least of the turn [1/m]."""
+    gap = scenario.axial_gap
+    if gap.is_crowned:
+        return 1.0 / gap.radius_at(0.0)
+    return 1.0 / max(gap.radius_at(patch.b) for patch in patches_at(scenario, point))
 
 
 def _jump_speed(turn: CamTurn) -> float | None:

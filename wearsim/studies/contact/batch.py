@@ -19,11 +19,13 @@ from wearsim.errors import (
     WearsimError,
 )
 from wearsim.evolution.contacts import unworn_contacts
+from wearsim.evolution.problem import WearProblem
 from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
 from wearsim.scenario import RandomInput, Scenario, realise
+from wearsim.scenario.parse.fields import is_axial
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.failures import explained
-from wearsim.studies.run.assemble import build_problem, prepared_model
+from wearsim.studies.run.assemble import build_problem, prepared_model, surfaces
 from wearsim.studies.run.draws import Drawer, units_of
 from wearsim.studies.run.grid import contact_positions, realisation_grid, wider_grid
 from wearsim.studies.run.inputs import (
@@ -247,7 +249,7 @@ class Realisations:
 
     def _drawn(self, part: slice) -> dict[str, FloatArray]:
         """Return the drawn inputs of some realisations by the names of `contact_values`."""
-        values = {key: column[part] for key, column in self.values.items()}
+        values = {key: column[part] for key, column in self.values.items() if not is_axial(key)}
         return contact_values(self._once.random, values)
 
     def _contacts(self, part: slice) -> ContactBatch:
@@ -255,7 +257,34 @@ class Realisations:
         drawn = {name: values[None] for name, values in self._drawn(part).items()}
         count = part.stop - part.start
         problem = build_problem(self.scenario, self.model, self.grid, drawn, realisations=count)
+        forms = {key: column[part] for key, column in self.values.items() if is_axial(key)}
+        if forms:
+            problem = self._with_forms(problem, drawn, forms)
         return unworn_contacts(problem)
+
+    def _with_forms(
+        self, problem: WearProblem, drawn: dict[str, FloatArray], forms: dict[str, FloatArray]
+    ) -> WearProblem:
+        """Return the problem with the drawn forms of the bodies along the axis."""
+        count = problem.shape[2]
+        offsets = contact_inputs(self.scenario, [0], drawn)["offset"]
+        offsets = np.broadcast_to(offsets, (1, count))
+        parts = []
+        for number in range(count):
+            values = {key: float(column[number]) for key, column in forms.items()}
+            own = realise(self._once, values)
+            parts.append(surfaces(own, [0], offsets[:, number : number + 1], self.grid))
+        rolling, slip = parts[0].roller_drop, parts[0].slip_profile
+        if rolling is not None:
+            rolling = np.concatenate([np.asarray(one.roller_drop) for one in parts], axis=1)
+        if slip is not None:
+            slip = np.concatenate([np.asarray(one.slip_profile) for one in parts], axis=2)
+        return replace(
+            problem,
+            flat_gap=np.concatenate([one.gap for one in parts], axis=2),
+            roller_drop=rolling,
+            slip_profile=slip,
+        )
 
     def _solve(self, part: slice) -> ContactBatchSolution:
         batch = self._contacts(part)
@@ -324,7 +353,7 @@ def acting_inputs(
 
 def _acts(scenario: Scenario, item: RandomInput) -> bool:
     """Return whether a random input changes one contact at the start of its load."""
-    if set(item.keys) <= FIELDS.keys():
+    if set(item.keys) <= FIELDS.keys() or is_axial(item.name):
         return True
     if not item.name.startswith("load."):
         return False

@@ -36,11 +36,12 @@ from wearsim.studies.run.recorder import history_row
 from wearsim.studies.schedule import Due, RecordSchedule, due_records, states_at
 from wearsim.types import FloatArray, Grid, IntArray
 
-_RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
-_ARRAYS = ("from_apex", "roller", "weight", "slip_profile")
+_RADII = ("cylinder_radius", "roller_radius", "rolling_speed")
+_ARRAYS = ("from_apex", "roller", "weight", "roller_drop", "slip_profile")
 MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
 MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
 SCALARS = ("depth_error", "volume_error", "steps", "solves")
+Observables = dict[str, float]
 
 
 def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
@@ -107,9 +108,6 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
             for items in zip(*(problem.varying for problem in problems), strict=True)
         ),
     )
-
-
-Observables = dict[str, float]
 
 
 @dataclass(frozen=True)

@@ -135,7 +135,10 @@ def _total_depth(
     stiffness : ndarray, shape (count,) or (1,)
         Loss of load per depth [N/m].
     """
-    crown, passes = 2.0 * scenario.roller.crown_radius, scenario.total_passes
+    gap, passes = scenario.axial_gap, scenario.total_passes
+    # of other forms, the crown of which a groove of the same cross-section is as deep
+    mean = float(gap.depth_of(float(np.mean(worn)) * passes))
+    crown = 2.0 * gap.radius_at(0.0 if gap.is_crowned else float(gap.half_width(mean)))
     free = (0.75 * worn * passes / np.sqrt(crown)) ** (2.0 / 3.0)
     held = np.where((stiffness > 0.0) & (force > 0.0), stiffness, 0.0)
     safe_force = np.where(force > 0.0, force, 1.0)

@@ -228,6 +228,14 @@ class _Study:
         require_run(scenario)
         passes = _passes(scenario, item)
         crown = scenario.roller.crown_radius
+        if item.profile is not None and not scenario.axial_gap.is_crowned:
+            what = "makes grooves that this study cannot level, those of circular crowns only"
+            form, remedy = (
+                scenario.roller.axial_profile.form,
+                "crown_radius, or depth = in the tests",
+            )
+            mistake = Mistake("roller", "axial_profile", what, form, remedy)
+            raise ScenarioError(scenario.file, [mistake])
         if item.lift is not None:
             assert scenario.cam is not None
             trace = read_change(item, scenario.cam.follower)

@@ -23,10 +23,11 @@ from wearsim.scenario import Scenario
 from wearsim.studies.cam.cam_wear import LIFT, CamView, Wanted, falls_of_lift, size_of
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, joined_problem
 from wearsim.studies.ensemble.realisation import closed_form_depths
-from wearsim.studies.run.assemble import assemble_problem, prepared_model, start_height
+from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer, Draws
 from wearsim.studies.run.grid import Extent, extent_of, lattice, strips_of_run
 from wearsim.studies.schedule import RecordSchedule, due_records, states_at
+from wearsim.studies.start.heights import start_height
 from wearsim.types import FloatArray, Grid, IntArray
 
 CYLINDER, ROLLER = "wear.cylinder.k_over_h", "wear.roller.k_over_h"

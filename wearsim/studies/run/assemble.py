@@ -33,6 +33,7 @@ from wearsim.studies.run.grid import growth_of, strips_of_run
 from wearsim.studies.run.groove import predicted_half_width
 from wearsim.studies.run.inputs import contact_inputs
 from wearsim.studies.run.nodes import MAX_NODES, minimum_nodes, redrawing, with_nodes
+from wearsim.studies.start.heights import roller_height, roller_profile, start_height
 from wearsim.types import FloatArray, Grid
 from wearsim.units import in_engineers_unit
 
@@ -88,7 +89,7 @@ def _check_spring(draws: Draws) -> None:
     if model not in ONE_PARABOLA or not stiffness * load or scenario.creepage.drive == "free":
         return
     half = predicted_half_width(draws, load, full_slip=False)
-    ratio = half**2 / (2.0 * scenario.roller.crown_radius) * stiffness / load
+    ratio = half**2 / (2.0 * scenario.axial_gap.radius_at(half)) * stiffness / load
     if ratio > UNLOADED:
         what = f"unloads the roller, whose load cannot be followed by contact.model = '{model}'"
         got = in_engineers_unit(stiffness, "N/m")
@@ -151,17 +152,11 @@ def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
     if draws.rollers or any(len(item.rollers) < count for item in draws.varying):
         return list(range(count)), np.ones(count)
     settings = scenario.roller.offset, creepage.yaw, creepage.tilt
-    rows = list(zip(*(scenario.per_roller(value) for value in settings), strict=True))
+    columns: list[Sequence[object]] = [scenario.per_roller(value) for value in settings]
+    columns.append([roller_profile(scenario, number) for number in range(count)])
+    rows = list(zip(*columns, strict=True))
     kinds = list(dict.fromkeys(rows))
     return [rows.index(kind) for kind in kinds], np.array([float(rows.count(k)) for k in kinds])
-
-
-def start_height(scenario: Scenario, grid: Grid) -> FloatArray:
-    """Return the cylinder's height above nominal before wear, shape (strips,) [m]."""
-    profile = scenario.cylinder.profile
-    if profile is None:
-        return np.zeros_like(grid.y)
-    return np.interp(grid.y, profile.y, profile.height)
 
 
 def assemble_problem(
@@ -228,7 +223,7 @@ def assemble_problem(
     problem = replace(
         problem,
         growth=growth_of(
-            draws, grid, partial(build, scenario), partial(surfaces, scenario, offsets)
+            draws, grid, partial(build, scenario), partial(surfaces, scenario, first, offsets)
         ),
     )
     if draws.passes and stepper.pass_by_pass and scenario.fatigue is not None:
@@ -268,6 +263,13 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
         "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
         "creepage_variation": ("creepage.differential_slip = true", creepage.differential_slip),
     }
+    if not scenario.axial_gap.is_crowned and scenario.contact.model in PARABOLA:
+        form = scenario.roller.axial_profile.form
+        raise CapabilityError(
+            f"{scenario.file}: contact model '{scenario.contact.model}' approximates the gap by a"
+            f" parabola, and axial_profile makes it another (form = '{form}' of the roller);"
+            " use contact.model = 'slender'"
+        )
     if scenario.roller.width is not None and scenario.contact.model in PARABOLA:
         raise CapabilityError(
             f"{scenario.file}: contact model '{scenario.contact.model}' approximates the gap by a"
@@ -339,7 +341,8 @@ def build_problem(
     cam = None
     if scenario.cam is not None:
         cam = cam_stations(turn_of(scenario), angles)
-    gap, s, slip = surfaces(scenario, values.pop("offset"), grid)
+    at = None if cam is None else cam.angle[:, 0, 0]
+    unworn = surfaces(scenario, rollers, values.pop("offset"), grid, at)
     tolerance = np.clip(ITERATION_FRACTION * scenario.evolution.tolerance, *ITERATION_RANGE)
     return WearProblem(
         grid=grid,
@@ -350,41 +353,60 @@ def build_problem(
         kinematics=Kinematics(
             cylinder_radius=cylinder.radius,
             roller_radius=roller.radius,
-            crown_radius=roller.crown_radius,
             rolling_speed=scenario.rolling_speed,
             multiplicity=np.ones(count) if multiplicity is None else multiplicity,
             cam=cam,
         ),
         flat_gap=np.broadcast_to(
-            gap, (1 if cam is None else len(cam.angle), count, realisations, grid.strips)
+            unworn.gap, (1 if cam is None else len(cam.angle), count, realisations, grid.strips)
         ),
-        from_apex=s,
+        from_apex=unworn.from_apex,
+        roller_drop=unworn.roller_drop,
+        crowned=scenario.axial_gap.is_crowned,
         inputs=ContactInputs.uniform(count, realisations).with_values(values),
         roller=np.arange(count, dtype=np.int64),
         weight=np.ones(count),
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
-        slip_profile=slip,
+        slip_profile=unworn.slip_profile,
         iteration_tolerance=float(tolerance),
     )
 
 
-def surfaces(scenario: Scenario, offset: FloatArray, grid: Grid) -> Surfaces:
+def surfaces(
+    scenario: Scenario,
+    rollers: Sequence[int],
+    offset: FloatArray,
+    grid: Grid,
+    angles: FloatArray | None = None,
+) -> Surfaces:
     """Return the surfaces of the unworn bodies on strips.
 
     Parameters
     ----------
     scenario : Scenario
+    rollers : sequence of int
+        Numbers of the rollers.
     offset : ndarray, shape (rollers, realisations or 1)
         Axial positions of the rollers [m].
     grid : Grid
+    angles : ndarray, shape (stations,), optional
+        Angles of the stations of a cam [rad].
     """
-    roller, cylinder = scenario.roller, scenario.cylinder
-    s, height = grid.y - offset[..., None], start_height(scenario, grid)
-    gap = s * s / (2.0 * roller.crown_radius) - height
+    roller, cylinder, form = scenario.roller, scenario.cylinder, scenario.axial_gap
+    s = grid.y - offset[..., None]
+    height = start_height(scenario, grid, angles)
+    if form.has_crowned_cylinder:
+        height = height - form.cylinder_drop(grid.y)
+    drop = form.roller_drop(s) - roller_height(scenario, rollers, s)
+    # leading axes: stations, rollers, realisations
+    height = height if height.ndim == 1 else height[:, None, None]
+    gap = drop - height
+    gap = gap if gap.ndim == 4 else gap[None]
     if roller.width is not None:
         gap = gap + roller.edge_drop(s)
+    rolling = drop if scenario.creepage.drive == "free" else None
     if not scenario.creepage.differential_slip:
-        return Surfaces(gap, s, None)
-    slip = s * s / (2.0 * roller.crown_radius * roller.radius) + height / cylinder.radius
-    return Surfaces(gap, s, slip)
+        return Surfaces(gap, s, rolling, None)
+    slip = drop / roller.radius + height / cylinder.radius
+    return Surfaces(gap, s, rolling, slip if slip.ndim == 4 else slip[None])

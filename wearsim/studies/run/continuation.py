@@ -133,7 +133,7 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
         if limit.quantity in _DEPTHS:
             most, shown = deep, f"{1e3 * deep:.4g} mm"
         elif limit.quantity == "width":
-            most = 2.0 * math.sqrt(2.0 * roller.crown_radius * deep)
+            most = 2.0 * float(scenario.axial_gap.half_width(deep))
             shown = f"{1e3 * most:.4g} mm, a groove of a depth of {1e3 * deep:.4g} mm"
         if limit.value > most:
             remedy = f"at most {shown}, {what}, or evolution.allow_deep = true"

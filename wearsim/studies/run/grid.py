@@ -26,7 +26,8 @@ from wearsim.studies.roller_ends import (
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
 from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
-from wearsim.types import FloatArray, Grid, Profile
+from wearsim.studies.start.heights import start_extent
+from wearsim.types import FloatArray, Grid
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
 FEWEST_PER_HALF_WIDTH = 5  # error below 1e-2, proportional to the square of the strip width
@@ -39,6 +40,10 @@ COARSER = 1.3  # width of strips that realisations share over the strips of one
 LEAST_CHOSEN = 2.5  # strips per half-width of a patch; with fewer chosen ones, strips grow
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
+STRIPS_OF_FORM = 121  # of a run on the width of a roller that is not crowned, at least
+PART_OF_FORM = 0.5  # of the patch of such bodies, which is resolved as that of a crown
+STRIPS_OF_CONTACT = 121
+STRIPS_OF_CONTACT_OF_FORM = 485  # where its ends are steep, for a peak pressure within 1 %
 DRAWN = {"scalar", "joint"}  # roles of random inputs with a range
 _MARGIN = 1e-9  # of a patch, against rounding at the outer edges
 _ROUNDING = 1e-12
@@ -53,12 +58,30 @@ def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> F
     inputs : mapping of str to ndarray
         Among them offset [m] and tilt [rad], see `contact_inputs`.
     """
+    apexes = scenario.axial_gap.apexes(inputs["offset"])
     if not scenario.creepage.tilt_shifts_contact:
-        return inputs["offset"]
-    shift = -scenario.roller.crown_radius * inputs["tilt"]
-    if scenario.roller.width is not None:
-        shift = np.clip(shift, -0.5 * scenario.roller.width, 0.5 * scenario.roller.width)
-    return np.asarray(inputs["offset"] + shift)
+        return apexes
+    return np.asarray(apexes + tilt_shift(scenario, inputs["tilt"]))
+
+
+def tilt_shift(scenario: Scenario, tilt: FloatArray | tuple[float, ...]) -> FloatArray:
+    """Return the distance by which tilt moves the contact of unworn bodies [m].
+
+    Parameters
+    ----------
+    scenario : Scenario
+    tilt : ndarray
+        [rad].
+    """
+    gap, half = scenario.axial_gap, 0.0
+    if not gap.is_crowned:
+        half = widest_patch(scenario, load_range(scenario, scenario.load.build(), 0.0)[1]).b
+    return gap.shift(np.asarray(tilt, dtype=np.float64), half)
+
+
+def _greatest_shift(draws: Draws) -> float:
+    """Return the greatest distance by which the drawn tilt moves contacts [m]."""
+    return float(np.abs(tilt_shift(draws.scenario, draws.range_of("tilt"))).max())
 
 
 def contact_centre(scenario: Scenario, rollers: Sequence[int]) -> float:
@@ -74,19 +97,21 @@ def contact_grid(scenario: Scenario, load: float) -> Grid:
 
     The scenario gives them, the whole width of the profile, or the choice of the model.
     """
-    choice, profile = scenario.contact, scenario.cylinder.profile
+    choice, profile = scenario.contact, start_extent(scenario)
     centre, half_width = contact_centre(scenario, [0]), widest_patch(scenario, load).b
     if choice.width is None and profile is not None:
-        return profile_grid(profile, half_width, choice.strips)
+        return profile_grid(profile.low, profile.high, half_width, choice.strips)
     half = 1.2 * half_width
+    crowned = scenario.axial_gap.is_crowned
+    default = STRIPS_OF_CONTACT if crowned else STRIPS_OF_CONTACT_OF_FORM
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
-        return roller_grid(scenario, choice.strips or strips_of_roller(scenario, 121, load))
+        return roller_grid(scenario, choice.strips or strips_of_roller(scenario, default, load))
     if choice.width is None and choice.strips is None:
         grid = suggested_grid(scenario, load)
         if grid is not None:
             return Grid(grid.y + centre, grid.spacing)
     width = choice.width if choice.width is not None else 2.4 * half_width
-    return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or 121)
+    return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or default)
 
 
 def suggested_grid(scenario: Scenario, load: float) -> Grid | None:
@@ -96,22 +121,25 @@ def suggested_grid(scenario: Scenario, load: float) -> Grid | None:
         return None
     curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
     materials = scenario.cylinder.material, scenario.roller.material
-    across = 1.0 / scenario.roller.crown_radius
+    gap = scenario.axial_gap
+    across = 1.0 / gap.radius_at(0.0 if gap.is_crowned else fresh_patch(scenario, load).b)
+    if across == 0.0:
+        return None
     return choice.spec.suggest_grid(choice.options, across, curvature, load, materials)
 
 
-def profile_grid(profile: Profile, half_width: float, strips: int | None) -> Grid:
-    """Return strips over a profile's whole width.
+def profile_grid(start: float, stop: float, half_width: float, strips: int | None) -> Grid:
+    """Return strips over the whole width of start profiles.
 
     Parameters
     ----------
-    profile : Profile
+    start, stop : float
+        Outer positions of the profiles [m].
     half_width : float
         Half-width of the initial patch [m].
     strips : int, optional
         Number of strips; by default sufficient to resolve the patch, at most `MOST_STRIPS`.
     """
-    start, stop = float(profile.y[0]), float(profile.y[-1])
     resolving = np.ceil(PROFILE_STRIPS_PER_HALF_WIDTH * (stop - start) / half_width)
     chosen = strips or int(np.clip(resolving, FEWEST_PROFILE_STRIPS, MOST_STRIPS))
     return Grid.spanning(start, stop, chosen)
@@ -135,10 +163,10 @@ def wider_grid(scenario: Scenario, grid: Grid, load: float, shift: float = 0.0) 
     Grid or None
         None if the scenario sets a width, has no profile, or the groove is not wider than it.
     """
-    profile, crown = scenario.cylinder.profile, scenario.roller.crown_radius
+    profile = start_extent(scenario)
     if scenario.contact.width is not None or profile is None:
         return None
-    groove = math.sqrt(2.0 * crown * float(np.ptp(profile.height)))  # of a conformal roller
+    groove = float(scenario.axial_gap.half_width(profile.relief))  # of a conformal roller
     half = 1.1 * groove + 1.3 * fresh_patch(scenario, load).b + shift
     centre = contact_centre(scenario, [0])
     lacking = max(grid.edges[0] - centre + half, centre + half - grid.edges[1])
@@ -211,8 +239,7 @@ def extent_of(draws: Draws) -> Extent:
     positions = contact_positions(scenario, contact_inputs(scenario, rollers))
     shift = float(np.abs(positions - centre).max())
     if scenario.creepage.tilt_shifts_contact:
-        tilt = max(abs(angle) for angle in draws.range_of("tilt"))
-        shift += scenario.roller.crown_radius * tilt
+        shift += _greatest_shift(draws)
     fresh = shift + 1.3 * patch.b
     final = fresh + 1.1 * predicted_half_width(draws, load)
     return Extent(patch, centre, shift, fresh, final, load)
@@ -231,9 +258,13 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
     """
     scenario, choice = draws.scenario, draws.scenario.contact
     patch, centre, shift, fresh, half, load = extent or extent_of(draws)
-    tolerance = scenario.evolution.tolerance
+    tolerance, size = scenario.evolution.tolerance, patch.b
+    if not scenario.axial_gap.is_crowned:  # loads fall to zero over the ends of the patch
+        size *= PART_OF_FORM
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
         least = strips_over(scenario.roller.width or 0.0, patch.b, tolerance)
+        if not scenario.axial_gap.is_crowned:
+            least = max(least, STRIPS_OF_FORM)
         inside = not ends_roller(scenario, centre - fresh, centre + fresh)
         if choice.strips or not inside or least < STRIPS_AT_START:
             return roller_grid(scenario, choice.strips or strips_of_roller(scenario, least, load))
@@ -243,14 +274,14 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
     if many:
         resolved = predicted_half_width(draws, load, full_slip=False)
         depth = scenario.limit.depth or math.inf
-        resolved = min(resolved, math.sqrt(2.0 * scenario.roller.crown_radius * depth))
+        resolved = min(resolved, float(scenario.axial_gap.half_width(depth)))
     if choice.width is None:  # strips grow from here
-        per_half_width = strips_per_half_width(patch.b, tolerance, resolved)
+        per_half_width = strips_per_half_width(size, tolerance, resolved)
         at_start = STRIPS_OF_MANY_CONTACTS if many else STRIPS_AT_START
         if choice.strips is not None:
             per_half_width, at_start = LEAST_CHOSEN, choice.strips
-        width = min(width, max(2.0 * fresh, patch.b / per_half_width * at_start))
-    strips = choice.strips or strips_over(width, patch.b, tolerance, resolved)
+        width = min(width, max(2.0 * fresh, size / per_half_width * at_start))
+    strips = choice.strips or strips_over(width, size, tolerance, resolved)
     if width < 2.0 * (shift + patch.b):
         raise ScenarioError(
             scenario.file,
@@ -280,7 +311,7 @@ def shared_strips(scenario: Scenario) -> Grid:
     ranged = (item for item in scenario.random if item.role in DRAWN)
     tilting = tuple(item for item in ranged if CONTACT_FIELDS.keys() >= set(item.keys))
     drawn = Draws(scenario, {}, (), tilting, {}, {})
-    tilts = scenario.roller.crown_radius * np.ptp(drawn.range_of("tilt"))
+    tilts = float(np.ptp(tilt_shift(scenario, drawn.range_of("tilt"))))
     wider = 0.5 * (1.25 * grid.strips * grid.spacing + tilts)
     return lattice(grid, wider)
 
@@ -324,7 +355,7 @@ def growth_of(
     draws: Draws,
     grid: Grid,
     model: Callable[[Grid], ContactModel],
-    surfaces: Callable[[Grid], Surfaces],
+    surfaces: Callable[[Grid, FloatArray | None], Surfaces],
 ) -> tuple[Growth, ...]:
     """Return how the strips of a run grow; they do not where the scenario defines their width.
 
@@ -342,22 +373,24 @@ def growth_of(
         If the load is not defined for the whole test.
     """
     scenario, choice, load = draws.scenario, draws.scenario.contact, draws.scenario.load.build()
+    start = scenario.cylinder.start_surface
+    by_angle = start is not None and start.varies
     greatest = load_range(scenario, load, scenario.total_time)[1]  # raises beyond a log
     greatest += draws.range_of("normal_force_offset")[1]
     coarse = partial(coarse_grid, scenario)
     if choice.width is not None or ends_roller(scenario, *grid.edges):
-        return (Growth(model, surfaces, coarse, 0),)
+        return (Growth(model, surfaces, coarse, 0, by_angle=by_angle),)
     many = scenario.cam is not None and turn_of(scenario).varies
     most = choice.strips or (STRIPS_OF_MANY_CONTACTS if many else STRIPS_BEFORE_JOINING)
     last, margin = None, 0.0
     if draws.varying or draws.passes or not load.constant:
         margin = 0.5 * widest_patch(scenario, greatest).b
     if scenario.creepage.tilt_shifts_contact:
-        margin += scenario.roller.crown_radius * max(map(abs, draws.range_of("tilt")))
+        margin += _greatest_shift(draws)
     if scenario.roller.width is not None:
         last = roller_grid(scenario, strips_of_roller(scenario, STRIPS_AT_START, greatest))
     least = LEAST_LOADED if choice.strips is None else FEWEST_PER_HALF_WIDTH
-    return (Growth(model, surfaces, coarse, most, margin, last, least),)
+    return (Growth(model, surfaces, coarse, most, margin, last, least, by_angle),)
 
 
 def coarse_grid(scenario: Scenario, grid: Grid) -> Grid:
@@ -416,7 +449,7 @@ def realisation_grid(
                     )
                 ],
             )
-    if choice.width is not None or scenario.cylinder.profile is not None:
+    if choice.width is not None or start_extent(scenario) is not None:
         return contact_grid(scenario, load)
     half = 1.2 * float((away + half_widths).max())
     if ends_roller(scenario, centre - half, centre + half):
@@ -455,8 +488,8 @@ def _too_many_strips(scenario: Scenario, strips: int, half: float, away: float) 
         less = f"a smaller {'radius' if 'radius' in item.options else 'spread'}"
         if TILT in item.keys:
             less += ", creepage.tilt_shifts_contact = false"
-            if len(shifting) == 1 and scenario.contact.centre is None:
-                crown = scenario.roller.crown_radius
+            crown, known = scenario.roller.crown_radius, scenario.axial_gap.is_crowned
+            if len(shifting) == 1 and scenario.contact.centre is None and known:
                 angle = f"{away / crown * 1e3:.4g} mrad"
                 shift += f", crown radius x tilt = {crown * 1e3:.4g} mm x {angle}"
         expected = f"{less}, or {coarser}"

@@ -12,10 +12,15 @@ from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
+from wearsim.scenario.axial_gap import AxialGap
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
+from wearsim.studies.start.heights import start_extent
 from wearsim.types import ContactSolution, FloatArray
+
+_BISECTIONS = 40
+LINE_APPROACH = 12.0  # of a line contact, roughly, over q/(pi E*)
 
 
 def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None) -> HertzContact:
@@ -28,14 +33,52 @@ def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None)
     if curvature is None:
         curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
     along = 0.5 * curvature
-    patch = hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
-    half = 0.5 * (scenario.roller.width or math.inf)
+    half, gap = 0.5 * (scenario.roller.width or math.inf), scenario.axial_gap
+    if not gap.is_crowned:
+        return _patch_of_form(gap, along, load, modulus)
+    patch = hertz(along, 0.5 / gap.radius_at(half), load, modulus)
     if patch.b <= half:
         return patch
     line_load = load / (2.0 * half)
     half_length = math.sqrt(2.0 * line_load / (math.pi * modulus * along))
     pressure = 2.0 * line_load / (math.pi * half_length)
     return replace(patch, a=half_length, b=half, peak_pressure=max(pressure, patch.peak_pressure))
+
+
+def _patch_of_form(gap: AxialGap, along: float, load: float, modulus: float) -> HertzContact:
+    """Return the approximate patch of bodies that are not circular crowns.
+
+    It is as wide as that of the crown with the same gap at its ends. The line loads are those of a
+    foundation that yields by the gap there, or by the approach of a line contact if that is more.
+    """
+    half = _half_width(gap, along, load, modulus)
+    line_load = load / (2.0 * half)
+    approach = LINE_APPROACH * line_load / (math.pi * modulus)
+    level = max(gap.depth_at(half), approach)
+    greatest = line_load * level / (level - gap.mean_drop(half))
+    half_length = math.sqrt(2.0 * greatest / (math.pi * modulus * along))
+    pressure = 2.0 * greatest / (math.pi * half_length)
+    return HertzContact(half_length, half, pressure, approach, load)
+
+
+def _half_width(gap: AxialGap, along: float, load: float, modulus: float) -> float:
+    """Return the half-width of the patch of a crown with the same gap there [m]."""
+    low, high = 0.0, gap.greatest_half_width
+    if _patch_is_wider(gap, along, load, modulus, high):
+        return high
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        wider = _patch_is_wider(gap, along, load, modulus, middle)
+        low, high = (middle, high) if wider else (low, middle)
+    return high
+
+
+def _patch_is_wider(
+    gap: AxialGap, along: float, load: float, modulus: float, half_width: float
+) -> bool:
+    """Return whether the crown with the same gap at a half-width has a wider patch."""
+    radius = gap.radius_at(half_width)
+    return math.isinf(radius) or hertz(along, 0.5 / radius, load, modulus).b > half_width
 
 
 def patches_at(scenario: Scenario, point: Point) -> list[HertzContact]:
@@ -70,9 +113,10 @@ def predicted_half_width(draws: Draws, load: float, full_slip: bool = True) -> f
     """Return half the final width of the groove predicted for full slip [m].
 
     Rigid bodies in full slip wear to a depth d = [(3/4) c N n / sqrt(2 R)]^(2/3) and a width
-    2 sqrt(2 R d), where c is the depth per pass and load of both bodies. For a nonlinear wear law c
-    is the greater value of the initial contact and the final groove. Without `full_slip` the
-    slip is less by the adhesion in the initial patch, after Carter.
+    2 sqrt(2 R d), where c is the depth per pass and load of both bodies; with another form than a
+    circular crown, to the depth of a conformal groove with the same cross-section. For a nonlinear
+    wear law c is the greater value of the initial contact and the final groove. Without `full_slip`
+    the slip is less by the adhesion in the initial patch, after Carter.
     """
     scenario, creepage = draws.scenario, draws.scenario.creepage
     if scenario.wear is None:
@@ -91,22 +135,23 @@ def predicted_half_width(draws: Draws, load: float, full_slip: bool = True) -> f
         for name, given in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
     )
     curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius if differs else 0.0
-    crown, profile = 2.0 * roller.crown_radius, scenario.cylinder.profile
+    gap, profile = scenario.axial_gap, start_extent(scenario)
     slipping = 1.0
     if not full_slip:
         saturated = friction * patch.a * (1.0 / roller.radius + 1.0 / scenario.cylinder.radius)
         saturated /= scenario.friction.creep_factor
         ratio = min(float(np.hypot(longitudinal, yaw)) / saturated, 1.0)
         slipping = ratio * (2.0 - ratio)
-    start = 0.0 if profile is None else float(np.ptp(profile.height))
+    start = 0.0 if profile is None else profile.relief
     half = patch.b
     for _ in range(20):  # the slip at the sides of the groove depends weakly on its width
-        along = longitudinal + tilt / roller.radius * half + half**2 / crown * curvature
+        rise = half**2 / (2.0 * gap.radius_at(half))
+        along = longitudinal + tilt / roller.radius * half + rise * curvature
         line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
         sliding = slipping * friction * float(np.hypot(along, yaw))
         per_load = wear_per_load(scenario, law, line_loads, sliding)
-        depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
-        before, half = half, float(np.sqrt(crown * (depth + start)))
+        depth = gap.depth_of(per_load * load * scenario.total_passes)
+        before, half = half, float(gap.half_width(depth + start))
         if half == before:
             break
     return half

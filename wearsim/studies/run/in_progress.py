@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
@@ -33,7 +34,7 @@ from wearsim.studies.contact.comparison import REFERENCE, error_above_tolerance
 from wearsim.studies.failures import explained, failures_explained, too_deep_failure
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
-from wearsim.studies.run.assemble import assemble_problem, coarse_stepper, start_height
+from wearsim.studies.run.assemble import assemble_problem, coarse_stepper
 from wearsim.studies.run.continuation import earlier_warnings
 from wearsim.studies.run.draws import Draws, units_of
 from wearsim.studies.run.grid import start_of_run
@@ -49,6 +50,7 @@ from wearsim.studies.run.recorder import (
 )
 from wearsim.studies.run.result import Result, RunData
 from wearsim.studies.schedule import RecordSchedule
+from wearsim.studies.start.heights import start_height
 from wearsim.types import FloatArray, Grid
 
 Watcher = Callable[[Event], None]
@@ -383,7 +385,7 @@ class RunInProgress:
                 "rolling_speed": kinematics.rolling_speed,
                 "cylinder_radius": kinematics.cylinder_radius,
                 "roller_radius": kinematics.roller_radius,
-                "crown_radius": kinematics.crown_radius,
+                "crown_radius": scenario.axial_gap.crown_radius or math.nan,
                 "pass_rate": kinematics.pass_rate,
                 "physical_rollers": kinematics.physical_rollers,
             },

@@ -24,6 +24,23 @@ from wearsim.studies.run.schema import ALL_VARIABLES, ESTIMATED
 from wearsim.studies.schedule import Due, RecordSchedule, due_records, state_at, states_at
 from wearsim.types import FloatArray, Grid
 
+#: means and sums over a turn of a cam
+_OF_TURN = {
+    *("roller_depth", "roller_worn_volume", "dissipated_energy", "power", "normal_force"),
+    *("descent", "elastic_approach"),
+}
+ERRORS = "depth_error", "volume_error", "profile_error"
+Variables = dict[str, FloatArray]
+_WITHOUT_REALISATION = {n for n, item in ALL_VARIABLES.items() if "realisation" not in item.dims}
+MOST_WAITING = 200_000  # strips of all contacts of the states that wait to be observed
+#: what observables do not depend on
+_NOT_OBSERVED = dict.fromkeys(
+    (
+        *("coarse_step_solution", "half_quadrature_solution", "wear_exponents", "past_wear"),
+        *("separation", "part", "whole_steps", "past_sums", "past_feedback", "stepping_error"),
+    )
+)
+
 
 @dataclass(frozen=True)
 class Started:
@@ -71,15 +88,7 @@ class Finished:
     wall_seconds: float
 
 
-#: means and sums over a turn of a cam
-_OF_TURN = {
-    *("roller_depth", "roller_worn_volume", "dissipated_energy", "power", "normal_force"),
-    *("descent", "elastic_approach"),
-}
-ERRORS = "depth_error", "volume_error", "profile_error"
 Event: TypeAlias = Started | Stepped | Warned | Checkpointed | Finished
-Variables = dict[str, FloatArray]
-_WITHOUT_REALISATION = {n for n, item in ALL_VARIABLES.items() if "realisation" not in item.dims}
 
 
 def history_row(
@@ -178,16 +187,6 @@ class History:
         """Keep the first rows only."""
         del self._rows[count:]
         self._computed = min(self._computed, count)
-
-
-MOST_WAITING = 200_000  # strips of all contacts of the states that wait to be observed
-#: what observables do not depend on
-_NOT_OBSERVED = dict.fromkeys(
-    (
-        *("coarse_step_solution", "half_quadrature_solution", "wear_exponents", "past_wear"),
-        *("separation", "part", "whole_steps", "past_sums", "past_feedback", "stepping_error"),
-    )
-)
 
 
 def _carries_loads(stepper: Stepper, problem: WearProblem, state: WearState) -> bool:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
 _DROPPED = {"station", "roller", "realisation"}
+Number: TypeAlias = float | list[float]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -116,9 +117,6 @@ def read_results(path: str | Path) -> RunData:
     """Read the results file of a run; errors as of `read_study`."""
     data: RunData = read_study(path, RunData)
     return data
-
-
-Number: TypeAlias = float | list[float]
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,6 +25,10 @@ from wearsim.uq.distributions.truncated_normal import (
 )
 
 _LARGE = 50.0  # shape above which digamma and logarithm cancel
+_ROUNDING = 1e-12
+_RAREST = 1e-12  # least probability of a peak at the far end of the support
+_SMALLEST, _LARGEST = 1e-150, 1e150  # range in which squares and their inverses are finite
+_OTHER_UNIT = "choose a unit in which it is between 1e-150 and 1e150"
 
 
 class Gamma(MaxentDistribution):
@@ -85,12 +89,6 @@ def gamma_shape(gap: float) -> float:
             slope = shape**2 * float(zeta(2.0, shape)) - shape
         shape = 1.0 / (1.0 / shape - excess / slope)
     return shape
-
-
-_ROUNDING = 1e-12
-_RAREST = 1e-12  # least probability of a peak at the far end of the support
-_SMALLEST, _LARGEST = 1e-150, 1e150  # range in which squares and their inverses are finite
-_OTHER_UNIT = "choose a unit in which it is between 1e-150 and 1e150"
 
 
 class Infeasible(WearsimError, ValueError):  # noqa: N818  (established term)

@@ -22,6 +22,8 @@ _CHUNK = 1 << 15  # draws per block; the panel data of a block fit into the proc
 
 #: Log density at offsets, up to a constant, and its first and second derivative.
 LogDensity: TypeAlias = Callable[[Any], tuple[Any, Any, Any]]
+_DEEPEST = 5.0  # greatest distance of the support from the parent's mean, in parent stds
+_NARROWEST = 0.03  # least width of the support, in parent stds
 
 
 class Piece:
@@ -119,7 +121,7 @@ class InverseTable:
         """Return the coefficients of the polynomial correction, shape (order, panels)."""
         share = np.cumsum(parts, axis=1)[:, :-1] / parts.sum(axis=1)[:, None]
         rest = np.cumsum(parts[:, ::-1], axis=1)[:, -2::-1] / parts.sum(axis=1)[:, None]
-        place = _exponential_place(
+        place = _exponential_quantile(
             share, rest, self._rise[:, None], self._growth[:, None], self._decay[:, None]
         )
         correction: FloatArray = (_NODES[1:-1] - place) / (place * (1.0 - place))
@@ -153,7 +155,7 @@ class InverseTable:
         part = np.where(upper, above - self._above[panel + 1], below - self._below[panel])
         part = np.clip(part / mass, 0.0, 1.0)
         share, rest = np.where(upper, 1.0 - part, part), np.where(upper, part, 1.0 - part)
-        place = _exponential_place(
+        place = _exponential_quantile(
             share, rest, self._rise[panel], self._growth[panel], self._decay[panel]
         )
         centred = 2.0 * place - 1.0
@@ -166,15 +168,22 @@ class InverseTable:
         return values
 
 
-def _exponential_place(
-    share: FloatArray, rest: FloatArray, rise: FloatArray, growth: FloatArray, decay: FloatArray
+def _exponential_quantile(
+    below: FloatArray, above: FloatArray, rise: FloatArray, growth: FloatArray, decay: FloatArray
 ) -> FloatArray:
-    """Return the quantile on (0, 1) with probability `share` below, `rest` above, if exponential.
+    """Return quantiles of densities proportional to exp(rise u) for u between 0 and 1.
 
-    The log density increases by `rise`; `growth` and `decay` are expm1 of `rise` and `-rise`.
+    Parameters
+    ----------
+    below, above : ndarray
+        Probabilities below and above the quantiles; their sum is 1.
+    rise : ndarray
+        Increase of the logarithm of the density from u = 0 to u = 1.
+    growth, decay : ndarray
+        ``expm1(rise)`` and ``expm1(-rise)``, which are the same for many quantiles.
     """
-    lower = share < 0.5  # distances from the nearer end avoid cancellation
-    distance: FloatArray = np.log1p(np.where(lower, share * growth, rest * decay)) / rise
+    lower = below < 0.5  # distances from the nearer end avoid cancellation
+    distance: FloatArray = np.log1p(np.where(lower, below * growth, above * decay)) / rise
     return np.where(lower, distance, 1.0 + distance)
 
 
@@ -183,10 +192,6 @@ def _node_logs(piece: Piece) -> tuple[FloatArray, FloatArray]:
     start, width = piece.edges[:-1, None], np.diff(piece.edges)[:, None]
     between = piece.log_density(start + width * _POINTS.ravel())[0]
     return piece.log_density(start + width * _NODES)[0], between.reshape(-1, *_POINTS.shape)
-
-
-_DEEPEST = 5.0  # greatest distance of the support from the parent's mean, in parent stds
-_NARROWEST = 0.03  # least width of the support, in parent stds
 
 
 class TruncatedNormal(MaxentDistribution):

@@ -32,6 +32,18 @@ _MIN_DRAWS = 5  # independent draws below which the error of a std is not estima
 _STEP = 0.5  # least standard error of an empirical distribution function, in units of 1/n
 _LARGEST = 1400.0  # twice the logarithm of a large finite float
 _MIN_VARIANCE = 1e-12  # relative variance without one realisation that causes nearly all of it
+_FEWEST = 32  # realisations; with fewer, an interval may be narrow by chance
+_STATISTICS: dict[str, Literal["mean", "std"] | float] = {
+    "mean": "mean",
+    "std": "std",
+    "median": 0.5,
+}
+LIFE = "life"  # the observable of targets such as "b10 3%"
+_FORM_OF_LIFE = re.compile(r"[bB](?P<percent>\d*\.?\d+)\s+(?P<width>\d*\.?\d+)\s*%")
+_FORM = re.compile(
+    r"(?P<observable>[a-z][a-z_]*)\.(?P<what>mean|std|median|q(?P<percent>\d+(\.\d+)?))"
+    r"\s+(?P<width>\d+(\.\d*)?|\.\d+)\s*%"
+)
 
 
 @dataclass(frozen=True)
@@ -276,20 +288,6 @@ class WeightedDistribution:
         if abs(beyond) > 1e-9 / count:  # with a margin for rounding at integer ranks
             return math.copysign(math.inf, beyond)
         return float(np.interp(level, heights, self.ordered))
-
-
-_FEWEST = 32  # realisations; with fewer, an interval may be narrow by chance
-_STATISTICS: dict[str, Literal["mean", "std"] | float] = {
-    "mean": "mean",
-    "std": "std",
-    "median": 0.5,
-}
-LIFE = "life"  # the observable of targets such as "b10 3%"
-_FORM_OF_LIFE = re.compile(r"[bB](?P<percent>\d*\.?\d+)\s+(?P<width>\d*\.?\d+)\s*%")
-_FORM = re.compile(
-    r"(?P<observable>[a-z][a-z_]*)\.(?P<what>mean|std|median|q(?P<percent>\d+(\.\d+)?))"
-    r"\s+(?P<width>\d+(\.\d*)?|\.\d+)\s*%"
-)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,9 @@ BELOW_ONE = 1.0 - 2.0**-53
 
 #: Number of independent Sobol sequences for confidence intervals: 7 degrees of freedom.
 REPLICATES = 8
+#: Two inputs and Spearman's rank correlation between them.
+Correlation: TypeAlias = tuple[str, str, float]
+_SINGULAR = 1e-9  # eigenvalue below which a correlation matrix is singular to rounding
 
 
 def monte_carlo(seed: int, name: str, dimension: int, first: int, count: int) -> FloatArray:
@@ -161,12 +164,6 @@ def drawing(plan: PlanName, seed: int, total: int | None, replicates: int = 1) -
     if total is None:
         raise ValueError("a latin-hypercube plan needs total, the number of its realisations")
     return lambda *where: latin_hypercube(seed, total, *where)
-
-
-#: Two inputs and Spearman's rank correlation between them.
-Correlation: TypeAlias = tuple[str, str, float]
-
-_SINGULAR = 1e-9  # eigenvalue below which a correlation matrix is singular to rounding
 
 
 class GaussianCopula:

@@ -17,6 +17,28 @@ Purpose: TypeAlias = Literal["test", "pass", "field", "process", "plan"]
 
 _LANES = 4  # 64-bit words per count of the generator
 _STEP = 2.0**-52  # one bit fewer than a float has, so that (k + 1/2) _STEP is exact and below 1
+Words: TypeAlias = npt.NDArray[np.uint32]
+SLOTS = 16
+#: First slot of each common input, and its number of slots.
+SLOT_OF = {
+    "load.normal_force": (0, 1),
+    "friction.coefficient": (1, 1),
+    "creepage.longitudinal": (2, 1),
+    "creepage.misalignment": (3, 2),
+    "creepage.yaw": (3, 1),
+    "creepage.tilt": (4, 1),
+    "wear.cylinder.k_over_h": (5, 1),
+    "wear.roller.k_over_h": (6, 1),
+    "load.stiffness": (7, 1),
+    "creepage.bearing_torque": (8, 1),
+    "load.thermal.gain": (9, 1),
+    "load.thermal.time_constant": (10, 1),
+    "roller.offset": (11, 1),
+}
+_ROLLER = re.compile("0|[1-9][0-9]{0,2}")  # fewer than scipy's 21201 dimensions
+_BITS = 32
+_ROUNDS = 4
+_VALUES, _ORDER = 0, 1  # uses of a key
 
 
 @dataclass(frozen=True)
@@ -73,32 +95,6 @@ class Stream:
         return np.stack(
             [self.uniforms(first, count, realisation, k) for k in range(dimension)], axis=1
         )
-
-
-Words: TypeAlias = npt.NDArray[np.uint32]
-
-SLOTS = 16
-#: First slot of each common input, and its number of slots.
-SLOT_OF = {
-    "load.normal_force": (0, 1),
-    "friction.coefficient": (1, 1),
-    "creepage.longitudinal": (2, 1),
-    "creepage.misalignment": (3, 2),
-    "creepage.yaw": (3, 1),
-    "creepage.tilt": (4, 1),
-    "wear.cylinder.k_over_h": (5, 1),
-    "wear.roller.k_over_h": (6, 1),
-    "load.stiffness": (7, 1),
-    "creepage.bearing_torque": (8, 1),
-    "load.thermal.gain": (9, 1),
-    "load.thermal.time_constant": (10, 1),
-    "roller.offset": (11, 1),
-}
-
-_ROLLER = re.compile("0|[1-9][0-9]{0,2}")  # fewer than scipy's 21201 dimensions
-_BITS = 32
-_ROUNDS = 4
-_VALUES, _ORDER = 0, 1  # uses of a key
 
 
 def slots(name: str, dimension: int) -> range | None:

@@ -18,6 +18,7 @@ FAMILIES: tuple[Family, ...] = ("log-normal", "Weibull")
 _DEVIANCE = 3.841458820694124  # 95 % quantile of chi-square with one degree of freedom
 _STEPS = 60  # of Newton's method
 _WIDEST = 1e3  # distance in standard errors at which the search for an end stops
+_Terms: TypeAlias = Callable[[FloatArray, BoolArray], tuple[FloatArray, FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,6 @@ def _extreme(z: FloatArray, observed: BoolArray) -> tuple[FloatArray, FloatArray
     return np.where(observed, z, 0.0) - power, observed - power, -power
 
 
-_Terms: TypeAlias = Callable[[FloatArray, BoolArray], tuple[FloatArray, FloatArray, FloatArray]]
 _TERMS: dict[Family, _Terms] = {"log-normal": _normal, "Weibull": _extreme}
 
 

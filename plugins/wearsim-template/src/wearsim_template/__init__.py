@@ -82,8 +82,52 @@ SPEC = ws.ContactModelSpec(
     protocol=2,
 )
 
+KIND = ws.StudyKind(
+    *("winkler-approach", "approach of the bodies by normal force"),
+    result="wearsim_template.study:Approach",
+    view="wearsim_template.study:ApproachView",
+    protocol=2,
+)
+
+
+class WinklerFormOptions(ws.Options):
+    """Options of the form along the axis `winkler-quartic`."""
+
+    length: ws.PositiveLength = ws.Field(description="length of the body")
+    drop: ws.PositiveLength = ws.Field(20e-6, description="drop at the ends")
+
+
+class WinklerForm(ws.AxialProfile):
+    """A body whose drop rises with the fourth power of the distance from its middle."""
+
+    def __init__(self, options, pair):
+        self.length, self.end_drop = options.length, options.drop
+
+    def drop(self, s):
+        """Return the distance of the surface below its highest line [m]."""
+        return self.end_drop * (2.0 * s / self.length) ** 4
+
+
+FORM = ws.AxialProfileSpec(
+    *("winkler-quartic", WinklerFormOptions, "drop with the fourth power of the distance"),
+    factory=WinklerForm,
+    protocol=2,
+)
+
+
+@ws.hookimpl
+def wearsim_axial_profiles():
+    """Yield the form along the axis."""
+    yield FORM
+
 
 @ws.hookimpl
 def wearsim_contact_models():
     """Yield the contact model."""
     yield SPEC
+
+
+@ws.hookimpl
+def wearsim_study_kinds():
+    """Yield the kind of study."""
+    yield KIND

@@ -15,7 +15,7 @@ from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.models.contact.strip_model import grid_about_hertz
 from wearsim.scenario.tables.plugin import ContactChoice
 from wearsim.studies.run.grid import profile_grid
-from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint, Profile
+from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint
 from wearsim_bench.exact_solutions import CREEPAGES, STEEL, WORN, rows, strips_of, worn_profile
 
 MATERIALS = (STEEL, STEEL)
@@ -86,8 +86,7 @@ class Case:
     def grid(self, choice: ContactChoice, strips: int | None = None) -> Grid:
         """Return the default strips of a single contact, or another number over the same width."""
         if self.span is not None:
-            ends = np.array([-0.5, 0.5]) * self.span
-            usual = profile_grid(Profile(ends, np.zeros(2)), self.patch.b, None)
+            usual = profile_grid(-0.5 * self.span, 0.5 * self.span, self.patch.b, None)
         else:
             suggest, load = choice.spec.suggest_grid or grid_about_hertz, self.point.normal_force
             problem = self.gap_curvature, self.longitudinal_curvature, load, MATERIALS

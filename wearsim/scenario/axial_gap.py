@@ -1,0 +1,177 @@
+"""Gap of two bodies along their axis, without start profiles, and the width of grooves in it."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from wearsim.plugins import AxialProfile
+from wearsim.types import FloatArray
+
+_POINTS = 4001  # of the tabulated drop
+_FIRST = 1e-3  # m, first half-length of a table
+_LONGEST = 1.0  # m, half-length of a body that nothing ends
+
+
+class AxialGap:
+    """Gap of roller and cylinder along the axis where neither is worn.
+
+    Of a circular crown all values are those of its parabola; of other forms they are taken from a
+    table, as they serve to choose strips and to forecast wear.
+
+    Parameters
+    ----------
+    roller, cylinder : AxialProfile
+        Forms of the bodies, both with their middle at y = 0.
+    width : float or None
+        Width of the roller [m].
+    greatest : float
+        Drop beyond which nothing is of interest, the radius of the roller [m].
+    """
+
+    def __init__(
+        self, roller: AxialProfile, cylinder: AxialProfile, width: float | None, greatest: float
+    ) -> None:
+        self._roller, self._cylinder = roller, cylinder
+        self._half = 0.5 * width if width else math.inf
+        self._greatest = greatest
+
+    @cached_property
+    def crown_radius(self) -> float | None:
+        """Relative crown radius of circular crowns, infinite for straight bodies [m]."""
+        radii = self._roller.crown_radius, self._cylinder.crown_radius
+        if radii[0] is None or radii[1] is None:
+            return None
+        if math.isinf(radii[1]):
+            return radii[0]
+        curvature = sum(1.0 / radius for radius in radii if radius is not None)
+        return 1.0 / curvature
+
+    @property
+    def is_crowned(self) -> bool:
+        """Whether the gap is a parabola, as contact models for ellipses need it."""
+        return self.crown_radius is not None and math.isfinite(self.crown_radius)
+
+    def roller_drop(self, s: FloatArray) -> FloatArray:
+        """Return the drop of the roller at axial distances from its apex [m]."""
+        return self._roller.drop(s)
+
+    def cylinder_drop(self, y: FloatArray) -> FloatArray:
+        """Return the drop of the cylinder at axial positions [m]; beyond its ends it is great."""
+        if self._cylinder.crown_radius == math.inf:
+            return np.zeros_like(y)
+        half = 0.5 * self._cylinder.length
+        if math.isinf(half):
+            return self._cylinder.drop(y)
+        drop = self._cylinder.drop(np.clip(y, -half, half))
+        return np.where(np.abs(y) > half, self._greatest, drop)
+
+    @property
+    def has_crowned_cylinder(self) -> bool:
+        """Whether the cylinder is not straight."""
+        return self._cylinder.crown_radius != math.inf
+
+    def apexes(self, offset: FloatArray) -> FloatArray:
+        """Return the positions of the contacts of rollers with an offset, without tilt [m]."""
+        radius, crown = self.crown_radius, self._roller.crown_radius
+        if not self.has_crowned_cylinder or not self.is_crowned or not radius or not crown:
+            return offset
+        return np.asarray(offset * (radius / crown))
+
+    def drop(self, s: FloatArray) -> FloatArray:
+        """Return the gap of rollers whose apex is above that of the cylinder [m]."""
+        return self._roller.drop(s) + self.cylinder_drop(s)
+
+    def half_width(self, depth: FloatArray | float) -> FloatArray:
+        """Return the half-width of a conformal groove of a depth, at most that of the roller [m].
+
+        Of circular crowns it is (2 R d)^(1/2), also beyond the ends of the roller.
+        """
+        if self.is_crowned:
+            return np.asarray(np.sqrt(2.0 * (self.crown_radius or 0.0) * depth))
+        places, drops, _ = self._table
+        return np.asarray(np.interp(depth, drops, places))
+
+    def depth_of(self, area: FloatArray | float) -> FloatArray:
+        """Return the depth of a conformal groove with a cross-section [m^2] [m]."""
+        if self.is_crowned:
+            root = np.sqrt(2.0 * (self.crown_radius or 0.0))
+            return np.asarray((0.75 * np.asarray(area) / root) ** (2.0 / 3.0))
+        places, drops, areas = self._table
+        found = np.interp(area, areas, drops)
+        beyond = np.maximum(np.asarray(area) - areas[-1], 0.0) / (2.0 * places[-1])
+        return np.asarray(found + beyond)
+
+    @property
+    def greatest_half_width(self) -> float:
+        """Greatest half-width of a contact, that of the roller or of a great drop [m]."""
+        return float(self._table[0][-1])
+
+    def radius_at(self, half_width: float) -> float:
+        """Return the radius of the parabola with the same drop at a half-width [m]."""
+        if self.is_crowned:
+            return self.crown_radius or math.inf
+        drop = self.depth_at(half_width)
+        return half_width**2 / (2.0 * drop) if drop > 0.0 else math.inf
+
+    def depth_at(self, half_width: float) -> float:
+        """Return the depth of a conformal groove of a half-width [m]."""
+        places, drops, _ = self._table
+        return float(np.interp(half_width, places, drops))
+
+    def mean_drop(self, half_width: float) -> float:
+        """Return the mean of the gap over a half-width [m]."""
+        places, drops, areas = self._table
+        level = float(np.interp(half_width, places, drops))
+        return level - float(np.interp(half_width, places, areas)) / (2.0 * half_width)
+
+    def shift(self, tilt: FloatArray, half_width: float) -> FloatArray:
+        """Return the axial distance by which tilt moves a contact from the apex [m].
+
+        A tilted contact is where both of its ends have the same gap; it stays on the roller.
+
+        Parameters
+        ----------
+        tilt : ndarray
+            [rad].
+        half_width : float
+            Half-width of the contact [m].
+        """
+        if self.is_crowned:
+            moved = -(self.crown_radius or 0.0) * tilt
+        else:
+            most = self._table[0][-1]
+            half = min(half_width, 0.5 * most)
+            middles = np.linspace(-(most - half), most - half, _POINTS)
+            slope = (self.drop(middles + half) - self.drop(middles - half)) / (2.0 * half)
+            slope = np.maximum.accumulate(slope)
+            rising = np.concatenate([[True], np.diff(slope) > 0.0])  # the first of equal ones
+            moved = np.interp(-np.asarray(tilt), slope[rising], middles[rising])
+            moved = np.where(np.asarray(tilt) == 0.0, 0.0, moved)
+        if math.isfinite(self._half):
+            moved = np.clip(moved, -self._half, self._half)
+        return np.asarray(moved)
+
+    @cached_property
+    def _table(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distances from the apex, drops there, and areas of conformal grooves that deep.
+
+        On each side the lower of both drops counts, so that grooves are not too narrow.
+        """
+        most = min(self._half, 0.5 * self._roller.length)
+        if math.isinf(most):
+            most = _FIRST
+            while most < _LONGEST and self._lower(np.array([most]))[0] < self._greatest:
+                most *= 2.0
+        # dense in the middle and at the end, where logarithmic profiles are steep
+        places = 0.5 * most * (1.0 - np.cos(np.linspace(0.0, np.pi, _POINTS)))
+        drops = np.maximum.accumulate(self._lower(places))
+        drops = drops - drops[0]
+        steps = np.diff(places) * 0.5 * (drops[1:] + drops[:-1])
+        below = np.concatenate([[0.0], np.cumsum(steps)])
+        return places, drops, 2.0 * (places * drops - below)
+
+    def _lower(self, s: FloatArray) -> FloatArray:
+        return np.minimum(self.drop(s), self.drop(-s))

@@ -1,0 +1,153 @@
+"""Key axial_profile of [roller], [cylinder] and [cam]: the form of a body along its axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from pydantic import Field
+
+from wearsim.errors import ScenarioError
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.plugins import AxialPair, AxialProfile, AxialProfileSpec, Options, registry
+from wearsim.scenario.axial_gap import AxialGap
+from wearsim.scenario.parse.fields import amount, target_of
+from wearsim.scenario.parse.mistakes import Mistakes, key_of_file, split_keys
+from wearsim.scenario.parse.random_inputs import validate
+from wearsim.units import QuantityError
+
+if TYPE_CHECKING:
+    from wearsim.scenario.tables.bodies import Cylinder, Roller
+
+_WIDER = 1.0 + 1e-9
+FILE_FORM = "table"  # that of a key with the name of a file
+AxialKey: TypeAlias = dict[str, object] | str
+
+DESCRIPTION = (
+    "Form along the axis: a table whose key form names it, a form without options, or the name of"
+    " a CSV file."
+)
+
+
+class AxialTable(Options):
+    """Form of a body along its axis; the other keys are its options."""
+
+    form: str = Field(description="Name of the form.")
+
+
+@dataclass(frozen=True)
+class AxialChoice:
+    """A form along the axis with its options."""
+
+    form: str
+    options: Options
+
+    def build(self, pair: AxialPair) -> AxialProfile:
+        """Return the profile for a pair of bodies."""
+        return registry().get(AxialProfileSpec, self.form).factory(self.options, pair)
+
+
+def crown(radius: float) -> AxialChoice:
+    """Return a circular crown."""
+    options: Any = registry().get(AxialProfileSpec, "crown").options
+    return AxialChoice("crown", options.model_construct(radius=radius))
+
+
+def straight() -> AxialChoice:
+    """Return a body without a crown."""
+    return AxialChoice("straight", registry().get(AxialProfileSpec, "straight").options())
+
+
+def read_axial(mistakes: Mistakes, key: AxialKey | None, table: str) -> AxialChoice | None:
+    """Return the form of a body, or None after adding its mistakes; straight without a key.
+
+    Parameters
+    ----------
+    mistakes : Mistakes
+    key : dict or str, optional
+        The key `axial_profile`.
+    table : str
+        Table of the body, "roller".
+    """
+    if key is None:
+        return straight()
+    if isinstance(key, str):
+        forms = registry().names(AxialProfileSpec)
+        key = {"form": key} if key in forms else {"form": FILE_FORM, "file": key}
+    place = f"{table}.axial_profile"
+    given, rest = split_keys(key, AxialTable)
+    named = validate(mistakes, AxialTable, given, place)
+    if named is None:
+        return None
+    spec = mistakes.find_plugin(AxialProfileSpec, named.form, place, "form")
+    options = validate(mistakes, spec.options, rest, place, AxialTable) if spec else None
+    return None if options is None else AxialChoice(named.form, options)
+
+
+def pair_of(roller: Roller, cylinder: Cylinder) -> AxialPair:
+    """Return the pair for which axial profiles are designed."""
+    modulus = combine(cylinder.material, roller.material).contact_modulus
+    return AxialPair(roller.width, modulus, 1.0 / cylinder.radius + 1.0 / roller.radius)
+
+
+def axial_gap(roller: Roller, cylinder: Cylinder) -> AxialGap:
+    """Return the gap of two bodies along their axis, without start profiles."""
+    pair = pair_of(roller, cylinder)
+    forms = roller.axial_profile.build(pair), cylinder.axial_profile.build(pair)
+    return AxialGap(*forms, roller.width, roller.radius)
+
+
+def check_axial(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Roller]:
+    """Add the mistakes of both forms; return the roller with the width of its form.
+
+    Parameters
+    ----------
+    mistakes : Mistakes
+    sections : mapping of str to object
+        The tables that have been read; None after mistakes in them.
+    """
+    roller, cylinder = sections["roller"], sections["cylinder"]
+    if roller is None or cylinder is None or not (roller.radius and cylinder.radius):
+        return {}
+    body = "cam" if sections.get("cam") is not None else "cylinder"
+    profile = _built(mistakes, "roller", roller.axial_profile, pair_of(roller, cylinder))
+    if profile is not None and math.isfinite(profile.length):
+        width, length = roller.width, profile.length
+        if width is None:
+            roller = roller.model_copy(update={"width": length})
+        elif width > _WIDER * length:
+            most = f"at most {1e3 * length:.6g} mm, the length of roller.axial_profile"
+            mistakes.add("roller", "width", "exceeds its profile", f"{1e3 * width:.6g} mm", most)
+    _built(mistakes, body, cylinder.axial_profile, pair_of(roller, cylinder))
+    return {"roller": roller}
+
+
+def _built(
+    mistakes: Mistakes, table: str, choice: AxialChoice, pair: AxialPair
+) -> AxialProfile | None:
+    """Return a profile, or None after adding the mistakes of its options."""
+    place = f"{table}.axial_profile"
+    try:
+        return choice.build(pair)
+    except ScenarioError as error:
+        files = {key: getattr(value, "path", None) for key, value in choice.options}
+        mistakes.add_file(error, place, key_of_file(files, error.file))
+    except QuantityError as error:
+        mistakes.add(place, "", error.what, error.got, error.expected)
+    except ValueError as error:
+        mistakes.add(place, "", str(error))
+    return None
+
+
+def described_form(choice: AxialChoice) -> str:
+    """Return a form in words: its name and the options that are given."""
+    texts = []
+    for key in sorted(choice.options.model_fields_set):
+        value, field = getattr(choice.options, key), type(choice.options).model_fields[key]
+        target = target_of(field)
+        if isinstance(value, float):
+            value = amount(value, target.quantity if target else None)
+        texts.append(f"{key} {getattr(value, 'path', value)}")
+    return ", ".join([choice.form, *texts])

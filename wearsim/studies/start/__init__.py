@@ -1,0 +1,1 @@
+"""Start profiles of a test: measured, or worn by an earlier one."""

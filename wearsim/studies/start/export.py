@@ -1,0 +1,211 @@
+"""Worn profiles of a test as the start profiles of another one: numerical running-in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.errors import ResultsFileError
+from wearsim.report.csv_files import path_in_folder, write_files
+from wearsim.scenario import Scenario
+from wearsim.scenario.parse.toml import apply_overrides, flat, parse_toml
+from wearsim.studies.run.assemble import merged_rollers
+from wearsim.studies.run.continuation import stored_scenario
+from wearsim.studies.run.draws import draw
+from wearsim.studies.run.inputs import contact_inputs
+from wearsim.studies.run.result import Result, RunData
+from wearsim.studies.start.heights import roller_profile, start_height
+from wearsim.types import FloatArray, Grid, Profile
+
+_OF_PROFILES = ("columns", "units", "row", "mean_rows", "at", "filter")
+
+
+class RunningIn(NamedTuple):
+    """Files of a scenario that starts from worn profiles, with what its user should know.
+
+    Parameters
+    ----------
+    paths : list of Path
+        The written files, the scenario first.
+    notes : list of str
+    """
+
+    paths: list[Path]
+    notes: list[str]
+
+
+def export_running_in(result: Result, folder: str | Path, *, force: bool = False) -> RunningIn:
+    """Write the worn profiles of a run as CSV, and a scenario that starts from them.
+
+    The scenario is that of the run, of the same length, with the start profiles of cylinder or cam
+    and rollers at the last record. A depth of the new test counts from these profiles.
+
+    Parameters
+    ----------
+    result : Result
+        Of one wear test.
+    folder : str or Path
+        Target folder, which is created if it does not exist.
+    force : bool
+        Overwrite existing files.
+
+    Returns
+    -------
+    RunningIn
+
+    Raises
+    ------
+    ResultsFileError
+        If the result is not that of one wear test, the folder cannot be written, or one of the
+        files exists and `force` is false; then no file is written.
+
+    Examples
+    --------
+    >>> result = wearsim.run("rig.toml")
+    >>> files = wearsim.export_running_in(result, "worn")
+    >>> [path.name for path in files.paths]
+    ['rig-worn.toml', 'cylinder-worn.csv']
+    >>> worn = wearsim.load_scenario(files.paths[0]).cylinder.profile
+    >>> print(f"{worn.height.min() * 1e6:.1f} um")
+    -48.1 um
+    """
+    if not isinstance(result, Result):
+        kind = type(result).__name__
+        raise ResultsFileError(
+            f"worn profiles are those of one wear test, from `wearsim run`, not of a {kind}"
+        )
+    data = result.raw
+    scenario = stored_scenario(data)
+    overrides: dict[str, object] = {"title": f"{scenario.title}, worn"}
+    contents: dict[str, str] = {}
+    if scenario.cam is None:
+        contents["cylinder-worn.csv"] = _profile_text(_cylinder(scenario, data))
+        overrides["cylinder.profile"] = "cylinder-worn.csv"
+    else:
+        contents["cam-worn.csv"] = _surface_text(scenario, data)
+        overrides["cam.start_profile"] = "cam-worn.csv"
+    profiles = _rollers(scenario, data)
+    names = [f"roller-{number}-worn.csv" for number in range(1, len(profiles) + 1)]
+    if len({profile.height.tobytes() for profile in profiles}) == 1:
+        profiles, names = profiles[:1], ["roller-worn.csv"]
+    if any(profile.height.any() for profile in profiles):
+        contents |= dict(zip(names, map(_profile_text, profiles), strict=True))
+        overrides["roller.profile"] = names if len(names) > 1 else names[0]
+    keys = _keys_of_texts(data.scenario_text)
+    for name, content in data.files.items():
+        key = keys.get(name, "")
+        if key in overrides or key not in {*keys.values()}:
+            continue  # a start profile of the run, which is replaced
+        copied = path_in_folder(name, contents)
+        contents[copied] = content
+        if copied != name:
+            overrides[key] = copied
+    removed = [f"cylinder.profile_{key}" for key in _OF_PROFILES]
+    text = apply_overrides(data.scenario_text, data.scenario_file, overrides, removed)
+    scenario_name = f"{Path(data.scenario_file).stem}-worn.toml"
+    paths = write_files(Path(folder), {scenario_name: [text], **_pieces(contents)}, force=force)
+    return RunningIn(paths, list(_notes(scenario, data)))
+
+
+def _pieces(contents: Mapping[str, str]) -> dict[str, list[str]]:
+    return {name: [text] for name, text in contents.items()}
+
+
+def _keys_of_texts(text: str) -> dict[str, str]:
+    """Return the dotted keys of the texts in a scenario, by text."""
+    found: dict[str, str] = {}
+    for key, value in flat(parse_toml(text, "scenario")):
+        texts = value if isinstance(value, list) else [value]
+        for item in texts:
+            inner = item.values() if isinstance(item, dict) else [item]
+            found |= {name: key for name in inner if isinstance(name, str)}
+    return found
+
+
+def _grid(data: RunData) -> Grid:
+    return Grid(data.static["y"], float(data.checkpoint["spacing"]))
+
+
+def _joined(y: FloatArray, height: FloatArray, earlier: Profile | None) -> Profile:
+    """Return a profile on strips, with an earlier profile where it reaches beyond them."""
+    if earlier is None:
+        return Profile(y, height)
+    before, after = earlier.y < y[0], earlier.y > y[-1]
+    places = np.concatenate([earlier.y[before], y, earlier.y[after]])
+    heights = np.concatenate([earlier.height[before], height, earlier.height[after]])
+    return Profile(places, heights)
+
+
+def _cylinder(scenario: Scenario, data: RunData) -> Profile:
+    """Return the worn profile of the cylinder."""
+    grid = _grid(data)
+    worn = data.records["cylinder_depth_profile"][-1, 0, 0]
+    return _joined(grid.y, start_height(scenario, grid) - worn, scenario.cylinder.profile)
+
+
+def _rollers(scenario: Scenario, data: RunData) -> list[Profile]:
+    """Return the worn profiles of all rollers, from their apexes."""
+    draws, count = draw(scenario), scenario.operation.rollers
+    groups, _ = merged_rollers(draws)
+    drawn = {name: values[:, None] for name, values in draws.rollers.items()}
+    offsets = contact_inputs(draws.scenario, range(count), drawn)["offset"]
+    settings = [_settings(draws.scenario, number) for number in range(count)]
+    y, worn = data.static["y"], data.records["roller_depth_profile"][-1, :, 0]
+    found = []
+    for number in range(count):
+        same = [k for k, first in enumerate(groups) if settings[first] == settings[number]]
+        place = groups.index(number) if number in groups else same[0]
+        s, earlier = y - offsets[number, 0], roller_profile(scenario, number)
+        start = 0.0 if earlier is None else np.interp(s, earlier.y, earlier.height)
+        found.append(_joined(s, start - worn[place], earlier))
+    return found
+
+
+def _settings(scenario: Scenario, number: int) -> tuple[object, ...]:
+    """Return what distinguishes rollers, as `merged_rollers` compares it."""
+    creepage = scenario.creepage
+    values = scenario.roller.offset, creepage.yaw, creepage.tilt
+    rows = (scenario.per_roller(value)[number] for value in values)
+    return (*rows, roller_profile(scenario, number))
+
+
+def _profile_text(profile: Profile) -> str:
+    """Return a profile as CSV, with all digits."""
+    rows = zip((1e3 * profile.y).tolist(), (1e6 * profile.height).tolist(), strict=True)
+    return "".join(["y [mm],height [um]\n", *(f"{y!r},{z + 0.0!r}\n" for y, z in rows)])
+
+
+def _surface_text(scenario: Scenario, data: RunData) -> str:
+    """Return the worn surface of a cam as CSV, with all digits."""
+    grid, angle = _grid(data), np.ravel(data.static["station_angle"])
+    worn = data.records["cylinder_depth_profile"][-1, :, 0]
+    height = start_height(scenario, grid, angle) - worn
+    y = (1e3 * grid.y).tolist()
+    rows = (
+        f"{math.degrees(place)!r},{at!r},{z + 0.0!r}\n"
+        for place, row in zip(angle.tolist(), (1e6 * height).tolist(), strict=True)
+        for at, z in zip(y, row, strict=True)
+    )
+    return "".join(["angle [deg],y [mm],height [um]\n", *rows])
+
+
+def _notes(scenario: Scenario, data: RunData) -> Iterator[str]:
+    """Yield what differs between the new test and the continuation of the old one."""
+    load = scenario.load.build()
+    passes, total = float(data.records["record_passes"][-1]), data.total_passes
+    if passes < total:
+        yield f"the profiles are those after {passes:.0f} of {total:.0f} passes"
+    feedback = getattr(load, "feedback", "none") != "none"
+    if load.stiffness or feedback:
+        yield (
+            "the load of the new scenario is that of the old one at its start: it falls with the"
+            " wear of the new test alone"
+        )
+    if not load.constant or scenario.load.terms:
+        yield "the load begins again at time 0"
+    if any(item.role == "process" for item in scenario.random):
+        yield "random processes begin again at time 0"

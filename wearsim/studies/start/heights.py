@@ -1,0 +1,99 @@
+"""Heights of the bodies above their nominal shapes at the start of a test."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.scenario import Scenario
+from wearsim.types import FloatArray, Grid, Profile
+
+
+class StartExtent(NamedTuple):
+    """Extent of the start profiles of a scenario.
+
+    Parameters
+    ----------
+    low, high : float
+        Outer positions of the profiles on the track [m].
+    relief : float
+        Greatest less least height, of roller and cylinder together [m].
+    """
+
+    low: float
+    high: float
+    relief: float
+
+
+def start_extent(scenario: Scenario) -> StartExtent | None:
+    """Return the extent of the start profiles, or None if there is none."""
+    cylinder, roller = scenario.cylinder, scenario.roller
+    ends, relief = [], 0.0
+    if cylinder.profile is not None:
+        ends.append((cylinder.profile.y, 0.0))
+        relief += float(np.ptp(cylinder.profile.height))
+    if cylinder.start_surface is not None:
+        ends.append((cylinder.start_surface.y, 0.0))
+        relief += float(np.ptp(cylinder.start_surface.height, axis=1).max())
+    for number, offset in enumerate(scenario.per_roller(roller.offset)):
+        profile = roller_profile(scenario, number)
+        if profile is not None:
+            ends.append((profile.y, offset))
+    relief += max((float(np.ptp(profile.height)) for profile in roller.profiles), default=0.0)
+    if not ends:
+        return None
+    low = min(float(y[0]) + offset for y, offset in ends)
+    return StartExtent(low, max(float(y[-1]) + offset for y, offset in ends), relief)
+
+
+def roller_profile(scenario: Scenario, number: int) -> Profile | None:
+    """Return the start profile of a roller by its number."""
+    profiles = scenario.roller.profiles
+    return profiles[min(number, len(profiles) - 1)] if profiles else None
+
+
+def start_height(scenario: Scenario, grid: Grid, angles: FloatArray | None = None) -> FloatArray:
+    """Return the height of the cylinder or the cam above nominal before wear.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    grid : Grid
+    angles : ndarray, shape (stations,), optional
+        Angles of a cam [rad].
+
+    Returns
+    -------
+    ndarray, shape (strips,), or (stations, strips) with angles
+        [m].
+    """
+    profile, surface = scenario.cylinder.profile, scenario.cylinder.start_surface
+    if surface is not None and angles is not None:
+        return surface.at(angles, grid.y)
+    height = np.zeros_like(grid.y)
+    if profile is not None:
+        height = np.interp(grid.y, profile.y, profile.height)
+    return height if angles is None else np.broadcast_to(height, (len(angles), len(height)))
+
+
+def roller_height(scenario: Scenario, rollers: Sequence[int], s: FloatArray) -> FloatArray | float:
+    """Return the height of rollers above nominal before wear, 0 without start profiles [m].
+
+    Parameters
+    ----------
+    scenario : Scenario
+    rollers : sequence of int
+        Numbers of the rollers.
+    s : ndarray, shape (rollers, realisations, strips)
+        Axial distance from the apex [m].
+    """
+    if not scenario.roller.profiles:
+        return 0.0
+    found = np.empty_like(s)
+    for place, number in enumerate(rollers):
+        profile = roller_profile(scenario, number)
+        assert profile is not None
+        found[place] = np.interp(s[place], profile.y, profile.height)
+    return found
