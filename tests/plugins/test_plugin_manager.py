@@ -51,7 +51,7 @@ def test_every_kind_of_spec_is_registered():
 
     specs = (
         *(ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec),
-        *(AxialProfileSpec, StudyKind),
+        *(FatigueLawSpec, AxialProfileSpec, StudyKind),
     )
     kinds = dict(zip(HOOKS, specs, strict=True))
     plugins = Registry([Point(module(**{hook: of(kind) for hook, kind in kinds.items()}))])

@@ -110,6 +110,9 @@ def scenario_schema() -> dict[str, Any]:
             fatigue = _fatigue_laws()
             given = {body: model.model_fields[body].description for body in BODIES}
             keys |= {body: (fatigue, Field(None, description=t)) for body, t in given.items()}
+            keys = (
+                keys if fatigue else {key: kept for key, kept in keys.items() if key not in given}
+            )
         if "axial_profile" in keys:
             described = Field(None, description=model.model_fields["axial_profile"].description)
             keys["axial_profile"] = str | _axial_profiles(table, random), described
