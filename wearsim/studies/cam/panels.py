@@ -43,7 +43,7 @@ from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.fatigue.panels import pitting_panel
-from wearsim.studies.fatigue.view import has_fatigue
+from wearsim.studies.fatigue.view import has_fatigue, source_line
 from wearsim.studies.run.panels import (
     HEIGHT,
     Y,
@@ -229,7 +229,7 @@ def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
         rows.insert(2, ["damage", "damage", "pitting"])
         heights.insert(2, 1.2)
     return Sheet(
-        f"{result.title}\n{_caption(result)}",
+        f"{result.title}\n{_caption(result)}{source_line(result)}",
         panels,
         rows,
         (12.5, 3.0 * sum(heights)),

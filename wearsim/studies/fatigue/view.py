@@ -73,3 +73,9 @@ def sources(scenario: Scenario | None) -> dict[str, str]:
 def sources_of(result: Result) -> dict[str, str]:
     """Return the sources of the constants of fatigue of a run by body."""
     return sources(_scenario(result)) if has_fatigue(result) else {}
+
+
+def source_line(result: Result) -> str:
+    """Return fatigue laws and sources of a run as a further line of a figure; else nothing."""
+    rows = source_rows(_scenario(result)) if has_fatigue(result) else []
+    return "".join(f"\n{row.label}: {row.text}" for row in rows)

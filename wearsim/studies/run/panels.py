@@ -29,7 +29,7 @@ from wearsim.report.panels import (
 from wearsim.report.text import count, shown, simulated
 from wearsim.report.view import width_row
 from wearsim.studies.fatigue.panels import damage_panel, pitting_panel
-from wearsim.studies.fatigue.view import has_fatigue
+from wearsim.studies.fatigue.view import has_fatigue, source_line
 from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray
 
@@ -53,7 +53,7 @@ def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
         panels |= {"damage": damage_panel(result), "pitting": pitting_panel(result)}
         rows, height = [*rows, ["damage", "pitting"]], 11.0
     return Sheet(
-        f"{result.title}\n{caption(result)}",
+        f"{result.title}\n{caption(result)}{source_line(result)}",
         panels,
         rows,
         (11.0, height),
