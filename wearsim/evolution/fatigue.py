@@ -173,8 +173,9 @@ def effective_of_rows(problem: WearProblem, rows: FloatArray) -> FloatArray:
     if fatigue.reference_area is not None:
         weighted = problem.volume_weights[1][:, None] * rows / fatigue.reference_area
     else:
-        bodies = rows[..., :-rollers, :].max(axis=-2), rows[..., -rollers:, :]
-        multiplicity = problem.kinematics.multiplicity[:, None]
-        each = bodies[0][..., None, :], multiplicity ** (1.0 / fatigue.slope) * bodies[1]
-        weighted = np.concatenate(each, axis=-2) ** fatigue.slope
+        if rows.shape[-2] > 1 + rollers:  # the cylinder has a single damage
+            cylinder = rows[..., :-rollers, :].max(axis=-2, keepdims=True)
+            rows = np.concatenate([cylinder, rows[..., -rollers:, :]], axis=-2)
+        weighted = rows**fatigue.slope
+        weighted[..., -rollers:, :] *= problem.kinematics.multiplicity[:, None]
     return np.asarray(sum_in_order(weighted, axis=-2) ** (1.0 / fatigue.slope))
