@@ -12,7 +12,15 @@ from wearsim import load_scenario, run
 from wearsim.report.text import OBSERVABLES as LABELS, si_key
 from wearsim.scenario.examples import scenario_schema
 from wearsim.studies.dissipation.result import VARIABLES as DISSIPATION
-from wearsim.studies.ensemble.file.schema import ANGLE, CAM_OBSERVABLES, ENSEMBLE, LIFE, STATISTICS
+from wearsim.studies.ensemble.file.schema import (
+    ANGLE,
+    CAM_OBSERVABLES,
+    ENSEMBLE,
+    FATIGUE_OBSERVABLES,
+    LIFE,
+    LIFE_FATIGUE,
+    STATISTICS,
+)
 from wearsim.studies.run.schema import ALL_VARIABLES as RUN
 
 ROOT = Path(__file__).parents[1]
@@ -70,7 +78,7 @@ def test_scenario_keys_of_the_glossary_exist():
 
 def test_file_variables_and_glossary_agree():
     stored = {*RUN, *DISSIPATION, *ENSEMBLE.variables, *LIFE, "control"} - set(STATISTICS)
-    stored |= {*CAM_OBSERVABLES, ANGLE.name}
+    stored |= {*CAM_OBSERVABLES, *FATIGUE_OBSERVABLES, *LIFE_FATIGUE, ANGLE.name}
     stored -= {name for name in DISSIPATION if name.startswith("dissipation_")}
     assert stored == set(names("file variable"))
 

@@ -128,6 +128,8 @@ DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3")
 
 MASS_PER_ENERGY = Kind("a mass per energy", "kg/J", "5.3 ug/J")
 
+AREA = Kind("an area", "m^2", "10 mm^2")
+
 VOLUME = Kind("a volume", "m^3", "10 mm^3")
 
 MASS = Kind("a mass", "kg", "0.5 kg")
@@ -143,7 +145,7 @@ TORSIONAL_STIFFNESS = Kind("a torsional stiffness", "N m/rad", "32 N m/rad")
 _KINDS = (
     *(LENGTH, FORCE, STIFFNESS, PRESSURE, WEAR_FACTOR, ROTATION_SPEED, DURATION, ANGLE, TORQUE),
     *(SPEED, PER_POWER, DENSITY, MASS_PER_ENERGY, MASS, INERTIA, TORSIONAL_STIFFNESS, VISCOSITY),
-    Kind("an area", "m^2", "10 mm^2"),
+    AREA,
     VOLUME,
     Kind("a power", "W", "0.07 W"),
     Kind("a frequency", "1/s", "16 turn/s"),

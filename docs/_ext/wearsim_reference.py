@@ -20,7 +20,12 @@ from wearsim.results.content import Schema, Variable
 from wearsim.scenario.examples import scenario_schema
 from wearsim.studies.dissipation.result import DISSIPATION
 from wearsim.studies.ensemble.file.schema import ENSEMBLE
-from wearsim.studies.run.schema import CAM_VARIABLES, RUN
+from wearsim.studies.run.schema import (
+    CAM_FATIGUE_VARIABLES,
+    CAM_VARIABLES,
+    FATIGUE_VARIABLES,
+    RUN,
+)
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -275,6 +280,8 @@ def result_files() -> str:
         parts.append(_variables(schema.variables))
         if schema is RUN:
             parts.append("### Further variables of a cam\n\n" + _variables(CAM_VARIABLES))
+            fatigue = {**FATIGUE_VARIABLES, **CAM_FATIGUE_VARIABLES}
+            parts.append("### Further variables with fatigue\n\n" + _variables(fatigue))
     return "\n".join(parts)
 
 

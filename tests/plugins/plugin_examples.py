@@ -17,6 +17,7 @@ HOOKS = (
     "wearsim_loads",
     "wearsim_random_inputs",
     "wearsim_motion_laws",
+    "wearsim_fatigue_laws",
     "wearsim_axial_profiles",
     "wearsim_study_kinds",
     "wearsim_tables",

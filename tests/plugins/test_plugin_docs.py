@@ -21,6 +21,7 @@ from wearsim.plugins import (
     AxialProfileSpec,
     Capabilities,
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     RandomInputSpec,
@@ -28,12 +29,13 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
-from wearsim.plugins.manager import HookSpecs
+from wearsim.plugins.hooks import HookSpecs
 from wearsim.scenario.examples import scenario_schema
 from wearsim.testing import random_inputs
 from wearsim.testing.axial_profiles import AXIAL_PROFILE, AxialProfileFixture
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
+from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
 from wearsim.testing.kit import CONTACT_MODEL
 from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
@@ -172,6 +174,15 @@ def test_documented_motion_law_passes_the_checks(documented):
     assert 'law = "power"' in tables["cam"]
     spec = registry().get(MotionLawSpec, "power")
     run_checks(MOTION_LAW, MotionLawFixture(ConfiguredSpec(spec, {"order": 4})))
+
+
+def test_documented_fatigue_law_passes_the_checks(documented):
+    tables = documented("wearsim_fatigue_laws")
+    scenario = rig(**tables)
+    (law,) = scenario.fatigue.laws.values()
+    spec = registry().get(FatigueLawSpec, law.law)
+    options = {"passes": 1e7, "knee": "1 GPa"}
+    run_checks(FATIGUE_LAW, FatigueLawFixture(ConfiguredSpec(spec, options)))
 
 
 def test_documented_axial_profile_passes_the_checks_and_runs(documented):

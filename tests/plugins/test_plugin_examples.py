@@ -17,6 +17,7 @@ import wearsim
 from wearsim.errors import ScenarioError
 from wearsim.plugins import (
     AxialProfileSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     RandomInputSpec,
@@ -24,11 +25,12 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
-from wearsim.plugins.manager import HookSpecs
+from wearsim.plugins.hooks import HookSpecs
 from wearsim.results.viewed import study_kinds
 from wearsim.testing import random_inputs
 from wearsim.testing.axial_profiles import AXIAL_PROFILE, AxialProfileFixture
 from wearsim.testing.checks import ConfiguredSpec
+from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
 from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
 from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
@@ -156,6 +158,13 @@ def test_example_of_a_motion_law_runs(example):
     example("wearsim_motion_laws")
     fixture = MotionLawFixture(ConfiguredSpec(registry().get(MotionLawSpec, "cosine")))
     for check in MOTION_LAW.values():
+        check(fixture)
+
+
+def test_example_of_a_fatigue_law_passes_the_checks(example):
+    example("wearsim_fatigue_laws")
+    fixture = FatigueLawFixture(ConfiguredSpec(registry().get(FatigueLawSpec, "ninth-power")))
+    for check in FATIGUE_LAW.values():
         check(fixture)
 
 

@@ -14,6 +14,7 @@ from wearsim.errors import PluginError, ScenarioError
 from wearsim.plugins import (
     AxialProfileSpec,
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     Options,
@@ -50,7 +51,7 @@ def test_every_kind_of_spec_is_registered():
 
     specs = (
         *(ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec),
-        *(AxialProfileSpec, StudyKind),
+        *(FatigueLawSpec, AxialProfileSpec, StudyKind),
     )
     kinds = dict(zip(HOOKS, specs, strict=True))
     plugins = Registry([Point(module(**{hook: of(kind) for hook, kind in kinds.items()}))])
@@ -171,6 +172,7 @@ def test_spec_of_another_protocol_is_listed_and_refused_when_selected(
         ("wearsim_loads", LoadSpec),
         ("wearsim_random_inputs", RandomInputSpec),
         ("wearsim_motion_laws", MotionLawSpec),
+        ("wearsim_fatigue_laws", FatigueLawSpec),
         ("wearsim_axial_profiles", AxialProfileSpec),
     ],
 )

@@ -17,6 +17,7 @@ from wearsim.plugins.template import clash, renamed, template_folder, write_plug
 from wearsim.testing import axial_profile_tests, contact_model_tests
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
+from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
 from wearsim.testing.kit import CONTACT_MODEL
 from wearsim.testing.study_kinds import STUDY_KIND, StudyKindFixture
 
@@ -35,6 +36,17 @@ def load_template():
 
 test_winkler = contact_model_tests(load_template().SPEC)
 test_winkler_quartic = axial_profile_tests(load_template().FORM, {"length": "10 mm"})
+
+
+def test_fatigue_law_of_the_readme_conforms():
+    blocks = (FOLDER / "README.md").read_text().split("```python\n")[1:]
+    (code,) = [block.split("```")[0] for block in blocks if "class NinthPower" in block]
+    names = {"ws": wearsim.plugins}
+    exec(code, names)
+    (spec,) = names["wearsim_fatigue_laws"]()
+    fixture = FatigueLawFixture(ConfiguredSpec(spec, {"passes": 2e6}))
+    for check in FATIGUE_LAW.values():
+        check(fixture)
 
 
 @pytest.fixture

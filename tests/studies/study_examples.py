@@ -72,6 +72,13 @@ ROLLERS: dict[str, dict[str, object]] = {
     "offset": {"roller.offset": ["-1 mm", "0.3 mm", "1 mm"], "contact.width": "7 mm"},
     "wearing": {"wear.roller.k_over_h": "1e-11 1/Pa"},
 }
+PITTING = {
+    "law": "pressure-life",
+    "source": "a test",
+    "reference_passes": 1e6,
+    "reference_pressure": "700 MPa",
+    "exponent": 8.0,
+}
 OTHERS: dict[str, dict[str, object]] = {
     "hertz-fastsim": {
         "contact.model": "hertz-fastsim",
@@ -89,6 +96,11 @@ OTHERS: dict[str, dict[str, object]] = {
     },
     "log spacing": {"outputs.records": 30, "outputs.spacing": "log"},
     "forced steps": {"evolution.step": 700},
+    "fatigue": {"fatigue": {"slope": 1.125, "cylinder": PITTING, "roller": PITTING}},
+    "fatigue under a log, removed by wear": {
+        "fatigue": {"slope": 1.125, "remove": True, "cylinder": PITTING},
+        "load": {"kind": "recorded", "file": "load.csv"},
+    },
 }
 
 

@@ -218,7 +218,8 @@ class Evolution:
 
         def attempt(places: IntArray) -> Attempt:
             some = problem.at(places), state.at(places), lengths[places]
-            return _finite(self.stepper.attempt(*some, self.stop, scheme))
+            tried = _finite(self.stepper.attempt(*some, self.stop, scheme))
+            return self.stepper.with_damage(*some[:2], tried) if problem.fatigue else tried
 
         resting = self._resting()
         done, failed = bisect_failures(attempt, (~resting).nonzero()[0])

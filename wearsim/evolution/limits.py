@@ -11,17 +11,19 @@ import numpy as np
 
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution import observables
+from wearsim.evolution.fatigue import effective_damage, fatigue_of
 from wearsim.evolution.integrate import Advance
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
 from wearsim.quantities import NUMBER, quantity
 from wearsim.types import FloatArray, IntArray
-from wearsim.units import QuantityError
+from wearsim.units import QuantityError, as_written
 
 _EXAMPLES = (
     '"depth 50 um", "roller depth 5 um", "lift error 30 um", "volume 12 mm^3", "width 14 mm",'
-    ' "peak pressure 900 MPa", "clearance 60 um", "12 h" or "2e6 passes"'
+    ' "peak pressure 900 MPa", "clearance 60 um", "damage 1", "12 h" or'
+    ' "2e6 passes"'
 )
 _LOCATED = 1e-9  # relative error of the quantity at a limit
 _MOST_TRIALS = 100
@@ -37,6 +39,8 @@ _QUANTITIES: dict[str, tuple[str, str]] = {
     "width": ("m", "width"),
     "peak pressure": ("Pa", "peak_pressure"),
     "clearance": ("m", "descent"),
+    "damage": ("1", "damage"),
+    "pitting": ("1", "pitting"),
     "time": ("s", "time"),
     "passes": ("1", "passes"),
 }
@@ -48,9 +52,21 @@ _VALUES: dict[str, Callable[[WearProblem, WearState], FloatArray]] = {
     "lift error": observables.lift_error,
     "volume": observables.volume,
     "clearance": observables.clearance,
+    "damage": lambda problem, state: damage_of(problem, state),  # noqa: PLW0108  (defined below)
+    "pitting": lambda problem, state: fatigue_of(problem).pitting(damage_of(problem, state)),
     "time": lambda problem, state: problem.time(state.passes),
     "passes": lambda problem, state: state.passes,
 }
+
+
+#: quantities of tests with fatigue
+OF_FATIGUE = "damage", "pitting"
+
+
+def damage_of(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the effective damage of the tests of a state with fatigue, (realisations,)."""
+    assert state.damage is not None
+    return effective_damage(problem, state.damage[0])
 
 
 @dataclass(frozen=True)
@@ -62,8 +78,8 @@ class Limit:
     quantity : str
         Greatest worn depth of the cylinder, "depth", or of a roller, "roller depth" [m]; "lift
         error" of a cam, peak to peak [m]; worn "volume" of the cylinder [m^3]; "width" of the
-        groove [m]; "peak pressure" [Pa]; "clearance", the worn descent of a roller [m]; simulated
-        "time" [s]; roller "passes".
+        groove [m]; "peak pressure" [Pa]; "clearance", the worn descent of a roller [m]; effective
+        "damage" by fatigue, and probability of "pitting"; simulated "time" [s]; roller "passes".
     value : float
         The limit, in SI.
     text : str
@@ -102,15 +118,16 @@ class Limit:
                 raise ValueError(f"'{text}' is not a whole number of passes")
         elif parts and kind in {"", *_QUANTITIES} - {"passes"}:
             try:
-                value = quantity(parts[2], _QUANTITIES[kind or "time"][0])
+                value = _value(parts[2], _QUANTITIES[kind or "time"][0])
             except QuantityError as error:
                 what = f": {error}" if kind else f", expected one such as {_EXAMPLES}"
                 raise ValueError(f"'{text}' is not a limit{what}") from error
             kind = kind or "time"
         else:
             raise ValueError(f"'{text}' is not a limit, expected one such as {_EXAMPLES}")
-        if not 0.0 < value < np.inf:
-            raise ValueError(f"'{text}' is not a limit: it must be above zero")
+        if not 0.0 < value < (1.0 if kind == "pitting" else np.inf):
+            below = " and below one" if kind == "pitting" else ""
+            raise ValueError(f"'{text}' is not a limit: it must be above zero{below}")
         return cls(kind, value, words)
 
     @property
@@ -154,6 +171,15 @@ class Limit:
         """
         found = first_crossings((self,), stepper, advance, np.array([place]))
         return found[0].state if found else None
+
+
+def _value(text: str, unit: str) -> float:
+    """Return the value of a limit in SI; a plain number has no unit."""
+    if unit != "1":
+        return quantity(text, unit)
+    if not NUMBER.fullmatch(text):
+        raise QuantityError("is not a plain number", as_written(text), "a number without unit")
+    return float(text)
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import BoolArray, FloatArray, Grid, IntArray
 
 if TYPE_CHECKING:
+    from wearsim.evolution.fatigue import Fatigue
     from wearsim.evolution.strips import Growth
 
 FREE = 0.075  # part of all strips that is without load on each side, at least
@@ -94,6 +95,8 @@ class WearProblem:
         known before the test.
     growth : tuple of Growth
         How the strips of each realisation grow with its groove; none where they do not.
+    fatigue : Fatigue, optional
+        Fatigue of the bodies.
     """
 
     grid: Grid
@@ -117,6 +120,7 @@ class WearProblem:
     passes_per_draw: float = 1.0
     quadrature_error: float = 0.0
     growth: tuple[Growth, ...] = ()
+    fatigue: Fatigue | None = None
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:

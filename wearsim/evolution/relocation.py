@@ -127,7 +127,10 @@ def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamSta
         )
     )
     depth = moved_depth(state.cylinder_depth[old.places], old.along, new.along)
+    damage, points = _moved_damage(state, old, new)
     found = state.replaced(
+        damage=damage,
+        damage_points=points,
         cylinder_depth=depth,
         contacts=fresh.contacts,
         approach_factor=fresh.approach_factor,
@@ -153,6 +156,22 @@ def _moved_errors(
     matrix, _, _ = moved_stations(old.panels, new.panels)
     cylinder = np.tensordot(matrix, errors[:stations][places], axes=1)
     return np.concatenate([cylinder, errors[stations:]])
+
+
+def _moved_damage(
+    state: WearState, old: CamStations, new: CamStations
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return damage at new stations, interpolated along the angle, and the points of its rates."""
+    if state.damage is None or state.damage_points is None:
+        return None, None
+    assert old.along.panels is not None
+    assert new.along.panels is not None
+    matrix, _, _ = moved_stations(old.along.panels, new.along.panels)
+    stations = len(state.cylinder_depth)
+    cylinder = state.damage[:, :stations][:, old.places]
+    moved = np.maximum(np.moveaxis(np.tensordot(matrix, cylinder, axes=(1, 1)), 0, 1), 0.0)
+    points = np.stack([np.full_like(state.damage_points[0], np.nan), state.damage_points[1]])
+    return np.concatenate([moved, state.damage[:, stations:]], axis=1), points
 
 
 def moved_depth(depth: FloatArray, old: CamStations, new: CamStations) -> FloatArray:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import CapabilityError
 from wearsim.evolution.contacts import unworn_contacts
+from wearsim.evolution.fatigue import fresh_damage
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import is_every
 from wearsim.types import FloatArray, IntArray
@@ -58,6 +59,8 @@ _AXES = {
     "order": 0,
     "skid_loads": 2,
     "stepping_error": 1,
+    "damage": 2,
+    "damage_points": 1,
 }
 
 
@@ -143,6 +146,11 @@ class WearState:
         the skids were last located, see `relocation` [N]; none before wear has changed them.
     stepping_error : ndarray, shape (stations + rollers, realisations, strips), optional
         Estimated error of the depths of cylinder and rollers, computed less true ones [m].
+    damage : ndarray, shape (4, stations + rollers, realisations, strips), optional
+        Where the bodies may pit, the damage of cylinder and rollers, its error by the integration
+        over the passes, and damage per roller pass at present and at the point before.
+    damage_points : ndarray, shape (2, realisations), optional
+        Roller passes at the point before, and those that wear off the elastic approach.
     """
 
     passes: FloatArray
@@ -178,6 +186,8 @@ class WearState:
     order: IntArray | None = None
     skid_loads: FloatArray | None = None
     stepping_error: FloatArray | None = None
+    damage: FloatArray | None = None
+    damage_points: FloatArray | None = None
 
     @property
     def depths(self) -> Depths:
@@ -318,6 +328,7 @@ def fresh_state(problem: WearProblem) -> WearState:
     zeros, counts = np.zeros(realisations), np.zeros(realisations, dtype=np.int64)
     problem = problem.at_time(zeros, zeros)
     n, solved = problem.grid.strips, problem.model.solve(unworn_contacts(problem))
+    damage = fresh_damage(problem, solved) if problem.fatigue else (None, None)
     return WearState(
         passes=zeros,
         cylinder_depth=np.zeros((stations, 1, realisations, n)),
@@ -336,6 +347,8 @@ def fresh_state(problem: WearProblem) -> WearState:
         solves=counts + stations * contacts,
         full_solves=counts,
         approach_factor=_approach_factor(problem, solved) if problem.has_spring else None,
+        damage=damage[0],
+        damage_points=damage[1],
     )
 
 

@@ -217,7 +217,10 @@ def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearStat
         Strips of the state.
     """
     new, contacts = problem.grid, state.contacts
-    names = "past_wear", "stepping_error", "wear_exponents", "cylinder_depth", "roller_depth"
+    names = (
+        *("past_wear", "stepping_error", "wear_exponents", "cylinder_depth", "roller_depth"),
+        "damage",
+    )
     arrays = {
         name: averaged(values, old, new)
         for name in names

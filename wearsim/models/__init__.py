@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from wearsim.models import axial, loads, motion, wear
+from wearsim.models import axial, fatigue, loads, motion, wear
 from wearsim.models.contact import hertz as hertz_model, hertz_fastsim, slender, strip_model
 from wearsim.models.random import distributions, mixture, posterior, varying
 from wearsim.plugins import (
     AxialProfileSpec,
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     RandomInputSpec,
@@ -46,6 +47,12 @@ def wearsim_random_inputs() -> Iterable[RandomInputSpec]:
 def wearsim_motion_laws() -> Iterable[MotionLawSpec]:
     """Yield the built-in motion laws of cams."""
     return motion.SPECS
+
+
+@hookimpl
+def wearsim_fatigue_laws() -> Iterable[FatigueLawSpec]:
+    """Yield the built-in fatigue laws."""
+    return fatigue.SPECS
 
 
 @hookimpl

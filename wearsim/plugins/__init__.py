@@ -11,22 +11,22 @@ from wearsim.plugins.contact_model import (
     SingleContactModel,
     refuse_unclaimed,
 )
-from wearsim.plugins.manager import hookimpl, registry
+from wearsim.plugins.hooks import hookimpl
+from wearsim.plugins.laws import BODIES, Body, FatigueLaw, MotionLaw, WearLaw
+from wearsim.plugins.manager import registry
 from wearsim.plugins.specs import (
-    BODIES,
     AxialPair,
     AxialProfile,
     AxialProfileSpec,
-    Body,
     ContactModelSpec,
     Distribution,
+    FatigueLawSpec,
     Frame,
     FrictionField,
     JointDistribution,
     Load,
     LoadSpec,
     LoadTerm,
-    MotionLaw,
     MotionLawSpec,
     Options,
     Process,
@@ -35,7 +35,6 @@ from wearsim.plugins.specs import (
     StudyKind,
     TableSpec,
     Uniforms,
-    WearLaw,
     WearLawSpec,
 )
 from wearsim.quantities import (
@@ -69,6 +68,8 @@ __all__ = [
     "ContactModel",
     "ContactModelSpec",
     "Distribution",
+    "FatigueLaw",
+    "FatigueLawSpec",
     "Field",
     "Frame",
     "FrictionField",

@@ -1,4 +1,4 @@
-"""Base classes of wear and motion laws, loads, axial profiles and random inputs; all specs."""
+"""Base classes of laws, loads and random inputs that plugins add, and the specs of all hooks."""
 
 from __future__ import annotations
 
@@ -13,13 +13,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from wearsim.plugins.contact_model import Capabilities, ContactModel
-from wearsim.types import ContactSolution, FloatArray, Grid, Material
+from wearsim.plugins.laws import FatigueLaw, MotionLaw, WearLaw
+from wearsim.types import FloatArray, Grid, Material
 from wearsim.uq.distributions.base import Distribution as Distribution  # noqa: PLC0414  (exported)
-
-Body: TypeAlias = Literal["cylinder", "roller"]
-
-BODIES: tuple[Body, ...] = ("cylinder", "roller")
-
 
 _NO_TIMES: FloatArray = np.zeros((0, 2))
 _NO_TIMES.flags.writeable = False
@@ -29,20 +25,6 @@ Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
 Uniforms: TypeAlias = Callable[[int, int], FloatArray]
 Materials: TypeAlias = tuple[Material, Material]
 SuggestGrid: TypeAlias = Callable[[Any, float, float, float, Materials], Grid | None]
-
-
-class WearLaw(ABC):
-    """Wear of both bodies as a function of a solved contact."""
-
-    @abstractmethod
-    def depth_per_pass(
-        self, body: Body, solution: ContactSolution, rolling_speed: float
-    ) -> FloatArray:
-        """Return the depth worn off `body` in one pass, shape (strips,) [m]."""
-
-    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float | None:
-        """Return depth per pass over dissipation [m/(W/m)], or None if the law is not linear."""
-        return None
 
 
 class Load(ABC):
@@ -110,27 +92,6 @@ class LoadTerm(ABC):
         The compiled per-pass loop supports first-order lags only; other terms need Python.
         """
         return None
-
-
-class MotionLaw(ABC):
-    """Motion of a follower over one segment of a cam's turn.
-
-    `breaks` are the angles from the segment's start [rad] where a derivative above the second
-    jumps; the second derivative is continuous within a segment.
-    """
-
-    breaks: tuple[float, ...] = ()
-
-    @abstractmethod
-    def lift(self, angle: FloatArray) -> FloatArray:
-        """Return lift and derivatives at angles from the segment's start [rad], shape (points,).
-
-        Returns
-        -------
-        ndarray, shape (3, points)
-            Lift above that at the segment's start [m, or rad of a swinging arm], and its first and
-            second derivative by the angle.
-        """
 
 
 @dataclass(frozen=True)
@@ -370,6 +331,22 @@ class LoadSpec(Spec):
 
     factory: Callable[[Any], Load | LoadTerm] = field(kw_only=True)
     role: Literal["base", "term"] = "base"
+
+
+@dataclass(frozen=True)
+class FatigueLawSpec(Spec):
+    """Spec of a fatigue law, selected by the key `law` of a body in the table [fatigue].
+
+    Parameters
+    ----------
+    factory : callable
+        ``factory(options, contact_modulus)`` returns a FatigueLaw for bodies with the contact
+        modulus E* [Pa].
+    """
+
+    kind: ClassVar[str] = "fatigue law"
+
+    factory: Callable[[Any, float], FatigueLaw] = field(kw_only=True)
 
 
 @dataclass(frozen=True)

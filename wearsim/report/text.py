@@ -151,7 +151,7 @@ class Named(NamedTuple):
     @property
     def label(self) -> str:
         """Name with the unit, for an axis or a table."""
-        return f"{self.words} [{self.unit}]"
+        return self.words if self.unit == "1" else f"{self.words} [{self.unit}]"
 
     @property
     def per_si(self) -> float:
@@ -159,7 +159,7 @@ class Named(NamedTuple):
         return PER_SI[self.unit]
 
 
-#: observables of an ensemble by name; the last four are of cams
+#: observables of an ensemble by name; the last ones are of cams and of fatigue
 OBSERVABLES: Mapping[str, Named] = {
     "depth": Named("depth", "um"),
     "width": Named("width", "mm"),
@@ -175,17 +175,23 @@ OBSERVABLES: Mapping[str, Named] = {
     "lift_error_angle": Named("angle of the lift error", "deg"),
     "depth_angle": Named("angle of the depth", "deg"),
     "peak_pressure_angle": Named("angle of the peak pressure", "deg"),
+    "damage": Named("effective damage", "1"),
+    "pitting": Named("probability of pitting", "1"),
+    "cylinder_damage": Named("damage of the cylinder", "1"),
+    "roller_damage": Named("damage of the rollers", "1"),
 }
 
 
 def si_unit(name: str) -> str:
     """Return the SI unit of an observable, "m3" for a volume."""
-    return _SI[OBSERVABLES[name].unit]
+    unit = OBSERVABLES[name].unit
+    return _SI.get(unit, unit)
 
 
 def si_key(name: str) -> str:
     """Return the name of an observable with its SI unit, for JSON: "worn_volume_m3"."""
-    return f"{name}_{si_unit(name)}"
+    unit = si_unit(name)
+    return name if unit == "1" else f"{name}_{unit}"
 
 
 def statistic_in_words(target: Target) -> str:

@@ -12,6 +12,7 @@ from wearsim.scenario.scenario import (
     require_run,
 )
 from wearsim.scenario.tables.bodies import Cylinder, Roller
+from wearsim.scenario.tables.fatigue import FatigueChoice, FatigueLawChoice
 from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
@@ -34,6 +35,8 @@ __all__ = [
     "Cylinder",
     "Drawn",
     "EvolutionTable",
+    "FatigueChoice",
+    "FatigueLawChoice",
     "FrictionTable",
     "LoadChoice",
     "OperationTable",

@@ -11,7 +11,9 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
 from wearsim.plugins import (
+    BODIES,
     AxialProfileSpec,
+    FatigueLawSpec,
     MotionLawSpec,
     Options,
     RandomInputSpec,
@@ -29,6 +31,7 @@ from wearsim.scenario.parse.toml import REQUIRED, TABLES
 from wearsim.scenario.scenario import Scenario, load_scenario
 from wearsim.scenario.tables.axial import AxialTable
 from wearsim.scenario.tables.cam_motion import MotionTable
+from wearsim.scenario.tables.fatigue import FatigueOfBody
 from wearsim.scenario.tables.plain import TopTable
 from wearsim.scenario.tables.plugin import AUTO, PLUGIN_TABLES, AutoTable
 
@@ -110,6 +113,13 @@ def scenario_schema() -> dict[str, Any]:
             kind: Any = tuple[laws, ...]  # type: ignore[valid-type]
             keys |= {"motion": (kind, described)} if laws else {}
             keys = keys if laws else {key: kept for key, kept in keys.items() if key != "motion"}
+        if table == "fatigue":
+            fatigue = _fatigue_laws()
+            given = {body: model.model_fields[body].description for body in BODIES}
+            keys |= {body: (fatigue, Field(None, description=t)) for body, t in given.items()}
+            keys = (
+                keys if fatigue else {key: kept for key, kept in keys.items() if key not in given}
+            )
         if "axial_profile" in keys:
             described = Field(None, description=model.model_fields["axial_profile"].description)
             keys["axial_profile"] = str | _axial_profiles(table, random), described
@@ -142,6 +152,16 @@ def _motion_laws() -> Any:
             del fields["rise"]
         models.append(_model(f"motion {spec.name}", spec.summary, fields))
     return _one_of("MotionLaw", models)
+
+
+def _fatigue_laws() -> Any:
+    """Return the model of a body in the table [fatigue], for each fatigue law."""
+    named, models = FatigueOfBody.model_fields["law"], []
+    for spec in installed(FatigueLawSpec):
+        fields = {**_fields(FatigueOfBody), **_fields(spec.options)}
+        fields["law"] = Literal[spec.name], Field(..., description=named.description)
+        models.append(_model(f"fatigue {spec.name}", spec.summary, fields))
+    return _one_of("FatigueLaw", models)
 
 
 def _axial_profiles(table: str, random: RandomInputs) -> Any:

@@ -19,6 +19,7 @@ from wearsim.scenario.parse.toml import flat, parse_fields, reader_in
 from wearsim.scenario.tables.axial import axial_gap
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.cam import Cam, LubricantTable
+from wearsim.scenario.tables.fatigue import FatigueChoice
 from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
@@ -65,6 +66,8 @@ class Scenario:
         Limits of wear.
     wear : WearChoice, optional
         The wear law; optional in a scenario of a single contact.
+    fatigue : FatigueChoice, optional
+        Rolling-contact fatigue of the bodies.
     cam : Cam, optional
         The cam; `cylinder` is then its base circle.
     lubricant : LubricantTable, optional
@@ -104,6 +107,7 @@ class Scenario:
     outputs: OutputsTable
     sampling: SamplingTable
     limit: LimitTable = field(default_factory=LimitTable)
+    fatigue: FatigueChoice | None = None
     cam: Cam | None = None
     lubricant: LubricantTable | None = None
     notes: tuple[str, ...] = ()

@@ -15,6 +15,7 @@ from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.effort import forecast_data
+from wearsim.studies.fatigue.unworn import unworn_data
 from wearsim.studies.plausibility import plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw, units_of
@@ -122,6 +123,8 @@ def dry_run(scenario: Scenario) -> Data:
         draws = draw(scenario)
         problem, _, stepper = assemble_problem(draws, start_of_run(scenario, draws))
         data["test"] = _test(scenario, problem, stepper)
+        if scenario.fatigue is not None:
+            data["pitting_without_wear"] = unworn_data(scenario, problem)
         data["forecast"], further = forecast_data(draws, problem, stepper)
         warnings += further
     else:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wearsim.studies.dry_run import Data
+from wearsim.studies.fatigue.unworn import unworn_text
 from wearsim.units import in_engineers_unit
 
 TableRows = list[tuple[str, str]]
@@ -197,8 +198,20 @@ def _test_rows(data: Data) -> TableRows:
         ("strips", strips),
         ("stepper", f"{test['stepper']}, tolerance {test['tolerance']:.1e}"),
         *_forecast_rows(data["forecast"]),
+        *_pitting_rows(data),
         *_limit_rows(data),
     ]
+
+
+def _pitting_rows(data: Data) -> TableRows:
+    """Return rows on pitting without wear; none of a scenario without fatigue."""
+    found = data.get("pitting_without_wear")
+    if found is None:
+        return []
+    rollers = None if data["cam"] is None else data["test"]["rollers"]
+    names = {"cylinder": "cylinder" if data["cam"] is None else "cam", "roller": "rollers"}
+    sources = [(f"fatigue of the {names[body]}", text) for body, text in found["sources"].items()]
+    return [("pitting without wear", unworn_text(found, rollers)), *sources]
 
 
 def _rounded(value: float) -> str:
@@ -233,6 +246,10 @@ def _limit_rows(data: Data) -> TableRows:
     rows, test = [], data["test"]
     for item in data["forecast"]["limits"]:
         unit, size = _LIMIT_UNITS.get(item["quantity"], ("um", 1e-6))
+        name = f"limit of {item['quantity'].replace('_', ' ')}"
+        if item["at_end"] is None:
+            rows.append((name, f"{item['limit']:.4g}, not forecast: the run computes it"))
+            continue
         ratio = f"{_rounded(item['at_end'] / size)} of {item['limit'] / size:.4g} {unit}"
         text = f"not reached: about {ratio} at the end"
         if item["reached_at_passes"] is not None:
@@ -243,5 +260,5 @@ def _limit_rows(data: Data) -> TableRows:
             if data["cam"] is not None:
                 length = f"{_rounded(passes / test['rollers'])} turns"
             text = f"reached after about {length}, {when}: about {ratio} at the end"
-        rows.append((f"limit of {item['quantity'].replace('_', ' ')}", text))
+        rows.append((name, text))
     return rows

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import ContactError
-from wearsim.evolution.limits import Limit
+from wearsim.evolution.limits import OF_FATIGUE, Limit
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import FALLEN, SMALL, preload_of
 from wearsim.scenario import Scenario
@@ -123,6 +123,10 @@ def _limits(
     """Return the limits of [limit] with the values at the end, and when they are reached."""
     total, limits = float(scenario.total_passes), []
     for key, value in scenario.limit.given.items():
+        item = {"quantity": key, "unit": Limit(key.replace("_", " "), value, key).unit}
+        if key in OF_FATIGUE:  # the run computes it
+            limits.append({**item, "limit": value, "at_end": None, "reached_at_passes": None})
+            continue
         reached = None
         if forecast.at(1.0)[key] >= value:
             reached = 0.0
@@ -133,7 +137,6 @@ def _limits(
                 worn = forecast.at(middle * total)[key] >= value
                 low, high = (low, middle) if worn else (middle, high)
             reached = high * total
-        item = {"quantity": key, "unit": Limit(key.replace("_", " "), value, key).unit}
         limits.append({**item, "limit": value, "at_end": wear[key], "reached_at_passes": reached})
     return limits
 

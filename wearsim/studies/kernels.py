@@ -74,6 +74,7 @@ def kernels_of(
         names |= {"linearised_wear", "wear_of_bodies"}
         by_doubling = varies or theory == "fastsim"
         names |= {"difference_sizes" if by_doubling else "carried_errors"}
+    names |= {"damage_of_step"} if steps and scenario.fatigue is not None else set()
     doubled = name != "per-pass" if not (compliant and implicit) else evolution.step is not None
     if steps and (doubled or (coarse and not compliant)):
         names |= {"difference_sizes"}

@@ -23,7 +23,10 @@ from wearsim.studies.run.groove import hardest_patch, widest_patch
 from wearsim.studies.run.inputs import load_file
 from wearsim.types import FloatArray
 
-YIELD_FACTOR = 4.0  # peak pressure over yield stress, beyond which a surface never shakes down
+# peak pressure over yield stress in shear, beyond which a surface never shakes down; with a
+# friction coefficient above 1/4 in full slip it is the inverse of that (Johnson, section 9.2)
+SHAKEDOWN = 4.0
+SURFACE_YIELDS = 0.3  # friction in full slip, above which the greatest shear is at the surface
 GREATEST_CREEPAGE = 0.05
 GREATEST_FRICTION = 1.0
 ELASTIC_PART = 0.04  # of the contact modulus; 4.4 GPa with steel, which hardened steel just bears
@@ -59,6 +62,7 @@ def plausibility_warnings(scenario: Scenario) -> list[str]:
     load = scenario.load.build()
     return [
         *_of_pressure(scenario, load),
+        *(fatigue_warnings(scenario, load) if scenario.fatigue is not None else ()),
         *_of_slip(scenario),
         *_of_width(scenario, load),
         *_of_log(scenario, load),
@@ -90,15 +94,18 @@ def _of_pressure(scenario: Scenario, load: Load) -> Iterator[str]:
     patch, force = hardest_patch(scenario, force)
     pressure = patch.peak_pressure
     text = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
+    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
     other = "cylinder" if scenario.cam is None else "cam"
     for name, body in (("roller", scenario.roller), (other, scenario.cylinder)):
-        strength, factor, what = body.material.yield_stress, YIELD_FACTOR, "yield stress"
-        if strength is None:
-            strength, factor, what = body.material.hardness, 1.0, "hardness"
-        if strength is not None and pressure > factor * strength:
-            times = f"{factor:g} times " if factor > 1.0 else ""
+        strength, hardness = body.material.yield_stress, body.material.hardness
+        limit, what = hardness, "its hardness"
+        if strength is not None:
+            factor = min(SHAKEDOWN, 1.0 / friction if friction > 0.0 else SHAKEDOWN)
+            limit = factor * strength / math.sqrt(3.0)
+            what = f"its shakedown limit, {factor:.3g} times the yield stress in shear,"
+        if limit is not None and pressure > limit:
             yield (
-                f"{name}.material: {text} exceeds {times}its {what} of {strength / 1e6:.4g} MPa;"
+                f"{name}.material: {text} exceeds {what} of {limit / 1e6:.4g} MPa;"
                 " the model is elastic"
             )
     modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
@@ -109,6 +116,36 @@ def _of_pressure(scenario: Scenario, load: Load) -> Iterator[str]:
             f"load: {text} exceeds {ELASTIC_PART:.0%} of the contact modulus, more than hardened"
             f" steel bears; {remedy} A thousandth of it gives {pressure / 1e7:.4g} MPa"
         )
+
+
+def fatigue_warnings(scenario: Scenario, load: Load) -> Iterator[str]:
+    """Yield warnings of friction by which the surface yields first, and of unfit constants.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With fatigue.
+    load : Load
+    """
+    choice, force = scenario.fatigue, greatest_load(scenario, load)
+    if choice is None or force <= 0.0:
+        return
+    patch, force = hardest_patch(scenario, force)
+    pressure = patch.peak_pressure
+    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
+    at = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
+    if friction > SURFACE_YIELDS:
+        yield (
+            f"fatigue, friction: with a coefficient of {friction:.3g}, above {SURFACE_YIELDS:g}, a"
+            " surface in full slip yields first, at the surface and not below it"
+        )
+    for body_name, law in choice.laws.items():
+        valid = law.valid_pressure
+        if valid is not None and not valid[0] <= pressure <= valid[1]:
+            yield (
+                f"fatigue.{body_name}: {at} is outside the {valid[0] / 1e6:.4g} to"
+                f" {valid[1] / 1e6:.4g} MPa for which the constants hold ({law.source})"
+            )
 
 
 def _of_slip(scenario: Scenario) -> Iterator[str]:

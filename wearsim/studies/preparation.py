@@ -12,6 +12,7 @@ from typing import Any
 from wearsim.errors import Mistake, ResultsFileError, ScenarioError
 from wearsim.plugins import (
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     RandomInputSpec,
     Spec,
@@ -98,6 +99,9 @@ def plugins_in_use(scenario: Scenario) -> list[dict[str, str]]:
     used += [(LoadSpec, term.name) for term in scenario.load.terms]
     if scenario.wear is not None:
         used.append((WearLawSpec, scenario.wear.law))
+    if scenario.fatigue is not None:
+        names = dict.fromkeys(law.law for law in scenario.fatigue.laws.values())
+        used += [(FatigueLawSpec, name) for name in names]
     random = [name for item in scenario.random for name in (item.kind, item.marginal) if name]
     used += [(RandomInputSpec, name) for name in dict.fromkeys(random)]
     return [
@@ -135,7 +139,8 @@ def check_plugins(path: Path, data: StudyData) -> None:
     ResultsFileError
         If one is not.
     """
-    kinds = {kind.kind: kind for kind in (ContactModelSpec, LoadSpec, WearLawSpec, RandomInputSpec)}
+    known = ContactModelSpec, LoadSpec, WearLawSpec, FatigueLawSpec, RandomInputSpec
+    kinds = {kind.kind: kind for kind in known}
     missing = [
         f"the {row['kind']} '{row['name']}' of {row['distribution']} {row['version']}"
         for row in data.plugins

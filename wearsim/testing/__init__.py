@@ -10,6 +10,7 @@ from wearsim.testing.contact_fixtures import STEEL, ContactCase
 from wearsim.testing.kit import (
     axial_profile_tests,
     contact_model_tests,
+    fatigue_law_tests,
     load_tests,
     motion_law_tests,
     random_input_tests,
@@ -26,6 +27,7 @@ __all__ = [
     "ContactCase",
     "axial_profile_tests",
     "contact_model_tests",
+    "fatigue_law_tests",
     "load_tests",
     "motion_law_tests",
     "random_input_tests",

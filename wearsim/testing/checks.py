@@ -17,6 +17,7 @@ from wearsim.errors import PluginError, WearsimError, described
 from wearsim.plugins import (
     AxialProfileSpec,
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     Options,
@@ -38,6 +39,7 @@ S = TypeVar(
     RandomInputSpec,
     MotionLawSpec,
     AxialProfileSpec,
+    FatigueLawSpec,
 )
 
 

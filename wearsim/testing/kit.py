@@ -10,6 +10,7 @@ from wearsim.plugins import (
     AxialPair,
     AxialProfileSpec,
     ContactModelSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     RandomInputSpec,
@@ -23,6 +24,7 @@ from wearsim.testing.checks import Check, Checks, ConfiguredSpec, resolve, spec_
 from wearsim.testing.contact_behaviour import BEHAVIOUR
 from wearsim.testing.contact_capabilities import CAPABILITIES
 from wearsim.testing.contact_fixtures import ContactCase, ContactFixture
+from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
 from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
 from wearsim.testing.study_kinds import STUDY_KIND, StudyKindFixture
@@ -173,6 +175,19 @@ def wear_law_tests(
     return build_tests(
         WEAR_LAW,
         lambda: WearLawFixture(ConfiguredSpec(resolve(WearLawSpec, spec), options)),
+        without,
+    )
+
+
+def fatigue_law_tests(
+    spec: FatigueLawSpec | str,
+    options: Mapping[str, object] = NOTHING,
+    without: Mapping[str, str] = NOTHING,
+) -> Tests[FatigueLawFixture]:
+    """Return tests of a fatigue law, one item per requirement; see `contact_model_tests`."""
+    return build_tests(
+        FATIGUE_LAW,
+        lambda: FatigueLawFixture(ConfiguredSpec(resolve(FatigueLawSpec, spec), options)),
         without,
     )
 

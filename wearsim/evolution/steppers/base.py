@@ -14,6 +14,7 @@ from wearsim.errors import ContactError, StepError
 from wearsim.evolution.pauses import rest, step_or_rest
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, joined_states
+from wearsim.evolution.steppers.damage import damage_excess, with_damage
 from wearsim.types import FloatArray, IntArray
 
 SMALLEST_STEP = 1e-6  # passes; with a great wear factor ten passes wear a whole groove
@@ -228,6 +229,18 @@ class Stepper(ABC):
             If the step is too long for one of the realisations.
         """
 
+    def with_damage(self, problem: WearProblem, state: WearState, tried: Attempt) -> Attempt:
+        """Return a trial step from `state` with the damage by fatigue, and its error."""
+        path, excess = [state], np.array(0.0)
+        for end in tried.path:
+            damaged, effective = with_damage(problem, path[-1], end)
+            path.append(damaged)
+            excess = np.maximum(excess, damage_excess(effective, self.tolerance))
+        with np.errstate(divide="ignore"):  # the error of the integral grows as the step cubed
+            ratio = np.minimum(GROW, SAFETY * excess ** (-1.0 / 3.0))
+        most, least = np.maximum(tried.excess, excess), np.minimum(tried.ratio, ratio)
+        return Attempt(tuple(path[1:]), most, least, tried.warning)
+
     def side_step(self, problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
         """Return the state `passes` passes later in one step, for a record between two steps.
 
@@ -235,8 +248,10 @@ class Stepper(ABC):
         """
         step = self.scheme(problem, state)
         if self.pass_by_pass:  # it passes over pauses itself, also within a step
-            return step(problem, state, passes)
-        return step_or_rest(step, problem, state, passes)
+            end = step(problem, state, passes)
+        else:
+            end = step_or_rest(step, problem, state, passes)
+        return with_damage(problem, state, end)[0] if problem.fatigue else end
 
     def rest(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float

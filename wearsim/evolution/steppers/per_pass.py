@@ -22,6 +22,7 @@ from wearsim.plugins import BODIES, PassLoop
 from wearsim.types import ContactSolution, FloatArray, IntArray, OperatingPoint
 
 CHUNK = 20_000  # passes between checks for records, progress and interruption
+DAMAGE_PART = 0.02  # passes between checks over those done, where damage is computed
 SLOW_CHUNK = 200  # the same where the loop is not compiled
 LOAD_TOLERANCE = 1e-6  # relative change of the load of a spring by the approach it causes
 
@@ -58,8 +59,14 @@ class PerPassStepper(Stepper):
         return nodes
 
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
-        """Return the number of passes between checks for records, progress and interruption."""
-        return np.full(state.passes.shape, float(CHUNK if is_compiled(problem) else SLOW_CHUNK))
+        """Return the number of passes between checks for records, progress and interruption.
+
+        Damage by fatigue is integrated from one check to the next, a small part of the passes done.
+        """
+        most = float(CHUNK if is_compiled(problem) else SLOW_CHUNK)
+        if problem.fatigue:
+            return np.clip(np.floor(DAMAGE_PART * state.passes), 1.0, most)
+        return np.full(state.passes.shape, most)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the loop over single passes."""

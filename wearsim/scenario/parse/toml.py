@@ -17,6 +17,7 @@ from wearsim.errors import Mistake, ScenarioError
 from wearsim.input_files import csv_of_profile, read_input
 from wearsim.plugins import (
     AxialProfileSpec,
+    FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
     Options,
@@ -45,6 +46,7 @@ from wearsim.scenario.tables.cam import (
     refuse_cylinder,
 )
 from wearsim.scenario.tables.cam_motion import MotionTable
+from wearsim.scenario.tables.fatigue import FatigueOfBody, FatigueTable, read_fatigue
 from wearsim.scenario.tables.plain import (
     ALTERNATIVES,
     CreepageTable,
@@ -98,6 +100,7 @@ TABLES: dict[str, type[Options]] = {
     "creepage": CreepageTable,
     "contact": ContactTable,
     "wear": WearTable,
+    "fatigue": FatigueTable,
     "evolution": EvolutionTable,
     "outputs": OutputsTable,
     "limit": LimitTable,
@@ -107,7 +110,7 @@ TABLES: dict[str, type[Options]] = {
 FIRST_PARTY = {"optimise": "wearsim-optimise"}
 #: [cam] replaces [cylinder]
 REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
-_ABSENT = {*REQUIRED, "wear", "cam", "follower", "lubricant"}  # tables without defaults
+_ABSENT = {*REQUIRED, "wear", "fatigue", "cam", "follower", "lubricant"}  # tables without defaults
 #: functions that read the tables with more checks than their models have
 READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
     "roller": read_roller,
@@ -116,6 +119,7 @@ READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
     "creepage": read_creepage,
     "contact": read_contact,
     "wear": read_wear,
+    "fatigue": read_fatigue,
     "outputs": read_outputs,
 }
 
@@ -456,6 +460,9 @@ def keys_by_place() -> dict[str, set[str]]:
             keys[place] = set(spec.options.model_fields)
     for law in installed(MotionLawSpec):
         keys[f'an entry of cam.motion with law = "{law.name}"'] = set(law.options.model_fields)
+    for spec in installed(FatigueLawSpec):
+        keys[f'a body of [fatigue] with law = "{spec.name}"'] = set(spec.options.model_fields)
+    keys["a body of [fatigue]"] = set(FatigueOfBody.model_fields)
     keys["an entry of cam.motion"] = set(MotionTable.model_fields)
     for profile in installed(AxialProfileSpec):
         place = f'axial_profile with form = "{profile.name}"'

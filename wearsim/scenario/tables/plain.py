@@ -226,6 +226,12 @@ class LimitTable(Options):
     clearance: PositiveLength | None = Field(
         default=None, description="Worn descent of a roller, by which the unloaded gap opens."
     )
+    damage: float | None = Field(
+        default=None, gt=0.0, description="Effective damage by fatigue; needs [fatigue]."
+    )
+    pitting: float | None = Field(
+        default=None, gt=0.0, lt=1.0, description="Probability of pitting; needs [fatigue]."
+    )
 
     @property
     def given(self) -> dict[str, float]:
@@ -313,10 +319,14 @@ def check_lists(
 ) -> None:
     """Add a mistake for each list of the tables `data` without one value per roller.
 
-    A limit of the lift error is one without a cam.
+    A limit of the lift error is one without a cam, that of damage or pitting one without fatigue.
     """
     if limits and limits.lift_error and "cam" not in data:
         mistakes.add("limit", "lift_error", "is a quantity of cams", None, "depth or clearance")
+    for key in ("damage", "pitting") if limits and "fatigue" not in data else ():
+        if getattr(limits, key) is not None:
+            what, remedy = "needs the fatigue of the bodies", "a table [fatigue]"
+            mistakes.add("limit", key, what, as_written(getattr(limits, key)), remedy)
     tables = {table: keys for table, keys in data.items() if isinstance(keys, dict)}
     rollers = tables.get("operation", {}).get("rollers", 1)
     for table, key in _LISTS:

@@ -42,6 +42,8 @@ from wearsim.studies.cam.grooves import grooves_at
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
 from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.fatigue.panels import pitting_panel
+from wearsim.studies.fatigue.view import has_fatigue, source_line
 from wearsim.studies.run.panels import (
     HEIGHT,
     Y,
@@ -212,7 +214,7 @@ def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     stations = turn.stations
     worn = np.asarray(result.raw.records["cylinder_depth_profile"])[:, :, 0]
     panels = {
-        "map": _map(turn, stations, worn[-1], result),
+        "map": _depth_map(turn, stations, worn[-1], result),
         "shape": _worn_shape(turn, stations, worn[-1]),
         "lift": _lift_error(turn, stations, result),
         "groove": _groove(result, measured),
@@ -220,12 +222,18 @@ def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
         "roller": _roller(result),
         "pressure": pressure_panel(result),
     }
+    rows = [["map", "map", "shape"], ["lift", "lift", "shape"], ["depth", "groove", "roller"]]
+    heights = [1.2, 0.9, 1.1]
+    if has_fatigue(result):
+        panels |= {"damage": _damage_map(turn, stations, result), "pitting": pitting_panel(result)}
+        rows.insert(2, ["damage", "damage", "pitting"])
+        heights.insert(2, 1.2)
     return Sheet(
-        f"{result.title}\n{_caption(result)}",
+        f"{result.title}\n{_caption(result)}{source_line(result)}",
         panels,
-        [["map", "map", "shape"], ["lift", "lift", "shape"], ["depth", "groove", "roller"]],
-        (12.5, 9.6),
-        heights=[1.2, 0.9, 1.1],
+        rows,
+        (12.5, 3.0 * sum(heights)),
+        heights=heights,
         scale_beside=["roller"],
         steps=record_texts(result),
         main="groove",
@@ -242,22 +250,40 @@ def _caption(result: Result) -> str:
     )
 
 
-def _map(turn: CamTurn, stations: Stations, depth: FloatArray, result: Result) -> Panel:
-    angle, values = stations.values_at(depth, _SAMPLES)
-    deepest = values.max(axis=0)
-    extent = result.y[deepest > 1e-3 * deepest.max()] if deepest.max() > 0.0 else result.y
-    # interpolation overshoots next to an edge
-    image = Image(angle, result.y, np.maximum(values, 0.0).T, Axis("depth", "um"), "magma_r")
+def _depth_map(turn: CamTurn, stations: Stations, depth: FloatArray, result: Result) -> Panel:
     place = float(np.max(result.final["depth_angle_rad"])) * DEG
     deepest = shown(float(np.max(result.depth[-1])), "um")
+    text = f"At the end the cam is deepest at {place:.4g} deg: {deepest}."
+    named = "Worn depth of the cam", text
+    return _map(turn, stations, depth, result, Axis("depth", "um"), named)
+
+
+def _damage_map(turn: CamTurn, stations: Stations, result: Result) -> Panel:
+    damage = np.asarray(result.raw.records["cylinder_damage_profile"])[-1, :, 0]
+    place = float(np.max(result.final["damage_angle_rad"])) * DEG
+    greatest = shown(float(np.max(result.final["cylinder_damage"])), "1")
+    text = f"At the end the damage of the cam is greatest at {place:.4g} deg: {greatest}."
+    named = "Damage of the cam by fatigue", text
+    return _map(turn, stations, damage, result, Axis("damage", "1"), named)
+
+
+def _map(
+    turn: CamTurn,
+    stations: Stations,
+    profiles: FloatArray,
+    result: Result,
+    scale: Axis,
+    named: tuple[str, str],
+) -> Panel:
+    """Return profiles at the stations as a map over angle and width, with title and caption."""
+    angle, values = stations.values_at(profiles, _SAMPLES)
+    greatest = values.max(axis=0)
+    extent = result.y[greatest > 1e-3 * greatest.max()] if greatest.max() > 0.0 else result.y
+    # interpolation overshoots next to an edge
+    image = Image(angle, result.y, np.maximum(values, 0.0).T, scale, "magma_r")
     limits = (1.25 * extent[0], 1.05 * extent[-1])  # the names of the segments lie below
-    return Panel(
-        "Worn depth of the cam",
-        ANGLE,
-        Axis("y across the track", "mm", limits=limits),
-        [image, *segment_marks(turn.cam.motion)],
-        f"At the end the cam is deepest at {place:.4g} deg: {deepest}.",
-    )
+    y = Axis("y across the track", "mm", limits=limits)
+    return Panel(named[0], ANGLE, y, [image, *segment_marks(turn.cam.motion)], named[1])
 
 
 def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:

@@ -13,6 +13,8 @@ from wearsim.report.text import NOTHING, PER_SI, in_unit, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.studies.cam.checks import harmonic_depth
 from wearsim.studies.cam.study import CamStudy
+from wearsim.studies.fatigue.unworn import lives_at, stresses_below
+from wearsim.studies.fatigue.view import source_rows
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -98,6 +100,12 @@ class CamView(View):
             text = f"{arcs}, {shown(energy, 'J', 3)} per turn" if energy else NOTHING
             answers = {"skid_energy": (energy, "J")}
             rows.append(Row("skids of the roller", text, answers=answers))
+        lives = lives_at(turn.scenario, np.array(study.max_peak_pressure[:1]))
+        if lives is not None:
+            turns = float(lives[0]) / turn.scenario.operation.rollers
+            text = shown(turns, "1", 3) if np.isfinite(turns) else "infinite"
+            text += f" turns at {turn.place(study.max_peak_pressure[1])}, which decides"
+            rows += [Row("pitting of the cam without wear", text), *source_rows(turn.scenario)]
         if study.weight is not None:
             rows.append(Row("stations", f"{len(study.weight)} of a run"))
         if measured := turn.cam.measured:
@@ -139,6 +147,18 @@ class CamView(View):
         ]
         if study.film is not None:
             columns.append(("film [um]", study.film, "um"))
+        if (lives := lives_at(turn.scenario, study.peak_pressure)) is not None:
+            found_below = stresses_below(
+                turn.scenario, study.peak_pressure, 0.5 * study.patch_length
+            )
+            below = [values for _, values in found_below.values()]
+            columns += [
+                ("pitting [turns]", lives / turn.scenario.operation.rollers, "1"),
+                ("orthogonal shear [MPa]", below[0], "MPa"),
+                ("at depth [um]", below[1], "um"),
+                ("von Mises [MPa]", below[2], "MPa"),
+                ("at depth [um]", below[3], "um"),
+            ]
         cells = [
             [in_unit(value, unit) for value in _without_rounding(values)]
             for _, values, unit in columns
@@ -202,6 +222,10 @@ class CamView(View):
                 columns["film_ratio"] = ("1", study.film / lubricant.roughness)
         if turn.cam.groove:
             columns["inner_flank"] = ("1", point.inner)
+        if (lives := lives_at(turn.scenario, study.peak_pressure)) is not None:
+            columns["pitting_life_turns"] = "1", lives / turn.scenario.operation.rollers
+            half = 0.5 * study.patch_length
+            columns |= stresses_below(turn.scenario, study.peak_pressure, half)
         return columns
 
     def data(self) -> dict[str, Any]:

@@ -28,7 +28,12 @@ from wearsim.studies.ensemble.designs import (
 from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
 from wearsim.studies.ensemble.file.data import EnsembleData
 from wearsim.studies.ensemble.file.parts import read_ensemble
-from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, OBSERVABLES
+from wearsim.studies.ensemble.file.schema import (
+    ALL_OBSERVABLES,
+    CAM_OBSERVABLES,
+    FATIGUE_OBSERVABLES,
+    OBSERVABLES,
+)
 from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import RealisationRunner, control_of, profile_axis
 from wearsim.studies.ensemble.result import EnsembleResult
@@ -170,7 +175,7 @@ def checked_request(
     checked_count(scenario, realisations)
     require_run(scenario)
     chosen = parse_plan(plan or scenario.sampling.plan)
-    target = None if precision is None else parse_target(precision, cam=scenario.cam is not None)
+    target = None if precision is None else parse_target(precision, scenario)
     check_plan(scenario, chosen, "a target" if precision else "")
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.is_redrawn for item in scenario.random)
@@ -202,15 +207,15 @@ def named_precision(precision: str | None, until: str | None) -> str | None:
     return until
 
 
-def parse_target(text: str, *, cam: bool = True) -> Target:
+def parse_target(text: str, scenario: Scenario | None = None) -> Target:
     """Return the target of a text.
 
     Parameters
     ----------
     text : str
         In the form of `Target.parse`.
-    cam : bool
-        Whether tests are of a cam.
+    scenario : Scenario, optional
+        Scenario of the tests, which may have observables of cams and of fatigue.
 
     Raises
     ------
@@ -218,7 +223,11 @@ def parse_target(text: str, *, cam: bool = True) -> Target:
         If it cannot be read, or names no observable of an ensemble.
     """
     target = Target.parse(text)
-    known = ALL_OBSERVABLES if cam else OBSERVABLES
+    known = {**ALL_OBSERVABLES}
+    if scenario is not None:
+        cam, fatigue = scenario.cam is not None, scenario.fatigue is not None
+        known = {**OBSERVABLES, **(CAM_OBSERVABLES if cam else {})}
+        known |= FATIGUE_OBSERVABLES if fatigue else {}
     if target.observable not in known:
         raise ValueError(
             f"'{text}' names '{target.observable}', which is not an observable, expected one of"
@@ -439,6 +448,7 @@ def ensemble_content(
         ],
         control=control,
         cam=scenario.cam is not None,
+        fatigue=scenario.fatigue is not None,
     )
     return header, {
         **({"angle": CURVE_ANGLES} if header.cam else {}),

@@ -218,6 +218,9 @@ def observables_of(
         "peak_pressure": row["peak_pressure"].max(axis=0),
         **cam_observables(problem, state, row),
     }
+    if "damage" in row:
+        columns |= {name: row[name] for name in ("damage", "pitting", "cylinder_damage")}
+        columns["roller_damage"] = row["roller_damage"].max(axis=0)
     return [
         {name: float(column[v]) for name, column in columns.items()}
         for v in range(problem.shape[2])

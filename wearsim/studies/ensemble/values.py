@@ -15,6 +15,7 @@ from wearsim.studies.ensemble.file.data import EnsembleData
 from wearsim.studies.ensemble.file.schema import (
     CAM_OBSERVABLES,
     DONE,
+    FATIGUE_OBSERVABLES,
     KEPT,
     OBSERVABLES,
     kept_profiles,
@@ -68,7 +69,8 @@ class EnsembleValues(StudyResult[EnsembleData]):
     @property
     def observables(self) -> tuple[str, ...]:
         """Names of the observables."""
-        return (*OBSERVABLES, *(CAM_OBSERVABLES if self.raw.cam else ()))
+        of_cams = CAM_OBSERVABLES if self.raw.cam else ()
+        return (*OBSERVABLES, *of_cams, *(FATIGUE_OBSERVABLES if self.raw.fatigue else ()))
 
     @property
     def y(self) -> FloatArray:

@@ -11,8 +11,16 @@ import numpy as np
 
 from wearsim.errors import StepError
 from wearsim.evolution.error_estimates import greatest_depth
+from wearsim.evolution.fatigue import effective_damage
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
-from wearsim.evolution.limits import Crossings, Limit, first_crossings, ratios, take_side_step
+from wearsim.evolution.limits import (
+    Crossings,
+    Limit,
+    damage_of,
+    first_crossings,
+    ratios,
+    take_side_step,
+)
 from wearsim.evolution.observables import (
     depth,
     extremes,
@@ -35,6 +43,7 @@ from wearsim.studies.ensemble.batch import (
     too_deep_tests,
 )
 from wearsim.studies.failures import too_deep_failure
+from wearsim.studies.fatigue.lives import course_of
 from wearsim.types import FloatArray, IntArray
 
 TOLERANCE = 1e-6  # relative error of a quantity at its limit
@@ -73,6 +82,7 @@ class _Test:
     limit: int = -1
     level: float = 1.0
     slope: float = 1.0
+    damage: list[tuple[float, float]] = field(default_factory=list)
 
 
 def observe_lives(
@@ -109,6 +119,9 @@ class _Group:
         )
         self.tests = [_Test() for _ in runs]
         self.first_rows = self._observed(self.problem, self.state)
+        if self.problem.fatigue and self.state.damage is not None:
+            rate = effective_damage(self.problem, self.state.damage[2])
+            self.first_damage = rate.tolist()
 
     def results(self) -> list[LifeRun | Exception]:
         """Return the result or the error of each test."""
@@ -161,6 +174,12 @@ class _Group:
         for place, number in enumerate(numbers):
             passes = float(advance.end.passes[place])
             self.tests[number].history.append((passes, relative[:, place]))
+        if advance.problem.fatigue:
+            damages = damage_of(advance.problem, advance.end).tolist()
+            for place, number in enumerate(numbers):
+                if self.tests[number].found is None:
+                    known = self.tests[number].damage
+                    known.append((float(advance.end.passes[place]), damages[place]))
         # the only state of a path may be known to be below all limits
         reached = (relative.max(axis=0) >= 1.0) | (len(advance.path) > 2)
         open_places = np.array(
@@ -326,7 +345,13 @@ class _Group:
             "first_limit": float(test.limit),
             "limit_angle": self._angle(test.limit, problem, state),
         }
+        curves: dict[str, FloatArray]
         (curves,) = curves_at_end(problem, state, [self.runs[number].draws.scenario])
+        if problem.fatigue:
+            scalars["damage_per_pass"] = self.first_damage[number]
+            scalars["course_end"] = float(state.passes[0])
+            end = scalars["course_end"], float(damage_of(problem, state)[0])
+            curves["damage_course"] = course_of(test.damage, end, self.first_damage[number])
         test.found = LifeRun(rows, scalars, curves, problem.grid, failure)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.evolution.limits import OF_FATIGUE
 from wearsim.plugins import BODIES
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.run.draws import Drawer
@@ -101,6 +102,8 @@ def _obstacle(scenario: Scenario) -> str:
     factors = _factors(scenario)
     if not factors:
         return "no wear factor is random"
+    if of_fatigue := [name for name in OF_FATIGUE if name in scenario.limit.given]:
+        return f"a limit of {of_fatigue[0]} depends on the wear factor and on the passes separately"
     names = [item.name for item in factors]
     if scenario.wear is None or not set(names) <= {SHARED, *OF_BODIES}:
         return f"{', '.join(names)} is not a factor of all wear"

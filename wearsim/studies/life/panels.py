@@ -31,6 +31,7 @@ from wearsim.report.view import Overview, Row, Rows
 from wearsim.studies.cam.overview import CAM_EXCLUDED, loads, picture
 from wearsim.studies.cam.panels import ANGLE
 from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
+from wearsim.studies.fatigue.view import EXCLUDED as NO_FATIGUE
 from wearsim.studies.life.comparison import swept_variable
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.view import EXCLUDED
@@ -342,6 +343,8 @@ def life_overview(result: LifeResult, lives: Mapping[str, Rows], no_effects: str
         Why there are no effects of the inputs, or an empty text.
     """
     scenario, groups, excluded = result.scenario, dict[str, Rows](), list(EXCLUDED)
+    if result.raw.fatigue:
+        excluded.remove(NO_FATIGUE)
     main = life_sheet(result).first if scenario.cam is None else None
     if scenario.cam is not None:
         groups["Loads"], main = loads(scenario), picture(scenario)

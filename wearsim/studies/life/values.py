@@ -147,7 +147,7 @@ class LifeValues(EnsembleResult):
         settings, keys = self.settings, (name, self.settings.factor, "score_mean")
         life, factor, shift = (self.raw.rows(key, 0, None)[numbers] for key in keys)
         kappa = life / settings.per_unit * factor
-        return FactorMixture(kappa, self._score, shift, settings.spread, settings.alone)
+        return FactorMixture(kappa, self.score, shift, settings.spread, settings.alone)
 
     def probability_obstacle(self, life: float) -> str:
         """Return why the probability of a life below `life` is not stated; empty if it is.
@@ -200,7 +200,7 @@ class LifeValues(EnsembleResult):
         return score_function(self._drawn_law)
 
     @cached_property
-    def _score(self) -> ScoreFunction:
+    def score(self) -> ScoreFunction:
         """Normal score of the wear factor."""
         return score_function(self.law) if self.law else self._drawn_score
 

@@ -23,6 +23,7 @@ from wearsim.report.text import (
 from wearsim.report.view import Overview, Row, Rows, Table
 from wearsim.results.study_view import SAMPLING
 from wearsim.studies.ensemble.view import RealisationsView
+from wearsim.studies.fatigue.lives import competing_data, competing_table, fatigue_of_lives
 from wearsim.studies.life.fits_table import fit_tables, fits_data
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.values import remarks
@@ -38,7 +39,11 @@ ERROR = (
     " error of the model."
 )
 
-_LIMIT_UNITS = {"volume": "mm^3", "peak_pressure": "MPa"}
+_LIMIT_UNITS = {
+    "volume": "mm^3",
+    "peak_pressure": "MPa",
+    **dict.fromkeys(("damage", "pitting"), "1"),
+}
 _UNKNOWN = (NOTHING, NOTHING)
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
@@ -115,6 +120,7 @@ class LifeView(RealisationsView[LifeResult]):
             Row("wear factor", factor),
             Row("lives", ends),
             *([Row("95 % intervals", result.method)] if result.count else []),
+            *fatigue_of_lives(result),
             Row("contact model", result.described_model),
             Row("wall time", lapse(result.raw.wall_seconds)),
         ]
@@ -124,6 +130,7 @@ class LifeView(RealisationsView[LifeResult]):
         result = self.result
         if not result.count:
             return []
+        competing = competing_table(result)
         lines = [
             [name.replace("_", " "), shown(share, "%", 3), self._angle(name)]
             for name, share in result.first_limits.items()
@@ -131,6 +138,7 @@ class LifeView(RealisationsView[LifeResult]):
         return [
             *([self._levels()] if result.uncertain is not None else []),
             lives_table([""], [result]),
+            *([Table("", competing[1], competing[0])] if competing else []),
             *fit_tables(result),
             Table("", lines, ["first limit", "share", ""]),
             self.observables_table("at the end of the life"),
@@ -236,6 +244,7 @@ class LifeView(RealisationsView[LifeResult]):
             "title": result.title,
             "unit": result.unit,
             "limits": result.scenario.limit.given,
+            **competing_data(result),
             "realisations": result.count,
             "failed": result.failed,
             "errors": dict(result.errors),
@@ -407,7 +416,8 @@ def rare_command(result: LifeResult) -> str:
 def _limits_in_si(limits: Mapping[str, float]) -> list[str]:
     """Return limits of a life as arguments of --limit, "depth=5e-05 m"."""
     units = ((name, kind_of(_LIMIT_UNITS.get(name, "um")).unit) for name in limits)
-    return [f"{name}={limits[name]:.12g} {unit}" for name, unit in units]
+    texts = ((name, "" if unit == "1" else f" {unit}") for name, unit in units)
+    return [f"{name}={limits[name]:.12g}{unit}" for name, unit in texts]
 
 
 def target_text(result: LifeResult) -> str:

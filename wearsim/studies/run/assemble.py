@@ -11,6 +11,7 @@ import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.error_estimates import half_quadrature, volume_of
+from wearsim.evolution.fatigue import Fatigue
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, Kinematics
 from wearsim.evolution.state import fresh_state
@@ -22,6 +23,7 @@ from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
 from wearsim.evolution.strip_errors import LOOSER, LOOSEST
 from wearsim.evolution.strips import Surfaces
+from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.stations import cam_stations
@@ -210,6 +212,7 @@ def assemble_problem(
             multiplicity=multiplicity,
         ),
         laws=(scenario.wear.build(),) if scenario.wear is not None else (),
+        fatigue=_fatigue(scenario),
         varying=tuple(
             replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
             for item in draws.varying
@@ -223,12 +226,26 @@ def assemble_problem(
             draws, grid, partial(build, scenario), partial(surfaces, scenario, first, offsets)
         ),
     )
+    if draws.passes and stepper.pass_by_pass and scenario.fatigue is not None:
+        what = "cannot follow damage by inputs drawn at every pass, which no contact represents"
+        mistake = Mistake("evolution", "stepper", what, "per-pass", "another stepper")
+        raise ScenarioError(scenario.file, [mistake])
     if draws.passes and stepper.pass_by_pass:
         nodes = with_nodes(problem, scenario, draws.passes, minimum_nodes(draws.passes))
         stepper = PerPassStepper(redrawing(scenario, draws.passes), nodes)
     elif draws.passes:
         problem = with_converged_nodes(problem, draws)
     return problem, stepper, name
+
+
+def _fatigue(scenario: Scenario) -> Fatigue | None:
+    """Return the fatigue of the bodies of a scenario, None without the table [fatigue]."""
+    choice = scenario.fatigue
+    if choice is None:
+        return None
+    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    laws = {body: law.build(modulus) for body, law in choice.laws.items()}
+    return Fatigue(laws, choice.slope, choice.probability, choice.reference_area, choice.remove)
 
 
 def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:

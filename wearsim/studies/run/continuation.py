@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.errors import Mistake, ResultsFileError, ScenarioError
-from wearsim.evolution.limits import SAME_VALUE, Limit
+from wearsim.evolution.limits import OF_FATIGUE, SAME_VALUE, Limit
 from wearsim.evolution.state import WearState
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.failures import DEEPEST
@@ -85,6 +85,8 @@ def written_value(limit: Limit, value: float) -> str:
     """Return a value of the quantity of a limit as text."""
     if limit.quantity == "passes":
         return f"{value:.0f} passes"
+    if limit.quantity in OF_FATIGUE:
+        return f"{limit.quantity} {value:.6g}"
     text = in_engineers_unit(value, limit.unit, 6)
     if limit.unit == "m":
         text = f"{value * 1e6:.6g} um"
@@ -117,7 +119,10 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
         If the limit is beyond the validity of the models, or no run of `EXTENSIONS` extensions
         reaches it, as forecast.
     """
-    if limit.quantity in {"time", "passes"}:
+    if limit.quantity in OF_FATIGUE and scenario.fatigue is None:
+        what, remedy = "needs the fatigue of the bodies", "a table [fatigue] in the scenario"
+        raise _refusal(scenario, limit, what, remedy)
+    if limit.quantity in {"time", "passes", *OF_FATIGUE}:
         return []
     roller, deep = scenario.roller, DEEPEST * scenario.roller.radius
     if not scenario.evolution.allow_deep:

@@ -28,6 +28,8 @@ from wearsim.report.panels import (
 )
 from wearsim.report.text import count, shown, simulated
 from wearsim.report.view import width_row
+from wearsim.studies.fatigue.panels import damage_panel, pitting_panel
+from wearsim.studies.fatigue.view import has_fatigue, source_line
 from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray
 
@@ -46,11 +48,15 @@ def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
         "load": _normal_force(result),
         "pressure": pressure_panel(result),
     }
+    rows, height = [["profiles", "depth"], ["dissipation", "load"]], 7.6
+    if has_fatigue(result):
+        panels |= {"damage": damage_panel(result), "pitting": pitting_panel(result)}
+        rows, height = [*rows, ["damage", "pitting"]], 11.0
     return Sheet(
-        f"{result.title}\n{caption(result)}",
+        f"{result.title}\n{caption(result)}{source_line(result)}",
         panels,
-        [["profiles", "depth"], ["dissipation", "load"]],
-        (11.0, 7.6),
+        rows,
+        (11.0, height),
         widths=[1.15, 1.0],
         scale_beside=["profiles", "dissipation"],
         steps=record_texts(result),

@@ -25,6 +25,7 @@ from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
+from wearsim.studies.fatigue.observables import fatigue_history, fatigue_record
 from wearsim.studies.run.schema import ALL_VARIABLES, ESTIMATED
 from wearsim.studies.schedule import Due, RecordSchedule, due_records, state_at, states_at
 from wearsim.types import FloatArray, Grid
@@ -135,6 +136,7 @@ def history_row(
         },
         **{n: problem.mean_over_turn(problem.per_roller(v))[0] for n, v in approach.items()},
         **cam_history(problem, state),
+        **fatigue_history(problem, state),
     }
 
 
@@ -238,6 +240,7 @@ def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Vari
             for name in ("line_load", "half_length", "dissipation")
         },
         **cam_record(problem, state),
+        **fatigue_record(problem, state),
     }
 
 
@@ -413,6 +416,7 @@ class Recorder:
                     -1, *(1,) * (columns[name].ndim - 1)
                 )
             error = self.observed_errors.get(name, unknown) + by_stations
+            error = error + columns.get(f"{name}_error_by_steps", 0.0)
             columns[f"{name}_error"] = np.minimum(error, np.pi) if name.endswith("angle") else error
         return columns
 

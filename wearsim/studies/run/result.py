@@ -21,7 +21,8 @@ from wearsim.results.content import (
     StudyResult,
 )
 from wearsim.results.io.files import read_study
-from wearsim.studies.run.schema import CAM_RUN, ESTIMATED, RUN
+from wearsim.studies.fatigue.observables import final_fatigue
+from wearsim.studies.run.schema import ESTIMATED, RUN, run_schema
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -85,12 +86,12 @@ class RunData(StudyData):
     @property
     def schema(self) -> Schema:
         """Schema of the results file."""
-        return self.schema_of({}, self.static)
+        return self.schema_of({}, {*self.static, *self.history})
 
     @classmethod
     def schema_of(cls, attributes: Mapping[str, Any], names: Container[str]) -> Schema:
         """Return the schema of a file by its attributes and the names of its variables."""
-        return CAM_RUN if "station_angle" in names else RUN
+        return run_schema(cam="station_angle" in names, fatigue="damage" in names)
 
     @classmethod
     def from_variables(
@@ -413,7 +414,6 @@ class Result(StudyResult[RunData]):
             *("descent", "elastic_approach"),
         )
         last.update({name: last[name].max(axis=0) for name in per_roller})
-        # the estimated errors apply to the deeper body and to the volume of both bodies
         deepest = np.maximum(last["depth"], last["roller_depth"])
         rollers = self.raw.static["multiplicity"] @ self.raw.history["roller_worn_volume"][-1]
         below_nominal = (
@@ -437,6 +437,7 @@ class Result(StudyResult[RunData]):
             "peak_pressure_Pa": _number(last["peak_pressure"]),
             "descent_m": _number(last["descent"]),
             "elastic_approach_m": _number(last["elastic_approach"]),
+            **{name: _number(value) for name, value in final_fatigue(last).items()},
             "depth_error_m": _number(last["depth_error"]),
             "volume_error_m3": _number(last["volume_error"]),
             **self._final_errors(last),
@@ -453,7 +454,7 @@ class Result(StudyResult[RunData]):
         errors: dict[str, Number] = {}
         for name in ESTIMATED:
             error = last.get(f"{name}_error")
-            if error is not None:
+            if error is not None and variables[name].unit != "1":
                 over_rollers = "roller" in variables[name].dims
                 greatest = error.max(axis=0) if over_rollers else error
                 errors[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)

@@ -55,8 +55,9 @@ def run(
         Results file; without it the result is kept in memory only.
     until : str or float, optional
         Limit at which the run stops: "depth 50 um", "roller depth 5 um", "lift error 30 um",
-        "volume 12 mm^3", "width 14 mm", "peak pressure 900 MPa", "clearance 60 um", "12 h" or
-        "2e6 passes"; a number is a time [s]. A test that ends before its limit is extended.
+        "volume 12 mm^3", "width 14 mm", "peak pressure 900 MPa", "clearance 60 um", "damage 1",
+        "pitting 0.1", "12 h" or "2e6 passes"; a number is a time [s]. A test that ends before its
+        limit is extended.
     force : bool
         Overwrite an existing file.
     progress : bool

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 
 from wearsim.results.content import Axis, Schema, Variable, by_name
 
@@ -47,6 +48,7 @@ _ESTIMATED = {
     "peak_pressure_angle": "the angle of the peak pressure",
     "least_wear_angle": "the angle of the least wear",
     "greatest_wear_angle": "the angle of the greatest wear",
+    "damage": "the effective damage",
 }
 #: their names; the name of the error ends on "_error"
 ESTIMATED = tuple(_ESTIMATED)
@@ -232,7 +234,64 @@ CAM_VARIABLES: Mapping[str, Variable] = by_name(
         )
     )
 )
-ALL_VARIABLES: Mapping[str, Variable] = {**VARIABLES, **CAM_VARIABLES}
+
+#: further variables of a run with the table [fatigue]
+FATIGUE_VARIABLES: Mapping[str, Variable] = by_name(
+    _with_errors(
+        (
+            Variable("damage", _TEST, "1", "effective damage of all bodies by fatigue", "history"),
+            Variable("pitting", _TEST, "1", "probability of pitting", "history"),
+            Variable("cylinder_damage", _TEST, "1", "greatest damage of the cylinder", "history"),
+            Variable("roller_damage", _ROLLER, "1", "greatest damage of a roller", "history"),
+            Variable(
+                "damage_error_by_steps",
+                _TEST,
+                "1",
+                "estimated error of the effective damage by its integration over the steps",
+                "history",
+            ),
+            Variable(
+                "cylinder_damage_profile",
+                _CYLINDER_PROFILE,
+                "1",
+                "damage of the cylinder",
+                "record",
+            ),
+            Variable("roller_damage_profile", _ROLLER_PROFILE, "1", "damage of a roller", "record"),
+        )
+    )
+)
+#: those of the run of a cam
+CAM_FATIGUE_VARIABLES: Mapping[str, Variable] = by_name(
+    (
+        Variable(
+            "station_damage",
+            ("step", "station", "realisation"),
+            "1",
+            "greatest damage of the cam at a station",
+            "history",
+        ),
+        Variable(
+            "damage_angle", _TEST, "rad", "angle of the greatest damage of the cam", "history"
+        ),
+    )
+)
+ALL_VARIABLES: Mapping[str, Variable] = {
+    **VARIABLES,
+    **CAM_VARIABLES,
+    **FATIGUE_VARIABLES,
+    **CAM_FATIGUE_VARIABLES,
+}
 
 RUN = Schema("wearsim-run", 9, "a wear test, from `wearsim run`", AXES, VARIABLES)
-CAM_RUN = replace(RUN, variables=ALL_VARIABLES)
+
+
+@cache
+def run_schema(*, cam: bool, fatigue: bool) -> Schema:
+    """Return the schema of the run of a cylinder or a cam, with fatigue or without."""
+    found = {
+        **VARIABLES,
+        **(CAM_VARIABLES if cam else {}),
+        **(FATIGUE_VARIABLES if fatigue else {}),
+    }
+    return replace(RUN, variables={**found, **(CAM_FATIGUE_VARIABLES if cam and fatigue else {})})

@@ -26,6 +26,12 @@ from wearsim.report.text import (
 )
 from wearsim.report.view import Column, Columns, Frame, Overview, Row, Rows, width_row
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
+from wearsim.studies.fatigue.view import (
+    EXCLUDED as NO_FATIGUE,
+    fatigue_rows,
+    has_fatigue,
+    sources_of,
+)
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.schema import ALL_VARIABLES, AXES
 from wearsim.types import FloatArray
@@ -42,14 +48,22 @@ if TYPE_CHECKING:
 
 _IN_OVERVIEW = {"roller depth", "width", "lift error, peak to peak"}
 #: what wear tests do not contain
-EXCLUDED = ("fatigue (pitting)", "heating", "plastic flow", "load carried by a lubricant film")
+EXCLUDED = (NO_FATIGUE, "heating", "plastic flow", "load carried by a lubricant film")
 _RECORDS = {
     "cylinder_depth_profiles.csv": "cylinder_depth_profile",
     "roller_depth_profiles.csv": "roller_depth_profile",
     "line_load.csv": "line_load",
     "dissipation.csv": "dissipation",
+    "cylinder_damage_profiles.csv": "cylinder_damage_profile",
+    "roller_damage_profiles.csv": "roller_damage_profile",
 }
-_UNITS = {"volume": "mm^3", "peak_pressure": "MPa", "width": "mm"}  # the others in um
+#: the others in um
+_UNITS = {
+    "volume": "mm^3",
+    "peak_pressure": "MPa",
+    "width": "mm",
+    **dict.fromkeys(("damage", "pitting"), "1"),
+}
 
 
 class RunView(StudyView[Result]):
@@ -129,6 +143,7 @@ class RunView(StudyView[Result]):
             stated("worn descent", "descent", "um"),
             stated("elastic approach", "elastic_approach", "um"),
             *self._of_cam(),
+            *fatigue_rows(result),
         ]
         if error is None:
             return [*rows, Row("error of depth", NO_STEPPING_ERROR)]
@@ -220,6 +235,7 @@ class RunView(StudyView[Result]):
             "random": varying_inputs(result, result.raw.drawn),
             **self.ending(),
             "limits": result.limits,
+            **({"fatigue_sources": of_bodies} if (of_bodies := sources_of(result)) else {}),
         }
 
     def _of_arm(self) -> dict[str, Any]:
@@ -267,6 +283,8 @@ class RunView(StudyView[Result]):
     def overview(self) -> Overview:
         """Return the worn body, its loads, and limits that are passed or not."""
         result, excluded = self.result, [*EXCLUDED, "scatter of the inputs"]
+        if has_fatigue(result):
+            excluded.remove(NO_FATIGUE)
         sheet = self.panels()
         if result.is_cam:
             from wearsim.studies.cam.overview import CAM_EXCLUDED, loads  # noqa: PLC0415
@@ -298,7 +316,8 @@ class RunView(StudyView[Result]):
         ]
         tables: dict[str, Columns] = {"history.csv": [history]}
         for file, name in _RECORDS.items():
-            if name != "roller_depth_profile" or raw.records[name].any():
+            always = not name.startswith("roller") and name in raw.records
+            if always or (name in raw.records and raw.records[name].any()):
                 tables[file] = [list(self._records(name))]
         surface = self.surface(Sampling())
         if surface is not None:
@@ -364,7 +383,9 @@ class RunView(StudyView[Result]):
         yield from _columns("y", raw.static["y"], ("y",), "y")
         dims = ("y", *ALL_VARIABLES[name].dims[1:-1])
         angles = self._angles()
-        quantity = "depth" if name.endswith("depth_profile") else name
+        quantity = {"depth_profile": "depth", "damage_profile": "damage"}.get(
+            name.partition("_")[2], name
+        )
         for passes, array in zip(raw.records["record_passes"], raw.records[name], strict=True):
             title = f"{quantity} at {passes:.12g} passes"
             yield from _columns(name, np.moveaxis(array, -1, 0), dims, title, angles)

@@ -23,6 +23,7 @@ from wearsim.studies.ensemble.file.schema import (
 )
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.survival.competing import POINTS
 
 if TYPE_CHECKING:
     import h5py
@@ -166,7 +167,7 @@ class EnsembleData(StudyData):
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(
         ("variables", "status", "errors")
     )
-    optional: ClassVar[frozenset[str]] = frozenset({"life", "cam"})
+    optional: ClassVar[frozenset[str]] = frozenset({"life", "cam", "fatigue"})
 
     base_schema: ClassVar[Schema] = ENSEMBLE
 
@@ -184,6 +185,7 @@ class EnsembleData(StudyData):
     control: dict[str, float] = field(default_factory=dict)
     life: dict[str, Any] = field(default_factory=dict)
     cam: bool = False
+    fatigue: bool = False
     variables: Mapping[str, Array] = field(default_factory=dict)
     status: Array = field(default_factory=lambda: np.zeros(0, np.uint8))
     errors: dict[int, str] = field(default_factory=dict)
@@ -194,7 +196,7 @@ class EnsembleData(StudyData):
     @property
     def schema(self) -> Schema:
         """Schema of the results file."""
-        return ensemble_schema(self.inputs, self.control, self.life, self.cam)
+        return ensemble_schema(self.inputs, self.control, self.life, self.cam, self.fatigue)
 
     @property
     def done(self) -> IntArray:
@@ -248,6 +250,7 @@ class EnsembleData(StudyData):
             "kept": kept_profiles(self.requested, strips),
             "quantile": len(QUANTILES),
             "angle": len(self.variables["angle"]) if self.cam else 0,
+            "course": POINTS if self.fatigue else 0,
         }
         return {
             name: tuple(lengths[dim] for dim in variable.dims)

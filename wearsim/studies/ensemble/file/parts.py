@@ -346,6 +346,7 @@ def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
         attributes["control"],
         attributes.get("life", {}),
         attributes.get("cam", False),
+        attributes.get("fatigue", False),
     )
     check_complete(path, file, schema.variables)
     datasets = {name: file[name] for name in schema.variables}

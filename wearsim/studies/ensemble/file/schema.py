@@ -52,7 +52,21 @@ CAM_OBSERVABLES: Mapping[str, Variable] = by_name(
         ("peak_pressure_angle", "rad", "angle of the greatest normal pressure"),
     )
 )
-ALL_OBSERVABLES: Mapping[str, Variable] = {**OBSERVABLES, **CAM_OBSERVABLES}
+#: Further variables of every record of an ensemble of tests with fatigue, by name.
+FATIGUE_OBSERVABLES: Mapping[str, Variable] = by_name(
+    Variable(name, _HISTORY, "1", long_name, "record")
+    for name, long_name in (
+        ("damage", "effective damage of all bodies by fatigue"),
+        ("pitting", "probability of pitting"),
+        ("cylinder_damage", "greatest damage of the cylinder"),
+        ("roller_damage", "greatest damage of a roller"),
+    )
+)
+ALL_OBSERVABLES: Mapping[str, Variable] = {
+    **OBSERVABLES,
+    **CAM_OBSERVABLES,
+    **FATIGUE_OBSERVABLES,
+}
 
 #: Variables common to all realisations.
 STATIC: Mapping[str, Variable] = by_name(
@@ -128,7 +142,26 @@ LIFE = by_name(
 )
 
 
-def _statistics(observables: Mapping[str, Variable], kept: Variable) -> Mapping[str, Variable]:
+_COURSE = Axis("course", "point of the course of a test with fatigue to its limit", 0)
+#: Further ones of tests with fatigue.
+LIFE_FATIGUE = by_name(
+    (
+        Variable("course_end", _DRAW, "1", "roller passes at the end of a course", "record"),
+        Variable(
+            "damage_course",
+            ("realisation", "course"),
+            "1",
+            "effective damage along the test, at passes that rise by one factor to its end",
+            "record",
+        ),
+        Variable("damage_per_pass", _DRAW, "1", "effective damage per pass before wear", "record"),
+    )
+)
+
+
+def _statistics(
+    observables: Mapping[str, Variable], kept: Variable | None
+) -> Mapping[str, Variable]:
     """Return the estimates of some observables and of a curve that is kept."""
     return by_name(
         [
@@ -160,6 +193,7 @@ def _statistics(observables: Mapping[str, Variable], kept: Variable) -> Mapping[
                 ("low", "2.5 % quantile"),
                 ("high", "97.5 % quantile"),
             )
+            if kept is not None
         ]
     )
 
@@ -168,6 +202,8 @@ def _statistics(observables: Mapping[str, Variable], kept: Variable) -> Mapping[
 STATISTICS: Mapping[str, Variable] = _statistics(OBSERVABLES, _DEPTH_PROFILE)
 #: Further estimates of an ensemble of cams.
 CAM_STATISTICS: Mapping[str, Variable] = _statistics(CAM_OBSERVABLES, _LIFT_ERROR)
+#: Further estimates of an ensemble of tests with fatigue.
+FATIGUE_STATISTICS: Mapping[str, Variable] = _statistics(FATIGUE_OBSERVABLES, None)
 
 #: Schema without the random inputs, which differ between studies, and the control variate.
 ENSEMBLE = Schema(
@@ -191,6 +227,7 @@ def ensemble_schema(
     control: Mapping[str, Any],
     life: Mapping[str, Any],
     cam: bool = False,
+    fatigue: bool = False,
 ) -> Schema:
     """Return the schema of an ensemble, with its drawn values.
 
@@ -204,6 +241,8 @@ def ensemble_schema(
         Settings of tests that end at a limit; empty for others.
     cam : bool
         Whether the tests are of a cam.
+    fatigue : bool
+        Whether the bodies may pit.
 
     Returns
     -------
@@ -214,7 +253,10 @@ def ensemble_schema(
     if cam:
         last |= {"angle": ANGLE, "lift_error_curve": _LIFT_ERROR}
         last |= {**CAM_OBSERVABLES, **CAM_STATISTICS}
-    return replace(schema, variables={**schema.variables, **last})
+    if fatigue:
+        last |= {**FATIGUE_OBSERVABLES, **FATIGUE_STATISTICS, **(LIFE_FATIGUE if life else {})}
+    axes = {**schema.axes, **({_COURSE.name: _COURSE} if fatigue and life else {})}
+    return replace(schema, axes=axes, variables={**schema.variables, **last})
 
 
 def is_row(variable: Variable) -> bool:

@@ -37,6 +37,7 @@ from wearsim.studies.ensemble.file.parts import (
 from wearsim.studies.ensemble.file.schema import (
     CAM_STATISTICS,
     ENSEMBLE,
+    FATIGUE_STATISTICS,
     PENDING,
     QUANTILES,
     STATIC,
@@ -318,7 +319,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
 
 
 def _put_statistic(dataset: h5py.Dataset, name: str, array: Array) -> None:
-    if name not in STATISTICS and name not in CAM_STATISTICS:
+    if name not in {**STATISTICS, **CAM_STATISTICS, **FATIGUE_STATISTICS}:
         raise ValueError(f"{name} is not a statistic of an ensemble")
     if np.shape(array) != dataset.shape:
         raise ValueError(f"{name} has the shape {np.shape(array)}, expected {dataset.shape}")

@@ -1,0 +1,95 @@
+"""Lives that end by wear or by pitting: the table, limits of damage, and reasons."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import wearsim
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.fatigue.lives import competing_risks, lives_of
+
+RIG = shipped_scenario
+FATIGUE = {
+    "slope": 1.125,
+    "cylinder": {
+        "law": "pressure-life",
+        "source": "invented for a test",
+        "reference_passes": 1e6,
+        "reference_pressure": "900 MPa",
+        "exponent": 8.0,
+    },
+}
+CHANGES: dict[str, object] = {
+    "fatigue": FATIGUE,
+    "contact.strips": 61,
+    "contact.width": "18 mm",
+    "evolution.tolerance": 1e-2,
+    "evolution.strip_error": False,
+}
+
+
+@pytest.fixture(scope="module")
+def lives():
+    return wearsim.life(RIG("rig-life", CHANGES), 6, workers=1)
+
+
+def test_life_with_both_is_shorter_than_with_either(lives):
+    found = lives_of(lives, 0.1)
+    assert lives.is_exact
+    assert found["both"] < min(found["without_wear"], found["without_pitting"])
+    assert found["without_pitting"] == pytest.approx(lives.b(10).value, rel=1e-3)
+    assert math.isinf(found["pitting"])  # the groove lowers the pressure before
+
+
+def test_incidences_add_up_and_are_shown_with_their_source(lives):
+    level = competing_risks(lives).at(math.inf)
+    assert level.survival == 0.0
+    assert level.pitting + level.wear == pytest.approx(1.0, abs=1e-12)
+    assert 0.0 < level.pitting < 0.1
+    view = lives.view
+    text = [row.text for row in view.study()]
+    assert any("invented for a test" in line for line in text)
+    (table,) = [item for item in view.details() if "at last" in item.heads]
+    rows = {row[0]: row for row in table.rows}
+    assert rows["pitting first"][1] == "infinite"
+    data = view.data()["wear_or_pitting"]
+    assert data["first_by_pitting"] == level.pitting
+    assert data["sources"] == {"cylinder": "invented for a test"}
+
+
+def test_course_of_the_damage_is_that_of_a_run(lives):
+    number = int(lives.numbers[0])
+    drawn = {key: float(values[0]) for key, values in lives.inputs.items()}
+    passes, factor = float(lives.values("course_end")[0]), lives.settings.reference
+    scenario = RIG("rig-life", CHANGES).changed(
+        {
+            "load.normal_force": f"{drawn['load.normal_force']!r} N",
+            "friction.coefficient": drawn["friction.coefficient"],
+            "wear.cylinder.k_over_h": f"{factor!r} 1/Pa",
+            "operation.passes": round(passes),
+        }
+    )
+    run = wearsim.run(scenario)
+    assert number == 0
+    found = lives.values("damage_course")[0]
+    assert found[-1] == pytest.approx(run.values("damage")[-1], rel=1e-2)
+    middle = np.interp(0.1 * passes, run.passes, run.values("damage"))
+    assert found[-21] == pytest.approx(middle, rel=1e-2)
+
+
+def test_limit_of_damage_ends_lives_which_are_then_counted():
+    found = wearsim.life(
+        RIG("rig-life", {**CHANGES, "limit": {"depth": "50 um", "damage": 2e-4}}), 2, workers=1
+    )
+    assert not found.is_exact
+    assert "damage depends on the wear factor and on the passes" in found.settings.reason
+    assert found.first_limits["damage"] == 1.0
+    assert found.at_end("damage") == pytest.approx([2e-4] * 2, rel=1e-5)
+
+
+def test_limit_of_damage_needs_fatigue():
+    with pytest.raises(wearsim.ScenarioError, match=r"\[limit\] damage: needs the fatigue"):
+        RIG("rig-450min", {"limit.damage": 1.0})

@@ -1,0 +1,1 @@
+"""Rolling-contact fatigue beside wear: observables, displays, and lives that end by pitting."""

@@ -1,0 +1,65 @@
+"""Observables of the damage by fatigue in a run: after each step, and at records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from wearsim.evolution.fatigue import effective_damage, fatigue_of, greatest_damages
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState
+from wearsim.studies.cam.observables import at_every_station
+from wearsim.types import FloatArray
+
+
+def fatigue_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
+    """Return the observables of fatigue after a step; none of a test without it."""
+    if state.damage is None:
+        return {}
+    damage, error = state.damage[:2]
+    effective = effective_damage(problem, damage)
+    cylinder, rollers = greatest_damages(problem, damage)
+    found = {
+        "damage": effective,
+        "pitting": fatigue_of(problem).pitting(effective),
+        "cylinder_damage": cylinder,
+        "roller_damage": rollers,
+        "damage_error_by_steps": effective_damage(problem, damage + error) - effective,
+    }
+    cam = problem.kinematics.cam
+    if cam is not None:
+        rows = damage[: problem.shape[0]].max(axis=-1)
+        found["station_damage"] = at_every_station(problem, rows)
+        found["damage_angle"] = cam.greatest(rows).angle
+    return found
+
+
+def fatigue_record(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
+    """Return the damage of the bodies at a record; nothing of a test without fatigue."""
+    if state.damage is None:
+        return {}
+    stations, damage = problem.shape[0], state.damage[0]
+    return {
+        "cylinder_damage_profile": at_every_station(problem, damage[:stations]),
+        "roller_damage_profile": damage[stations:],
+    }
+
+
+def final_fatigue(last: Mapping[str, Any]) -> dict[str, FloatArray]:
+    """Return the observables of fatigue at the end of a run by their keys in JSON.
+
+    Parameters
+    ----------
+    last : mapping of str to ndarray
+        Last row of the history, by variable.
+    """
+    if "damage" not in last:
+        return {}
+    names = "damage", "damage_error", "pitting", "cylinder_damage", "roller_damage"
+    found = {name: np.asarray(last[name]) for name in names}
+    found["roller_damage"] = found["roller_damage"].max(axis=0)
+    if "damage_angle" in last:
+        found["damage_angle_rad"] = np.asarray(last["damage_angle"])
+    return found

@@ -1,0 +1,127 @@
+"""Pitting without wear: lives by the pressures of the fresh contact, and stresses below it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wearsim.evolution.fatigue import effective_damage, greatest_damages
+from wearsim.evolution.state import fresh_state
+from wearsim.mechanics.fatigue import ORTHOGONAL, greatest_von_mises
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.report.text import shown
+from wearsim.types import FloatArray
+
+if TYPE_CHECKING:
+    from wearsim.evolution.problem import WearProblem
+    from wearsim.scenario import Scenario
+
+
+def lives_at(scenario: Scenario, pressure: FloatArray) -> FloatArray | None:
+    """Return the life of points of the cylinder or the cam at constant pressures [passes].
+
+    Parameters
+    ----------
+    scenario : Scenario
+    pressure : ndarray
+        Greatest pressures [Pa].
+
+    Returns
+    -------
+    ndarray or None
+        Same shape, infinite below an endurance pressure; None if this body does not pit.
+    """
+    choice = scenario.fatigue
+    if choice is None or "cylinder" not in choice.laws:
+        return None
+    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    damage = choice.laws["cylinder"].build(modulus).damage_per_pass(np.asarray(pressure))
+    return np.where(damage > 0.0, 1.0 / np.where(damage > 0.0, damage, 1.0), np.inf)
+
+
+def stresses_below(
+    scenario: Scenario, pressure: FloatArray, half_length: FloatArray
+) -> dict[str, tuple[str, FloatArray]]:
+    """Return stresses below line contacts on the cylinder or the cam, without traction.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    pressure, half_length : ndarray
+        Greatest pressures [Pa] and half-lengths [m].
+
+    Returns
+    -------
+    dict of str to tuple
+        Unit and values of the greatest orthogonal shear stress and stress of von Mises, and their
+        depths, by key.
+    """
+    stress, depth = greatest_von_mises(scenario.cylinder.material.poisson_ratio)
+    return {
+        "orthogonal_shear_Pa": ("Pa", ORTHOGONAL[0] * pressure),
+        "orthogonal_shear_depth_m": ("m", ORTHOGONAL[1] * half_length),
+        "von_mises_Pa": ("Pa", stress * pressure),
+        "von_mises_depth_m": ("m", depth * half_length),
+    }
+
+
+def unworn_data(scenario: Scenario, problem: WearProblem) -> dict[str, Any] | None:
+    """Return the lives of a test by pitting without wear, in roller passes; None without fatigue.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    problem : WearProblem
+        Of the test.
+    """
+    choice, state = scenario.fatigue, fresh_state(problem)
+    if choice is None or state.damage is None:
+        return None
+    rate, cam = state.damage[2], problem.kinematics.cam
+    cylinder, rollers = greatest_damages(problem, rate)
+    damages = {
+        "passes": effective_damage(problem, rate),
+        "cylinder_passes": cylinder,
+        "roller_passes": rollers.max(axis=0),
+    }
+    data: dict[str, Any] = {
+        name: float(1.0 / value[0]) if value[0] > 0.0 else None for name, value in damages.items()
+    }
+    data["probability"] = choice.probability
+    data["sources"] = {body: law.source for body, law in choice.laws.items()}
+    if cam is not None:
+        angle = cam.greatest(rate[: problem.shape[0]].max(axis=-1)).angle
+        data["angle_rad"] = float(angle[0])
+    return data
+
+
+def unworn_text(data: dict[str, Any], rollers: int | None) -> str:
+    """Return the life of a test by pitting without wear in words.
+
+    Parameters
+    ----------
+    data : dict
+        From `unworn_data`.
+    rollers : int, optional
+        Rollers of a cam, whose life is in turns.
+    """
+    unit, size = ("passes", 1.0) if rollers is None else ("turns", float(rollers))
+
+    def life(name: str) -> str:
+        passes = data[name]
+        return "infinite" if passes is None else f"{shown(passes / size, '1', 3)} {unit}"
+
+    text = f"{life('passes')} to a probability of {data['probability']:g}"
+    body = "cylinder" if rollers is None else "cam"
+    place = f" at {shown(data['angle_rad'], 'deg')}" if "angle_rad" in data else ""
+    parts = [
+        f"{name} {life(key)}{where}"
+        for name, key, where in ((body, "cylinder_passes", place), ("roller", "roller_passes", ""))
+        if data[key] is not None
+    ]
+    return (
+        f"{text} ({', '.join(parts)})"
+        if parts
+        else "does not occur: no pressure is above endurance"
+    )
