@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -110,6 +110,37 @@ class ScenarioError(WearsimError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.file, self.mistakes), {**self.__dict__, "args": self.args}
+
+
+class InfeasibleCamError(ScenarioError):
+    """A cam that its roller cannot follow: undercut, jumping or reaching the pivot of its arm.
+
+    Parameters
+    ----------
+    file, mistakes
+        As in `ScenarioError`.
+    margins : mapping of str to float
+        How far the cam is from being feasible, in SI: ``undercut_margin`` [m],
+        ``least_normal_force`` [N] and of an arm ``pivot_margin`` [m]. All are above zero for a
+        feasible cam.
+
+    Examples
+    --------
+    >>> from wearsim.scenario.examples import shipped_scenario
+    >>> fast = shipped_scenario("cam-cycloidal", {"operation.speed": "3000 rpm"})
+    >>> try:
+    ...     wearsim.study_cam(fast)
+    ... except wearsim.errors.InfeasibleCamError as error:
+    ...     print(f"{error.margins['least_normal_force']:.0f} N")
+    -672 N
+    """
+
+    def __init__(self, file: str, mistakes: list[Mistake], margins: Mapping[str, float]) -> None:
+        super().__init__(file, mistakes)
+        self.margins = dict(margins)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.file, self.mistakes, self.margins), {"args": self.args}
 
 
 class PluginError(WearsimError):

@@ -19,6 +19,7 @@ HOOKS = (
     "wearsim_motion_laws",
     "wearsim_axial_profiles",
     "wearsim_study_kinds",
+    "wearsim_tables",
 )
 RIG = (
     BODIES

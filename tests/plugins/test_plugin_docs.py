@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import wearsim
 from wearsim.cli.app import app as cli_app
-from wearsim.errors import CapabilityError, PluginError
+from wearsim.errors import CapabilityError, PluginError, ScenarioError
 from wearsim.plugins import (
     AxialProfileSpec,
     Capabilities,
@@ -29,6 +29,7 @@ from wearsim.plugins import (
     registry,
 )
 from wearsim.plugins.manager import HookSpecs
+from wearsim.scenario.examples import scenario_schema
 from wearsim.testing import random_inputs
 from wearsim.testing.axial_profiles import AXIAL_PROFILE, AxialProfileFixture
 from wearsim.testing.checks import ConfiguredSpec
@@ -102,6 +103,14 @@ def test_documented_contact_model_passes_the_checks_and_runs(documented):
     assert result.power[-1] == pytest.approx(3 * 0.1 * 300.0 * 2.618 * 1e-3, rel=1e-4)
     with pytest.raises(CapabilityError, match="wear compliance"):
         wearsim.run(rig({"evolution.stepper": "implicit"}, **tables))
+
+
+def test_documented_table_is_read_with_the_scenario(documented):
+    tables = documented("wearsim_tables")
+    assert rig(**tables).tables["survey"].spacing == 2e-3
+    assert "survey" in scenario_schema()["properties"]
+    with pytest.raises(ScenarioError, match=r"\[survey\] grooves: .*got 0"):
+        rig(survey="grooves = 0")
 
 
 @pytest.mark.parametrize("stepper", ["auto", "per-pass"])

@@ -27,6 +27,7 @@ _BAR, _COLUMNS_FOR_BAR = 24, 115
 CHECKPOINT = "stopping at a checkpoint; repeat to stop at once"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 BATCHES = "stopping after the next batch; repeat to stop at once"  # at a signal to an ensemble
+PARTS = "stopping after the parts in progress; repeat to stop at once"  # to a study of a plugin
 
 
 class Display:
@@ -162,6 +163,24 @@ class Counter(Display):
         """Show how many of them are done."""
         left = self.advance(done, total)
         self.show(f"{count(done)} of {count(total)} realisations{left}")
+
+
+class PartWatcher(Display):
+    """Display of a study that is computed in parts, with a text on its present state."""
+
+    @property
+    def callbacks(self) -> dict[str, Any]:
+        """Arguments with which a study reports to this display, and asks whether to stop."""
+        return {**super().callbacks, "on_notice": self.notice}
+
+    def notice(self, text: str) -> None:
+        """Show a notice, also if nothing else is shown."""
+        self.write(text, also_quiet=True)
+
+    def __call__(self, done: int, total: int, text: str) -> None:
+        """Show how many parts are done, and the text."""
+        left = self.advance(done, total)
+        self.show(f"{count(done)} of {count(total)}, {text}{left}", always=done == total)
 
 
 class RunWatcher(Display):

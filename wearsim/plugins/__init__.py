@@ -33,6 +33,7 @@ from wearsim.plugins.specs import (
     RandomInputSpec,
     Spec,
     StudyKind,
+    TableSpec,
     Uniforms,
     WearLaw,
     WearLawSpec,
@@ -50,8 +51,9 @@ from wearsim.quantities import (
     PositiveWearFactor,
     Quantity,
     Value,
+    quantity,
 )
-from wearsim.units import Kind, QuantityError
+from wearsim.units import Kind, QuantityError, kind_of
 
 __all__ = [
     "BODIES",
@@ -97,11 +99,14 @@ __all__ = [
     "SingleContactModel",
     "Spec",
     "StudyKind",
+    "TableSpec",
     "Uniforms",
     "Value",
     "WearLaw",
     "WearLawSpec",
     "hookimpl",
+    "kind_of",
+    "quantity",
     "refuse_unclaimed",
     "registry",
 ]

@@ -21,6 +21,7 @@ from wearsim.plugins.specs import (
     RandomInputSpec,
     Spec,
     StudyKind,
+    TableSpec,
     WearLawSpec,
 )
 
@@ -38,6 +39,7 @@ _HOOKS: dict[type[Spec], str] = {
     MotionLawSpec: "wearsim_motion_laws",
     AxialProfileSpec: "wearsim_axial_profiles",
     StudyKind: "wearsim_study_kinds",
+    TableSpec: "wearsim_tables",
 }
 #: modules of wearsim that implement hooks; they need no entry point
 _BUILT_IN = {"builtin": "wearsim.models", "studies": "wearsim.studies.kinds"}
@@ -332,6 +334,26 @@ class HookSpecs:
                     holds="depths of several grooves, from `wearsim survey`",
                     protocol=2,
                 )
+        """
+
+    @hookspec
+    def wearsim_tables(self) -> Iterable[TableSpec]:  # type: ignore[empty-body]
+        """Yield tables of the scenario that the plugin owns; see `TableSpec`.
+
+        Examples
+        --------
+        .. code-block:: python
+
+            from wearsim.plugins import Options, PositiveLength, TableSpec, hookimpl
+
+
+            class SurveyOptions(Options):
+                spacing: PositiveLength = 1e-3  # between the grooves
+
+
+            @hookimpl
+            def wearsim_tables():
+                yield TableSpec("survey", SurveyOptions, "grooves of a survey", protocol=2)
         """
 
 

@@ -429,6 +429,17 @@ class RandomInputSpec(Spec):
 
 
 @dataclass(frozen=True)
+class TableSpec(Spec):
+    """Spec of a table of the scenario that a plugin owns, ``[NAME]``.
+
+    Its options are validated with the scenario, and stored in ``Scenario.tables`` by name. They
+    have no effect on studies other than the plugin's own.
+    """
+
+    kind: ClassVar[str] = "scenario table"
+
+
+@dataclass(frozen=True)
 class StudyKind(Spec):
     """Spec of a kind of study: its results, their file, and how they are shown and continued.
 
@@ -453,7 +464,10 @@ class StudyKind(Spec):
     holds : str
         Content of a file and the command that writes it, for messages.
     resume : str
-        Reference of a function that continues a study from its file; empty if there is none.
+        Reference of a function that continues a study from its file; empty if there is none. That
+        of a plugin is called as ``resume(file, workers=..., scheduler=..., on_progress=...,
+        on_notice=..., stop_requested=...)``, where ``on_progress(done, total, text)`` shows how far
+        it is.
     compare : str
         Reference of a function that returns the view of several results; kinds with the same one
         can be compared with each other.

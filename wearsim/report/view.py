@@ -7,6 +7,7 @@ views, and figures (`figures`) the panels of a view.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from pkgutil import resolve_name
@@ -40,12 +41,16 @@ class Row(NamedTuple):
         Unit that is shown, a key of `PER_SI`.
     error : float, optional
         Half-width of the interval that holds the true value [SI].
+    answers : mapping of str to (float, str), optional
+        The numbers that the row states: value in SI and unit that is shown, by the name under which
+        other studies ask for them, {"outer_radius": (0.031, "mm")}.
     """
 
     label: str
     quantity: Any
     unit: str = "1"
     error: float | None = None
+    answers: Mapping[str, tuple[float | None, str]] = {}
 
     @property
     def text(self) -> str:
@@ -61,11 +66,39 @@ class Row(NamedTuple):
 Rows: TypeAlias = list[Row]
 
 
+class Answer(NamedTuple):
+    """A number that a view states.
+
+    Parameters
+    ----------
+    value : float
+        In SI; not a number where it is not known.
+    unit : str
+        Unit that is shown, a key of `PER_SI`.
+    label : str
+        Label of its row.
+    """
+
+    value: float
+    unit: str
+    label: str
+
+
+def answers_of(rows: Rows) -> dict[str, Answer]:
+    """Return the numbers that rows state, by name."""
+    return {
+        name: Answer(math.nan if value is None else float(value), unit, row.label)
+        for row in rows
+        for name, (value, unit) in row.answers.items()
+    }
+
+
 def width_row(width: Any, threshold: float) -> Row:
     """Return widths of the groove, or the depth that it has not reached, in SI."""
+    answers = {"width": (float(np.max(width)), "mm")}
     if not np.any(width):
-        return Row("width", f"0 mm, not deeper than {shown(threshold, 'um')}")
-    return Row("width", width, "mm")
+        return Row("width", f"0 mm, not deeper than {shown(threshold, 'um')}", answers=answers)
+    return Row("width", width, "mm", answers=answers)
 
 
 class Table(NamedTuple):
@@ -170,6 +203,13 @@ class View(ABC):
     @abstractmethod
     def data(self) -> dict[str, Any]:
         """Return all numbers for JSON, in SI units."""
+
+    def answers(self) -> dict[str, Answer]:
+        """Return the numbers that rows and tables state, by the name of the quantity.
+
+        Studies that choose a design ask for them, as objectives and constraints.
+        """
+        return answers_of(self.rows())
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over computed ones."""

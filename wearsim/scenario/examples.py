@@ -10,7 +10,13 @@ from pydantic import BaseModel, Field, RootModel, create_model
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
-from wearsim.plugins import AxialProfileSpec, MotionLawSpec, Options, RandomInputSpec
+from wearsim.plugins import (
+    AxialProfileSpec,
+    MotionLawSpec,
+    Options,
+    RandomInputSpec,
+    TableSpec,
+)
 from wearsim.scenario.parse.fields import (
     FRICTION,
     RandomInputTable,
@@ -87,6 +93,12 @@ def scenario_schema() -> dict[str, Any]:
     Returns
     -------
     dict
+
+    Examples
+    --------
+    >>> schema = wearsim.scenario_schema()
+    >>> schema["required"]
+    ['roller', 'operation', 'load', 'friction', 'creepage']
     """
     random = _random_inputs()
     tables: dict[str, Any] = {}
@@ -105,6 +117,9 @@ def scenario_schema() -> dict[str, Any]:
         kind = kind or _model(table, model.__doc__, keys)
         needed = table in REQUIRED and table != "cylinder"  # a cam may replace it
         tables[table] = kind, Field(... if needed else None, description=model.__doc__)
+    for spec in installed(TableSpec):
+        owned = _model(spec.name, spec.summary, _fields(spec.options))
+        tables[spec.name] = owned, Field(None, description=spec.summary)
     scenario = _model(
         "wearsim scenario",
         "Scenario of a wear simulation of a rolling contact, for wearsim.",

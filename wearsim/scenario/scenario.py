@@ -11,6 +11,7 @@ from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.plugins import Options
 from wearsim.profiles import split_name
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import RandomInput
@@ -74,6 +75,8 @@ class Scenario:
         The random inputs, in the order of their names.
     drawn : mapping of str to float or tuple of float
         Values that replace random inputs, by dotted key, in SI; a tuple has one value per roller.
+    tables : mapping of str to Options
+        Tables that belong to plugins, by name.
 
     Examples
     --------
@@ -106,6 +109,7 @@ class Scenario:
     notes: tuple[str, ...] = ()
     random: tuple[RandomInput, ...] = ()
     drawn: Mapping[str, Drawn] = field(default_factory=dict)
+    tables: Mapping[str, Options] = field(default_factory=dict)
 
     def _repr_html_(self) -> str:
         from wearsim.scenario.display import scenario_html  # noqa: PLC0415  (of notebooks)
@@ -120,6 +124,7 @@ class Scenario:
         *,
         folder: str | Path = ".",
         name: str = "scenario",
+        confined: bool = False,
     ) -> Scenario:
         """Read a scenario from a text.
 
@@ -133,6 +138,8 @@ class Scenario:
             Folder of the files that the scenario names.
         name : str
             Name of the scenario in messages, and its title if it has none.
+        confined : bool
+            Refuse files outside the folder, for scenarios that somebody else writes.
 
         Returns
         -------
@@ -150,7 +157,8 @@ class Scenario:
         >>> wearsim.Scenario.from_toml(text, {"operation.rollers": 1}).total_passes
         450000
         """
-        return parse_scenario(text, str(Path(folder) / name), reader_in(Path(folder)), overrides)
+        read = reader_in(Path(folder), confined=confined)
+        return parse_scenario(text, str(Path(folder) / name), read, overrides)
 
     @classmethod
     def from_dict(
@@ -199,7 +207,8 @@ class Scenario:
         Parameters
         ----------
         overrides : mapping of str to object
-            Values by dotted key, {"load.normal_force": "350 N"}.
+            Values by dotted key, {"load.normal_force": "350 N"}; an entry of a list has its number,
+            {"cam.motion.2.law": "modified-sine"}.
 
         Returns
         -------

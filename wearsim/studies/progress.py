@@ -14,7 +14,7 @@ from wearsim.studies.kernels import kernels_of
 @contextmanager
 def shown_progress(
     progress: bool,
-    display: Literal["RunWatcher", "EnsembleWatcher", "Counter"],
+    display: Literal["RunWatcher", "EnsembleWatcher", "Counter", "PartWatcher"],
     watcher: Callable[..., object] | None,
     scenario: Scenario,
 ) -> Iterator[Any]:

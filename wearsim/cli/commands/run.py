@@ -104,7 +104,15 @@ def resume(
     quiet: Quiet = False,
 ) -> None:
     """Continue a run or an ensemble from its results file."""
-    from wearsim.cli.progress import BATCHES, CHECKPOINT, EnsembleWatcher, RunWatcher, watching
+    from wearsim.cli.progress import (
+        BATCHES,
+        CHECKPOINT,
+        PARTS,
+        EnsembleWatcher,
+        PartWatcher,
+        RunWatcher,
+        watching,
+    )
     from wearsim.results.kinds import kind_of, open_study
 
     kind = kind_of(file)
@@ -119,10 +127,19 @@ def resume(
             resumed = wearsim.resume(file, until, allow_deep=allow_deep, **shown.callbacks)
         show_view(resumed.view, json=json, files={"results file": resumed.path})
         return
+    chosen = checked_scheduler(scheduler, workers)
+    if kind.name not in {"ensemble", "life"}:
+        given = {"--until": until, "--allow-deep": allow_deep}
+        given |= {"--failed": failed, "--realisations": realisations}
+        refuse_options(given, f"has no meaning for a file that holds {kind.holds}")
+        with watching(PartWatcher, open_study(file, kind), quiet, PARTS) as parts:
+            hands = {"workers": workers, "scheduler": chosen}
+            result = kind.load("resume")(file, **hands, **parts.callbacks)
+        show_view(result.view, json=json, files={"results file": result.path})
+        return
     refuse(until is not None, "only wear tests can be extended", "--until")
     refuse(allow_deep, "is an option for wear tests only", "--allow-deep")
     refuse(failed and realisations is not None, "extend the ensemble first", "--failed")
-    chosen = checked_scheduler(scheduler, workers)
     before = open_study(file, kind)
     nothing = _nothing_to_do(before, kind.name, failed)
     if nothing and realisations is None:

@@ -18,6 +18,8 @@ formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
@@ -26,7 +28,12 @@ from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.loads import descents, elastic_approaches, with_feedback
 from wearsim.evolution.steppers.single_step import carried_loads
-from wearsim.mechanics.numerics.edge_strips import SETTLED, EdgeStrips, start_edges
+from wearsim.mechanics.numerics.edge_strips import (
+    SETTLED,
+    EdgeStrips,
+    mark_strips,
+    start_edges,
+)
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
 from wearsim.types import BoolArray, FloatArray, IntArray
@@ -34,6 +41,7 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 # greatest order where edges are resolved within a strip: beyond the first derivative the wear of
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
+YOUNG_STEPS = 2.0  # steps for which a strip is young, over the order
 YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
 LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
@@ -116,6 +124,8 @@ def by_resolution(
         state = _with_new_edges(problem, state, whole & ~low)
         whole = unresolved(state)
     parts = []
+    if not whole.any():
+        return [(every, problem, state)]
     for kind in (False, True):
         places = np.flatnonzero(whole == kind)
         if places.size:
@@ -215,53 +225,67 @@ def edges_of_step(
     return edges
 
 
-def crossed_strips(state: WearState) -> BoolArray | None:
-    """Return which strips of the bodies an edge is crossing or has crossed lately."""
-    if state.whole_steps is None or state.part is None:
-        return None
-    lately = (state.part > 0.0) & (state.whole_steps < SETTLED)
-    return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
-
-
 def most(state: WearState) -> int:
     """Return the greatest order of steps from a state."""
     return MAX_ORDER if state.part is None else EDGE_ORDER
 
 
-def young_strips(state: WearState) -> BoolArray | None:
-    """Return which strips of the bodies take steps of first order.
+class MarkedStrips(NamedTuple):
+    """Strips of the bodies about the edges of their contacts, each an array as `WearState.stacked`.
 
-    Points of formulas of the state's order would lie ahead of the edge or close to it. There the
-    surfaces close as the power 3/2 of the distance from it, and higher orders would overshoot.
-    A worn roller of a cam meets the edges at all stations at different times. Its wear by one of
-    them has no past points, and both bodies of a contact must wear by the same formula: no strip
-    is young then.
+    Parameters
+    ----------
+    young : ndarray of bool
+        Strips that take steps of first order. Points of formulas of the state's order would lie
+        ahead of the edge or close to it, until as many steps again have been taken. There the
+        surfaces close as the power 3/2 of the distance from it, and higher orders would overshoot.
+        A worn roller of a cam meets the edges at all stations at different times. Its wear by one
+        of them has no past points, and both bodies of a contact must wear by the same formula: no
+        strip is young then.
+    crossed : ndarray of bool
+        Strips that an edge is crossing or has crossed lately.
+    parts : ndarray
+        Greatest part in contact, 0 without wear.
     """
+
+    young: BoolArray
+    crossed: BoolArray
+    parts: FloatArray
+
+    @property
+    def weights(self) -> FloatArray:
+        """Part of each strip's error that counts.
+
+        The formulas also continue the separation of strips that are not in contact. Young strips
+        are not smooth enough for an estimate, which is too great, see `first_order_errors`.
+        """
+        return np.where(self.young, YOUNG * self.parts, self.parts)
+
+
+def marked_strips(state: WearState) -> MarkedStrips | None:
+    """Return the strips of a state about the edges, None where edges are not resolved."""
     if state.whole_steps is None or state.part is None or state.past_wear is None:
         return None
     assert state.order is not None
-    touching, stations = state.part > 0.0, len(state.part)
-    young, ahead = touching & (state.whole_steps < state.order[:, None]), ~touching
-    found = [(young.any(axis=axis) | ahead.all(axis=axis)) for axis in (1, 0)]
-    if stations > 1:
-        unworn = ~(state.past_wear[0][stations:] > 0.0).any(axis=(0, 2))
-        found = [one & unworn[:, None] for one in found]
-    return np.concatenate(found)
+    wear = kernel_input(state.past_wear[0])
+    young, crossed = np.empty((2, *wear.shape), dtype=np.bool_)
+    marked = MarkedStrips(young, crossed, np.empty_like(wear))
+    steps = (YOUNG_STEPS * state.order).astype(np.float64)
+    mark_strips(kernel_input(state.part), kernel_input(state.whole_steps), steps, wear, *marked)
+    return marked
 
 
-def with_sum(
-    end: WearState, errors: FloatArray, crossed: BoolArray, parts: FloatArray
-) -> FloatArray:
+def with_sum(end: WearState, errors: FloatArray, marked: MarkedStrips) -> FloatArray:
     """Return errors of the depths that a step adds, which agree with those of their sums.
 
-    `with_volume` keeps the sums; `parts` are those of `parts_of_bodies`.
+    `with_volume` keeps the sums.
     """
     past, spans, orders = end.past_sums, end.past_spans, end.order
     assert past is not None
     assert spans is not None
     assert orders is not None
-    parts = np.where(crossed, 0.0, parts)
-    errors = np.where(crossed, 0.0, errors)
+    parts = np.where(marked.crossed, 0.0, marked.weights)
+    errors = np.where(marked.crossed, 0.0, errors)
     sums = kernel_input(past[:, :-1, :, None])
     ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
     scale = np.ones(len(orders))
@@ -280,21 +304,6 @@ def relative_size(errors: FloatArray, depths: FloatArray) -> FloatArray:
     """Return the Euclidean norm of errors of all depths over that of the depths, shape (N,)."""
     size, whole = (sum_in_order(over_strips(values**2), 0) for values in (errors, depths))
     return np.asarray(np.sqrt(size / np.where(whole > 0.0, whole, np.inf)))
-
-
-def parts_of_bodies(state: WearState, young: BoolArray | None) -> FloatArray:
-    """Return the part of each strip's error that counts, as `WearState.stacked`.
-
-    The formulas also continue the separation of strips that are not in contact. Those that the edge
-    has just crossed, the `young_strips`, are not smooth enough for an estimate, which is too great,
-    see `first_order_errors`.
-    """
-    if young is None:
-        return np.ones(state.stacked.shape)
-    assert state.part is not None
-    assert state.past_wear is not None
-    parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
-    return np.where(state.past_wear[0] > 0.0, np.where(young, YOUNG * parts, parts), 0.0)
 
 
 def first_order_errors(end: WearState, young: BoolArray) -> FloatArray:

@@ -167,8 +167,8 @@ class ImplicitStepper(StepDoublingStepper):
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
         left = self._left(problem, state, stop, OF_STEPS)
-        young = edges.young_strips(end)
-        parts = edges.parts_of_bodies(end, young)
+        marked = edges.marked_strips(end)
+        parts = np.ones_like(depths) if marked is None else marked.weights
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, past.order, part, aim, KEEP, edges.most(end)),
@@ -188,7 +188,7 @@ class ImplicitStepper(StepDoublingStepper):
             passes=passes,
             steps=state.steps + 1,
             order=order,
-            **_estimates(problem, state, end, depths, own, step, displaced, young, parts),
+            **_estimates(problem, state, end, depths, own, step, displaced, marked),
             **others,
         )
         return Attempt((end,), over, ratio)
@@ -270,8 +270,7 @@ def _estimates(
     added: FloatArray,
     passes: FloatArray,
     displaced: FloatArray | None,
-    young: BoolArray | None,
-    parts: FloatArray,
+    marked: edges.MarkedStrips | None,
 ) -> dict[str, FloatArray]:
     """Return the error estimates at the end of a step, by their names in `WearState`.
 
@@ -286,17 +285,16 @@ def _estimates(
         Length of the step.
     displaced : ndarray, shape (realisations,), optional
         Displacement of a roller that the error of its load corresponds to [m].
-    young, parts : ndarray
-        Strips that take steps of first order, where edges are resolved, and `parts_of_bodies`.
+    marked : MarkedStrips, optional
+        Strips of the end, where edges are resolved.
     """
     contacts, shape = end.contacts, end.contacts.line_load.shape
     stiffness = np.zeros(shape[0])
     if problem.has_spring:
         stiffness = np.broadcast_to(problem.stiffness, problem.shape).flatten()
-    crossed = edges.crossed_strips(end)
     errors, sizes = carried_errors(
         np.asarray(start.stepping_error),
-        added if crossed is None else edges.with_sum(end, added, crossed, parts),
+        added if marked is None else edges.with_sum(end, added, marked),
         contacts.line_load,
         problem.wear_parts(contacts, passes).reshape(2, *shape),
         np.asarray(end.wear_exponents).reshape(shape),
@@ -311,8 +309,9 @@ def _estimates(
     if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
-    if crossed is not None and young is not None:
-        at_edges = EDGES * (np.where(crossed, added, 0.0) + edges.first_order_errors(end, young))
+    if marked is not None:
+        of_first_order = edges.first_order_errors(end, marked.young)
+        at_edges = EDGES * (np.where(marked.crossed, added, 0.0) + of_first_order)
         sizes[2] = np.hypot(sizes[2], edges.relative_size(at_edges, depths))
         sizes[:2] *= OF_EDGES
     found = COVER * sizes
@@ -441,8 +440,9 @@ def _step(
     formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
     added, guess = extrapolated(weights, past.wear)
-    scale, young = None, edges.young_strips(state)
-    if young is not None:
+    scale, marked = None, edges.marked_strips(state)
+    if marked is not None:
+        young = marked.young
         added = np.where(young, half_pass[:, None] * past.wear[0], added)
         first = (conditions.mean * passes / conditions.own - half_pass) / worn_passes
         scale = np.where(young, first[:, None], 1.0)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from wearsim.atomic_write import refuse_if_locked, refuse_inputs
-from wearsim.errors import ResultsFileError
+from wearsim.errors import ResultsFileError, WearsimError
 
 _OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
 
@@ -69,8 +69,12 @@ def _continuing(path: str | Path) -> str:
                 return ""
             # by a variable that only files of this kind have
             verbs = {"step": "resume", "life": "resume_life", "realisation": "resume_ensemble"}
-            return next((verb for name, verb in verbs.items() if name in file), "")
-    except (OSError, RuntimeError, KeyError, ValueError):  # not a results file, or damaged
+            known = next((verb for name, verb in verbs.items() if name in file), "")
+        from wearsim.results.kinds import kind_of  # noqa: PLC0415  (imports the plugins)
+
+        return known or kind_of(path).resume.rpartition(":")[2]
+    # not a results file, damaged, or of a plugin that is not installed
+    except (OSError, RuntimeError, KeyError, ValueError, WearsimError):
         return ""
 
 

@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import suppress
+from errno import EACCES
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -20,6 +21,7 @@ from wearsim.plugins import (
     MotionLawSpec,
     Options,
     RandomInputSpec,
+    TableSpec,
 )
 from wearsim.profiles import ROW_CHOICES, split_name
 from wearsim.quantities import DECIMAL_COMMA
@@ -101,6 +103,8 @@ TABLES: dict[str, type[Options]] = {
     "limit": LimitTable,
     "sampling": SamplingTable,
 }
+#: tables of distributions of this project, ignored with a note where these are not installed
+FIRST_PARTY = {"optimise": "wearsim-optimise"}
 #: [cam] replaces [cylinder]
 REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
 _ABSENT = {*REQUIRED, "wear", "cam", "follower", "lubricant"}  # tables without defaults
@@ -243,10 +247,20 @@ def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, 
         raise ValueError("is not a key to override")
     table = document
     for name in tables:
-        table = table.setdefault(name, {})
-        if not isinstance(table, MutableMapping):
+        if isinstance(table, list):
+            if not (name.isdigit() and 1 <= int(name) <= len(table)):
+                raise ValueError(
+                    f"cannot be set, since '{name}' is not the number of an entry, from 1 to"
+                    f" {len(table)}"
+                )
+            table = table[int(name) - 1]
+        else:
+            table = table.setdefault(name, {})
+        if not isinstance(table, MutableMapping | list):
             raise ValueError(f"cannot be set, since '{name}' is not a table")
-    return table  # type: ignore[no-any-return]
+    if not isinstance(table, MutableMapping):
+        raise ValueError(f"cannot be set, since '{key}' is not a key of an entry")
+    return table
 
 
 def flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
@@ -260,11 +274,13 @@ def flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, 
             yield f"{prefix}{key}", value
 
 
-def reader_in(folder: Path) -> Callable[[str], str]:
-    """Return a function that reads the input files in a folder."""
+def reader_in(folder: Path, *, confined: bool = False) -> Callable[[str], str]:
+    """Return a function that reads the input files in a folder, if confined no others."""
 
     def read(name: str) -> str:
         file, choice = split_name(name)
+        if confined and not (folder / file).resolve().is_relative_to(folder.resolve()):
+            raise PermissionError(EACCES, "outside the folder of the scenario", file)
         return read_input(folder / file, choice)
 
     return read
@@ -300,6 +316,7 @@ def parse_fields(
     refuse_cylinder(mistakes, data)
     tables = of_follower(data)
     sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
+    owned = _read_owned(mistakes, data)
     assemble_cam(mistakes, sections, "cam" in tables)
     sections |= check_axial(mistakes, sections)
     check_lists(mistakes, data, sections["limit"])
@@ -321,6 +338,7 @@ def parse_fields(
         "files": files,
         "notes": notes,
         "random": random,
+        "tables": owned,
         **sections,
     }
 
@@ -370,7 +388,14 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
 def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
     """Return the keys above the tables; add a mistake for each unknown key and table."""
     keys = {key: data[key] for key in TopTable.model_fields if key in data}
-    for key in [key for key in data if key not in TABLES and key not in keys]:
+    known = {*TABLES, *keys, *(spec.name for spec in installed(TableSpec))}
+    for key in [key for key in data if key not in known]:
+        if key in FIRST_PARTY and isinstance(data[key], dict):
+            mistakes.notes.append(
+                f"[{key}] is a table of {FIRST_PARTY[key]}, which is not installed:"
+                f" pip install 'wearsim[{key}]'"
+            )
+            continue
         if isinstance(data[key], dict):
             hint = nearest(key, TABLES) or f" (known: {', '.join(TABLES)})"
             mistakes.add(key, "", f"unknown table{hint}")
@@ -394,6 +419,23 @@ def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> A
     if table in READERS:
         return READERS[table](mistakes, raw)
     return validate(mistakes, TABLES[table], raw, table)
+
+
+def _read_owned(mistakes: Mistakes, data: Mapping[str, object]) -> dict[str, Options]:
+    """Return the tables that belong to plugins, by name; adds their mistakes."""
+    owned = {}
+    for spec in installed(TableSpec):
+        raw = data.get(spec.name)
+        if raw is None:
+            continue
+        if not isinstance(raw, dict):
+            expected = f"a line [{spec.name}] and its keys below"
+            mistakes.add("", spec.name, "is not a table", as_written(raw), expected)
+            continue
+        options = validate(mistakes, spec.options, raw, spec.name)
+        if options is not None:
+            owned[spec.name] = options
+    return owned
 
 
 def _unused_sampling_note(data: Mapping[str, Any], random: tuple[RandomInput, ...]) -> list[str]:
@@ -420,6 +462,7 @@ def keys_by_place() -> dict[str, set[str]]:
         keys[place] = set(profile.options.model_fields)
     keys["axial_profile"] = set(AxialTable.model_fields)
     keys['[contact] with model = "auto"'] = {"tolerance"}
+    keys |= {f"[{spec.name}]": set(spec.options.model_fields) for spec in installed(TableSpec)}
     keys["a random input"] = set(RandomInputTable.model_fields)
     return keys | {
         f'a random input with distribution = "{spec.name}"': set(spec.options.model_fields)

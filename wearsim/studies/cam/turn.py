@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import InfeasibleCamError, Mistake, ScenarioError
 from wearsim.mechanics.cam import (
     Panel,
     RollerKinematics,
@@ -392,9 +392,28 @@ class CamTurn:
             )
             mistakes.append(Mistake("load", "preload", what, got, expected))
         if mistakes:
-            raise ScenarioError(self.scenario.file, mistakes)
+            raise InfeasibleCamError(self.scenario.file, mistakes, self.margins)
         self.arcs  # noqa: B018  (raises where the roller rolls nowhere)
         return self
+
+    @cached_property
+    def margins(self) -> dict[str, float]:
+        """Distances from what a roller cannot follow, in SI; below zero if it cannot.
+
+        ``undercut_margin``: least radius of the pitch curve where it is convex, less that of the
+        roller, which is the least radius of the cam [m]; infinite without convex parts.
+        ``least_normal_force`` [N], of a cam without a groove. ``pivot_margin``: distance of the
+        pivot of an arm from the cam [m].
+        """
+        radius, found = self.scenario.roller.radius, {}
+        sharpest, _ = extreme(self.panels, self._undercut)
+        found["undercut_margin"] = radius / sharpest - radius if sharpest > 0.0 else math.inf
+        if not self.cam.groove:
+            found["least_normal_force"] = self.normal_range[0]
+        if self.cam.follower.swings and not self.cam.groove:
+            greatest, _ = extreme(self.panels, self.radius)
+            found["pivot_margin"] = self.cam.follower.centre_distance - greatest
+        return found
 
     def _reach_mistakes(self) -> list[Mistake]:
         """Return a mistake if the cam of a swinging arm reaches its pivot."""

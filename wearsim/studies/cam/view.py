@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -53,30 +54,50 @@ class CamView(View):
         """Return the numbers of the turn."""
         study, turn = self.result, self.result.turn
 
-        def place(unit: str, value: float, theta: float) -> str:
-            return f"{shown(value, unit)} at {turn.place(theta)}"
+        def place(name: str, label: str, unit: str, value: float, theta: float) -> Row:
+            text = f"{shown(value, unit)} at {turn.place(theta)}"
+            return Row(label, text, answers={name: (value, unit)})
+
+        def stated(name: str, label: str, value: float | None, unit: str, digits: int = 4) -> Row:
+            return Row(label, shown(value, unit, digits), answers={name: (value, unit)})
 
         least, greatest = turn.normal_range
         depth = shown(harmonic_depth(turn), "um", 2)
         p, q = study.winding_ratio
         sweeps = "" if study.sweeps is None else f", {study.sweeps:.4g} sweeps around the roller"
+        never = study.jump_speed is None
+        forces = {"least_normal_force": (least, "N"), "greatest_normal_force": (greatest, "N")}
         rows = [
-            Row("perimeter", shown(study.perimeter, "mm", 6)),
-            Row("integral of N ds", shown(study.load_integral, "N m", 6)),
-            Row("normal force", f"{shown(least, 'N')} to {shown(greatest, 'N')}"),
-            Row("greatest pressure", place("MPa", *study.max_peak_pressure)),
-            Row("greatest pressure angle", place("deg", *study.max_pressure_angle)),
-            Row("outer radius", place("mm", *study.max_radius)),
-            Row("least radius of curvature", shown(study.min_radius_of_curvature, "mm")),
-            Row("speed at which the follower jumps", shown(study.jump_speed, "rpm")),
+            stated("perimeter", "perimeter", study.perimeter, "mm", 6),
+            stated("load_integral", "integral of N ds", study.load_integral, "N m", 6),
+            Row("normal force", f"{shown(least, 'N')} to {shown(greatest, 'N')}", answers=forces),
+            place("peak_pressure", "greatest pressure", "MPa", *study.max_peak_pressure),
+            place("pressure_angle", "greatest pressure angle", "deg", *study.max_pressure_angle),
+            place("outer_radius", "outer radius", "mm", *study.max_radius),
+            Row(
+                "least radius of curvature",
+                shown(study.min_radius_of_curvature, "mm"),
+                answers={"undercut_margin": (turn.margins["undercut_margin"], "mm")},
+            ),
+            Row(
+                "speed at which the follower jumps",
+                shown(study.jump_speed, "rpm"),
+                answers={"jump_speed": (math.inf if never else study.jump_speed, "rpm")},
+            ),
             Row(f"harmonic limit at {depth} of wear", shown(study.harmonic_limit, "1", 3)),
-            Row("winding number", f"{study.winding_number:.6g}, nearest ratio {p}/{q}{sweeps}"),
+            Row(
+                "winding number",
+                f"{study.winding_number:.6g}, nearest ratio {p}/{q}{sweeps}",
+                answers={"winding_number": (study.winding_number, "1")},
+            ),
+            *self._film_rows(),
         ]
         if turn.free:
             arcs = f"{len(study.skids)} arc{'s' * (len(study.skids) > 1)}"
             energy = sum(skid.energy for skid in study.skids)
             text = f"{arcs}, {shown(energy, 'J', 3)} per turn" if energy else NOTHING
-            rows.append(Row("skids of the roller", text))
+            answers = {"skid_energy": (energy, "J")}
+            rows.append(Row("skids of the roller", text, answers=answers))
         if study.weight is not None:
             rows.append(Row("stations", f"{len(study.weight)} of a run"))
         if measured := turn.cam.measured:
@@ -87,6 +108,19 @@ class CamView(View):
             words = f"rms {rms}, at most {most} at {where}; noise {noise}"
             rows.append(Row(f"residuals of the {measured.quantity}", words))
         return rows
+
+    def _film_rows(self) -> Rows:
+        """Return the least film of the turn and its ratio to the roughness, with a lubricant."""
+        film, lubricant = self.result.film, self.result.turn.scenario.lubricant
+        if film is None or lubricant is None:
+            return []
+        least = float(film.min())
+        answers: dict[str, tuple[float | None, str]] = {"film_thickness": (least, "um")}
+        text = shown(least, "um")
+        if lubricant.roughness is not None:
+            answers["film_ratio"] = (least / lubricant.roughness, "1")
+            text += f", {shown(least / lubricant.roughness, '1')} times the roughness"
+        return [Row("least film thickness", text, answers=answers)]
 
     def tables(self) -> list[Table]:
         """Return motion, loads and contact at the stations, in engineering units."""

@@ -38,13 +38,22 @@ class ContactView(View):
         self.start: dict[str, str] = {}  # description of a measured profile
         self.edges = patch_edges(study.solution.y, study.solution.half_length)
 
+    @property
+    def _width(self) -> float:
+        """Width of the patch across the track [m]."""
+        return float(self.edges[1] - self.edges[0]) if self.edges else 0.0
+
     def rows(self) -> Rows:
         """Return the numbers of the contact."""
         study, point, solution = self.result, self.result.point, self.result.solution
         rounding = 1e-12 * point.normal_force * study.grid.spacing * study.grid.strips
         moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
         spin = f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"
-        width = shown(self.edges[1] - self.edges[0], "mm") if self.edges else NOTHING
+        width = shown(self._width, "mm") if self.edges else NOTHING
+
+        def stated(label: str, name: str, value: float, unit: str) -> Row:
+            return Row(label, value, unit, answers={name: (value, unit)})
+
         return [
             *(Row(*pair) for pair in self.start.items()),
             Row("contact model", study.described_model),
@@ -55,14 +64,16 @@ class ContactView(View):
             Row("longitudinal creepage", solution.longitudinal_creepage),
             Row("lateral creepage", point.creepage.lateral),
             Row("spin", spin),
-            Row("patch length 2a", 2.0 * float(solution.half_length.max()), "mm"),
-            Row("patch width", width),
-            Row("peak pressure", solution.peak_pressure, "MPa"),
-            Row("approach", solution.approach, "um"),
-            Row("longitudinal force", solution.force_x, "N"),
-            Row("lateral force", solution.force_y, "N"),
-            Row("spin moment", moment, "N mm"),
-            Row("dissipated power", solution.power, "W"),
+            stated(
+                "patch length 2a", "patch_length", 2.0 * float(solution.half_length.max()), "mm"
+            ),
+            Row("patch width", width, answers={"patch_width": (self._width, "mm")}),
+            stated("peak pressure", "peak_pressure", solution.peak_pressure, "MPa"),
+            stated("approach", "approach", solution.approach, "um"),
+            stated("longitudinal force", "force_x", solution.force_x, "N"),
+            stated("lateral force", "force_y", solution.force_y, "N"),
+            stated("spin moment", "spin_moment", moment, "N mm"),
+            stated("dissipated power", "power", solution.power, "W"),
             Row("adhesion fraction", round(solution.adhesion_fraction, _DIGITS), "%"),
         ]
 
@@ -94,7 +105,7 @@ class ContactView(View):
             "lateral_creepage": point.creepage.lateral,
             "spin_per_m": point.creepage.spin,
             "patch_length_m": 2.0 * float(solution.half_length.max()),
-            "patch_width_m": self.edges[1] - self.edges[0] if self.edges else 0.0,
+            "patch_width_m": self._width,
             "peak_pressure_Pa": solution.peak_pressure,
             "approach_m": solution.approach,
             "force_x_N": solution.force_x,

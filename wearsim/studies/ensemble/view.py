@@ -29,7 +29,7 @@ from wearsim.report.text import (
     too_few,
     within,
 )
-from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table
+from wearsim.report.view import Answer, Column, Columns, Frame, Row, Rows, Table
 from wearsim.results.study_view import (
     CONSTANT,
     StudyView,
@@ -76,6 +76,29 @@ class RealisationsView(StudyView[Shown]):
         groups = {item["name"]: item["text"] for item in self.result.raw.groups}
         varying = varying_inputs(self.result, self.result.inputs)
         return [*drawn_rows(self.result), *varying_rows(groups | varying)]
+
+    def observables_table(self, title: str) -> Table:
+        """Return the estimates of all observables at the end, with intervals."""
+        names = observed(self.result)
+        lines = [line for name in names for line in _lines(self.result, name)]
+        return Table("", lines, (title, *_HEADS[1:]))
+
+    def answers(self) -> dict[str, Answer]:
+        """Return the numbers of the rows and of the table of observables, ``depth.p95``.
+
+        The name of an observable alone stands for its mean.
+        """
+        found = super().answers()
+        for name in observed(self.result):
+            words, unit = OBSERVABLES[name]
+            estimate = self.result.estimate(name, -1, QUANTILES)
+            values = {"": estimate.mean, ".mean": estimate.mean, ".std": estimate.std}
+            values |= {f".p{100.0 * p:g}": interval for p, interval in estimate.quantiles}
+            found |= {
+                f"{name}{ending}": Answer(value.value, unit, words)
+                for ending, value in values.items()
+            }
+        return found
 
     def frame(self) -> Frame:
         """Return the successful realisations, one row each, at the end of the test."""
@@ -193,9 +216,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         result = self.result
         if not result.count:
             return []
-        names = [name for name in result.observables if result.at_end(name).any()]
-        lines = [line for name in names for line in _lines(result, name)]
-        return [Table("", lines, _HEADS), self._effects()]
+        return [self.observables_table(_HEADS[0]), self._effects()]
 
     def _effects(self) -> Table:
         """Return the Sobol indices of the depth."""
@@ -275,6 +296,13 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         raw = self.result.raw
         options = ["-n", str(self.result.requested), "--plan", raw.plan, "--seed", str(raw.seed)]
         return [*options, *(["--precision", raw.until] if raw.until else [])]
+
+
+def observed(result: EnsembleResult) -> list[str]:
+    """Return the names of the observables that are not zero in all realisations."""
+    if not result.count:
+        return []
+    return [name for name in result.observables if result.at_end(name).any()]
 
 
 def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:

@@ -15,7 +15,7 @@ import numpy as np
 from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.results.io.outputs import check_output
-from wearsim.scenario import Scenario, as_scenario, parse_scenario
+from wearsim.scenario import Scenario, as_scenario, parse_scenario, realise
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.api import (
     Watcher,
@@ -31,7 +31,7 @@ from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import profile_axis
 from wearsim.studies.ensemble.sweep import path_of
-from wearsim.studies.life.rare import next_stages
+from wearsim.studies.life.rare.stages import next_stages
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.settings import SHARES, checked_study, design_variable
@@ -261,7 +261,8 @@ def _prepared(
         scenario = with_length(scenario, settings.most)
     base = first_length(scenario, fixed, settings.most)
     first = with_length(scenario, base)
-    grid = profile_axis(first)
+    # a single test has the groove of the wear factor with which it is run
+    grid = profile_axis(realise(first, fixed) if settings.alone else first)
     request = checked_request(first, settings.plain, "monte-carlo", None)
     header, static = ensemble_content(first, request, grid)
     header = replace(

@@ -105,10 +105,12 @@ class RunView(StudyView[Result]):
 
         def stated(label: str, name: str, unit: str) -> Row:
             values = np.asarray(getattr(result, name)[-1])
-            return Row(label, with_error(values, errors.get(name), unit))
+            answers = {name: (float(np.max(values)), unit)}
+            return Row(label, with_error(values, errors.get(name), unit), answers=answers)
 
         error = None if is_exact else float(np.max(result.depth_error[-1]))
-        rows = [Row("depth", result.depth[-1], "um", error)]
+        answers = {"depth": (float(np.max(result.depth[-1])), "um")}
+        rows = [Row("depth", result.depth[-1], "um", error, answers)]
         if result.start_height.any():
             below = Row("depth below nominal", result.depth_below_nominal[-1], "um")
             rows = [rows[0]._replace(label="depth worn since the start"), below]
@@ -145,13 +147,20 @@ class RunView(StudyView[Result]):
             error = final[f"{name}_error_{key}"]
             return with_error(np.asarray(final[f"{name}_{key}"]), float(np.max(error)), unit)
 
+        def of(name: str, unit: str, key: str) -> dict[str, tuple[float | None, str]]:
+            return {name: (float(np.max(final[f"{name}_{key}"])), unit)}
+
         arm, greatest = self._arm_length(), float(np.max(final["lift_error_m"]))
         of_arm = f", {shown(greatest / arm, 'deg', 3)} of the arm" if arm else ""
         return [
             Row("turns of the cam", count(float(np.max(final["turns"])))),
             Row("angle of the depth", stated("depth_angle", "deg", "rad")),
             Row("angle of the peak pressure", stated("peak_pressure_angle", "deg", "rad")),
-            Row("lift error, peak to peak", stated("lift_error", "um", "m") + of_arm),
+            Row(
+                "lift error, peak to peak",
+                stated("lift_error", "um", "m") + of_arm,
+                answers=of("lift_error", "um", "m"),
+            ),
             Row("least wear of the lift", f"at {stated('least_wear_angle', 'deg', 'rad')}"),
             Row("greatest wear of the lift", f"at {stated('greatest_wear_angle', 'deg', 'rad')}"),
         ]

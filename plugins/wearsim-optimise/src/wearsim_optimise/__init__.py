@@ -1,0 +1,1 @@
+"""Choice of design variables for wearsim: search, fronts, confirmation and robustness."""

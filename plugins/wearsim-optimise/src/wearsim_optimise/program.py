@@ -1,0 +1,457 @@
+"""The phases of an optimisation: starts, search, second choice and front.
+
+Each phase asks `Designs` for rounds of designs and decides by their outcomes alone. A resumed
+optimisation repeats the phases with the outcomes that its file holds, and equals an unbroken one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from wearsim.errors import WearsimError
+from wearsim_optimise.designs import Design, Designs, completed
+from wearsim_optimise.goals import ONE_PERCENT, TIGHTER, Constraint, Goals
+from wearsim_optimise.solvers import (
+    RADIUS,
+    Answer,
+    Cobyqa,
+    Evolution,
+    Search,
+    feasible_first,
+    violation,
+)
+from wearsim_optimise.variables import Vector, start_of
+
+CANDIDATES = 32  # designs among which a feasible start is looked for
+EVOLVED = 0.5  # part of the designs of the evolution strategy; the rest refines its best design
+LEVELS = 5  # of the second objective between the ends of a front
+SECOND = 0.05  # first trust region of a search from a known design
+TIMES = 4  # designs asked for over evaluations, at most
+
+Loss = Callable[[Design], float]
+
+
+class NoFeasibleDesignError(WearsimError):
+    """No design within the bounds satisfies the constraints."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Settings of a search.
+
+    Parameters
+    ----------
+    objectives : tuple of (str, int)
+    constraints : tuple of Constraint
+    then : str
+    evaluations : int
+        Greatest number of designs that are run.
+    starts : int
+    method : {"auto", "cobyqa", "evolution"}
+    seed : int
+    """
+
+    objectives: tuple[tuple[str, int], ...]
+    constraints: tuple[Constraint, ...]
+    then: str
+    evaluations: int
+    starts: int
+    method: str
+    seed: int
+
+
+def first_goals(designs: Designs, plan: Plan) -> Design:
+    """Evaluate the first design, from which the quantities are known; return it.
+
+    Raises
+    ------
+    NoFeasibleDesignError
+        If neither the first design nor another one can be evaluated.
+    """
+    start = start_of(designs.scenario, designs.variables)
+    (first,) = designs.with_numbers([start], "start")
+    basis = first
+    if not first.outcome.get("named"):
+        basis = _some_design(designs, plan, first)
+    values, margins = basis.outcome["values"], basis.outcome["margins"]
+    scales = {**values, **{f"margin {name}": value for name, value in margins.items()}}
+    goals = Goals(plan.objectives, plan.constraints, plan.then, basis.outcome["named"], scales)
+    for constraint in plan.constraints:
+        goals.limit(constraint)  # raises for a unit of another quantity
+    designs.use(goals)
+    return designs.all[0]
+
+
+def _some_design(designs: Designs, plan: Plan, first: Design) -> Design:
+    """Return a design that can be evaluated, where the first one cannot."""
+    tried = [first]
+    for place in _scattered(len(designs.variables), CANDIDATES, plan.seed):
+        (design,) = designs.at([place], "feasibility")
+        tried.append(design)
+        if design.outcome.get("named"):
+            return design
+    reasons = {design.outcome["reason"].splitlines()[0] for design in tried}
+    where = _nearest_to_feasible(designs, tried)
+    raise NoFeasibleDesignError(
+        f"no feasible start: none of {len(tried)} designs between the bounds can be evaluated;"
+        f" {where}{next(iter(reasons))}; choose other bounds"
+    )
+
+
+def _nearest_to_feasible(designs: Designs, tried: Sequence[Design]) -> str:
+    """Return which margin of a cam is least violated, and where, in words."""
+    found = [
+        (min(design.outcome["margins"].values()), design)
+        for design in tried
+        if design.outcome["margins"]
+    ]
+    if not found:
+        return ""
+    best = max(found, key=lambda item: item[0])[1]
+    return f"nearest to a feasible one is {described(designs, best)}: "
+
+
+def described(designs: Designs, design: Design) -> str:
+    """Return the values of a design's variables in words."""
+    pairs = zip(designs.variables, design.numbers, strict=True)
+    return ", ".join(f"{variable.name} = {variable.shown(number)}" for variable, number in pairs)
+
+
+def _scattered(dimensions: int, count: int, seed: int) -> list[Vector]:
+    """Return points of a scrambled Sobol sequence."""
+    from scipy.stats import qmc  # noqa: PLC0415  (slow to import)
+
+    rng = np.random.default_rng([seed, 40])
+    power = max(int(np.ceil(np.log2(max(count, 2)))), 1)
+    try:
+        engine = qmc.Sobol(dimensions, scramble=True, rng=rng)
+    except TypeError:  # SciPy before 1.15
+        engine = qmc.Sobol(dimensions, scramble=True, seed=rng)
+    return [np.asarray(point) for point in engine.random_base2(power)[:count]]
+
+
+def starts_of(designs: Designs, plan: Plan, first: Design) -> list[Design]:
+    """Return the designs from which the search starts, the first one included.
+
+    Others are spread between the bounds; those that no cam or limit before wear allows are left
+    out as far as there are others.
+    """
+    wanted = plan.starts - 1
+    if not wanted:
+        return [first]
+    places = _scattered(len(designs.variables), 4 * wanted, plan.seed)
+    if designs.limits or (designs.goals and designs.goals.margin_names):
+        before = designs.at(places, "feasibility", before_wear=True)
+        beyond = [_known_violation(design) for design in before]
+        order = sorted(range(len(places)), key=lambda n: (beyond[n], n))
+        places = [places[n] for n in order]
+    return [first, *designs.at(places[:wanted], "start")]
+
+
+def _known_violation(design: Design) -> float:
+    """Return the greatest violation among the slacks that are known."""
+    known = design.slacks[np.isfinite(design.slacks)]
+    return max(-float(known.min()), 0.0) if len(known) else math.inf
+
+
+@dataclass
+class Way:
+    """A search with the designs that it has asked for, and how they are rated for it."""
+
+    search: Search
+    rated: Callable[[Design], Answer]
+    found: list[Design]
+
+
+class Runner:
+    """Searches within a budget.
+
+    Parameters
+    ----------
+    designs : Designs
+    plan : Plan
+    """
+
+    def __init__(self, designs: Designs, plan: Plan) -> None:
+        self.designs, self.plan = designs, plan
+        self.asked = 0
+
+    def left(self, budget: int) -> bool:
+        """Return whether the budget allows another design."""
+        return self.designs.runs < budget and self.asked < TIMES * budget
+
+    def search(
+        self,
+        starts: Sequence[Design],
+        budget: int,
+        loss: Loss,
+        purpose: str,
+        radius: float = RADIUS,
+    ) -> None:
+        """Search by COBYQA from several starts until the budget of runs is spent.
+
+        The starts share the first half; the second half is left to the best of them.
+        """
+        half = self.designs.runs + (budget - self.designs.runs) // 2
+
+        def rated(design: Design) -> Answer:
+            return completed(self.designs, design, loss)
+
+        def narrowed(ways: list[Way]) -> list[Way]:
+            if len(ways) == 1 or self.designs.runs < half:
+                return ways
+            ranks = [min(_rank(design, loss) for design in way.found) for way in ways]
+            return [ways[ranks.index(min(ranks))]]
+
+        ways = [self.way(start, rated, radius) for start in starts]
+        self.run(ways, budget, purpose, narrowed)
+
+    def way(
+        self,
+        start: Design,
+        rated: Callable[[Design], Answer],
+        radius: float = RADIUS,
+        further: int = 0,
+    ) -> Way:
+        """Return a search by COBYQA from a design, with further slacks than the constraints."""
+        places = self.designs.places(start)
+        fixed = [variable.kind != "continuous" for variable in self.designs.variables]
+        search = Cobyqa(places, len(start.slacks) + further, radius, fixed)
+        return Way(search, rated, [start])
+
+    def run(
+        self,
+        ways: list[Way],
+        budget: int,
+        purpose: str,
+        narrowed: Callable[[list[Way]], list[Way]] = lambda ways: ways,
+    ) -> None:
+        """Evaluate designs of several searches round by round until they or the budget end."""
+        while ways and self.left(budget):
+            ways = self._round(narrowed(ways), purpose)
+
+    def _round(self, ways: list[Way], purpose: str) -> list[Way]:
+        """Evaluate the next design of each search; return those that have not ended."""
+        asked = [(way, way.search.ask()) for way in ways]
+        places = [place for _, more in asked for place in more]
+        designs = iter(self.designs.at(places, purpose))
+        self.asked += len(places)
+        for way, more in asked:
+            new = [next(designs) for _ in more]
+            way.found += new
+            if new:
+                way.search.tell([way.rated(design) for design in new])
+        return [way for way, more in asked if more]
+
+    def evolve(self, budget: int, order: Callable[[Sequence[Any]], Sequence[float]]) -> None:
+        """Search by the evolution strategy until the budget of runs is spent."""
+        search = Evolution(self.designs.variables, self.plan.seed, order)
+        same = 0
+        while self.left(budget) and same < 3:
+            before, places = self.designs.runs, search.ask()
+            if not places:
+                return
+            new = self.designs.at(places, "search")
+            self.asked += len(new)
+            search.tell(new)
+            same = same + 1 if self.designs.runs == before else 0
+
+
+def _rank(design: Design, loss: Loss) -> tuple[float, float]:
+    """Return a key by which designs are ordered: feasible ones by their loss, others after them."""
+    value = loss(design)
+    if not design.is_evaluated or math.isnan(value):
+        return math.inf, math.inf
+    return violation(design), value
+
+
+def best_of(found: Sequence[Design], loss: Loss) -> Design | None:
+    """Return the feasible design with the least loss; the first of equal ones."""
+    feasible = [design for design in found if design.is_feasible and math.isfinite(loss(design))]
+    return min(feasible, key=lambda design: (loss(design), design.number), default=None)
+
+
+def objective(number: int) -> Loss:
+    """Return the loss of an objective."""
+    return lambda design: design.losses[number] if design.losses else math.nan
+
+
+def optimum(designs: Designs, plan: Plan) -> Design:
+    """Search; return the best design.
+
+    Raises
+    ------
+    NoFeasibleDesignError
+        If none is feasible; says which constraint is least violated, and where.
+    """
+    first = first_goals(designs, plan)
+    runner = Runner(designs, plan)
+    main = objective(0)
+    mixed = any(variable.kind != "continuous" for variable in designs.variables)
+    rough = any(design.outcome.get("rough") for design in designs.all)
+    evolves = plan.method == "evolution" or (plan.method == "auto" and (mixed or rough))
+    budget = plan.evaluations
+    if evolves:
+        order = feasible_first if len(plan.objectives) == 1 else pareto_first
+        share = round(EVOLVED * budget) if len(plan.objectives) == 1 else budget
+        runner.evolve(share, order)
+        best = best_of(designs.all, main)
+        if (
+            best
+            and len(plan.objectives) == 1
+            and any(v.kind == "continuous" for v in designs.variables)
+        ):
+            runner.search([best], budget, main, "search")
+    elif len(plan.objectives) == 2:
+        _front(runner, starts_of(designs, plan, first))
+    else:
+        share = budget if not plan.then else max(budget - budget // 3, 1)
+        starts = starts_of(designs, plan, first)
+        runner.search(starts, share, main, "search")
+        if plan.then and (best := best_of(designs.all, main)):
+            _then(runner, best, budget)
+    return chosen(designs, plan)
+
+
+def _then(runner: Runner, best: Design, budget: int) -> None:
+    """Search for the least second quantity among designs within 1 % of the best."""
+    designs = runner.designs
+    goals = designs.goals
+    assert goals is not None
+    limit = best.loss + ONE_PERCENT - TIGHTER
+
+    def loss(design: Design) -> float:
+        value = design.values.get(goals.then, math.nan)
+        return goals.scaled(goals.then, value)
+
+    def rated(design: Design) -> Answer:
+        found, main = (completed(designs, design, each) for each in (loss, objective(0)))
+        return Answer(found.loss, np.append(found.slacks, limit - main.loss))
+
+    runner.run([runner.way(best, rated, SECOND, 1)], budget, "then")
+
+
+def _front(runner: Runner, starts: list[Design]) -> None:
+    """Search for a front: its ends, and the least first objective at levels of the second."""
+    designs, budget = runner.designs, runner.plan.evaluations
+    used = designs.runs
+    for number, share in ((0, 0.25), (1, 0.5)):
+        runner.search(starts, used + round(share * (budget - used)), objective(number), "search")
+    ends = [best_of(designs.all, objective(number)) for number in (0, 1)]
+    if ends[0] is None or ends[1] is None:
+        return
+    span = ends[0].losses[1] - ends[1].losses[1]
+    if not span > 0.0:
+        return
+    levels = [ends[1].losses[1] + span * (n + 1.0) / (LEVELS + 1.0) for n in range(LEVELS)]
+    feasible = [design for design in designs.all if design.is_feasible]
+    ways = []
+    for level in levels:
+        near = min(feasible, key=partial(_beyond, level))
+        ways.append(runner.way(near, partial(_at_level, designs, level), SECOND, 1))
+    runner.run(ways, budget, "front")
+
+
+def _beyond(level: float, design: Design) -> tuple[float, float]:
+    """Return a key for the start at a level of the second objective: within it, the best first."""
+    over = max(design.losses[1] - level, 0.0)
+    return over, design.losses[0]
+
+
+def _at_level(designs: Designs, level: float, design: Design) -> Answer:
+    """Return the first loss of a design, with the second one as a constraint."""
+    first = completed(designs, design, objective(0))
+    second = completed(designs, design, objective(1))
+    return Answer(first.loss, np.append(first.slacks, level - second.loss))
+
+
+def pareto_first(rated: Sequence[Any]) -> list[float]:
+    """Return the order of designs by two objectives: fronts, and within them the lonely first."""
+    order = np.array(feasible_first(rated))
+    feasible = [n for n, item in enumerate(rated) if item.is_feasible]
+    if not feasible:
+        return list(map(float, order))
+    losses = np.array([rated[n].losses for n in feasible])
+    spread = np.ptp(losses, axis=0)
+    scaled = losses / np.where(spread > 0.0, spread, 1.0)
+    dominated = [
+        sum(bool(np.all(other <= row) and np.any(other < row)) for other in losses)
+        for row in losses
+    ]
+    for n, row in enumerate(scaled):
+        apart = np.sort(np.abs(scaled - row).sum(axis=1))[1] if len(scaled) > 1 else 1.0
+        order[feasible[n]] = dominated[n] - 0.5 * min(float(apart), 1.0) - 1e6
+    return list(map(float, order))
+
+
+def front_of(designs: Designs) -> list[Design]:
+    """Return the feasible designs that no other surpasses in both objectives, by the first."""
+    feasible = [design for design in designs.all if design.is_feasible]
+    return sorted(
+        (design for design in feasible if not any(_surpasses(other, design) for other in feasible)),
+        key=lambda design: (design.losses, design.number),
+    )
+
+
+def _surpasses(other: Design, design: Design) -> bool:
+    """Return whether a design is at least as good in all objectives, and better in one."""
+    pairs = list(zip(other.losses, design.losses, strict=True))
+    if all(a == b for a, b in pairs):
+        return other.number < design.number
+    return all(a <= b for a, b in pairs)
+
+
+def chosen(designs: Designs, plan: Plan) -> Design:
+    """Return the best design of all that were evaluated.
+
+    Of a front it is the one nearest to the best of both objectives, each over its range. With a
+    second quantity it is the least of that within 1 % of the best.
+    """
+    if len(plan.objectives) == 2 and (front := front_of(designs)):
+        losses = np.array([design.losses for design in front])
+        span = np.ptp(losses, axis=0)
+        away = (losses - losses.min(axis=0)) / np.where(span > 0.0, span, 1.0)
+        return front[int(np.hypot(*away.T).argmin())]
+    best = best_of(designs.all, objective(0))
+    if best is None:
+        raise NoFeasibleDesignError(_least_violated(designs))
+    if not plan.then:
+        return best
+    near = [d for d in designs.all if d.is_feasible and d.loss <= best.loss + ONE_PERCENT]
+    return min(near, key=lambda design: (design.values[plan.then], design.number))
+
+
+def _least_violated(designs: Designs) -> str:
+    """Return which constraint is least violated, and where."""
+    goals = designs.goals
+    assert goals is not None
+    known = [design for design in designs.all if np.isfinite(design.slacks).any()]
+    runs = len(designs.all)
+    if not known:
+        reason = designs.all[0].outcome["reason"]
+        return f"no feasible design found in {runs}: none could be evaluated; the first: {reason}"
+    nearest = min(known, key=lambda design: (_known_violation(design), design.number))
+    slacks = np.where(np.isfinite(nearest.slacks), nearest.slacks, np.inf)
+    place = int(slacks.argmin())
+    if slacks[place] >= 0.0:
+        return (
+            f"no feasible design found in {runs}: the objective is known of none within the"
+            f" constraints, as of {described(designs, nearest)}: {nearest.outcome['reason']}"
+        )
+    if place < len(goals.constraints):
+        name = goals.constraints[place].name
+        value = goals.shown(name, nearest.values[name])
+    else:
+        name = goals.margin_names[place - len(goals.constraints)]
+        value = f"{nearest.outcome['margins'][name]:.4g} in SI units"
+    return (
+        f"no feasible design found in {runs}: the least violated constraint is"
+        f" '{goals.slack_names[place]}', with {value} at {described(designs, nearest)};"
+        " relax it, or choose other bounds"
+    )
