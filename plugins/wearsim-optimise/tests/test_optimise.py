@@ -102,7 +102,7 @@ def test_cams_that_cannot_be_followed_guide_the_search():
 
 def test_list_of_motion_laws_is_searched_by_the_evolution_strategy():
     scenario = shipped_scenario("cam-cycloidal")
-    laws = ["cycloidal", "modified-sine", "poly-3-4-5"]
+    laws = ["cycloidal", "modified-sine", "modified-trapezoid"]
     pytest.importorskip("cmaes")
     found = optimise(
         scenario,

@@ -28,6 +28,7 @@ from wearsim_optimise.variables import (
     as_table,
     check_variables,
     from_table,
+    overrides,
     parse_variable,
 )
 
@@ -220,6 +221,9 @@ def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
     if not variables:
         raise ValueError("nothing is varied; name a variable, such as cam.base_radius=35mm:60mm")
     check_variables(variables, scenario)
+    for variable in variables:  # a choice that no scenario can have is an error at once
+        for number in range(len(variable.choices)):
+            scenario.changed(overrides([variable], [number]))
     objectives = [(name, 1) for name in given["maximise"]]
     objectives += [(name, -1) for name in given["minimise"]]
     if not 1 <= len(objectives) <= 2:
