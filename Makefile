@@ -52,6 +52,7 @@ bench-docs: $(VENV)/.installed-dev
 	-$(BIN)/wearsim bench --hard -o out/bench --force
 	cp out/bench/hard.json $(MEASURED)
 	$(BIN)/python -m tests.benchmarks.report -o $(MEASURED)/report.json
+	$(BIN)/python -m tests.benchmarks.exploring -o $(MEASURED)/explore.json
 	$(BIN)/python -m tests.benchmarks.models -o $(MEASURED)/models.json
 	$(BIN)/python -m tests.benchmarks.model_choice -o $(MEASURED)/model-choice.json
 	$(BIN)/python -m tests.benchmarks.axial_profiles -o $(MEASURED)/axial-profiles.json

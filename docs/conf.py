@@ -30,6 +30,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx_design",
+    "groove_pressure",
     "wearsim_measurements",
     "wearsim_reference",
 ]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 #: tests.benchmarks imports wearsim_bench
-NAMES = r"wearsim_(?:bench|chevalier2005|halfspace|validation)|tests\.benchmarks import"
+NAMES = r"wearsim_(?:bench|chevalier2005|explore|halfspace|validation)|tests\.benchmarks import"
 IMPORT = re.compile(rf"^\s*(?:from|import)\s+({NAMES})", re.M)
 
 

@@ -3,6 +3,8 @@
 Scenarios
     load_scenario(path, overrides)      read a scenario from a TOML file
     Scenario                            all inputs of a test: from_toml, from_dict, changed
+    scenario_schema()                   its JSON Schema, with the installed plugins
+    explore(scenario)                   a page on which its values are changed
     Profile(y, height)                  a measured profile of the cylinder
 
 One contact
@@ -38,6 +40,7 @@ Results
     LifeResult                          of a study of lives: b, survival, compare
     ContactSolution, ContactStudy       of one contact: dissipation, line_load, approach, ...
     CamStudy                            of a cam: kinematics, loads and contact at its stations
+    save_report(results, path)          one page on results for a browser
     to_dataframe(), to_xarray(), plot() of every result of a test or a study
 
 Errors
@@ -96,9 +99,12 @@ if TYPE_CHECKING:
         WorkerError as WorkerError,
     )
     from wearsim.scenario import Scenario, load_scenario
+    from wearsim.scenario.examples import scenario_schema
+    from wearsim.scenario.exploration import explore
     from wearsim.studies.cam.study import CamStudy, study_cam
     from wearsim.studies.comparison.compare import compare
     from wearsim.studies.contact.single import ContactStudy, solve_contact, study_contact
+    from wearsim.studies.demonstration.result import Demonstration, demonstration
     from wearsim.studies.dissipation.monte_carlo import dissipation
     from wearsim.studies.dissipation.result import DissipationResult
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
@@ -108,7 +114,13 @@ if TYPE_CHECKING:
     from wearsim.studies.identify.result import IdentificationResult
     from wearsim.studies.life.api import life, resume_life, sweep_life
     from wearsim.studies.life.result import LifeResult
-    from wearsim.studies.opening import open_dissipation, open_ensemble, open_results
+    from wearsim.studies.opening import (
+        open_dissipation,
+        open_ensemble,
+        open_results,
+        save_report,
+    )
+    from wearsim.studies.returns.result import FieldReturns, field_returns
     from wearsim.studies.run.result import Result
     from wearsim.studies.run.run import resume, run
     from wearsim.studies.start.export import export_running_in
@@ -129,13 +141,17 @@ _NAMES = {
         "WearsimError",
         "WorkerError",
     ],
+    "wearsim.studies.demonstration.result": ["Demonstration", "demonstration"],
     "wearsim.studies.dissipation.result": ["DissipationResult"],
     "wearsim.studies.ensemble.result": ["EnsembleResult"],
     "wearsim.studies.identify.result": ["IdentificationResult"],
     "wearsim.studies.life.result": ["LifeResult"],
+    "wearsim.studies.returns.result": ["FieldReturns", "field_returns"],
     "wearsim.studies.run.result": ["Result"],
-    "wearsim.studies.opening": ["open_dissipation", "open_ensemble", "open_results"],
+    "wearsim.scenario.exploration": ["explore"],
+    "wearsim.studies.opening": ["open_dissipation", "open_ensemble", "open_results", "save_report"],
     "wearsim.scenario": ["Scenario", "load_scenario"],
+    "wearsim.scenario.examples": ["scenario_schema"],
     "wearsim.studies.cam.study": ["CamStudy", "study_cam"],
     "wearsim.studies.dissipation.monte_carlo": ["dissipation"],
     "wearsim.studies.contact.single": ["ContactStudy", "solve_contact", "study_contact"],
@@ -155,17 +171,22 @@ __all__ = [
     "CamStudy",
     "ContactSolution",
     "ContactStudy",
+    "Demonstration",
     "DissipationResult",
     "EnsembleResult",
+    "FieldReturns",
     "IdentificationResult",
     "LifeResult",
     "Profile",
     "Result",
     "Scenario",
     "compare",
+    "demonstration",
     "dissipation",
     "ensemble",
+    "explore",
     "export_running_in",
+    "field_returns",
     "identify",
     "life",
     "load_scenario",
@@ -176,6 +197,8 @@ __all__ = [
     "resume_ensemble",
     "resume_life",
     "run",
+    "save_report",
+    "scenario_schema",
     "solve_contact",
     "study_cam",
     "study_contact",

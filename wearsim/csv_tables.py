@@ -167,6 +167,40 @@ def read_columns(
     return {column.name: data[column.name][order] * column.factor for column in chosen}
 
 
+class TextRow(NamedTuple):
+    """A row of a CSV file: its line in the file, and its cells by the names of the columns."""
+
+    line: int
+    cells: dict[str, str]
+
+
+def read_texts(text: str) -> tuple[dict[str, str | None], list[TextRow]]:
+    """Read the cells of a CSV file as texts, for columns that are not all numbers.
+
+    Parameters
+    ----------
+    text : str
+        Content of the file; its first line that is no comment is the header.
+
+    Returns
+    -------
+    units : dict of str to str or None
+        Unit of each column by its name in lower case.
+    rows : list of TextRow
+        Cells that are missing at the end of a row are empty.
+    """
+    lines = text.removeprefix("\ufeff").splitlines()
+    header, separator = _find_header(lines, {})
+    if header is None:
+        return {}, []
+    heads = [_name_and_unit(cell) for cell in header.cells]
+    rows = []
+    for row in _rows(lines[header.line :], header.line, separator):
+        cells = row.cells + [""] * (len(heads) - len(row.cells))
+        rows.append(TextRow(row.line, dict(zip([name for name, _ in heads], cells, strict=False))))
+    return dict(heads), rows
+
+
 def column_names(text: str) -> list[str]:
     """Return the names of the columns of a CSV file, in lower case; see `read_columns`."""
     header = _find_header(text.removeprefix("\ufeff").splitlines(), {})[0]

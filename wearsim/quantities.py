@@ -135,7 +135,8 @@ class Quantity:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return {"type": "string", "pattern": _PATTERN, "examples": [self.kind.example]}
+        pattern = _PATTERN if self.bound == "any" else _PATTERN.replace("[+-]?", "[+]?", 1)
+        return {"type": "string", "pattern": pattern, "examples": [self.kind.example]}
 
 
 def _within(

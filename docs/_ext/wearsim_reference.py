@@ -35,6 +35,7 @@ PACKAGES = {
     "wearsim.plugins": "Base classes, specs and quantities for authors of plugins.",
     "wearsim.types": "Types that contact models and results share.",
     "wearsim.contact_batch": "Batches of contacts as contact models receive and return them.",
+    "wearsim.report": "Panels of results as data, and their figures on pages.",
     "wearsim.testing": "Conformance tests for plugins.",
 }
 Table = Mapping[str, Any]
@@ -79,7 +80,16 @@ def python_names() -> str:
 def _is_documented(value: Any, module: str) -> bool:
     """Return whether a value is a class or function of wearsim that a module defines or exports."""
     home = str(getattr(value, "__module__", ""))
-    exported = module in {"wearsim", "wearsim.plugins", "wearsim.testing"} or home == module
+    exported = (
+        module
+        in {
+            "wearsim",
+            "wearsim.plugins",
+            "wearsim.report",
+            "wearsim.testing",
+        }
+        or home == module
+    )
     return home.startswith("wearsim") and hasattr(value, "__name__") and exported
 
 

@@ -163,6 +163,7 @@ def test_new_plugin_is_the_renamed_template(command: Command) -> None:
         "README.md",
         "pyproject.toml",
         "src/wearsim_soft_layer/__init__.py",
+        "src/wearsim_soft_layer/study.py",
         "tests/test_soft_layer.py",
     }
     project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
@@ -175,7 +176,8 @@ def test_new_plugin_is_the_renamed_template(command: Command) -> None:
             assert not re.search("winkler|wearsim.template", text, flags=re.IGNORECASE), path
     module = ast.parse((folder / "src/wearsim_soft_layer/__init__.py").read_text())
     classes = [node.name for node in module.body if isinstance(node, ast.ClassDef)]
-    assert classes == ["SoftLayerOptions", "SoftLayer"]
+    forms = ["SoftLayerFormOptions", "SoftLayerForm"]
+    assert classes == ["SoftLayerOptions", "SoftLayer", *forms]
     compile((folder / "tests/test_soft_layer.py").read_text(), "test_soft_layer.py", "exec")
     assert "pip install -e" in done.stderr
 

@@ -215,6 +215,7 @@ def test_verb_of_two_distributions_is_an_error_naming_both(
     ("verb", "distribution", "extra"),
     [
         ("bench", "wearsim-bench", "wearsim[bench]"),
+        ("explore", "wearsim-explore", "wearsim[explore]"),
         ("reproduce", "wearsim-chevalier2005", "wearsim[chevalier2005]"),
         ("validate", "wearsim-validation", "wearsim[validation]"),
     ],

@@ -61,7 +61,7 @@ def test_stated_error_of_the_peak_pressure_holds_and_is_small(groove: wearsim.Re
     late = groove.time > 0.5 * groove.time[-1]
     stated, pressure = groove.errors["peak_pressure"][late], groove.peak_pressure[late]
     assert (np.abs(pressure - rigid(groove, late)) < stated).all()
-    assert (stated < 0.02 * pressure).all()
+    assert (stated < 0.03 * pressure).all()
 
 
 def test_line_load_at_the_edge_converges(groove: wearsim.Result, fine: wearsim.Result) -> None:
@@ -73,7 +73,7 @@ def test_line_load_at_the_edge_converges(groove: wearsim.Result, fine: wearsim.R
     edge = np.sqrt(2.0 * 0.5 * groove.depth[-1])
     outer = (np.abs(groove.y) > edge - 0.5e-3 - 0.5 * spacing) & (true > 0.0)
     difference = np.abs(groove.line_load[-1] - true)
-    assert difference[outer].sum() < 0.03 * true[outer].sum()
+    assert difference[outer].sum() < 0.02 * true[outer].sum()
     last = outer & (np.abs(groove.y) > edge - 0.5 * spacing)
     assert (difference < 0.01 * true)[outer & ~last].all()
 
@@ -134,3 +134,22 @@ def test_resumed_test_is_equal_to_the_bit(tmp_path) -> None:
     assert np.array_equal(resumed.depth, whole.depth)
     assert np.array_equal(resumed.profiles[-1], whole.profiles[-1])
     assert np.array_equal(resumed.peak_pressure, whole.peak_pressure)
+
+
+def test_peak_pressure_under_a_spring_is_that_of_rigid_bodies() -> None:
+    result = run({"load.kind": "spring", "load.stiffness": "2000 N/mm", **PLAIN})
+    late = result.time > 100.0 * 60.0
+    force = result.normal_force[late].ravel()
+    assert force[-1] < 0.8 * 300.0
+    expected = rigid(result, late) * np.sqrt(force / 300.0)
+    assert result.peak_pressure[late].ravel() == pytest.approx(expected, rel=1e-2)
+
+
+@pytest.mark.parametrize("stepper", ["stabilised", "explicit"])
+def test_stated_errors_cover_the_pressure_of_whole_strips(stepper: str) -> None:
+    result = run({"evolution.stepper": stepper})
+    late = result.time > 100.0 * 60.0
+    difference = np.abs(result.peak_pressure[late].ravel() - rigid(result, late))
+    assert difference.max() > 0.02 * result.peak_pressure[-1].max()  # strips are whole
+    covered = difference < result.errors["peak_pressure"][late].ravel()
+    assert covered.mean() >= 0.92

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 import wearsim
-from wearsim.evolution.strip_errors import Course, strip_errors
+from wearsim.evolution.state import fresh_state
+from wearsim.evolution.strip_errors import Course, sizes_of, strip_errors
+from wearsim.studies.run.assemble import assemble_problem
+from wearsim.studies.run.draws import draw
+from wearsim.studies.run.grid import start_of_run
 from wearsim.types import Grid
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
@@ -74,6 +78,40 @@ def test_equal_courses_have_no_error() -> None:
     passes = np.array([10.0, 100.0, 1000.0])
     sizes = np.array([passes**0.7, 0.5 * passes**0.7, passes])
     grid, profiles = Grid.spanning(-1.0, 1.0, 5), np.ones((2, 5))
-    course = Course(passes.tolist(), list(sizes.T), [np.zeros(3)] * 3, profiles, grid)
+    course = Course(passes.tolist(), list(sizes.T), profiles, grid)
     np.testing.assert_allclose(strip_errors(course, passes, sizes, course), 0.0, atol=1e-12)
     assert np.isnan(strip_errors(None, passes, sizes, course)).all()
+
+
+def parabola(y: np.ndarray) -> np.ndarray:
+    """Return depths of a groove whose deepest point is in the middle of no strip."""
+    return np.maximum(1.0 - np.square((y - 0.03) / 0.8), 0.0)
+
+
+def test_courses_on_exact_parabolas_differ_by_the_sampling_of_the_depth_alone() -> None:
+    fine, coarse = (
+        Grid.spanning(-1.0, 1.0, 41),
+        Grid.spanning(-1.0 - 1.0 / 41.0, 1.0 + 1.0 / 41.0, 21),
+    )
+    passes = np.array([1.0, 10.0])
+    deepest = parabola(fine.y).max()
+    sizes = np.array([[0.5 * deepest, deepest], [0.0, 0.0], [0.5, 1.0]])
+    tops = [np.array([0.5, 0.0, 0.5]), np.array([1.0, 0.0, 1.0])]
+    other = Course(passes.tolist(), tops, parabola(coarse.y)[None], coarse)
+    end = Course(profiles=parabola(fine.y)[None], grid=fine)
+    depth, volume, profile = strip_errors(other, passes, sizes, end)[:, -1]
+    assert 1.0 - deepest <= depth <= 2.0 * (1.0 - deepest)
+    assert volume <= 1e-3
+    assert profile <= 2e-3  # where the cubic polynomials cross the ends of the groove
+
+
+def test_greatest_depths_of_coarse_strips_are_those_between_them() -> None:
+    scenario = wearsim.load_scenario(RIG, overrides=SHORT)
+    problem = assemble_problem(draw(scenario), start_of_run(scenario, draw(scenario)))[0]
+    state = fresh_state(problem)
+    y, width = problem.grid.y, problem.grid.spacing
+    depths = 1e-6 - np.square(y - 0.3 * width)
+    worn = state.replaced(cylinder_depth=np.broadcast_to(depths, state.cylinder_depth.shape).copy())
+    by_strips, between = (sizes_of(problem, worn, kind)[0, 0] for kind in (False, True))
+    assert between == pytest.approx(1e-6, rel=1e-9)
+    assert by_strips == pytest.approx(1e-6 - (0.3 * width) ** 2, rel=1e-9)

@@ -10,6 +10,7 @@ from scipy.integrate import trapezoid
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, ContactError
+from wearsim.mechanics.slender.newton import solve_slender
 from wearsim.plugins import ContactModelSpec, SharedWear, registry
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
@@ -91,6 +92,14 @@ def test_coupled_sets_equal_single_solutions(case):
         for one, other in zip([*found.at(own), *again.at(own)], [*single, *warm], strict=True):
             assert (one.line_load == other.line_load).all()
             assert one.power == other.power
+    # with and without bodies in common; each further signature takes a quarter of a minute
+    layouts = [
+        argument.layout
+        for item in solve_slender.dispatcher.signatures
+        for argument in item
+        if hasattr(argument, "layout")
+    ]
+    assert set(layouts) <= {"C"}
 
 
 def test_creepage_variation(case):

@@ -25,6 +25,7 @@ from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.opening import comparison_of, save_report
 
 SHORT = {"operation.duration": "3 min", "outputs.records": 4}
+SERIAL = {"scheduler": "serial"}
 MEASURED = Measured("trace", np.array([-1e-3, 0.0, 1e-3]), np.array([0.0, -2e-6, 0.0]))
 
 
@@ -206,7 +207,9 @@ def test_one_contact_is_not_compared_with_tests(result):
 def life(tmp_path_factory):
     folder = tmp_path_factory.mktemp("life")
     scenario = shipped_scenario("rig-life", {"contact.strips": 61})
-    return wearsim.life(scenario, 40, folder / "life.h5", limits=["depth 5 um"], target=20_000)
+    return wearsim.life(
+        scenario, 40, folder / "life.h5", limits=["depth 5 um"], target=20_000, **SERIAL
+    )
 
 
 def test_life_shows_its_quantiles_and_survival(life):
@@ -245,7 +248,7 @@ def test_command_of_an_ensemble_has_its_precision(tmp_path):
 
 def test_two_lives_are_compared(life, tmp_path):
     scenario = shipped_scenario("rig-life", {"contact.strips": 61, "friction.coefficient": 0.15})
-    other = wearsim.life(scenario, 40, tmp_path / "rough.h5", limits=["depth 5 um"])
+    other = wearsim.life(scenario, 40, tmp_path / "rough.h5", limits=["depth 5 um"], **SERIAL)
     page = unescape(page_of([life, other]))
     assert "Which design lasts more passes?" in page
     assert f"{life.compare(other).b10_ratio.value:.2f}"[:3] in page

@@ -64,6 +64,24 @@ def identification(folder: Path) -> Any:
     return wearsim.identify(scenario, depths, folder / "k.h5", draws=16)
 
 
+def posterior_lives(folder: Path) -> Any:
+    """Return the lives with a small posterior of K/H."""
+    medians = [f"{k}e-11,{t},1" for k in (0.8, 1.0, 1.3) for t in (0.2, 0.4)]
+    (folder / "K.csv").write_text("\n".join(["median [1/Pa],scatter,weight", *medians]))
+    return made("life", 0).with_posterior(folder / "K.csv")
+
+
+def returns(folder: Path) -> Any:
+    units = ["life,state", "9000,failed", "12000,suspended", "15000,suspended"]
+    (folder / "returns.csv").write_text("\n".join(units))
+    return wearsim.field_returns(posterior_lives(folder), folder / "returns.csv")
+
+
+def demonstration(folder: Path) -> Any:
+    lives = posterior_lives(folder)
+    return wearsim.demonstration([lives, lives], "R=0.9 C=0.95 at 0.1 h", labels=["a", "b"])
+
+
 def comparison(folder: Path) -> Any:
     return wearsim.compare([made("run", 0), made("ensemble", 0)], ["run", "tests"])
 
@@ -75,6 +93,8 @@ SAMPLES: dict[str, list[Callable[[Path], Any]]] = {
     "dissipation": [dissipation],
     "ensemble": [ensemble],
     "life": [life],
+    "returns": [returns],
+    "demonstration": [demonstration],
     "identification": [identification],
     "comparison": [comparison],
 }

@@ -45,6 +45,28 @@ TESTED = {
     ],
     "constant": [({"value": "300 N"}, LOAD)],
     "table": [({"file": "loads.csv"}, LOAD), ({"file": "table.csv"}, LOAD)],
+    "mixture": [
+        (
+            {
+                "of": [
+                    {"distribution": "normal", "mean": "300 N", "std": "20 N"},
+                    {"distribution": "uniform", "low": "100 N", "high": "200 N"},
+                ],
+                "weights": [0.7, 0.3],
+            },
+            LOAD,
+        ),
+        (
+            {
+                "of": [
+                    {"distribution": "lognormal", "median": 0.1, "factor": 1.2},
+                    {"distribution": "constant", "value": 0.15},
+                ],
+                "weights": [3, 1],
+            },
+            {},
+        ),
+    ],
     "posterior": [({"file": "levels.csv"}, {"kind": WEAR_FACTOR, "files": POSTERIOR})],
     "disc": [({"radius": "2 mrad"}, {"kind": ANGLE})],
     "white": [({}, FRICTION), ({"frame": "roller"}, FRICTION)],

@@ -31,6 +31,7 @@ GROUP = "wearsim.commands"
 #: distributions of this project that add a verb
 FIRST_PARTY = {
     "bench": "wearsim-bench",
+    "explore": "wearsim-explore",
     "reproduce": "wearsim-chevalier2005",
     "validate": "wearsim-validation",
 }

@@ -154,13 +154,35 @@ def clearance(problem: WearProblem, state: WearState) -> FloatArray:
     return np.asarray(greatest(problem, descents(problem, state.depths)).max(axis=0))
 
 
+LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
+STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
+
+
 def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the greatest pressure of the contacts of a state at every station, (S, R, N) [Pa]."""
-    return problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
+    """Return the greatest pressure of the contacts of a state at every station, (S, R, N) [Pa].
+
+    A strip that the edge of a contact crosses carries its load on the part that is in contact.
+    """
+    values = problem.values_of(state.contacts, "peak_pressure")
+    if state.part is None:
+        return problem.per_roller(values)
+    load, half = (problem.values_of(state.contacts, n) for n in ("line_load", "half_length"))
+    # the square of the pressure is proportional to the line load where the bodies are smooth
+    square = np.square(2.0 / np.pi * load / np.where(half > 0.0, half, np.inf))
+    greatest_square = square.max(axis=-1)
+    for side in (slice(None), slice(None, None, -1)):
+        part, own = state.part[..., side], square[..., side]
+        crossed, inner, next_inner = own[..., 2:], own[..., 1:-1], own[..., :-2]
+        at_edge = (part[..., 2:] >= LEAST_PART) & (part[..., 2:] < 1.0)
+        at_edge &= (part[..., 1:-1] >= 1.0) & (part[..., :-2] >= 1.0)
+        # the load of a strip of which little is in contact is uncertain
+        most = inner + STEEPER * np.maximum(inner - next_inner, 0.0)
+        found = np.minimum(crossed / np.where(at_edge, part[..., 2:], 1.0), most)
+        greatest_square = np.maximum(greatest_square, (found * at_edge).max(axis=-1))
+    return problem.per_roller(np.maximum(values, np.sqrt(greatest_square)))
 
 
 def peak_pressure(stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest pressure at the present loads, shape (realisations,) [Pa]."""
     recorded, state, _ = present_contacts(stepper, problem, state)
-    values = recorded.values_of(state.contacts, "peak_pressure")
-    return np.asarray(greatest(recorded, values).max(axis=0))
+    return np.asarray(greatest(recorded, peak_pressures(recorded, state)).max(axis=0))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from operator import is_
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +24,7 @@ HERTZ = 2.0 / 3.0  # approach of unworn bodies as a power of the load
 SIGMAS = 2.0  # standard deviations of the sampling scatter that are counted as error
 #: Depths of cylinder and rollers, shapes as in `WearState` [m].
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
+T = TypeVar("T")
 _CONTACT = "contact_"
 _AUXILIARY = ("coarse_step_solution", "half_quadrature_solution")
 #: axis of the realisations in the arrays of a `WearState`
@@ -195,7 +197,17 @@ class WearState:
     @property
     def stacked(self) -> FloatArray:
         """Worn depths of all bodies, shape (stations + rollers, realisations, strips) [m]."""
-        return stacked_depths(self.depths)
+        return self.computed_once(stacked_depths, self.cylinder_depth, self.roller_depth)
+
+    def computed_once(self, compute: Callable[..., T], *fields: Any) -> T:
+        """Return `compute` of fields of this state; again only where others have replaced them."""
+        before = self.__dict__.get(compute.__name__)
+        if before is not None and all(map(is_, before[0], fields)):
+            found: T = before[1]
+            return found
+        found = compute(*fields)
+        self.__dict__[compute.__name__] = fields, found
+        return found
 
     @property
     def auxiliary(self) -> dict[str, Any]:
@@ -300,9 +312,9 @@ def joined_states(states: Sequence[WearState]) -> WearState:
     )
 
 
-def stacked_depths(depths: Depths) -> FloatArray:
+def stacked_depths(cylinder: FloatArray, roller: FloatArray) -> FloatArray:
     """Return depths of cylinder and rollers as `WearState.stacked`."""
-    return np.concatenate([depths[0][:, 0], depths[1][0]])
+    return np.concatenate([cylinder[:, 0], roller[0]])
 
 
 def separated(depths: FloatArray, stations: int) -> Depths:

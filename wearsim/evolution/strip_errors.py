@@ -2,40 +2,45 @@
 
 A test is repeated on strips of twice the width, with a greater tolerance of its steps: the error
 accumulates in it as in the test, which contacts solved on coarse strips at a few times do not show.
-The error estimate is the difference of the two tests times a safety factor, less a part of the
-error estimate of the steps of the coarse test, which is usually several times its true error. A
-difference is three times the error of the test where that is proportional to the square of the
-width of the strips, and equal to it where strips that enter the contact one by one dominate, as
-they do in a fresh contact.
+The error estimate is the difference of the two tests times a safety factor. Profiles are compared
+at the middles of the coarse strips, and greatest depths of the test with the deepest points between
+coarse strips: averages over strips, and the deepest strips, differ by their width alone. The
+depth between the deepest strips of the test, by a parabola, is part of the error of its depth.
+
+A difference is three times the error of the test where that is proportional to the square of the
+width of the strips, as in a groove at full slip. Where slip is partial it is equal to the error:
+most wear is then at the edges of the contact, where a strip is inside or outside as a whole. The
+rate of wear then depends on the strips, and the difference of the volumes over that of the profiles
+shows how far slip is partial. In a fresh contact, too, strips enter one by one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import Advance, Evolution
-from wearsim.evolution.observables import depth, roller_depth
+from wearsim.evolution.observables import greatest
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import elastic_approaches
-from wearsim.evolution.strips import averaged, coarse_problem
+from wearsim.evolution.strips import coarse_problem
 from wearsim.types import FloatArray, Grid
 
 LOOSER = 10.0  # tolerance of the coarse test over that of the test
 LOOSEST = 0.1  # greatest tolerance of a coarse test
-# safety factors on the differences of depth, volume and profile; those before wear are greater:
-# later, wear reduces errors of the shape of a groove
-COVER, FRESH_COVER = np.array([[0.5], [0.6], [0.5]]), np.array([[1.25], [1.9], [1.5]])
-STEPS = 0.15  # part of the error estimate of the coarse steps that is subtracted from it
-LEAST = 0.1  # estimate over the difference, at least
-# estimates of depth and volume over that of the profile, all relative, at least
-OF_PROFILE = np.array([0.2, 0.1])
+# safety factors on the differences of depth, volume and profile where the rate of wear does not
+# depend on the strips, where it does, and before wear: later, wear reduces errors of the shape
+COVER, PARTIAL_COVER, FRESH_COVER = (
+    np.array(factors)[:, None] for factors in ((0.3, 0.5, 0.9), (0.8, 1.1, 1.3), (1.6, 1.8, 1.8))
+)
+OF_PROFILE = 0.1  # estimates of depth and volume over that of the profile, all relative, at least
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
 COARSE_TOLERANCE = 1e-5  # of the iterations of a step
 
@@ -53,8 +58,6 @@ class Course:
         Roller passes.
     sizes : list of ndarray, shape (3,)
         Greatest depth of the cylinder and of the rollers [m], volume worn off both [m^3].
-    by_steps : list of ndarray, shape (3,)
-        Estimated errors of depth [m], volume [m^3] and profile due to the steps.
     profiles : ndarray, shape (bodies, strips)
         Depths at the end, of the cylinder at the stations of the unworn cam [m].
     grid : Grid
@@ -67,17 +70,38 @@ class Course:
 
     passes: list[float] = field(default_factory=list)
     sizes: list[FloatArray] = field(default_factory=list)
-    by_steps: list[FloatArray] = field(default_factory=list)
     profiles: FloatArray | None = None
     grid: Grid | None = None
     approach: float = 0.0
     observed: list[dict[str, FloatArray]] = field(default_factory=list)
 
 
-def sizes_of(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return greatest depth of cylinder and rollers [m] and volume [m^3], (3, realisations)."""
-    depths = depth(problem, state), roller_depth(problem, state)
-    return np.array([*depths, volume_of(problem, state.depths)])
+def sizes_of(problem: WearProblem, state: WearState, between: bool = False) -> FloatArray:
+    """Return greatest depth of cylinder and rollers [m] and volume [m^3], (3, realisations).
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    between : bool
+        Whether the greatest depths are those of parabolas through the deepest strips and their
+        neighbours, instead of those of strips.
+    """
+    top = _peaks if between else partial(np.max, axis=-1)
+    cylinder = greatest(problem, top(state.cylinder_depth[:, 0]))
+    rollers = top(state.roller_depth).max(axis=(0, 1))
+    return np.array([cylinder, rollers, volume_of(problem, state.depths)])
+
+
+def _peaks(depths: FloatArray) -> FloatArray:
+    """Return the greatest depths between strips, the last axis, by parabolas."""
+    rows = depths.reshape(-1, depths.shape[-1])
+    each, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
+    top, inner = rows[each, place], (place > 0) & (place < last)
+    before, after = rows[each, place - inner], rows[each, place + inner]
+    curvature = 2.0 * top - before - after
+    rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
+    return np.asarray((top + rise).reshape(depths.shape[:-1]))
 
 
 def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:
@@ -88,16 +112,17 @@ def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:
     return np.concatenate([cylinder, state.roller_depth[0]])
 
 
-def add_step(courses: Sequence[Course], advance: Advance) -> None:
-    """Add a step of some tests to their courses, which are numbered as the tests."""
+def add_step(courses: Sequence[Course], advance: Advance, between: bool = False) -> None:
+    """Add a step of some tests to their courses, which are numbered as the tests.
+
+    `between` is that of `sizes_of`.
+    """
     problem, end = advance.problem, advance.end
-    sizes, profiles = sizes_of(problem, end), profiles_of(problem, end)
-    errors = np.array([end.depth_error, end.volume_error, end.profile_error])
+    sizes, profiles = sizes_of(problem, end, between), profiles_of(problem, end)
     for place, number in enumerate(advance.numbers.tolist()):
         course = courses[number]
         course.passes.append(float(end.passes[place]))
         course.sizes.append(sizes[:, place])
-        course.by_steps.append(errors[:, place])
         course.profiles, course.grid = profiles[:, place], problem.grid
 
 
@@ -146,7 +171,7 @@ def coarse_courses(
         if observe is not None:
             add_observed(courses, range(len(courses)), observe(coarse, state))
         for advance in tests:
-            add_step(courses, advance)
+            add_step(courses, advance, between=True)
             if observe is not None:
                 numbers = advance.numbers.tolist()
                 add_observed(courses, numbers, observe(advance.problem, advance.end))
@@ -206,22 +231,23 @@ def strip_errors(
     recent = (there[None, :] > there[:, None] / BACK) & (there[None, :] <= there[:, None])
     decay = np.sqrt(there[None, :] / there[:, None])
     relative = (np.where(recent, decay, 0.0)[None] * ratio[:, None, :]).max(axis=2)
-    part = [np.interp(passes, there, one) for one in relative]
+    part = np.array([np.interp(passes, there, one) for one in relative])
     depth = np.maximum(part[0] * sizes[0], part[1] * sizes[1])
-    profile = np.zeros(len(passes))
-    if steps[-1] == last:
-        profile = profile + _profile_error(coarse, end)
+    of_profile = _profile_error(coarse, end) if steps[-1] == last else 0.0
+    profile = np.full(len(passes), of_profile)
     if relative[0, -1] > 0.0:
         profile = profile * np.maximum(part[0] / relative[0, -1], 1.0)
-    differences = np.array([depth, part[2] * sizes[2], profile])
-    by_steps = [np.interp(passes, steps, one) for one in np.array(coarse.by_steps).T]
+    # how far the rate of wear depends on the strips
+    partial_slip = min(float(part[2, -1]) / of_profile, 1.0) if of_profile > 0.0 else 1.0
     deepest = np.maximum(sizes[0], sizes[1])
     fresh = coarse.approach / (coarse.approach + 3.0 * deepest) if coarse.approach > 0.0 else 0.0
-    cover = COVER + (FRESH_COVER - COVER) * fresh
-    found = np.maximum(LEAST * differences, cover * (differences - STEPS * np.array(by_steps)))
+    cover = COVER + (PARTIAL_COVER - COVER) * partial_slip
+    found = (cover + (FRESH_COVER - cover) * fresh) * np.array([depth, part[2] * sizes[2], profile])
     # the differences of depth and volume may be small by chance, that of one strip more often
-    least = OF_PROFILE[:, None] * np.array([deepest, sizes[2]])
+    least = OF_PROFILE * np.array([deepest, partial_slip * sizes[2]])
     found[:2] = np.maximum(found[:2], least * found[2])
+    if end.profiles is not None and end.profiles.any():
+        found[0] += deepest * (_peaks(end.profiles).max() / end.profiles.max() - 1.0)
     return np.asarray(found)
 
 
@@ -229,6 +255,20 @@ def _profile_error(coarse: Course, end: Course) -> float:
     """Return the norm of the difference of two tests at their end, over that of the depths."""
     if coarse.grid is None or coarse.profiles is None or end.grid is None or end.profiles is None:
         return 0.0
-    fine = averaged(end.profiles, end.grid, coarse.grid)
+    fine = _at_points(end.profiles, end.grid, coarse.grid.y)
     size = float(np.linalg.norm(fine))
     return float(np.linalg.norm(fine - coarse.profiles)) / size if size > 0.0 else 0.0
+
+
+def _at_points(depths: FloatArray, grid: Grid, y: FloatArray) -> FloatArray:
+    """Return depths at points by cubic polynomials through four strips, 0 beyond the strips."""
+    place = (y - grid.y[0]) / grid.spacing
+    first = np.clip(np.floor(place).astype(np.int64) - 1, 0, max(grid.strips - 4, 0))
+    nodes = np.arange(min(4, grid.strips))
+    found = np.zeros((*depths.shape[:-1], len(y)))
+    for node in nodes:
+        others = nodes[nodes != node]
+        weight = np.prod((place[:, None] - first[:, None] - others) / (node - others), axis=1)
+        found += weight * depths[..., first + node]
+    inside = (place >= -0.5) & (place <= grid.strips - 0.5)
+    return np.asarray(np.where(inside, found, 0.0))

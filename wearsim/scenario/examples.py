@@ -95,6 +95,12 @@ def scenario_schema() -> dict[str, Any]:
     Returns
     -------
     dict
+
+    Examples
+    --------
+    >>> schema = wearsim.scenario_schema()
+    >>> schema["required"]
+    ['roller', 'operation', 'load', 'friction', 'creepage']
     """
     random = _random_inputs()
     tables: dict[str, Any] = {}

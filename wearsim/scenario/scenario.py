@@ -124,6 +124,7 @@ class Scenario:
         *,
         folder: str | Path = ".",
         name: str = "scenario",
+        confined: bool = False,
     ) -> Scenario:
         """Read a scenario from a text.
 
@@ -137,6 +138,8 @@ class Scenario:
             Folder of the files that the scenario names.
         name : str
             Name of the scenario in messages, and its title if it has none.
+        confined : bool
+            Refuse files outside the folder, for scenarios that somebody else writes.
 
         Returns
         -------
@@ -154,7 +157,8 @@ class Scenario:
         >>> wearsim.Scenario.from_toml(text, {"operation.rollers": 1}).total_passes
         450000
         """
-        return parse_scenario(text, str(Path(folder) / name), reader_in(Path(folder)), overrides)
+        read = reader_in(Path(folder), confined=confined)
+        return parse_scenario(text, str(Path(folder) / name), read, overrides)
 
     @classmethod
     def from_dict(

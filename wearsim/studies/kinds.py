@@ -77,6 +77,20 @@ def wearsim_study_kinds() -> Iterable[StudyKind]:
         protocol=2,
     )
     yield StudyKind(
+        "returns",
+        summary="lives of designs after returns from the field",
+        result="wearsim.studies.returns.result:FieldReturns",
+        view="wearsim.studies.returns.view:FieldReturnsView",
+        protocol=2,
+    )
+    yield StudyKind(
+        "demonstration",
+        summary="tests that demonstrate the life of a design",
+        result="wearsim.studies.demonstration.result:Demonstration",
+        view="wearsim.studies.demonstration.view:DemonstrationView",
+        protocol=2,
+    )
+    yield StudyKind(
         "identification",
         summary="wear factors of measured grooves",
         result="wearsim.studies.identify.result:IdentificationResult",

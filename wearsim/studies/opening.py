@@ -132,7 +132,9 @@ def views_of(results: Sequence[Any]) -> list[View]:
     return [comparison_of(results, labels_of(results)), *views]
 
 
-def save_report(results: Sequence[Any], path: Path, measured: Sequence[Measured] = ()) -> None:
+def save_report(
+    results: Sequence[Any], path: str | Path, measured: Sequence[Measured] = ()
+) -> None:
     """Write one page on results for a browser; several are also compared.
 
     Parameters
@@ -149,10 +151,14 @@ def save_report(results: Sequence[Any], path: Path, measured: Sequence[Measured]
         If bokeh or jinja2 is not installed, which are part of the extra ``wearsim[report]``.
     ResultsFileError
         If the page cannot be written, or the results cannot be compared.
+
+    Examples
+    --------
+    >>> wearsim.save_report([wearsim.run("rig.toml")], "rig.html")
     """
     from wearsim.report.page.page import save_page  # noqa: PLC0415  (only of pages)
 
-    save_page(views_of(results), path, measured)
+    save_page(views_of(results), Path(path), measured)
 
 
 def export_csv(

@@ -220,6 +220,13 @@ class ConfiguredSpec(Generic[S]):
         context: dict[str, Any] = {"read": self.files.__getitem__}
         if self.kind is not None:
             context["quantity"] = Quantity(self.kind)
+
+        def component(table: Mapping[str, Any]) -> Any:
+            inner = {key: value for key, value in table.items() if key != "distribution"}
+            spec = resolve(RandomInputSpec, table["distribution"])
+            return spec.factory(ConfiguredSpec(spec, inner, self.kind, self.files).options)
+
+        context["component"] = component
         try:
             return self.spec.options.model_validate(dict(self.raw), context=context)
         except ValidationError as error:

@@ -54,12 +54,18 @@ KEYS = {"load.stiffness", "load.thermal", "load", "roller.offset", "wear", "cont
 CREEPAGE = {"yaw", "tilt", "differential_slip", "drive", "bearing_torque", "longitudinal"}
 
 
-def test_random_tests_are_valid_and_cover_all_features():
+@pytest.fixture(scope="module")
+def random_tests():
+    """Return 200 random tests, and their scenarios."""
     tests = [random_test(3, number) for number in range(200)]
+    return tests, [test.scenario() for test in tests]
+
+
+def test_random_tests_are_valid_and_cover_all_features(random_tests):
+    tests, scenarios = random_tests
     assert len({test.digest for test in tests}) == len(tests)
     assert {key for test in tests for key in test.changes} >= KEYS
     assert {key for test in tests for key in test.changes.get("creepage", {})} >= CREEPAGE
-    scenarios = [test.scenario() for test in tests]
     assert {item.tolerance for item in tests} == {1e-2, 1e-3, 1e-4}
     assert {item.persistence for s in scenarios for item in s.random} >= {"per-test", "per-pass"}
     assert any(", 0.0\n" in text for test in tests for text in test.files.values())  # a pause
@@ -67,10 +73,10 @@ def test_random_tests_are_valid_and_cover_all_features():
     assert set(numbers) == {1, 2, 3}
 
 
-def test_strata_alternate_and_have_their_features():
-    tests = [random_test(4, number) for number in range(100)]
+def test_strata_alternate_and_have_their_features(random_tests):
+    tests, scenarios = random_tests
     assert [test.stratum for test in tests[:5]] == list(STRATA)
-    of = {name: [t.scenario() for t in tests if t.stratum == name] for name in STRATA}
+    of = {name: scenarios[k :: len(STRATA)] for k, name in enumerate(STRATA)}
     assert all(scenario.cam is not None for scenario in of[CAM])
     assert all(1e-5 <= s.creepage.longitudinal <= 1e-4 for s in of[ADHESION])
     assert all(s.creepage.drive == "free" for s in of[FREE])

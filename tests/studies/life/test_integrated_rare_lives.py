@@ -19,7 +19,7 @@ from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.life.api import life, resume_life
 from wearsim.studies.life.factor import exact_factor
-from wearsim.studies.life.rare_estimates import IMPORTANCE, SUBSET
+from wearsim.studies.life.rare.estimates import IMPORTANCE, SUBSET
 from wearsim.studies.life.realisation import LifeRunner
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.view import life_cells

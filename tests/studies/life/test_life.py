@@ -17,11 +17,11 @@ from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.life.api import life, resume_life, sweep_life
+from wearsim.studies.life.comparison import swept_variable as against
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.realisation import LifeRunner
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.settings import design_variable, parse_life
-from wearsim.studies.life.stored_settings import swept_variable as against
 from wearsim.studies.opening import open_results
 from wearsim.studies.run.run import run
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,10 +10,20 @@ import pytest
 from tests.faulty_storage import WatchedStorage
 from tests.studies.ensemble_cases import LOGNORMAL, differences
 from tests.studies.life.test_life import design
+from wearsim.studies.life import settings
 from wearsim.studies.life.api import life, resume_life
 from wearsim.studies.life.result import LifeResult
 
 COUNT = 4
+RARE = 60  # fewer than in use, to save time
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_tests() -> Iterator[None]:
+    """Accept few tests for rare ends of life."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(settings, "LEAST_TESTS", RARE)
+        yield
 
 
 class Killed(BaseException):
@@ -33,7 +44,7 @@ def counted(stages: list[str], last: int | None = None) -> WatchedStorage:
 def study(path: Path, storage: WatchedStorage) -> LifeResult:
     """Run a study with tests for rare ends of life."""
     scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"})
-    return life(scenario, COUNT, path, target=600, rare=200, scheduler="serial", storage=storage)
+    return life(scenario, COUNT, path, target=600, rare=RARE, scheduler="serial", storage=storage)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from wearsim.studies.ensemble.file.data import Outcome
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.file.schema import OBSERVABLES
 from wearsim.studies.life.api import life, resume_life
-from wearsim.studies.life.rare_estimates import IMPORTANCE, SUBSET
+from wearsim.studies.life.rare.estimates import IMPORTANCE, SUBSET
 from wearsim.studies.life.realisation import LifeRunner
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.draws import Drawer

@@ -13,7 +13,8 @@ import typer
 
 import wearsim
 from wearsim.cli.commands.ensemble import swept
-from wearsim.cli.render import draw_figure, show_view
+from wearsim.cli.commands.life_use import LifeUse
+from wearsim.cli.render import draw_figure, show_view, show_with_figure
 from wearsim.cli.shared import (
     FigureOption,
     Force,
@@ -137,6 +138,46 @@ def life(
             show_default=False,
         ),
     ] = None,
+    returns: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Lives of units in service, which update the posterior of K/H: columns life (or"
+            " low and high), state (failed, suspended), and optionally limit, design and unit.",
+            show_default=False,
+        ),
+    ] = None,
+    life_factor: Annotated[
+        float | None,
+        typer.Option(
+            metavar="FACTOR",
+            help="Prior of the factor by which all lives of --returns differ from the computed"
+            " ones: two of three within FACTOR, by default 1.5; 1 for none.",
+            show_default=False,
+        ),
+    ] = None,
+    demonstrate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="'R=0.9 C=0.95 at LIFE'",
+            help="Specimens and duration of tests that show the survival R of a life with the"
+            " confidence C. Further designs are the conditions of accelerated tests.",
+            show_default=False,
+        ),
+    ] = None,
+    page: Annotated[
+        Path | None,
+        typer.Option("--page", metavar="FILE.html", help="Also write a page.", show_default=False),
+    ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            "--table",
+            metavar="FILE.csv",
+            help="Also write the running units of --returns, or the tests of --demonstrate.",
+            show_default=False,
+        ),
+    ] = None,
     seed: Seed = None,
     settings: Settings = None,
     json: Json = False,
@@ -145,6 +186,8 @@ def life(
 ) -> None:
     """Compute the life of a design until a limit is reached, and compare two designs."""
     check_figure(figure, force, "--figure")
+    use = LifeUse(returns, life_factor, demonstrate, page, table)
+    use.check(force)
     with checking("--b"):
         shares = _shares(b)
     files = [path.suffix.lower() in _FILES for path in designs]
@@ -164,7 +207,7 @@ def life(
             "--output": output,
         }
         refuse_options(given, "has no meaning for results files")
-        show_lives(*_reopened(designs, target, shares, posterior), json, figure)
+        show_lives(*_reopened(designs, target, shares, posterior), use, json, figure)
         return
     from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
     from wearsim.results.io.outputs import check_output
@@ -185,10 +228,12 @@ def life(
         "rare_method": rare_method,
     }
     with checking_arguments(limits="--limit", most="--max"):
-        scenarios = [
-            checked_study(scenario, realisations, limits=limit or [], **arguments)[0]
+        checked = [
+            checked_study(scenario, realisations, limits=limit or [], **arguments)
             for scenario in scenarios
         ]
+    scenarios = [scenario for scenario, _, _ in checked]
+    use.check_studies(labels, [(scenario, settings) for scenario, settings, _ in checked])
     paths = _paths(scenarios, labels, output)
     scheduler = checked_scheduler(scheduler, workers)
     going_on = partial(_going_on, labels, scenarios, paths, key)
@@ -204,7 +249,7 @@ def life(
         with going_on(path), watching(EnsembleWatcher, scenario, quiet, BATCHES) as watch:
             lives = wearsim.life(scenario, realisations, path, **arguments, **watch.callbacks)
         results.append(lives)
-    show_lives(results, labels, json, figure)
+    show_lives(results, labels, use, json, figure)
 
 
 def _variants(
@@ -256,7 +301,7 @@ def _reopened(
     designs: Sequence[Path], target: str | None, shares: tuple[float, ...], posterior: Path | None
 ) -> tuple[list[LifeResult], list[str]]:
     """Return the results in files, and their labels: of a sweep the values of its key."""
-    from wearsim.studies.life.stored_settings import swept_variable
+    from wearsim.studies.life.comparison import swept_variable
 
     results = [_opened(path, target, shares, posterior) for path in designs]
     if swept_variable(results) is None:
@@ -288,7 +333,11 @@ def _opened(
 
 
 def show_lives(
-    results: Sequence[LifeResult], labels: Sequence[str], json: bool, figure: Path | None
+    results: Sequence[LifeResult],
+    labels: Sequence[str],
+    use: LifeUse,
+    json: bool,
+    figure: Path | None,
 ) -> None:
     """Write the lives of designs to stdout, and compare each with the first.
 
@@ -296,6 +345,8 @@ def show_lives(
     ----------
     results : sequence of LifeResult
     labels : sequence of str
+    use : LifeUse
+        Returns or a demonstration test, which are shown instead.
     json : bool
         Whether to write JSON instead of tables.
     figure : Path, optional
@@ -314,15 +365,24 @@ def show_lives(
             note(f"warning: {view.failures}")
             raise SolverError(f"{result.path}: all realisations failed")
     paths = [result.path for result in results]
+    if use.is_special:
+        view = use.view_of(results, labels)
+        files = use.write([view])
+        show_with_figure(view, figure, json=json, files=files, more=files)
+        return
     if len(results) > 1:
         views.append(comparison_of(results, labels))
         paths.append(None)
     draw_figure(views[-1].panels(), figure)
+    # the comparison is the first part of a page
+    files = use.write([views[-1], *views[:-1]])
+    more = {"figure": figure, **({"page": use.page} if use.page else {})}
     first = len(views) - 1 if json else 0
     for view, path in zip(views[first:], paths[first:], strict=True):
-        show_view(view, json=json, files={"results file": path}, more={"figure": figure})
-    if figure is not None and not json:
-        note(f"figure: {figure}")
+        show_view(view, json=json, files={"results file": path}, more=more)
+    for name, file in {"figure": figure, **files}.items():
+        if file is not None and not json:
+            note(f"{name}: {file}")
 
 
 @contextmanager

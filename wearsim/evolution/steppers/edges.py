@@ -18,14 +18,22 @@ formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.loads import descents, elastic_approaches
-from wearsim.mechanics.numerics.edge_strips import SETTLED, EdgeStrips, start_edges
+from wearsim.evolution.steppers.loads import descents, elastic_approaches, with_feedback
+from wearsim.evolution.steppers.single_step import carried_loads
+from wearsim.mechanics.numerics.edge_strips import (
+    SETTLED,
+    EdgeStrips,
+    mark_strips,
+    start_edges,
+)
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
 from wearsim.types import BoolArray, FloatArray, IntArray
@@ -33,8 +41,13 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 # greatest order where edges are resolved within a strip: beyond the first derivative the wear of
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
+YOUNG_STEPS = 2.0  # steps for which a strip is young, over the order
 YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
+LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
+# part of a contact that adheres up to which edges are resolved: where most of it adheres, wear is
+# greatest at the edge, and the line load is not uniform up to the layer in which it falls
+MOST_ADHESION = 0.5
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
 
@@ -43,12 +56,13 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     """Return whether steps resolve the edges of contacts within a strip once there is a groove.
 
     The contact model must return the separation, every contact must have its own body or station,
-    and load and inputs must be constant: where they vary, an edge also retreats. The rise of the
-    gap across a strip must be that of crowned bodies.
+    and load and inputs must be constant: where they vary, an edge also retreats. The load of a
+    spring falls, and wear advances the edge until the spring has almost no load, see `_unloaded`.
+    The rise of the gap across a strip must be that of crowned bodies.
     """
     stations, each, _ = problem.shape
     varies = problem.constant_load is None or len(problem.varying) > 0
-    varies |= stations == 1 and (problem.has_spring or bool(problem.terms))
+    varies |= stations == 1 and bool(problem.terms)
     apart = not problem.has_nodes and (stations == 1 or each == 1)
     possible = contacts.separation is not None and apart and not varies
     return possible and problem.has_crowned_gap
@@ -99,17 +113,34 @@ def by_resolution(
     every = np.arange(len(state.passes))
     if state.part is None:
         return [(every, problem, state)]
-    whole = unresolved(state)
-    if whole.any():
-        state = _with_new_edges(problem, state, whole)
+    whole, low = unresolved(state), _unloaded(problem, state)
+    if (low & ~whole).any():
+        assert state.order is not None
+        fields = unresolved_edges(problem)
+        ended = {n: np.where(low[:, None], one, getattr(state, n)) for n, one in fields.items()}
+        state = state.replaced(**ended, order=np.where(low & ~whole, 1, state.order))
+        whole = unresolved(state)
+    if (whole & ~low).any():
+        state = _with_new_edges(problem, state, whole & ~low)
         whole = unresolved(state)
     parts = []
+    if not whole.any():
+        return [(every, problem, state)]
     for kind in (False, True):
         places = np.flatnonzero(whole == kind)
         if places.size:
             part = state.at(places)
             parts.append((places, problem.at(places), without_edges(part) if kind else part))
     return parts
+
+
+def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
+    """Return which tests have a roller whose spring has lost most of its load."""
+    if not problem.has_spring or problem.shape[0] > 1:
+        return np.zeros(len(state.passes), dtype=np.bool_)
+    force = problem.force(problem.time(state.passes))
+    free = with_feedback(problem, force, np.zeros(()), ())
+    return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
@@ -121,6 +152,8 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
     worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
     separation = state.contacts.separation.reshape(shape)
     begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3))
+    adhering = problem.values_of(state.contacts, "adhesion_fraction")
+    begins &= adhering.max(axis=(0, 1)) <= MOST_ADHESION
     begins &= sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
     if not begins.any():
         return state
@@ -192,41 +225,57 @@ def edges_of_step(
     return edges
 
 
-def crossed_strips(state: WearState) -> BoolArray | None:
-    """Return which strips of the bodies an edge is crossing or has crossed lately."""
-    if state.whole_steps is None or state.part is None:
-        return None
-    lately = (state.part > 0.0) & (state.whole_steps < SETTLED)
-    return np.concatenate([lately.any(axis=1), lately.any(axis=0)])
-
-
 def most(state: WearState) -> int:
     """Return the greatest order of steps from a state."""
     return MAX_ORDER if state.part is None else EDGE_ORDER
 
 
-def young_strips(state: WearState) -> BoolArray | None:
-    """Return which strips of the bodies take steps of first order.
+class MarkedStrips(NamedTuple):
+    """Strips of the bodies about the edges of their contacts, each an array as `WearState.stacked`.
 
-    Points of formulas of the state's order would lie ahead of the edge or close to it. There the
-    surfaces close as the power 3/2 of the distance from it, and higher orders would overshoot.
-    A worn roller of a cam meets the edges at all stations at different times. Its wear by one of
-    them has no past points, and both bodies of a contact must wear by the same formula: no strip
-    is young then.
+    Parameters
+    ----------
+    young : ndarray of bool
+        Strips that take steps of first order. Points of formulas of the state's order would lie
+        ahead of the edge or close to it, until as many steps again have been taken. There the
+        surfaces close as the power 3/2 of the distance from it, and higher orders would overshoot.
+        A worn roller of a cam meets the edges at all stations at different times. Its wear by one
+        of them has no past points, and both bodies of a contact must wear by the same formula: no
+        strip is young then.
+    crossed : ndarray of bool
+        Strips that an edge is crossing or has crossed lately.
+    parts : ndarray
+        Greatest part in contact, 0 without wear.
     """
+
+    young: BoolArray
+    crossed: BoolArray
+    parts: FloatArray
+
+    @property
+    def weights(self) -> FloatArray:
+        """Part of each strip's error that counts.
+
+        The formulas also continue the separation of strips that are not in contact. Young strips
+        are not smooth enough for an estimate, which is too great, see `first_order_errors`.
+        """
+        return np.where(self.young, YOUNG * self.parts, self.parts)
+
+
+def marked_strips(state: WearState) -> MarkedStrips | None:
+    """Return the strips of a state about the edges, None where edges are not resolved."""
     if state.whole_steps is None or state.part is None or state.past_wear is None:
         return None
     assert state.order is not None
-    touching, stations = state.part > 0.0, len(state.part)
-    young, ahead = touching & (state.whole_steps < state.order[:, None]), ~touching
-    found = [(young.any(axis=axis) | ahead.all(axis=axis)) for axis in (1, 0)]
-    if stations > 1:
-        unworn = ~(state.past_wear[0][stations:] > 0.0).any(axis=(0, 2))
-        found = [one & unworn[:, None] for one in found]
-    return np.concatenate(found)
+    wear = kernel_input(state.past_wear[0])
+    young, crossed = np.empty((2, *wear.shape), dtype=np.bool_)
+    marked = MarkedStrips(young, crossed, np.empty_like(wear))
+    steps = (YOUNG_STEPS * state.order).astype(np.float64)
+    mark_strips(kernel_input(state.part), kernel_input(state.whole_steps), steps, wear, *marked)
+    return marked
 
 
-def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArray:
+def with_sum(end: WearState, errors: FloatArray, marked: MarkedStrips) -> FloatArray:
     """Return errors of the depths that a step adds, which agree with those of their sums.
 
     `with_volume` keeps the sums.
@@ -235,8 +284,8 @@ def with_sum(end: WearState, errors: FloatArray, crossed: BoolArray) -> FloatArr
     assert past is not None
     assert spans is not None
     assert orders is not None
-    parts = np.where(crossed, 0.0, parts_of_bodies(end))
-    errors = np.where(crossed, 0.0, errors)
+    parts = np.where(marked.crossed, 0.0, marked.weights)
+    errors = np.where(marked.crossed, 0.0, errors)
     sums = kernel_input(past[:, :-1, :, None])
     ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
     scale = np.ones(len(orders))
@@ -257,26 +306,9 @@ def relative_size(errors: FloatArray, depths: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(size / np.where(whole > 0.0, whole, np.inf)))
 
 
-def parts_of_bodies(state: WearState) -> FloatArray:
-    """Return the part of each strip's error that counts, as `WearState.stacked`.
-
-    The formulas also continue the separation of strips that are not in contact. Those that the edge
-    has just crossed are not smooth enough for an estimate, which is too great, see
-    `first_order_errors`.
-    """
-    young = young_strips(state)
-    if young is None:
-        return np.ones(state.stacked.shape)
-    assert state.part is not None
-    assert state.past_wear is not None
-    parts = np.concatenate([state.part.max(axis=1), state.part.max(axis=0)])
-    return np.where(state.past_wear[0] > 0.0, np.where(young, YOUNG * parts, parts), 0.0)
-
-
-def first_order_errors(end: WearState) -> FloatArray:
+def first_order_errors(end: WearState, young: BoolArray) -> FloatArray:
     """Return the errors that a step adds to young strips in contact, as `WearState.stacked` [m]."""
-    young, past, spans = young_strips(end), end.past_wear, end.past_spans
-    assert young is not None
+    past, spans = end.past_wear, end.past_spans
     assert past is not None
     assert spans is not None
     factor = spans[0] / (1.0 / spans[0] + 1.0 / spans[1])

@@ -60,12 +60,10 @@ OF_VOLUME = 0.33, 0.5
 KEEP = 0.9
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 # safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
-EDGES, OF_EDGES = 8.0, 5.0
-# safety factors of volume and profile, also those of step doubling, whose error of the volume is a
-# sum of absolute changes
-OF_STEPS = COVER[1:, 0].tolist()
-OF_STEPS_WITH_EDGES = [OF_EDGES * OF_STEPS[0], OF_STEPS[1]]
-DOUBLED = math.inf, COVER_OF_DOUBLING
+EDGES, OF_EDGES = 8.0, 3.0
+# factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
+# of the volume, which do not add up
+OF_STEPS, DOUBLED = (1.0, float(COVER[2, 0])), (math.inf, COVER_OF_DOUBLING)
 # the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
 # number, to a least part of itself at the second one
 ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
@@ -168,21 +166,13 @@ class ImplicitStepper(StepDoublingStepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
-        factors = OF_STEPS if state.part is None else OF_STEPS_WITH_EDGES
-        left = self._left(problem, state, stop, factors)
+        left = self._left(problem, state, stop, OF_STEPS)
+        marked = edges.marked_strips(end)
+        parts = np.ones_like(depths) if marked is None else marked.weights
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
-            *(
-                past.wear,
-                past.spans,
-                depths,
-                past.order,
-                part,
-                aim,
-                KEEP,
-                edges.most(end),
-            ),
-            *(edges.parts_of_bodies(end), own, order),
+            *(past.wear, past.spans, depths, past.order, part, aim, KEEP, edges.most(end)),
+            *(parts, own, order),
         )
         # without half a pass, the wear of a pass is that after it instead of before it
         if step.min() <= WHOLE_PASSES:
@@ -198,7 +188,7 @@ class ImplicitStepper(StepDoublingStepper):
             passes=passes,
             steps=state.steps + 1,
             order=order,
-            **_estimates(problem, state, end, depths, own, step, displaced),
+            **_estimates(problem, state, end, depths, own, step, displaced, marked),
             **others,
         )
         return Attempt((end,), over, ratio)
@@ -217,17 +207,8 @@ class ImplicitStepper(StepDoublingStepper):
         part = (end.passes / stop) ** PART_EXPONENT / left
         scale = part / (DOUBLED_SHARE * self.tolerance)
         over, ratio = next_steps(
-            *(
-                past.wear,
-                past.spans,
-                depths,
-                past.order,
-                scale,
-                1.0,
-                1.0,
-                edges.most(end),
-            ),
-            *(edges.parts_of_bodies(end), own, order),
+            *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, edges.most(end)),
+            *(np.ones_like(depths), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
@@ -289,6 +270,7 @@ def _estimates(
     added: FloatArray,
     passes: FloatArray,
     displaced: FloatArray | None,
+    marked: edges.MarkedStrips | None,
 ) -> dict[str, FloatArray]:
     """Return the error estimates at the end of a step, by their names in `WearState`.
 
@@ -303,15 +285,16 @@ def _estimates(
         Length of the step.
     displaced : ndarray, shape (realisations,), optional
         Displacement of a roller that the error of its load corresponds to [m].
+    marked : MarkedStrips, optional
+        Strips of the end, where edges are resolved.
     """
     contacts, shape = end.contacts, end.contacts.line_load.shape
     stiffness = np.zeros(shape[0])
     if problem.has_spring:
         stiffness = np.broadcast_to(problem.stiffness, problem.shape).flatten()
-    crossed = edges.crossed_strips(end)
     errors, sizes = carried_errors(
         np.asarray(start.stepping_error),
-        added if crossed is None else edges.with_sum(end, added, crossed),
+        added if marked is None else edges.with_sum(end, added, marked),
         contacts.line_load,
         problem.wear_parts(contacts, passes).reshape(2, *shape),
         np.asarray(end.wear_exponents).reshape(shape),
@@ -326,8 +309,9 @@ def _estimates(
     if displaced is not None:  # a stiff spring holds the depth, and errors of its load remain
         sizes[0] += displaced
         sizes[2] += displaced / np.where(displaced > 0.0, greatest_depth(end.depths), 1.0)
-    if crossed is not None:
-        at_edges = EDGES * (np.where(crossed, added, 0.0) + edges.first_order_errors(end))
+    if marked is not None:
+        of_first_order = edges.first_order_errors(end, marked.young)
+        at_edges = EDGES * (np.where(marked.crossed, added, 0.0) + of_first_order)
         sizes[2] = np.hypot(sizes[2], edges.relative_size(at_edges, depths))
         sizes[:2] *= OF_EDGES
     found = COVER * sizes
@@ -456,8 +440,9 @@ def _step(
     formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
     added, guess = extrapolated(weights, past.wear)
-    scale, young = None, edges.young_strips(state)
-    if young is not None:
+    scale, marked = None, edges.marked_strips(state)
+    if marked is not None:
+        young = marked.young
         added = np.where(young, half_pass[:, None] * past.wear[0], added)
         first = (conditions.mean * passes / conditions.own - half_pass) / worn_passes
         scale = np.where(young, first[:, None], 1.0)

@@ -344,6 +344,58 @@ def end_edges(
             fields[0, k, i] = apart
 
 
+@kernel
+def mark_strips(
+    part: FloatArray,
+    whole_steps: FloatArray,
+    young_steps: FloatArray,
+    wear: FloatArray,
+    young: BoolArray,
+    crossed: BoolArray,
+    parts: FloatArray,
+) -> None:
+    """Fill which strips of the bodies are young, which an edge has crossed, and their parts.
+
+    Parameters
+    ----------
+    part, whole_steps : ndarray, shape (stations, contacts each, realisations, strips)
+        As in `WearState`.
+    young_steps : ndarray, shape (realisations,)
+        Steps for which a strip is young after it has come into contact as a whole.
+    wear : ndarray, shape (bodies, realisations, strips)
+        Wear per roller pass [m].
+    young, crossed : ndarray of bool, shape as `wear`
+        Results, see `evolution.steppers.edges`.
+    parts : ndarray, shape as `wear`
+        Result: greatest part in contact, 0 without wear.
+    """
+    stations, each, realisations, n = part.shape
+    rows = wear.shape[0]
+    for v in range(realisations):
+        takes_part = True
+        if stations > 1:
+            for b in range(stations, rows):
+                for i in range(n):
+                    takes_part = takes_part and not wear[b, v, i] > 0.0
+        for b in range(rows):
+            of_station = b < stations
+            first, last = (b, b + 1) if of_station else (0, stations)
+            for i in range(n):
+                comes, touches, lately, most = False, False, False, 0.0
+                for s in range(first, last):
+                    for c in range(each if of_station else 1):
+                        k = c if of_station else b - stations
+                        here = part[s, k, v, i]
+                        most = max(most, here)
+                        if here > 0.0:
+                            touches = True
+                            comes = comes or whole_steps[s, k, v, i] < young_steps[v]
+                            lately = lately or whole_steps[s, k, v, i] < SETTLED
+                young[b, v, i] = takes_part and (comes or not touches)
+                crossed[b, v, i] = lately
+                parts[b, v, i] = most if wear[b, v, i] > 0.0 else 0.0
+
+
 def compile_edges() -> None:
     """Compile the kernels of a step by a call for one contact of one strip."""
     strip, rows, wear = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
@@ -354,6 +406,8 @@ def compile_edges() -> None:
     one = np.ones(1, np.bool_)
     compare_edges(strips, one, strip, strip, strip, strip, strip, wear, np.ones((1, 1)))
     end_edges(strips, strip, strip, wear, rows, rows.copy(), rows.copy(), np.ones((3, 1, 1)))
+    contact, marks = np.ones((1, 1, 1, 1)), np.ones((2, 2, 1, 1), np.bool_)
+    mark_strips(contact, contact, np.ones(1), rows, marks[0], marks[1], rows.copy())
 
 
 compile_alongside("solve_slender", compile_edges)

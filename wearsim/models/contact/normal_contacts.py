@@ -158,11 +158,12 @@ class NormalContacts(NamedTuple):
     ) -> None:
         """Solve sets in place; `members` and `shared` are those of `SharedWear.groups`."""
         status, iterations = np.zeros((2, len(self.gap)), np.int64)
+        # contacts chosen from sets have arrays of another layout, for which numba would compile
         kernels.solve_slender(
             self.gap,
-            own,
+            kernel_input(own),
             members,
-            shared,
+            None if shared is None else kernel_input(shared),
             self.loads,
             self.longitudinal_curvature,
             *constants,

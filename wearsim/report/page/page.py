@@ -155,6 +155,11 @@ def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
     )
 
 
+def page_style() -> str:
+    """Return the style sheet of pages, light and dark."""
+    return Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+
+
 def part_of(view: View, measured: Sequence[Measured] = ()) -> PagePart:
     """Return a view as a part of a page, with its panels drawn."""
     from wearsim.report.page.plots import plots_of  # noqa: PLC0415  (imports bokeh)

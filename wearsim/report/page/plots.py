@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -52,11 +53,22 @@ _LEGEND: dict[str, Any] = {
 _CELLS = 301  # of an image along each axis, if its places are irregular
 
 
+def panels_of(sheet: Sheet) -> tuple[dict[str, Panel], list[str]]:
+    """Return the panels of a page by name, and the texts of the slider.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    """
+    shown = {name: panel for name, panel in sheet.panels.items() if not panel.figure_only}
+    kept = evenly_spaced(len(sheet.steps), MOST_RECORDS) if sheet.steps else ()
+    return shown, [sheet.steps[number] for number in kept]
+
+
 def plots_of(sheet: Sheet) -> tuple[list[tuple[Panel, Any]], list[str]]:
     """Return the panels of a page with their figures, and the texts of the slider."""
-    shown = [panel for panel in sheet.panels.values() if not panel.figure_only]
-    kept = evenly_spaced(len(sheet.steps), MOST_RECORDS) if sheet.steps else ()
-    return [(panel, draw(panel)) for panel in shown], [sheet.steps[number] for number in kept]
+    shown, steps = panels_of(sheet)
+    return [(panel, draw(panel)) for panel in shown.values()], steps
 
 
 def draw(panel: Panel) -> Any:
@@ -66,8 +78,8 @@ def draw(panel: Panel) -> Any:
         sizing_mode="stretch_width",
         tools="pan,box_zoom,wheel_zoom,reset,save",
         active_scroll=None,
-        x_axis_label=_plain(panel.x.label),
-        y_axis_label=_plain(panel.y.label),
+        x_axis_label=plain_label(panel.x.label),
+        y_axis_label=plain_label(panel.y.label),
         toolbar_location="above",
         min_border_right=14,  # for half of the last tick label
         x_axis_type="log" if panel.x.log else "linear",
@@ -75,42 +87,65 @@ def draw(panel: Panel) -> Any:
         match_aspect=panel.equal,
     )
     plot.toolbar.logo = None
-    _set_axis(plot, "x", panel.x)
-    _set_axis(plot, "y", panel.y)
+    for along, axis in (("x", panel.x), ("y", panel.y)):
+        _set_axis(plot, along, replace(axis, limits=(None, None)) if is_boxed(panel) else axis)
     if panel.right is not None:
-        # a plain range, since one that follows the data would follow both axes
-        values = [np.ravel(mark.y) for mark in panel.marks if isinstance(mark, Line) and mark.right]
-        data = np.concatenate(values) * panel.right.scale
-        least, greatest = float(np.nanmin(data)), float(np.nanmax(data))
-        margin = 0.05 * (greatest - least)
-        low, high = _limits(panel.right, least - margin, greatest + margin)
+        low, high = right_ends(panel, panel.right)
         plot.extra_y_ranges = {"right": Range1d(start=low, end=high)}
-        label = _plain(panel.right.label)
+        label = plain_label(panel.right.label)
         plot.add_layout(LinearAxis(y_range_name="right", axis_label=label), "right")
     for axis in (*plot.xaxis, *plot.yaxis):
         axis.update(axis_label_text_font_style="normal", axis_label_text_font_size="14px")
         axis.update(major_label_text_font_size="13px", **_TEXT)
     plot.grid.grid_line_color = "#e4e4e4"
-    for mark in panel.marks:
-        y = panel.right if mark.right and panel.right else panel.y
-        _draw(plot, mark, panel.x, y, {"y_range_name": "right"} if mark.right else {})
+    draw_marks(plot, panel)
     _set_legend(plot)
     return plot
 
 
-def _plain(text: str) -> str:
+def right_ends(panel: Panel, right: Axis) -> list[float]:
+    """Return the ends of the axis at the right of a panel, in its unit.
+
+    They make a plain range, since one that follows the data would follow both axes.
+    """
+    values = [np.ravel(mark.y) for mark in panel.marks if isinstance(mark, Line) and mark.right]
+    data = np.concatenate(values) * right.scale
+    least, greatest = float(np.nanmin(data)), float(np.nanmax(data))
+    margin = 0.05 * (greatest - least)
+    return limits_of(right, least - margin, greatest + margin)
+
+
+def is_boxed(panel: Panel) -> bool:
+    """Return whether a panel has one scale and fixed ends: its axes must then follow a box.
+
+    Bokeh keeps one scale only on axes that follow the data.
+    """
+    return panel.equal and None not in (*panel.x.limits, *panel.y.limits)
+
+
+def draw_marks(plot: Any, panel: Panel) -> None:
+    """Draw the marks of a panel on a figure that has its axes."""
+    if is_boxed(panel):
+        box = _source({"x": limits_of(panel.x), "y": limits_of(panel.y)})
+        plot.line("x", "y", source=box, line_alpha=0.0)
+    for mark in panel.marks:
+        y = panel.right if mark.right and panel.right else panel.y
+        _draw(plot, mark, panel.x, y, {"y_range_name": "right"} if mark.right else {})
+
+
+def plain_label(text: str) -> str:
     """Return a label without the marks of matplotlib's mathematical text."""
     return text.replace("$", "").replace("_l", "").replace("_d", "").replace("\n", " ")
 
 
-def _limits(axis: Axis, *default: float) -> list[Any]:
+def limits_of(axis: Axis, *default: float) -> list[Any]:
     """Return the ends of an axis in its unit; those that follow the data are None by default."""
     ends = zip(axis.limits, default or (None, None), strict=True)
     return [other if end is None else float(end * axis.scale) for end, other in ends]
 
 
 def _set_axis(plot: Any, along: str, axis: Axis) -> None:
-    named = zip(("start", "end"), _limits(axis), strict=True)
+    named = zip(("start", "end"), limits_of(axis), strict=True)
     ends: dict[str, Any] = {name: end for name, end in named if end is not None}
     # ticks at the places of the data only, without the lines of annotations
     shown = Range1d(**ends) if len(ends) > 1 else DataRange1d(only_visible=True, **ends)
@@ -120,7 +155,9 @@ def _set_axis(plot: Any, along: str, axis: Axis) -> None:
         places = [float(tick * axis.scale) for tick in axis.ticks]
         ticks.ticker = FixedTicker(ticks=places)
         if axis.names is not None:
-            ticks.major_label_overrides = dict(zip(places, map(_plain, axis.names), strict=True))
+            ticks.major_label_overrides = dict(
+                zip(places, map(plain_label, axis.names), strict=True)
+            )
     elif axis.log:
         ticks.formatter = NumeralTickFormatter(format="0,0.[00000]")
     else:
@@ -153,7 +190,7 @@ def _colour(colour: Any) -> Any:
 
 def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
     """Draw a mark in the units of both axes."""
-    named = {"legend_label": _plain(mark.label)} if mark.label else {}
+    named = {"legend_label": plain_label(mark.label)} if mark.label else {}
     style = {"color": _colour(mark.colour), "alpha": mark.alpha, **on}
     match mark:
         case Line():
@@ -184,7 +221,8 @@ def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
             height = 0.04 * float(np.ptp(mark.y)) * y.scale / longest
             tail_x, tail_y = np.ravel(mark.x) * x.scale, np.ravel(mark.y) * y.scale
             tips = tail_x + width * np.ravel(mark.along_x), tail_y + height * np.ravel(mark.along_y)
-            plot.segment(tail_x, tail_y, *tips, **style)
+            data = _source({"x": tail_x, "y": tail_y, "tip_x": tips[0], "tip_y": tips[1]})
+            plot.segment("x", "y", "tip_x", "tip_y", source=data, **style)
         case Patch():
             data = _source({"x": mark.x * x.scale, "y": mark.y * y.scale})
             plot.patch("x", "y", source=data, line_alpha=0.0, **style, **named)
@@ -194,6 +232,8 @@ def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
 
 def _hover(plot: Any, renderers: Sequence[Any], *tips: tuple[str, str], line: bool = False) -> None:
     """Show values of the drawn data under the pointer, of a line also above and below it."""
+    if None in renderers:  # recorded without a figure
+        return
     columns = [text.partition("{")[0] for _, text in tips if text[0] == "@" and "{" in text]
     printed: Any = dict.fromkeys(columns, "printf")
     options: Any = {"mode": "vline" if line else "mouse", "formatters": printed}
@@ -202,8 +242,8 @@ def _hover(plot: Any, renderers: Sequence[Any], *tips: tuple[str, str], line: bo
 
 def _tip(axis: Axis, column: str, name: str = "") -> tuple[str, str]:
     """Return the name of an axis, and the text of a column in its unit."""
-    unit = "" if axis.unit == "1" else f" {_plain(axis.unit)}"
-    return _plain(name or axis.name or "value"), f"@{column}{{%.5g}}{unit}"
+    unit = "" if axis.unit == "1" else f" {plain_label(axis.unit)}"
+    return plain_label(name or axis.name or "value"), f"@{column}{{%.5g}}{unit}"
 
 
 def _more(mark: Line | Bars) -> tuple[dict[str, Any], list[tuple[str, str]]]:
@@ -221,7 +261,8 @@ def _draw_line(
     if values.ndim > 1:
         some = values[:MOST_CURVES].astype(np.float32)
         across = [places.astype(np.float32)] * len(some)
-        plot.multi_line(across, list(some), line_width=1, **style, **named)
+        curves = ColumnDataSource({"x": across, "y": list(some)})
+        plot.multi_line("x", "y", source=curves, line_width=1, **style, **named)
         return
     if not len(places):
         return
@@ -271,9 +312,9 @@ def _draw_band(
     plot.varea("x", "low", "high", source=source, **style, **named)
     # values under the pointer need a line, which areas do not have
     line = plot.line("x", "high", source=source, line_alpha=0.0)
-    unit = "" if y.unit == "1" else f" {_plain(y.unit)}"
+    unit = "" if y.unit == "1" else f" {plain_label(y.unit)}"
     ends = f"@low{{%.5g}} to @high{{%.5g}}{unit}"
-    _hover(plot, [line], (_plain(mark.label) or "interval", ends), line=True)
+    _hover(plot, [line], (plain_label(mark.label) or "interval", ends), line=True)
 
 
 def _draw_bars(
@@ -300,7 +341,7 @@ def _draw_bars(
         columns["name"] = [names[round(at)] for at in middle] if names else [""] * len(middle)
         tips.insert(0, ("", "@name"))
     elif place.names is None:
-        tips.insert(0, (place.name, f"@low{{%.5g}} to @high{{%.5g}} {_plain(place.unit)}"))
+        tips.insert(0, (place.name, f"@low{{%.5g}} to @high{{%.5g}} {plain_label(place.unit)}"))
     bars = plot.quad(**ends, source=_source(columns), **style, **named)
     _hover(plot, [bars], *tips, *more_tips)
 
@@ -319,7 +360,9 @@ def _draw_span(plot: Any, mark: Span, scale: float, named: dict[str, Any]) -> No
     )  # fmt: skip
     plot.add_layout(rule)
     if named:  # an annotation has no entry in the legend, a line without points has
-        plot.line([], [], color=colour, line_dash=_DASHES[mark.dash], line_width=2, **named)
+        nothing = _source({"x": [], "y": []})
+        look = {"color": colour, "line_dash": _DASHES[mark.dash], "line_width": 2}
+        plot.line("x", "y", source=nothing, **look, **named)
 
 
 def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
@@ -339,13 +382,16 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
     mapper.nan_color = "rgba(0, 0, 0, 0)"
     extent = {"x": float(across[0] * x.scale), "y": float(up[0] * y.scale)}
     extent |= {"dw": float(np.ptp(across) * x.scale), "dh": float(np.ptp(up) * y.scale)}
-    picture = plot.image(image=[values.astype(np.float32)], color_mapper=mapper, **extent)
-    bar = ColorBar(color_mapper=mapper, width=12, title=_plain(mark.axis.label))
+    places = {name: [place] for name, place in extent.items()}
+    source = ColumnDataSource({"image": [values.astype(np.float32)], **places})
+    names = dict(zip(source.data, source.data, strict=True))
+    picture = plot.image(**names, source=source, color_mapper=mapper)
+    bar = ColorBar(color_mapper=mapper, width=12, title=plain_label(mark.axis.label))
     bar.title_text_font_style = "normal"
     plot.add_layout(bar, "right")
     tips = (
-        (_plain(x.name), f"$x{{0.00}} {x.unit}"),
-        (_plain(y.name), f"$y{{0.00}} {y.unit}"),
+        (plain_label(x.name), f"$x{{0.00}} {x.unit}"),
+        (plain_label(y.name), f"$y{{0.00}} {y.unit}"),
         (mark.axis.name, f"@image{{%.5g}} {mark.axis.unit}"),
     )
     _hover(plot, [picture], *tips)
@@ -363,7 +409,7 @@ def _draw_text(plot: Any, mark: Text, x: Axis, y: Axis) -> None:
         places |= {mark.parts: 3, f"{mark.parts}_units": "screen"}
     plot.add_layout(
         Label(
-            text=_plain(mark.text), text_color=_colour(mark.colour), text_align=mark.anchor,
+            text=plain_label(mark.text), text_color=_colour(mark.colour), text_align=mark.anchor,
             text_font_size=f"{round(1.45 * mark.size)}px", x_offset=mark.offset[0],
             y_offset=mark.offset[1], text_font_style="bold" if mark.bold else "normal", **places,
         )

@@ -17,6 +17,7 @@ from wearsim.plugins import Distribution, FrictionField, JointDistribution, Opti
 from wearsim.quantities import HostQuantity, Quantity
 from wearsim.types import FloatArray
 from wearsim.units import as_written, in_engineers_unit
+from wearsim.uq.distributions.mixture import Mixture
 from wearsim.uq.sampling.sampler import BELOW_ONE
 
 _LIMITS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
@@ -350,6 +351,8 @@ class RandomInput:
     def describe(self) -> str:
         """Return a description in one line, in engineering units."""
         words = [self.kind]
+        if isinstance(self.distribution, Mixture):
+            words[0] += f" of {len(self.distribution.components)}"
         if isinstance(self.distribution, JointDistribution):
             pairs = zip(self.distribution.components, self.distribution.reach, strict=True)
             words += [f"{key} up to {amount(most, self.quantity)}" for key, most in pairs]

@@ -143,6 +143,7 @@ def validate_options(
     other_keys: type[BaseModel] | None = None,
     quantity: Quantity | None = None,
     refused: Sequence[tuple[str | int, ...]] | None = None,
+    component: Callable[[dict[str, object]], object] | None = None,
 ) -> M | None:
     """Return `raw` as an instance of `model`, or None after adding its mistakes.
 
@@ -163,10 +164,18 @@ def validate_options(
     refused : sequence of locations, optional
         Locations whose mistakes have been added already; for a table that had random inputs, whose
         means are there as ``{"si": 3.0}`` or as plain numbers.
+    component : callable, optional
+        Returns the distribution of a table within the options of another distribution, in their
+        order, or None after adding its mistakes.
     """
     # as JSON: its strict mode rejects "3" for 3 but accepts a list for a tuple
     numbers = None if refused is None else dict
-    context = {"read": mistakes.read, "quantity": quantity, "numbers": numbers}
+    context = {
+        "read": mistakes.read,
+        "quantity": quantity,
+        "numbers": numbers,
+        "component": component,
+    }
     try:
         return model.model_validate_json(json.dumps(raw, default=str), strict=True, context=context)
     except ValidationError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Collection, Mapping
+from itertools import count
 from typing import Any, TypeAlias
 
 from pydantic import BaseModel
@@ -252,17 +253,47 @@ def _read_marginal(
     mistakes: Mistakes, raw: object, name: str, quantity: Quantity | None
 ) -> Distribution | None:
     """Return the marginal distribution of a field or a process."""
-    place, expected = f"{name}.marginal", _one_of({"scalar"})
     if raw is None:
-        mistakes.add(
-            name, "marginal", "is missing", None, "a table with a distribution and its options"
-        )
+        what = "a table with a distribution and its options"
+        mistakes.add(name, "marginal", "is missing", None, what)
     if not isinstance(raw, dict):
         return None
+    place = f"{name}.marginal"
+    found: Distribution | None = _read_scalar(mistakes, raw, place, name, "marginal", quantity)
+    return found
+
+
+def _read_scalar(
+    mistakes: Mistakes,
+    raw: Mapping[str, object],
+    place: str,
+    name: str,
+    what: str,
+    quantity: Quantity | None,
+) -> Any:
+    """Return the distribution of one number that is part of a random input.
+
+    Parameters
+    ----------
+    mistakes : Mistakes
+        Collects the mistakes.
+    raw : mapping of str to object
+        Table with a distribution and its options.
+    place : str
+        Its name in messages.
+    name : str
+        Dotted key of the random input.
+    what : str
+        What the distribution is, "marginal".
+    quantity : Quantity, optional
+        Of the number.
+    """
+    expected = _one_of({"scalar"})
     keys, options = split_keys(raw, RandomInputTable)
     kind = keys.pop("distribution", None)
     for key in sorted(keys):
-        mistakes.add(place, key, f"belongs in [{name}], not in its marginal", as_written(keys[key]))
+        text = f"belongs in [{name}], not in its {what}"
+        mistakes.add(place, key, text, as_written(keys[key]))
     spec = None
     if kind is None:
         mistakes.add(place, "distribution", "is missing", None, expected)
@@ -271,13 +302,8 @@ def _read_marginal(
     else:
         spec = mistakes.find_plugin(RandomInputSpec, kind, place, "distribution")
     if spec and spec.role != "scalar":
-        mistakes.add(
-            place,
-            "distribution",
-            f"is a {spec.role}, but a marginal is the distribution of one number",
-            as_written(kind),
-            expected,
-        )
+        text = f"is a {spec.role}, but a {what} is the distribution of one number"
+        mistakes.add(place, "distribution", text, as_written(kind), expected)
         return None
     return _build(mistakes, spec, options, place, quantity) if spec else None
 
@@ -291,8 +317,17 @@ def _build(
     marginal: Distribution | None = None,
 ) -> Any:
     """Build a distribution, or add the mistakes of its options and return None."""
-    options = validate_options(mistakes, spec.options, raw, place, RandomInputTable, quantity)
-    if options is None or (spec.role in WITH_MARGINAL and marginal is None):
+    before, number = len(mistakes.entries), count(1)
+
+    def component(table: dict[str, object]) -> Any:
+        inner = f"{place}.of (entry {next(number)})"
+        return _read_scalar(mistakes, table, inner, place, "component", quantity)
+
+    options = validate_options(
+        mistakes, spec.options, raw, place, RandomInputTable, quantity, component=component
+    )
+    within = len(mistakes.entries) > before  # mistakes of a component
+    if within or options is None or (spec.role in WITH_MARGINAL and marginal is None):
         return None
     try:
         return spec.factory(options) if marginal is None else spec.factory(options, marginal)

@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import suppress
+from errno import EACCES
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -264,11 +265,13 @@ def flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, 
             yield f"{prefix}{key}", value
 
 
-def reader_in(folder: Path) -> Callable[[str], str]:
-    """Return a function that reads the input files in a folder."""
+def reader_in(folder: Path, *, confined: bool = False) -> Callable[[str], str]:
+    """Return a function that reads the input files in a folder, if confined no others."""
 
     def read(name: str) -> str:
         file, choice = split_name(name)
+        if confined and not (folder / file).resolve().is_relative_to(folder.resolve()):
+            raise PermissionError(EACCES, "outside the folder of the scenario", file)
         return read_input(folder / file, choice)
 
     return read

@@ -28,6 +28,7 @@ from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, sp
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.types import Grid, Material
 from wearsim.units import as_written
+from wearsim.uq.distributions.mixture import Mixture
 from wearsim.uq.distributions.two_levels import TwoLevels
 
 AUTO = "auto"
@@ -268,7 +269,7 @@ def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | Non
 def check_contained(mistakes: Mistakes) -> None:
     """Add the mistakes of random inputs whose scatter a posterior of K/H contains already."""
     for factor in mistakes.random_inputs:
-        if not isinstance(factor.distribution, TwoLevels):
+        if not isinstance(factor.distribution, TwoLevels | Mixture):
             continue
         for item in mistakes.random_inputs:
             for key in set(item.keys) & set(factor.distribution.contained):

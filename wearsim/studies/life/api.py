@@ -31,7 +31,7 @@ from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import profile_axis
 from wearsim.studies.ensemble.sweep import path_of
-from wearsim.studies.life.rare import next_stages
+from wearsim.studies.life.rare.stages import next_stages
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.settings import SHARES, checked_study, design_variable

@@ -11,12 +11,9 @@ from wearsim.errors import ResultsFileError
 from wearsim.levelling import Measured
 from wearsim.report.text import part_with_interval
 from wearsim.report.view import Row, Rows, Table, View
+from wearsim.studies.life.comparison import LifeComparison, swept_variable
 from wearsim.studies.life.result import LifeResult
-from wearsim.studies.life.stored_settings import (
-    DesignVariable,
-    LifeComparison,
-    swept_variable,
-)
+from wearsim.studies.life.stored_settings import DesignVariable
 from wearsim.studies.life.view import ERROR, lives_table
 from wearsim.uq.estimation.intervals import Interval
 

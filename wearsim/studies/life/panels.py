@@ -32,12 +32,12 @@ from wearsim.studies.cam.overview import CAM_EXCLUDED, loads, picture
 from wearsim.studies.cam.panels import ANGLE
 from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
 from wearsim.studies.fatigue.view import EXCLUDED as NO_FATIGUE
+from wearsim.studies.life.comparison import swept_variable
 from wearsim.studies.life.result import LifeResult
-from wearsim.studies.life.stored_settings import swept_variable
 from wearsim.studies.run.view import EXCLUDED
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
-from wearsim.uq.survival.fits import FAMILIES, Family
+from wearsim.uq.survival.fits import FAMILIES, Family, FittedLives, standard_score
 from wearsim.uq.survival.lives import cumulative_incidence, median_positions
 
 _POINTS = 200  # of a curve
@@ -200,20 +200,16 @@ def _probabilities(designs: Sequence[_Design], family: Family, axis: Axis) -> Pa
         picks = evenly_spaced(len(lives), _MOST_MARKS)
         marks.append(dots(lives[picks], scale(part[picks]), ".", colour=colour, label=design.label))
         ends += [float(lives[0]), float(lives[-1])]
-        fit = next((item for item in result.fits if item.family == family), None)
-        if fit is not None:
-            across = np.geomspace(0.7 * lives[0], 1.3 * lives[-1], _POINTS)
-            line = np.clip(fit.probability_before(across), 1e-4, 1.0 - 1e-4)
-            inside = (line > 1e-4) & (line < 1.0 - 1e-4)
-            dash, label = ("-", "fit, lower AIC") if result.fits[0] is fit else ("--", "fit")
-            curve = across[inside], scale(line[inside])
-            marks.append(Line(*curve, dash=dash, width=1.4, colour=colour, label=label))
+        first, last = 0.7 * lives[0], 1.3 * lives[-1]
+        if result.settings.alone:  # one test, which is a point of the distribution
+            first, last = (result.distribution.quantile_of_mean(p) for p in (0.002, 0.998))
+            ends += [first, last]
+        across = np.geomspace(first, last, _POINTS)
+        fits: Sequence[FittedLives] = result.integrated_fits or result.fits
+        for fit in fits:
+            if fit.family == family:
+                marks += _fit_marks(fit, across, colour, is_best=fit is fits[0])
         if result.is_exact:
-            first, last = 0.7 * lives[0], 1.3 * lives[-1]
-            if result.settings.alone:  # one test, which is a point of the distribution
-                first, last = (result.distribution.quantile_of_mean(p) for p in (0.002, 0.998))
-                ends += [first, last]
-            across = np.geomspace(first, last, _POINTS)
             mean = np.clip(result.distribution.failed(across).mean(axis=0), 1e-4, 1.0 - 1e-4)
             curve = across, scale(mean)
             marks.append(Line(*curve, dash=":", width=0.9, colour=_DARK, label="exact K/H"))
@@ -228,8 +224,22 @@ def _probabilities(designs: Sequence[_Design], family: Family, axis: Axis) -> Pa
             "failed [%]", limits=(low, high), ticks=ticks, names=[f"{tick:g}" for tick in _PERCENT]
         ),
         marks,
-        f"Lives on a scale on which a {family} distribution is a straight line.",
+        f"Lives on a scale on which a {family} distribution is a straight line; of the fit with its"
+        " 95 % band.",
     )
+
+
+def _fit_marks(fit: FittedLives, life: FloatArray, colour: str, *, is_best: bool) -> list[Mark]:
+    """Return a fit on its own probability scale, with its pointwise 95 % band."""
+    score, reach = fit.score(life), 1.96 * fit.score_error(life)
+    low, high = (standard_score(fit.family, p) for p in (1e-4, 1.0 - 1e-4))
+    inside = (score > low) & (score < high)
+    life, score, reach = life[inside], score[inside], reach[inside]
+    dash, label = ("-", "fit, lower AIC") if is_best else ("--", "fit")
+    marks: list[Mark] = [Line(life, score, dash=dash, width=1.4, colour=colour, label=label)]
+    if reach.any():
+        marks.append(Band(life, score - reach, score + reach, colour=colour, alpha=0.15))
+    return marks
 
 
 def _tornado(designs: Sequence[_Design]) -> Panel:

@@ -18,8 +18,8 @@ from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
 from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
 from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths
 from wearsim.studies.life.batch import LifeRun, observe_lives
-from wearsim.studies.life.draws import changes_of, log_weight
 from wearsim.studies.life.factor import NEGLIGIBLE, RARE, ExactFactor, exact_factor
+from wearsim.studies.life.rare.draws import changes_of, log_weight
 from wearsim.studies.life.stored_settings import LifeSettings
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid

@@ -7,24 +7,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.studies.life.factor import posterior_table
-from wearsim.studies.life.rare_estimates import rare_estimates
-from wearsim.studies.life.stored_settings import LifeComparison
+from wearsim.studies.life.rare.estimates import rare_estimates
 from wearsim.studies.life.values import LifeValues
-from wearsim.types import IntArray
 from wearsim.uq.estimation.estimates import LIFE, Estimate, Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
-from wearsim.uq.sensitivity.effects import TAIL, SignedEffect
-from wearsim.uq.survival.distributions import (
-    CountedLives,
-    FactorMixture,
-    LifeDistribution,
-)
-from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
+from wearsim.uq.survival.distributions import FactorMixture
+from wearsim.uq.survival.fits import FAMILIES, IntegratedFit, LifeFit, fit_lives, fit_mixture
 from wearsim.uq.survival.lives import (
     SurvivalCurve,
     life_quantile,
@@ -35,7 +28,10 @@ from wearsim.uq.survival.lives import (
 from wearsim.uq.survival.rare_events import RareProbability
 from wearsim.uq.survival.two_levels import UncertainLife
 
-_QUANTILES = np.array([TAIL, 0.5, 1.0 - TAIL])
+if TYPE_CHECKING:
+    from wearsim.studies.life.comparison import LifeComparison
+    from wearsim.uq.sensitivity.effects import SignedEffect
+
 _POINTS = 200  # of a curve
 _FEWEST = 32  # realisations below which a target is not reached
 
@@ -313,12 +309,22 @@ class LifeResult(LifeValues):
 
     @cached_property
     def fits(self) -> list[LifeFit]:
-        """Fits to the lives above zero, best first by Akaike's criterion."""
+        """Fits to the drawn lives above zero, best first by Akaike's criterion."""
         positive = self.lives > 0.0
-        lives = np.minimum(self.lives[positive], self.most)
-        if not len(lives):
+        # with the wear factor integrated, lives beyond the maximum are known too
+        lives = self.known_lives if self.is_known_throughout else np.minimum(self.lives, self.most)
+        observed = np.isfinite(lives) if self.is_known_throughout else self.observed
+        if not positive.any():
             return []
-        fitted = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
+        fitted = [fit_lives(family, lives[positive], observed[positive]) for family in FAMILIES]
+        return sorted((fit for fit in fitted if fit is not None), key=lambda fit: fit.aic)
+
+    @cached_property
+    def integrated_fits(self) -> list[IntegratedFit]:
+        """Fits to the lives with the wear factor integrated exactly, best first; else none."""
+        if not isinstance(self.distribution, FactorMixture) or not self.count:
+            return []
+        fitted = [fit_mixture(family, self.distribution) for family in FAMILIES]
         return sorted((fit for fit in fitted if fit is not None), key=lambda fit: fit.aic)
 
     def _indices(
@@ -354,38 +360,19 @@ class LifeResult(LifeValues):
         wear.cylinder.k_over_h 1.68 0.59
         friction.coefficient 1.17 0.87
         """
-        from wearsim.uq.sensitivity.effects import (  # noqa: PLC0415  (rarely needed)
-            effects,
-            exact_effect,
-            normal_scores,
-        )
+        from wearsim.studies.life.effects import effects_on_life  # noqa: PLC0415  (rarely needed)
 
-        if self.effects_obstacle:
-            return {}
-        drawn = self.drawn_numbers([item["name"] for item in self.raw.groups])
-        factor, logs, by_input = self.settings.factor, self.log_lives, dict[str, SignedEffect]()
-        if factor in drawn and self.is_known_throughout and not self.at_once:
-            # life is kappa/K: kappa holds all that the other inputs change
-            logs = np.log(self.values("life") * self.values(factor))
-            low, middle, high = np.log((self.law or self._drawn_law).quantile(_QUANTILES)).tolist()
-            by_input[factor] = exact_effect(middle - low, middle - high)
-            del drawn[factor]
-        laws = {
-            random_input.name: random_input.scalar
-            for random_input in self.scenario.random
-            if random_input.role == "scalar"
-        }
-        scores = {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
-        by_input |= effects(logs, scores)
-        return dict(sorted(by_input.items(), key=lambda item: -item[1].size))
+        return effects_on_life(self)
 
-    def compare(self, other: LifeResult) -> LifeComparison:
+    def compare(self, other: LifeResult, percent: float = 10.0) -> LifeComparison:
         """Compare the lives with another design's.
 
         Parameters
         ----------
         other : LifeResult
             With the same unit of life; common draws if it has the same seed.
+        percent : float
+            Percentage of the lives in ``b10_ratio``, 10 for B10.
 
         Raises
         ------
@@ -402,49 +389,9 @@ class LifeResult(LifeValues):
         >>> print(f"{found.two_specimens.value:.2f}")
         0.88
         """
-        from wearsim.uq.survival.comparison import (  # noqa: PLC0415  (rarely needed)
-            quantile_ratio,
-            same_machine,
-            two_specimens,
-        )
+        from wearsim.studies.life.comparison import compare_lives  # noqa: PLC0415  (rarely needed)
 
-        if self.unit != other.unit:
-            raise ValueError(
-                f"{self.title} is in {self.unit} and {other.title} in {other.unit}; their lives"
-                " cannot be compared"
-            )
-        # kappa is known beyond the maximum, and with it the survival
-        both = (self, other)
-        most = (
-            math.inf
-            if all(item.is_known_throughout for item in both)
-            else min(item.most for item in both)
-        )
-        paired = self.raw.seed == other.raw.seed
-        first, second = self.distribution, other.distribution
-        name = "known_lives" if math.isinf(most) else "lives"
-        lives, other_lives = (getattr(item, name) for item in both)
-        common = np.intersect1d(self.numbers, other.numbers)
-        if paired and not (first.exact and second.exact):
-            places = [np.searchsorted(item.numbers, common) for item in both]
-            if first.exact or second.exact:
-                paired = False
-            else:
-                first, second = _at(first, places[0]), _at(second, places[1])
-                lives, other_lives = lives[places[0]], other_lives[places[1]]
-        machine = (
-            same_machine(lives, other_lives, most)
-            if paired and len(lives) == len(other_lives)
-            else None
-        )
-        if machine and all(item.settings.alone for item in both):  # for any wear factor
-            machine = Interval(machine.value, machine.value, machine.value)
-        return LifeComparison(
-            quantile_ratio(first, second, 0.1, most, paired),
-            machine,
-            two_specimens(first, second, most, paired),
-            len(common),
-        )
+        return compare_lives(self, other, percent / 100.0)
 
     def estimate_for(self, target: Target) -> Estimate:
         """Return the estimate to which a target applies.
@@ -489,12 +436,3 @@ class LifeResult(LifeValues):
         """
         lives = {f"b{share:g}": asdict(self.b(share)) for share in self.settings.shares}
         return {**super().final_estimates(), "life": lives}
-
-
-def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
-    """Return the distribution of some realisations."""
-    if isinstance(distribution, FactorMixture):
-        shift = np.broadcast_to(np.asarray(distribution.shift), distribution.kappa.shape)
-        return replace(distribution, kappa=distribution.kappa[places], shift=shift[places])
-    assert isinstance(distribution, CountedLives)
-    return CountedLives(distribution.life[places])

@@ -16,9 +16,8 @@ from wearsim.evolution.limits import OF_LIFE, Limit
 from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import checked_request
-from wearsim.studies.life.draws import shifted_inputs
 from wearsim.studies.life.factor import exact_factor
-from wearsim.studies.life.rare import LEAST_TESTS
+from wearsim.studies.life.rare.draws import LEAST_TESTS, shifted_inputs
 from wearsim.studies.life.realisation import with_length
 from wearsim.studies.life.stored_settings import DesignVariable, LifeSettings, life_target
 from wearsim.units import QuantityError, kind_of

@@ -1,14 +1,12 @@
-"""Settings and targets of a study of lives, and the comparison of two designs."""
+"""Settings and targets of a study of lives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from wearsim.uq.estimation.estimates import LIFE, Target
-from wearsim.uq.estimation.intervals import Interval
 
 
 def life_target(text: str) -> Target:
@@ -109,43 +107,3 @@ class LifeSettings:
     rare_method: str = "auto"
     stages: tuple[dict[str, Any], ...] = ()
     variable: dict[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class LifeComparison:
-    """Lives of two designs.
-
-    Parameters
-    ----------
-    b10_ratio : Interval
-        B10 of the first over B10 of the second.
-    same_machine : Interval, optional
-        Probability that the first outlives the second with the same drawn values; None without
-        common draws.
-    two_specimens : Interval
-        Probability that a specimen of the first outlives one of the second, drawn separately.
-    count : int
-        Number of pairs.
-    """
-
-    b10_ratio: Interval
-    same_machine: Interval | None
-    two_specimens: Interval
-    count: int
-
-
-def swept_variable(results: Sequence[Any]) -> DesignVariable | None:
-    """Return the design variable whose value differs between results of a sweep, if there is one.
-
-    Parameters
-    ----------
-    results : sequence of LifeResult
-
-    Returns
-    -------
-    DesignVariable or None
-        That of the first; None unless all have the same variable with different values.
-    """
-    variables = [result.variable for result in results if result.variable]
-    keys, values = {(item.key, item.unit) for item in variables}, {item.value for item in variables}
-    return variables[0] if len(keys) == 1 and len(values) == len(results) > 1 else None

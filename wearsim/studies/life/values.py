@@ -177,9 +177,14 @@ class LifeValues(EnsembleResult):
         return inputs[self.settings.factor].scalar
 
     @property
+    def factor_law(self) -> Distribution:
+        """Distribution of the wear factor that is integrated exactly."""
+        return self.law or self._drawn_law
+
+    @property
     def levels(self) -> TwoLevels | None:
         """Posterior of the wear factor that is integrated exactly, if its distribution is one."""
-        law = self.law or (self._drawn_law if self.is_exact else None)
+        law = self.factor_law if self.is_exact else None
         return law if isinstance(law, TwoLevels) else None
 
     @cached_property

@@ -24,6 +24,7 @@ from wearsim.report.view import Overview, Row, Rows, Table
 from wearsim.results.study_view import SAMPLING
 from wearsim.studies.ensemble.view import RealisationsView
 from wearsim.studies.fatigue.lives import competing_data, competing_table, fatigue_of_lives
+from wearsim.studies.life.fits_table import fit_tables, fits_data
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.values import remarks
 from wearsim.units import kind_of
@@ -132,7 +133,7 @@ class LifeView(RealisationsView[LifeResult]):
             *([self._levels()] if result.uncertain is not None else []),
             lives_table([""], [result]),
             *([Table("", competing[1], competing[0])] if competing else []),
-            *([self._fits()] if len(result.fits) >= 2 else []),
+            *fit_tables(result),
             Table("", lines, ["first limit", "share", ""]),
             self._effects(),
         ]
@@ -164,25 +165,6 @@ class LifeView(RealisationsView[LifeResult]):
         head = f"life [{result.unit}], given {_tests_of(result)}"
         parts_of = ["sd of ln life", "by more tests", "by more realisations"]
         return Table("", lines, [head, "predictive", "plug-in", "95 % credible", *parts_of])
-
-    def _fits(self) -> Table:
-        """Return the fitted distributions, best first."""
-        result, shares, lines = self.result, self.result.settings.shares, []
-        for fit in result.fits:
-            intervals = [fit.interval(share / 100.0) for share in shares]
-            cells = [
-                "{1} ({0}..{2})".format(*rounded_lives(interval.low, interval.value, interval.high))
-                for interval in intervals
-            ]
-            scale = f"{count(math.exp(fit.mu))} {result.unit}"
-            parameters = (
-                f"median {scale}, sigma {fit.sigma:.3f}"
-                if fit.family == "log-normal"
-                else f"scale {scale}, shape {1.0 / fit.sigma:.3f}"
-            )
-            lines.append([fit.family, *cells, f"{fit.aic - result.fits[0].aic:+.1f}", parameters])
-        heads = [f"fit [{result.unit}]", *(f"B{share:g}" for share in shares)]
-        return Table("", lines, [*heads, "AIC", "parameters"])
 
     def _angle(self, name: str) -> str:
         """Return where on a cam a limit was reached, empty for other limits."""
@@ -269,16 +251,7 @@ class LifeView(RealisationsView[LifeResult]):
             "rare": self._rare(),
             "first_limits": result.first_limits,
             "angles_deg": {name: np.degrees(angles) for name, angles in result.angles.items()},
-            "fits": [
-                {
-                    "family": fit.family,
-                    "aic": fit.aic,
-                    "mu": fit.mu,
-                    "sigma": fit.sigma,
-                    "b": {f"{p:g}": asdict(fit.interval(p / 100.0)) for p in settings.shares},
-                }
-                for fit in result.fits
-            ],
+            **fits_data(result),
             "sensitivity_of_life": [
                 {"input": item.name, "first_order": asdict(item.first)}
                 for item in (result.sensitivity("life") if result.count > 1 else [])

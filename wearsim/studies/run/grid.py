@@ -394,12 +394,12 @@ def growth_of(
 
 
 def coarse_grid(scenario: Scenario, grid: Grid) -> Grid:
-    """Return strips of about twice the width over the same range; ends of a roller are edges."""
+    """Return strips of twice the width about the same middle; ends of a roller are edges."""
     if ends_roller(scenario, *grid.edges) and scenario.contact.width is None:
         strips = math.ceil(0.5 * (scenario.roller.width or 0.0) / grid.spacing - _MARGIN)
         return roller_grid(scenario, strips + 2 * STRIPS_BEYOND)
-    strips, middle = math.ceil(0.5 * grid.strips), 0.5 * (grid.edges[0] + grid.edges[1])
-    half = strips * grid.spacing
+    strips = math.ceil(0.5 * grid.strips) | grid.strips % 2  # with one in the middle if it had one
+    middle, half = 0.5 * (grid.edges[0] + grid.edges[1]), strips * grid.spacing
     return Grid.spanning(middle - half, middle + half, strips)
 
 

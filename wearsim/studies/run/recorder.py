@@ -10,7 +10,13 @@ import numpy as np
 
 from wearsim.errors import ContactError, SolverError, StepError
 from wearsim.evolution.integrate import Advance
-from wearsim.evolution.observables import depth, groove_width, present_contacts, volume
+from wearsim.evolution.observables import (
+    depth,
+    groove_width,
+    peak_pressures,
+    present_contacts,
+    volume,
+)
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import worn_volume
 from wearsim.evolution.state import WearState, joined_states
@@ -37,7 +43,7 @@ MOST_WAITING = 200_000  # strips of all contacts of the states that wait to be o
 _NOT_OBSERVED = dict.fromkeys(
     (
         *("coarse_step_solution", "half_quadrature_solution", "wear_exponents", "past_wear"),
-        *("separation", "part", "whole_steps", "past_sums", "past_feedback", "stepping_error"),
+        *("separation", "whole_steps", "past_sums", "past_feedback", "stepping_error"),
     )
 )
 
@@ -123,7 +129,7 @@ def history_row(
         "rejected": state.rejected,
         "solves": state.solves,
         "full_solves": state.full_solves,
-        "peak_pressure": per_roller("peak_pressure").max(axis=0),
+        "peak_pressure": peak_pressures(problem, state).max(axis=0),
         **{
             name: problem.mean_over_turn(per_roller(name))[0]
             for name in ("approach", "longitudinal_creepage", "adhesion_fraction")

@@ -10,7 +10,8 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from wearsim.types import BoolArray, FloatArray
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval
+from wearsim.uq.survival.distributions import FactorMixture
 
 Family: TypeAlias = Literal["log-normal", "Weibull"]
 FAMILIES: tuple[Family, ...] = ("log-normal", "Weibull")
@@ -18,30 +19,32 @@ FAMILIES: tuple[Family, ...] = ("log-normal", "Weibull")
 _DEVIANCE = 3.841458820694124  # 95 % quantile of chi-square with one degree of freedom
 _STEPS = 60  # of Newton's method
 _WIDEST = 1e3  # distance in standard errors at which the search for an end stops
+_SCORES = np.linspace(-6.0, 6.0, 121)  # of the wear factor, in fits to its whole distribution
+_SHARES = np.exp(-0.5 * _SCORES**2) / np.exp(-0.5 * _SCORES**2).sum()
+_COMPARED = 401  # lives at which a fit is compared with them
 _Terms: TypeAlias = Callable[[FloatArray, BoolArray], tuple[FloatArray, FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True)
-class LifeFit:
-    """Distribution of lives fitted by maximum likelihood.
+class FittedLives:
+    """Distribution of lives whose logarithm has a location and a scale.
 
-    The logarithm of the life has the location mu and the scale sigma. The scale parameter of a
-    Weibull distribution is exp(mu), its shape 1/sigma; the median of a log-normal one is exp(mu).
+    The scale parameter of a Weibull distribution is exp(mu), its shape 1/sigma; the median of a
+    log-normal one is exp(mu).
 
     Parameters
     ----------
     family : {"log-normal", "Weibull"}
     mu, sigma : float
+        Location and scale of the logarithm of the life.
     log_likelihood : float
         Of the lives, with their unit.
-    sample : _Sample
     """
 
     family: Family
     mu: float
     sigma: float
     log_likelihood: float
-    sample: _Sample
 
     @property
     def aic(self) -> float:
@@ -50,15 +53,72 @@ class LifeFit:
 
     def quantile(self, probability: float) -> float:
         """Return the life that a share `probability` does not reach."""
-        return math.exp(self.mu + self.sigma * self.sample.score(probability))
+        return math.exp(self.mu + self.sigma * standard_score(self.family, probability))
 
     def probability_before(self, life: FloatArray) -> FloatArray:
         """Return the probability of a life below each of `life`, shape as `life`."""
-        from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
+        return standard_probability(self.family, self.score(life))
 
+    def score(self, life: FloatArray) -> FloatArray:
+        """Return the standardised logarithm of each of `life`, shape as `life`."""
         with np.errstate(divide="ignore"):
-            z = (np.log(life) - self.mu) / self.sigma
-        return np.asarray(ndtr(z) if self.family == "log-normal" else -np.expm1(-np.exp(z)))
+            return np.asarray((np.log(life) - self.mu) / self.sigma)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the estimates of mu and ln sigma, shape (2, 2)."""
+        raise NotImplementedError
+
+    def interval(self, probability: float) -> Interval:
+        """Return a quantile with its 95 % interval."""
+        raise NotImplementedError
+
+    def score_error(self, life: FloatArray) -> FloatArray:
+        """Return the standard error of the score of each of `life`, shape as `life`.
+
+        Notes
+        -----
+        By the delta method (Meeker and Escobar, Statistical Methods for Reliability Data (1998),
+        section 8.4), so that score +- 1.96 errors is a pointwise 95 % band on a probability plot.
+        """
+        gradient = np.stack([np.full(np.shape(life), -1.0 / self.sigma), -self.score(life)])
+        covariance = self.covariance
+        square = np.einsum("i...,ij,j...->...", gradient, covariance, gradient)
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+
+
+def standard_score(family: Family, probability: float) -> float:
+    """Return the standardised logarithm of the life that a share does not reach."""
+    from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
+
+    if family == "log-normal":
+        return float(ndtri(probability))
+    return math.log(-math.log1p(-probability))
+
+
+def standard_probability(family: Family, score: FloatArray) -> FloatArray:
+    """Return the probability of a smaller standardised logarithm, shape as `score`."""
+    from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
+
+    return np.asarray(ndtr(score) if family == "log-normal" else -np.expm1(-np.exp(score)))
+
+
+@dataclass(frozen=True)
+class LifeFit(FittedLives):
+    """Distribution of lives fitted by maximum likelihood; parameters also as of `FittedLives`.
+
+    Parameters
+    ----------
+    sample : _Sample
+    """
+
+    sample: _Sample
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the estimates of mu and ln sigma, from the observed information."""
+        _, _, curvature = self.sample.derivatives(self.mu, math.log(self.sigma), 0.0)
+        return np.asarray(np.linalg.inv(-curvature))
 
     def interval(self, probability: float) -> Interval:
         """Return a quantile with its likelihood-ratio interval.
@@ -71,7 +131,7 @@ class LifeFit:
         """
         from scipy.optimize import brentq  # noqa: PLC0415  (slow to load)
 
-        w = self.sample.score(probability)
+        w = standard_score(self.family, probability)
         best = self.mu + self.sigma * w
         _, gradient, curvature = self.sample.derivatives(best, math.log(self.sigma), w)
         del gradient
@@ -98,19 +158,12 @@ class LifeFit:
 
 @dataclass(frozen=True, eq=False)
 class _Sample:
-    """Logarithms of lives with the log-likelihood of a family."""
+    """Logarithms of lives with the log-likelihood of a family, and optionally their weights."""
 
     family: Family
     logs: FloatArray
     observed: BoolArray
-
-    def score(self, probability: float) -> float:
-        """Return the standardised logarithm of a quantile."""
-        from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
-
-        if self.family == "log-normal":
-            return float(ndtri(probability))
-        return math.log(-math.log1p(-probability))
+    weight: FloatArray | float = 1.0
 
     def derivatives(self, q: float, s: float, w: float) -> tuple[float, FloatArray, FloatArray]:
         """Return log-likelihood, gradient and second derivatives in q and s = ln sigma.
@@ -118,9 +171,12 @@ class _Sample:
         The location is q - w sigma, so that q is the logarithm of the quantile with the score w.
         """
         v = (self.logs - q) * math.exp(-s)
-        value, first, second = _TERMS[self.family](v + w, self.observed)
-        failures = int(self.observed.sum())
-        total = float(value.sum()) - failures * s - float(self.logs[self.observed].sum())
+        value, first, second = (
+            self.weight * term for term in TERMS[self.family](v + w, self.observed)
+        )
+        failures = float((self.weight * self.observed).sum())
+        ended = float((self.weight * np.where(self.observed, self.logs, 0.0)).sum())
+        total = float(value.sum()) - failures * s - ended
         inverse, mixed = math.exp(-s), second * v + first
         gradient = np.array([-first.sum() * inverse, -(first * v).sum() - failures])
         across = mixed.sum() * inverse
@@ -134,7 +190,9 @@ class _Sample:
     def maximum(self, w: float = 0.0) -> tuple[FloatArray, float]:
         """Return location and ln sigma of the greatest log-likelihood, and its value."""
         found = self.logs[self.observed]
-        start = np.array([self.logs.mean(), math.log(max(float(found.std()), 1e-12))])
+        weight = np.broadcast_to(np.asarray(self.weight), self.logs.shape)
+        middle = float(np.average(self.logs, weights=weight))
+        start = np.array([middle, math.log(max(float(found.std()), 1e-12))])
         return self._maximised(start, w, [0, 1])
 
     def _maximised(self, at: FloatArray, w: float, free: list[int]) -> tuple[FloatArray, float]:
@@ -181,7 +239,8 @@ def _extreme(z: FloatArray, observed: BoolArray) -> tuple[FloatArray, FloatArray
     return np.where(observed, z, 0.0) - power, observed - power, -power
 
 
-_TERMS: dict[Family, _Terms] = {"log-normal": _normal, "Weibull": _extreme}
+#: log density, or log survival where censored, with two derivatives, of standardised logarithms
+TERMS: dict[Family, _Terms] = {"log-normal": _normal, "Weibull": _extreme}
 
 
 def fit_lives(family: Family, life: FloatArray, observed: BoolArray) -> LifeFit | None:
@@ -212,6 +271,88 @@ def fit_lives(family: Family, life: FloatArray, observed: BoolArray) -> LifeFit 
     sample = _Sample(family, np.log(life), np.asarray(observed, dtype=np.bool_))
     (mu, s), value = sample.maximum()
     return LifeFit(family, float(mu), math.exp(s), value, sample)
+
+
+@dataclass(frozen=True)
+class IntegratedFit(FittedLives):
+    """Distribution fitted to lives whose wear factor is integrated exactly.
+
+    Parameters
+    ----------
+    family, mu, sigma, log_likelihood
+        As of `FittedLives`; the log likelihood is its expectation over the wear factor.
+    sampling : ndarray, shape (2, 2)
+        Covariance of the estimates of mu and ln sigma by the sampling of the realisations.
+    degrees : float
+        Its degrees of freedom.
+    difference : float
+        Greatest difference of its probabilities from those of the lives.
+    """
+
+    sampling: FloatArray
+    degrees: float
+    difference: float
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the estimates of mu and ln sigma."""
+        return self.sampling
+
+    def interval(self, probability: float) -> Interval:
+        """Return a quantile with its interval by Student's t of the logarithm."""
+        w = standard_score(self.family, probability)
+        gradient = np.array([1.0, self.sigma * w])
+        error = math.sqrt(max(float(gradient @ self.covariance @ gradient), 0.0))
+        best = self.mu + self.sigma * w
+        ends = t_interval(best, error, self.degrees) if error else Interval(best, best, best)
+        return Interval(*(math.exp(end) for end in (ends.value, ends.low, ends.high)))
+
+
+def fit_mixture(family: Family, lives: FactorMixture) -> IntegratedFit | None:
+    """Fit a distribution to lives whose wear factor is integrated exactly.
+
+    The expected logarithm of the density is greatest: the likelihood of infinitely many wear
+    factors for each realisation.
+
+    Parameters
+    ----------
+    family : {"log-normal", "Weibull"}
+    lives : FactorMixture
+
+    Returns
+    -------
+    IntegratedFit or None
+        None where a realisation fails at once or never, or all lives are equal.
+
+    Notes
+    -----
+    The errors are those of an M-estimator over independent realisations, each with the mean of its
+    score over the wear factor (White, Econometrica 50 (1982), DOI 10.2307/1912526).
+    """
+    if not lives.is_finite.all():
+        return None
+    shift = np.broadcast_to(np.asarray(lives.shift), lives.kappa.shape)
+    factor = lives.score.log_quantile(shift[:, None] + lives.spread * _SCORES)
+    logs = np.log(lives.kappa)[:, None] - factor
+    count, weight = lives.count, np.broadcast_to(_SHARES, logs.shape)
+    if np.ptp(logs) == 0.0:
+        return None
+    sample = _Sample(family, logs.ravel(), np.ones(logs.size, dtype=np.bool_), weight.ravel())
+    (mu, s), value = sample.maximum()
+    _, _, curvature = sample.derivatives(mu, s, 0.0)
+    v = (logs - mu) * math.exp(-s)
+    _, first, _ = TERMS[family](v, np.ones(v.shape, dtype=np.bool_))
+    scores = np.stack([-(first * math.exp(-s)) @ _SHARES, -(first * v) @ _SHARES - 1.0])
+    bread = np.linalg.inv(curvature)
+    # with nothing else random there is no sampling error
+    degrees = math.inf if lives.exact else max(count - 1.0, 1.0)
+    meat = (scores @ scores.T) * (0.0 if lives.exact else count / degrees)
+    fit = FittedLives(family, float(mu), math.exp(s), value)
+    across = np.exp(np.quantile(logs, np.linspace(0.0, 1.0, _COMPARED)))
+    difference = np.abs(fit.probability_before(across) - lives.failed(across).mean(axis=0)).max()
+    return IntegratedFit(
+        family, fit.mu, fit.sigma, value, bread @ meat @ bread, degrees, float(difference)
+    )
 
 
 def fitted_quantile(fit: LifeFit | None, probability: float) -> Interval:

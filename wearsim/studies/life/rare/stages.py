@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from wearsim.studies.ensemble.file.schema import DONE
-from wearsim.studies.life.draws import MOST_INPUTS, drawn_scores, shifted_inputs
-from wearsim.studies.life.rare_estimates import by_importance, by_subset, needs_subset, responses
+from wearsim.studies.life.rare.draws import MOST_INPUTS, drawn_scores, shifted_inputs
+from wearsim.studies.life.rare.estimates import by_importance, by_subset, needs_subset, responses
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, IntArray
@@ -23,7 +23,6 @@ from wearsim.uq.survival.design_points import (
 from wearsim.uq.survival.distributions import FactorMixture
 from wearsim.uq.survival.rare_events import log_weights, next_shift
 
-LEAST_TESTS = 200
 _ADAPTED = 2  # stages that choose the shift, each with a quarter of the tests
 _IMPROVING = 4  # one test of so many improves the shifts
 

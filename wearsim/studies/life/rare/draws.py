@@ -12,6 +12,7 @@ from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray
 from wearsim.uq.survival.design_points import mixture_log_weights
 
+LEAST_TESTS = 200  # for rare events
 MOST_INPUTS = 4  # with a shift
 
 

@@ -1,0 +1,1 @@
+"""Page on which the values of a scenario are changed, and its results follow."""

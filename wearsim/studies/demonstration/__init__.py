@@ -1,0 +1,1 @@
+"""Demonstration tests: how many specimens for how long show the life of a design."""

@@ -1,0 +1,142 @@
+"""Comparison of the lives of designs, with common draws where they have the same seed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wearsim.studies.life.stored_settings import DesignVariable
+from wearsim.studies.life.values import LifeValues
+from wearsim.types import FloatArray, IntArray
+from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.survival.comparison import quantile_ratio, same_machine, two_specimens
+from wearsim.uq.survival.distributions import (
+    CountedLives,
+    FactorMixture,
+    LifeDistribution,
+)
+
+
+@dataclass(frozen=True)
+class LifeComparison:
+    """Lives of two designs.
+
+    Parameters
+    ----------
+    b10_ratio : Interval
+        B10 of the first over B10 of the second.
+    same_machine : Interval, optional
+        Probability that the first outlives the second with the same drawn values; None without
+        common draws.
+    two_specimens : Interval
+        Probability that a specimen of the first outlives one of the second, drawn separately.
+    count : int
+        Number of pairs.
+    """
+
+    b10_ratio: Interval
+    same_machine: Interval | None
+    two_specimens: Interval
+    count: int
+
+
+class _Pair(NamedTuple):
+    """Lives of two designs, of their common realisations if they are paired.
+
+    Parameters
+    ----------
+    distributions : (LifeDistribution, LifeDistribution)
+    lives : (ndarray, ndarray)
+    most : float
+        Life up to which both are known.
+    paired : bool
+        Whether realisations of the same number have common draws.
+    common : int
+        Number of realisations that both have.
+    """
+
+    distributions: tuple[LifeDistribution, LifeDistribution]
+    lives: tuple[FloatArray, FloatArray]
+    most: float
+    paired: bool
+    common: int
+
+
+def _pair(first: LifeValues, second: LifeValues) -> _Pair:
+    both = (first, second)
+    # kappa is known beyond the maximum, and with it the survival
+    known = all(item.is_known_throughout for item in both)
+    most = math.inf if known else min(item.most for item in both)
+    paired = first.raw.seed == second.raw.seed
+    distributions = first.distribution, second.distribution
+    lives = tuple(item.known_lives if known else item.lives for item in both)
+    common = np.intersect1d(first.numbers, second.numbers)
+    exact = [item.exact for item in distributions]
+    if paired and not all(exact):
+        if any(exact):
+            paired = False
+        else:
+            places = [np.searchsorted(item.numbers, common) for item in both]
+            parts = zip(distributions, lives, places, strict=True)
+            (first_at, lives_of_first), (second_at, lives_of_second) = [
+                (_at(d, at), of[at]) for d, of, at in parts
+            ]
+            distributions, lives = (first_at, second_at), (lives_of_first, lives_of_second)
+    return _Pair(distributions, (lives[0], lives[1]), most, paired, len(common))
+
+
+def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
+    """Return the distribution of some realisations."""
+    if isinstance(distribution, FactorMixture):
+        shift = np.broadcast_to(np.asarray(distribution.shift), distribution.kappa.shape)
+        return replace(distribution, kappa=distribution.kappa[places], shift=shift[places])
+    assert isinstance(distribution, CountedLives)
+    return CountedLives(distribution.life[places])
+
+
+def compare_lives(first: LifeValues, second: LifeValues, share: float = 0.1) -> LifeComparison:
+    """Return the comparison of two designs; `share` is that of the lives in `b10_ratio`.
+
+    Raises
+    ------
+    ValueError
+        If the units of their lives differ.
+    """
+    if first.unit != second.unit:
+        raise ValueError(
+            f"{first.title} is in {first.unit} and {second.title} in {second.unit}; their lives"
+            " cannot be compared"
+        )
+    pair = _pair(first, second)
+    machine = None
+    if pair.paired and len(pair.lives[0]) == len(pair.lives[1]):
+        machine = same_machine(*pair.lives, pair.most)
+        if first.settings.alone and second.settings.alone:  # for any wear factor
+            machine = Interval(machine.value, machine.value, machine.value)
+    return LifeComparison(
+        quantile_ratio(*pair.distributions, share, pair.most, pair.paired),
+        machine,
+        two_specimens(*pair.distributions, pair.most, pair.paired),
+        pair.common,
+    )
+
+
+def swept_variable(results: Sequence[Any]) -> DesignVariable | None:
+    """Return the design variable whose value differs between results of a sweep, if there is one.
+
+    Parameters
+    ----------
+    results : sequence of LifeResult
+
+    Returns
+    -------
+    DesignVariable or None
+        That of the first; None unless all have the same variable with different values.
+    """
+    variables = [result.variable for result in results if result.variable]
+    keys, values = {(item.key, item.unit) for item in variables}, {item.value for item in variables}
+    return variables[0] if len(keys) == 1 and len(values) == len(results) > 1 else None

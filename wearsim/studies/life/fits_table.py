@@ -1,0 +1,81 @@
+"""Fitted distributions of lives as tables and as data for JSON."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+from wearsim.report.text import NOTHING, count, rounded_lives, shown
+from wearsim.report.view import Table
+from wearsim.studies.life.result import LifeResult
+from wearsim.uq.survival.fits import FittedLives
+from wearsim.uq.survival.goodness import AndersonDarling, anderson_darling
+
+_SMALL = 0.01  # probability below which it is not stated
+
+
+def fit_tables(result: LifeResult) -> list[Table]:
+    """Return the fitted distributions, best first, and how well the drawn lives agree."""
+    lives = [f"B{share:g}" for share in result.settings.shares]
+    tables, exact = list[Table](), result.integrated_fits
+    if exact:
+        lines = [[*_cells(result, fit, exact[0]), shown(fit.difference, "%", 2)] for fit in exact]
+        head = f"fit to lives with exact K/H [{result.unit}]"
+        heads = [head, *lives, "AIC", "parameters", "greatest difference"]
+        tables.append(Table("", lines, heads))
+    if len(result.fits) >= 2:
+        lines = [
+            [*_cells(result, fit, result.fits[0]), _test_text(anderson_darling(fit))]
+            for fit in result.fits
+        ]
+        head = f"fit{' to drawn lives' if exact else ''} [{result.unit}]"
+        heads = [head, *lives, "AIC", "parameters", "Anderson-Darling"]
+        tables.append(Table("", lines, heads))
+    return tables
+
+
+def _cells(result: LifeResult, fit: FittedLives, best: FittedLives) -> list[str]:
+    """Return the cells of a fit: lives with intervals, AIC above the best one, parameters."""
+    cells = []
+    for share in result.settings.shares:
+        life = fit.interval(share / 100.0)
+        low, value, high = rounded_lives(life.low, life.value, life.high)
+        cells.append(value if life.low == life.high else f"{value} ({low}..{high})")
+    scale = f"{count(math.exp(fit.mu))} {result.unit}"
+    parameters = (
+        f"median {scale}, sigma {fit.sigma:.3f}"
+        if fit.family == "log-normal"
+        else f"scale {scale}, shape {1.0 / fit.sigma:.3f}"
+    )
+    return [fit.family, *cells, f"{fit.aic - best.aic:+.1f}", parameters]
+
+
+def _test_text(test: AndersonDarling | None) -> str:
+    if test is None:
+        return NOTHING
+    chance = f"{test.probability:.2f}" if test.probability >= _SMALL else f"below {_SMALL:g}"
+    return f"{test.statistic:.2f}, p {'=' if test.probability >= _SMALL else 'is'} {chance}"
+
+
+def fits_data(result: LifeResult) -> dict[str, Any]:
+    """Return the fits to the drawn lives, and to those with K/H integrated exactly."""
+
+    def numbers(fit: FittedLives) -> dict[str, Any]:
+        shares = result.settings.shares
+        lives = {f"{share:g}": asdict(fit.interval(share / 100.0)) for share in shares}
+        return {
+            "family": fit.family, "aic": fit.aic, "mu": fit.mu, "sigma": fit.sigma, "b": lives
+        }  # fmt: skip
+
+    tests = [anderson_darling(fit) for fit in result.fits]
+    return {
+        "fits": [
+            {**numbers(fit), "anderson_darling": test._asdict() if test else None}
+            for fit, test in zip(result.fits, tests, strict=True)
+        ],
+        "fits_with_exact_wear_factor": [
+            {**numbers(fit), "greatest_difference": fit.difference}
+            for fit in result.integrated_fits
+        ],
+    }
