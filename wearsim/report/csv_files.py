@@ -28,6 +28,7 @@ _UNITS = {
     "rad": ("deg", math.radians(1.0)),
 }
 _IN_MM = {"y", "width", "width_error", "half_length"}  # other lengths are written in um
+_COMMENT = "#"
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]\d+)?")
 
 
@@ -46,6 +47,8 @@ def table_text(columns: Columns) -> Iterator[str]:
     """Yield the text of a CSV file, block by block."""
     for number, block in enumerate(columns):
         if number == 0:
+            for source in dict.fromkeys(column.source for column in block if column.source):
+                yield "".join(f"{_COMMENT} {line}\n" for line in source.splitlines())
             yield _csv([[c.name if c.unit == "1" else f"{c.name} [{c.unit}]" for c in block]])
         yield _csv(zip(*map(_cells, block), strict=True))
 
@@ -67,6 +70,9 @@ def _csv(cells: Iterable[Sequence[str]]) -> str:
 def _with_decimal_comma(pieces: Iterable[str]) -> Iterator[str]:
     """Yield a table with decimal commas, and semicolons between the cells."""
     for piece in pieces:
+        if piece.startswith(_COMMENT):
+            yield piece
+            continue
         text = io.StringIO()
         writer = csv.writer(text, delimiter=";", lineterminator="\n")
         for cells in csv.reader(io.StringIO(piece)):

@@ -119,12 +119,16 @@ class Table(NamedTuple):
 
 
 class Column(NamedTuple):
-    """A column of a CSV file: name, values in SI or texts, unit, and its size in SI."""
+    """A column of a CSV file: name, values in SI or texts, unit, and its size in SI.
+
+    The source of constants behind the values stands as a comment above the table.
+    """
 
     name: str
     values: Any
     unit: str = "1"
     size: float = 1.0
+    source: str = ""
 
 
 Columns: TypeAlias = Iterable[Sequence[Column]]  # in blocks of rows

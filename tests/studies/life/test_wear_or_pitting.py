@@ -10,6 +10,7 @@ import pytest
 import wearsim
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.fatigue.lives import competing_risks, lives_of
+from wearsim.studies.opening import export_csv
 
 RIG = shipped_scenario
 FATIGUE = {
@@ -58,6 +59,28 @@ def test_incidences_add_up_and_are_shown_with_their_source(lives):
     data = view.data()["wear_or_pitting"]
     assert data["first_by_pitting"] == level.pitting
     assert data["sources"] == {"cylinder": "invented for a test"}
+
+
+def test_figure_shows_incidences_of_wear_pitting_and_both_with_the_source(lives):
+    sheet = lives.view.panels()
+    assert "invented for a test" in sheet.title
+    assert all("wear or pitting" in row for row in sheet.rows)
+    curves = {mark.label: mark for mark in sheet.panels["wear or pitting"].marks}
+    assert list(curves) == ["wear first", "pitting first", "both"]
+    wear, pitting, both = (mark.y for mark in curves.values())
+    assert wear + pitting == pytest.approx(both, abs=1e-12)
+    assert both[[0, -1]] == pytest.approx([1e-3, 0.999], rel=1e-6)
+    assert pitting[-1] == pytest.approx(competing_risks(lives).at(math.inf).pitting, rel=1e-2)
+
+
+def test_tables_of_lives_state_the_source_above(lives, tmp_path):
+    export_csv(lives, tmp_path, decimal=",")
+    source = "# fatigue of the cylinder: pressure-life; source: invented for a test"
+    for name in ("realisations.csv", "courses.csv"):
+        first, head, *_ = (tmp_path / name).read_text().splitlines()
+        assert first == source
+        assert "damage" in head
+    assert "#" not in (tmp_path / "profile.csv").read_text()
 
 
 def test_course_of_the_damage_is_that_of_a_run(lives):

@@ -9,6 +9,7 @@ from study_examples import PITTING, short
 import wearsim
 from wearsim.errors import ScenarioError
 from wearsim.mechanics.fatigue import SHEAR_DEPTH, greatest_von_mises
+from wearsim.report.csv_files import table_text
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.dry_run import dry_run
 from wearsim.studies.dry_run_table import plan
@@ -43,7 +44,11 @@ def test_rows_and_json_state_damage_limits_and_sources(result):
     assert data["fatigue_sources"] == {"cylinder": "a test", "roller": "a test"}
     assert "fatigue (pitting)" not in result.view.overview().excluded
     assert {"damage", "pitting"} <= result.view.panels().panels.keys()
-    assert "cylinder_damage_profiles.csv" in result.view.columns()
+    tables = {name: "".join(table_text(blocks)) for name, blocks in result.view.columns().items()}
+    source = "# fatigue of the cylinder: pressure-life; source: a test\n"
+    assert tables["cylinder_damage_profiles.csv"].startswith(source)
+    assert tables["history.csv"].startswith(source)
+    assert "#" not in tables["cylinder_depth_profiles.csv"]
 
 
 def test_scenario_without_fatigue_shows_nothing_of_it():
@@ -70,6 +75,9 @@ def test_ensemble_has_the_damage_of_each_realisation(tmp_path):
     scenario = short(**FATIGUE, **COARSE, **{"load.normal_force": load})
     tests = wearsim.ensemble(scenario, 3, tmp_path / "tests.h5", workers=1)
     assert {"damage", "pitting", "roller_damage"} <= set(tests.observables)
+    assert "a test" in tests.view.panels().title
+    assert tests.view.data()["fatigue_sources"] == {"cylinder": "a test", "roller": "a test"}
+    assert any("source: a test" in row.text for row in tests.view.study())
     order = np.argsort(tests.inputs["load.normal_force"])
     assert (np.diff(tests.at_end("damage")[order]) > 0.0).all()
     number = int(order[-1])
@@ -101,6 +109,9 @@ def test_cam_states_lives_and_stresses_at_every_angle():
     rows = {row.label: row.text for row in study.view.rows()}
     assert "which decides" in rows["pitting of the cam without wear"]
     assert rows["fatigue of the cam"].endswith("a test")
+    motion = "".join(table_text(study.view.columns()["motion.csv"]))
+    assert motion.startswith("# fatigue of the cam: pressure-life; source: a test\nangle")
+    assert "pitting life [turns]" in motion
     assert "pitting [turns]" in study.view.tables()[0].heads
 
 

@@ -14,7 +14,7 @@ from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.studies.cam.checks import harmonic_depth
 from wearsim.studies.cam.study import CamStudy
 from wearsim.studies.fatigue.unworn import lives_at, stresses_below
-from wearsim.studies.fatigue.view import source_rows
+from wearsim.studies.fatigue.view import source_rows, with_sources
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -287,7 +287,10 @@ class CamView(View):
         table = [
             Column(title, values[key], unit, 1.0 / PER_SI[unit]) for title, key, unit in chosen
         ]
-        return {"motion.csv": [[*table, Column("segment", self._segment_names())]]}
+        if "pitting_life_turns" in values:
+            table.append(Column("pitting life", values["pitting_life_turns"], "turns"))
+        table.append(Column("segment", self._segment_names()))
+        return {"motion.csv": [with_sources(table, self.result.turn.scenario)]}
 
     def surface(self, sampling: Sampling) -> Surface:
         """Return the surface of the cam before wear."""

@@ -48,6 +48,7 @@ from wearsim.studies.cam.panels import ANGLE, segment_marks
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.ensemble.file.data import Effect
 from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.studies.fatigue.view import readable_scenario, source_text
 from wearsim.studies.run.panels import HEIGHT, Y
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
@@ -65,7 +66,8 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
 
     Measured profiles are drawn over the worn profile.
     """
-    title = f"{result.title}\n{_caption(result)}"
+    sources = source_text(readable_scenario(result)) if result.raw.fatigue else ""
+    title = "\n".join(filter(None, [result.title, _caption(result), sources]))
     if result.count == 0:
         nothing = message("", "no realisation is completed: nothing to draw")
         return Sheet(title, {"nothing": nothing}, [["nothing"]], (13.0, 7.5))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -42,6 +42,12 @@ from wearsim.results.study_view import (
 from wearsim.studies.ensemble.file.data import Band, Effect, EnsembleData
 from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, LIFE, PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.studies.fatigue.view import (
+    readable_scenario,
+    source_rows,
+    sources,
+    with_sources,
+)
 from wearsim.uq.estimation.estimates import Estimate, Target
 
 QUANTILES = (0.05, 0.5, 0.95)
@@ -49,6 +55,9 @@ INTERVAL = "  95 % interval"
 _HEADS = ("at the end", "mean", "std", "5 %", "median", "95 %")
 _SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")
 _BLOCK = 16384  # realisations in memory at a time
+
+if TYPE_CHECKING:
+    from wearsim.scenario import Scenario
 
 Shown = TypeVar("Shown", bound=EnsembleResult)
 
@@ -70,6 +79,11 @@ class RealisationsView(StudyView[Shown]):
             " memory, a killed worker or an updated plugin repeat them with:"
             f" wearsim resume {result.path} --failed"
         )
+
+    @property
+    def _scenario(self) -> Scenario | None:
+        """Scenario of tests with fatigue, if its plugins are installed; None of others."""
+        return readable_scenario(self.result) if self.result.raw.fatigue else None
 
     def random_inputs(self) -> Rows:
         """Return the draws of the random inputs, and descriptions of those that vary in time."""
@@ -117,9 +131,13 @@ class RealisationsView(StudyView[Shown]):
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, courses, and profile and lift error at the end."""
         result = self.result
-        tables: dict[str, Columns] = {"realisations.csv": _realisations(result.raw)}
+        scenario = self._scenario
+        blocks = _realisations(result.raw)
+        tables: dict[str, Columns] = {
+            "realisations.csv": (with_sources(block, scenario) for block in blocks)
+        }
         if result.count:
-            tables["courses.csv"] = [list(_courses(result))]
+            tables["courses.csv"] = [with_sources(_courses(result), scenario)]
             tables["profile.csv"] = [_band("y", "m", "depth", result.band())]
         if result.count and result.raw.cam:
             band = result.band("lift_error_curve")
@@ -186,6 +204,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
                 "length of a test",
                 f"{count(raw.total_passes)} passes, {shown(raw.total_time, 'min')}",
             ),
+            *source_rows(self._scenario),
             Row("contact model", result.described_model),
             Row("stepper", f"{raw.stepper}, tolerance {raw.tolerance:g}"),
         ]
@@ -271,6 +290,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
             "inputs": drawn_data(result),
             "random": varying_inputs(result, result.inputs),
             "record_passes": result.record_passes,
+            **({"fatigue_sources": of_bodies} if (of_bodies := sources(self._scenario)) else {}),
             "wall_seconds": raw.wall_seconds,
             **self.ending(),
         }

@@ -96,7 +96,7 @@ def lives_of(result: LifeValues, share: float) -> dict[str, float] | None:
         return None
     scale = 1.0 / result.settings.per_unit
     each = {
-        "both": lambda life: 1.0 - risks.at(life).survival,
+        "both": risks.either,
         "without_wear": risks.without_wear,
         "without_pitting": _without_pitting(risks),
         "pitting": lambda life: risks.at(life).pitting,

@@ -1,17 +1,34 @@
-"""Panels of the damage by fatigue in a run."""
+"""Panels of fatigue: the damage in a run, and lives that end by wear or by pitting."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wearsim.report.panels import BLACK, Axis, Line, Mark, Panel, Records, worn_limits
+from wearsim.report.panels import (
+    BLACK,
+    BLUE,
+    ORANGE,
+    Axis,
+    Line,
+    Mark,
+    Panel,
+    Records,
+    message,
+    worn_limits,
+)
 from wearsim.report.text import pass_unit, shown
+from wearsim.studies.fatigue.lives import competing_risks
 
 if TYPE_CHECKING:
+    from wearsim.studies.life.result import LifeResult
     from wearsim.studies.run.result import Result
 
+_POINTS = 81  # of an incidence
+_ENDS = 1e-3, 0.999  # share of the lives at the ends of the axis
 DAMAGE = Axis("damage", "1", limits=(0.0, None))
 
 
@@ -50,3 +67,43 @@ def pitting_panel(result: Result) -> Panel:
     )
     x = Axis(name, per_si=1.0 / size)
     return Panel("Effective damage, and pitting", x, DAMAGE, marks, text, legend="lower right")
+
+
+def incidence_panel(designs: Sequence[tuple[LifeResult, str, str]], axis: Axis) -> Panel:
+    """Return the probability of wear first, of pitting first and of either, against the life.
+
+    Parameters
+    ----------
+    designs : sequence of (LifeResult, str, str)
+        Lives with the label and the colour of each design; the label of one alone is empty.
+    axis : Axis
+        Of the life.
+    """
+    title, marks, text = "Ended by wear or by pitting", list[Mark](), ""
+    for result, label, colour in designs:
+        risks = competing_risks(result)
+        if risks is None:
+            continue
+        level = risks.at(math.inf)
+        ended = 1.0 - level.survival
+        low, high = (risks.life(share * ended, risks.either) for share in _ENDS)
+        if not 0.0 < low < high < math.inf:
+            continue
+        passes = np.geomspace(low, high, _POINTS)
+        found = np.array([risks.at(life) for life in passes.tolist()])
+        curves = {
+            "wear first": (found[:, 2], "-", BLUE),
+            "pitting first": (found[:, 1], "--", ORANGE),
+            "both": (1.0 - found[:, 0], ":", BLACK),
+        }
+        for words, (share, dash, of_curve) in curves.items():
+            name, drawn = (f"{label}: {words}", colour) if label else (words, of_curve)
+            lives = passes / result.settings.per_unit
+            marks.append(Line(lives, share, dash, colour=drawn, label=name))
+        text += f" {label}:" if label else ""
+        text += f" At last {shown(level.wear, '%', 3)} end by wear and"
+        text += f" {shown(level.pitting, '%', 3)} by pitting."
+    if not marks:
+        return message(title, "no life ended by wear or by pitting")
+    x, y = Axis(axis.name, axis.unit, axis.per_si, log=True), Axis("ended", "%", limits=(0.0, 1.02))
+    return Panel(title, x, y, marks, text.strip(), legend="upper left")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.errors import WearsimError
 from wearsim.report.text import shown, with_error
-from wearsim.report.view import Row, Rows
+from wearsim.report.view import Column, Row, Rows
 
 if TYPE_CHECKING:
+    from wearsim.results.content import StudyResult
     from wearsim.scenario import Scenario
     from wearsim.studies.run.result import Result
 
@@ -37,7 +40,7 @@ def fatigue_rows(result: Result) -> Rows:
         Row("effective damage", with_error(damage, float(np.max(error)), "1")),
         Row("greatest damage", greatest),
         Row("probability of pitting", np.asarray(final["pitting"], dtype=float), "%"),
-        *source_rows(_scenario(result)),
+        *source_rows(readable_scenario(result)),
     ]
 
 
@@ -45,10 +48,11 @@ def _most(value: float | list[float]) -> float:
     return float(np.max(value))
 
 
-def _scenario(result: Result) -> Scenario | None:
+def readable_scenario(result: StudyResult[Any]) -> Scenario | None:
+    """Return the scenario of a result; None if a plugin of it is not installed."""
     try:
         return result.scenario
-    except WearsimError:  # a plugin of the scenario is not installed
+    except WearsimError:
         return None
 
 
@@ -72,10 +76,29 @@ def sources(scenario: Scenario | None) -> dict[str, str]:
 
 def sources_of(result: Result) -> dict[str, str]:
     """Return the sources of the constants of fatigue of a run by body."""
-    return sources(_scenario(result)) if has_fatigue(result) else {}
+    return sources(readable_scenario(result)) if has_fatigue(result) else {}
+
+
+def source_text(scenario: Scenario | None) -> str:
+    """Return fatigue laws and sources of a scenario, one line for each body; else nothing."""
+    return "\n".join(f"{row.label}: {row.text}" for row in source_rows(scenario))
 
 
 def source_line(result: Result) -> str:
-    """Return fatigue laws and sources of a run as a further line of a figure; else nothing."""
-    rows = source_rows(_scenario(result)) if has_fatigue(result) else []
-    return "".join(f"\n{row.label}: {row.text}" for row in rows)
+    """Return fatigue laws and sources of a run as further lines of a figure; else nothing."""
+    text = source_text(readable_scenario(result)) if has_fatigue(result) else ""
+    return f"\n{text}" if text else ""
+
+
+def with_sources(columns: Iterable[Column], scenario: Scenario | None) -> list[Column]:
+    """Return columns of a CSV file, those of fatigue with the source of its constants."""
+    text = source_text(scenario)
+    return [
+        column._replace(source=text) if re.search("damage|pitting", column.name) else column
+        for column in columns
+    ]
+
+
+def sourced_table(result: Result, columns: Iterable[Column]) -> list[Column]:
+    """Return columns of a CSV file of a run, see `with_sources`."""
+    return with_sources(columns, readable_scenario(result) if has_fatigue(result) else None)

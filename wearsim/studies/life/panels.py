@@ -31,7 +31,8 @@ from wearsim.report.view import Overview, Row, Rows
 from wearsim.studies.cam.overview import CAM_EXCLUDED, loads, picture
 from wearsim.studies.cam.panels import ANGLE
 from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
-from wearsim.studies.fatigue.view import EXCLUDED as NO_FATIGUE
+from wearsim.studies.fatigue.panels import incidence_panel
+from wearsim.studies.fatigue.view import EXCLUDED as NO_FATIGUE, source_text
 from wearsim.studies.life.comparison import swept_variable
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.view import EXCLUDED
@@ -40,6 +41,7 @@ from wearsim.units import engineers_unit
 from wearsim.uq.survival.fits import FAMILIES, Family, FittedLives, standard_score
 from wearsim.uq.survival.lives import cumulative_incidence, median_positions
 
+_WIDTH = 14.0  # of a figure with three columns [in]
 _POINTS = 200  # of a curve
 _MOST_MARKS = 500
 _PERCENT = (0.1, 1.0, 5.0, 10.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0, 99.9)
@@ -86,7 +88,8 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
     Sheet
         Survival with its 95 % band and ticks where lives are censored; probability plots on the
         scales of both fits; the effect of each input; the limits that were reached first, for a
-        cam by angle; for a sweep also the lives against the design variable.
+        cam by angle; for a sweep also the lives against the design variable, with fatigue the
+        incidences of wear and of pitting. Sources of constants are in the title.
     """
     pairs = zip(results, labels, several_colours(len(results)), strict=True)
     designs = [_Design(*pair, len(results) > 1) for pair in pairs]
@@ -100,6 +103,10 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
     if swept_variable(results) is not None:
         panels["against"] = _against(designs)
         rows = [[*row, "against"] for row in rows]
+    if any(result.raw.fatigue for result in results):
+        of_designs = [(design.result, design.named, design.colour) for design in designs]
+        panels["wear or pitting"] = incidence_panel(of_designs, axis)
+        rows = [[*row, "wear or pitting"] for row in rows]
     (result, *others) = results
     if not (others or result.are_equal or result.settings.alone):
         if effects := known_effects(result, "life"):
@@ -107,7 +114,9 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
             panels["indices"] = effects_panel(title, "ln life", effects)
         panels |= draws_panels(result, "life", result.lives, axis)
     title = titles.pop() if len(titles) == 1 else "lives of designs"
-    return Sheet(title, panels, rows, (18.5 if len(rows[0]) > 3 else 14.0, 8.4))
+    sources = dict.fromkeys(source_text(result.scenario) for result in results)
+    title = "\n".join([title, *(text for text in sources if text)])
+    return Sheet(title, panels, rows, (_WIDTH * (len(rows[0]) / 3.0), 8.4))
 
 
 def _against(designs: Sequence[_Design]) -> Panel:

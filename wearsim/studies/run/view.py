@@ -30,6 +30,7 @@ from wearsim.studies.fatigue.view import (
     EXCLUDED as NO_FATIGUE,
     fatigue_rows,
     has_fatigue,
+    sourced_table,
     sources_of,
 )
 from wearsim.studies.run.result import Result
@@ -314,11 +315,11 @@ class RunView(StudyView[Result]):
             if variable.kind == "history"
             for column in _columns(name, raw.history[name], variable.dims, name, self._angles())
         ]
-        tables: dict[str, Columns] = {"history.csv": [history]}
+        tables: dict[str, Columns] = {"history.csv": [sourced_table(self.result, history)]}
         for file, name in _RECORDS.items():
             always = not name.startswith("roller") and name in raw.records
             if always or (name in raw.records and raw.records[name].any()):
-                tables[file] = [list(self._records(name))]
+                tables[file] = [sourced_table(self.result, self._records(name))]
         surface = self.surface(Sampling())
         if surface is not None:
             tables["worn_cam.csv"] = [surface.columns]

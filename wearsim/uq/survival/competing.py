@@ -114,6 +114,10 @@ class CompetingRisks:
         found = float(survival.mean()), float(wear.mean())
         return Incidence(found[0], 1.0 - found[0] - found[1], found[1])
 
+    def either(self, life: float) -> float:
+        """Return the probability of an end by wear or by pitting before a life."""
+        return 1.0 - self.at(life).survival
+
     def without_wear(self, life: float) -> float:
         """Return the probability of pitting before a life of bodies that do not wear."""
         survives = np.exp(-self.constant * (self.rate * life) ** self.slope)
