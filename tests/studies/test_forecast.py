@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from study_examples import PITTING
 
 import wearsim
 from tests.evolution import SCENARIOS
@@ -54,6 +56,43 @@ def test_forecast_agrees_with_the_run(name: str, tmp_path: Path) -> None:
     steps = scenario.total_passes if "pass" in name else len(result.passes) - 1
     for key, value in (("steps", steps), ("file_bytes", size)):
         assert 1.0 / 3.0 < forecast[key] / value < 3.0, (key, forecast[key], value)
+
+
+@pytest.mark.parametrize(
+    ("file", "changes", "factor"),
+    [
+        ("rig-450min", {"fatigue.remove": True}, 3.0),
+        ("cam-eccentric", {"fatigue.roller": PITTING}, 3.0),
+        (
+            "rig-450min",
+            {
+                "fatigue.scatter": "weakest-link",
+                "fatigue.reference_area": "100 mm^2",
+                "operation.rollers": 2,
+                "roller.offset": ["-1 mm", "1 mm"],
+                "operation.passes": 20_000,
+            },
+            3.0,
+        ),
+        ("rig-450min", {"wear.cylinder.k_over_h": "0 1/Pa", "operation.passes": 2000}, 1.001),
+    ],
+    ids=["rig", "cam", "two rollers", "no wear"],
+)
+def test_forecast_of_damage_agrees_with_the_run(file, changes, factor) -> None:
+    fatigue = {"fatigue": {"slope": 1.125, "cylinder": PITTING}, "evolution.strip_error": False}
+    limit = {"limit.damage": 1e-4}
+    scenario = wearsim.load_scenario(
+        SCENARIOS / f"{file}.toml", {**LOOSE, **fatigue, **limit, **changes}
+    )
+    forecast = dry_run(scenario)["forecast"]
+    result = wearsim.run(scenario)
+    damage = result.values("damage").reshape(len(result.passes), -1).max(axis=1)
+    assert 1.0 / factor < forecast["damage"] / damage[-1] < factor
+    chance = 1.0 - 0.9 ** (forecast["damage"] ** 1.125)
+    assert forecast["pitting"] == pytest.approx(chance, rel=1e-9)
+    (found,) = (item for item in forecast["limits"] if item["quantity"] == "damage")
+    passes = np.interp(1e-4, damage, result.passes)
+    assert 1.0 / factor < found["reached_at_passes"] / passes < factor
 
 
 def test_spring_that_unloads_has_a_forecast_up_to_its_travel() -> None:

@@ -13,7 +13,13 @@ from wearsim.units import in_engineers_unit
 TableRows = list[tuple[str, str]]
 _RADII = ("radius_m", "crown_radius_m", "width_m", "edge_radius_m", "chamfer_m")
 _UNITS = {"_m": ("mm", 1e-3), "_Pa": ("GPa", 1e9), "_rad": ("mrad", 1e-3)}  # by ends of keys
-_LIMIT_UNITS = {"volume": ("mm^3", 1e-9), "peak_pressure": ("MPa", 1e6), "width": ("mm", 1e-3)}
+_LIMIT_UNITS = {
+    "volume": ("mm^3", 1e-9),
+    "peak_pressure": ("MPa", 1e6),
+    "width": ("mm", 1e-3),
+    "damage": ("1", 1.0),
+    "pitting": ("1", 1.0),
+}
 
 
 def plan(data: Data) -> TableRows:
@@ -231,6 +237,9 @@ def _forecast_rows(forecast: Data) -> TableRows:
     )
     if forecast["lift_error_m"] is not None:
         wear += f", lift error {forecast['lift_error_m'] * 1e6:.3g} um"
+    if "damage" in forecast:
+        wear += f", damage {forecast['damage']:.3g}, probability of pitting"
+        wear += f" {forecast['pitting']:.3g}"
     seconds = forecast["wall_time_s"]
     time = f"{seconds:.2g} s" if seconds < 100.0 else f"{seconds / 60.0:.2g} min"
     effort = (
@@ -247,10 +256,8 @@ def _limit_rows(data: Data) -> TableRows:
     for item in data["forecast"]["limits"]:
         unit, size = _LIMIT_UNITS.get(item["quantity"], ("um", 1e-6))
         name = f"limit of {item['quantity'].replace('_', ' ')}"
-        if item["at_end"] is None:
-            rows.append((name, f"{item['limit']:.4g}, not forecast: the run computes it"))
-            continue
-        ratio = f"{_rounded(item['at_end'] / size)} of {item['limit'] / size:.4g} {unit}"
+        ratio = f"{_rounded(item['at_end'] / size)} of {item['limit'] / size:.4g}"
+        ratio += "" if unit == "1" else f" {unit}"
         text = f"not reached: about {ratio} at the end"
         if item["reached_at_passes"] is not None:
             passes = item["reached_at_passes"]

@@ -108,6 +108,7 @@ def forecast_data(
         "worn_volume_m3": wear["volume"],
         "dissipated_energy_J": wear["energy"],
         "lift_error_m": wear.get("lift_error"),
+        **{key: wear[key] for key in OF_FATIGUE if key in wear},
         "steps": effort.steps,
         "contact_solves": effort.solves,
         "wall_time_s": effort.seconds,
@@ -124,9 +125,6 @@ def _limits(
     total, limits = float(scenario.total_passes), []
     for key, value in scenario.limit.given.items():
         item = {"quantity": key, "unit": Limit(key.replace("_", " "), value, key).unit}
-        if key in OF_FATIGUE:  # the run computes it
-            limits.append({**item, "limit": value, "at_end": None, "reached_at_passes": None})
-            continue
         reached = None
         if forecast.at(1.0)[key] >= value:
             reached = 0.0

@@ -32,6 +32,7 @@ from wearsim.evolution.steppers.single_step import solve_loaded, solve_present
 from wearsim.evolution.strips import on_grid
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import ContactModelSpec, registry
+from wearsim.studies.fatigue.forecast import damage_after, places_across, rates_across
 from wearsim.studies.run.assemble import PARABOLA, prepared_model
 from wearsim.studies.run.draws import Draws
 from wearsim.types import FloatArray, Grid
@@ -46,9 +47,10 @@ _LOST = 8  # grooves on the way to the depth at which the contacts fail
 _PARTS = 16  # of the depths between two grooves, over which rates are integrated
 _POINTS = 2001  # across the strips, to measure a width
 
+_AS_SOLVED = "pressure", "width", "damage", "length"  # rates that are no integrals
 TINY = 1e-200  # for zero, which has no logarithm
 
-#: Rates per roller pass, pressure and width by name, shape (stations,).
+#: Rates per roller pass, pressure and width by name, shape (stations,); damage of the places.
 Rates: TypeAlias = dict[str, FloatArray]
 
 
@@ -107,6 +109,7 @@ class WearForecast:
         least = half_strip**2 / (2.0 * self._scout.axial_gap.radius_at(half_strip))
         self.elastic = float(rise.max(initial=least, where=loaded))
         lowest = problem.nominal_gap.argmin(axis=-1)
+        self._places = places_across(problem)
         self._centres = problem.grid.y[[lowest.min(), lowest.max()]]
         self._depths: list[float] = []
         self._rates: list[Rates] = []
@@ -120,7 +123,8 @@ class WearForecast:
         dict of str to float
             "depth" of the cylinder, "roller_depth", "clearance" (of both bodies) and, of a cam,
             "lift_error" [m]; "volume" of the cylinder [m^3], "width" in contact [m],
-            "peak_pressure" [Pa] where the load is spread evenly, and "energy" [J].
+            "peak_pressure" [Pa] where the load is spread evenly, and "energy" [J]; with fatigue the
+            effective "damage" and the probability of "pitting".
         """
         self._extend(passes)
         course, problem = self._course(), self.problem
@@ -145,6 +149,8 @@ class WearForecast:
         if cam is not None:
             away = np.sign(np.ravel(cam.load_factor)) * depth
             values["lift_error"] = np.ptp(away / np.cos(np.ravel(cam.pressure_angle)))
+        if problem.fatigue is not None:
+            values |= damage_after(problem, self._places, course, passes)
         return {
             name: float(value) if value > math.sqrt(TINY) else 0.0 for name, value in values.items()
         }
@@ -219,8 +225,7 @@ class WearForecast:
             "roller": _integral(columns["roller"] / rate, depth),
             "area": _integral(columns["area"], passes),
             "energy": _integral(columns["power"], passes) / self.problem.kinematics.pass_rate,
-            "pressure": columns["pressure"],
-            "width": columns["width"],
+            **{name: columns[name] for name in _AS_SOLVED if name in columns},
         }
 
     def _add(self, depth: float) -> None:
@@ -291,6 +296,11 @@ class WearForecast:
                 _median(here.values_of(contacts, name)) for name in ("line_load", "half_length")
             )
             pressure = 2.0 * load / (np.pi * length)
+        of_fatigue = {}
+        if here.fatigue is not None:
+            damage = rates_across(here, contacts, self._places, is_groove=depth > 0.0)
+            lengths = _median(here.values_of(contacts, "half_length"))
+            of_fatigue = {"damage": damage, "length": lengths.mean(axis=(1, 2))}
         power = here.values_of(contacts, "power") * here.cylinder_share[:, None]
         return {
             "cylinder": shape * cylinder,
@@ -299,6 +309,7 @@ class WearForecast:
             "power": power.sum(axis=(1, 2)) * here.kinematics.physical_rollers,
             "pressure": pressure.max(axis=(1, 2)),
             "width": np.full(len(cylinder), width),
+            **of_fatigue,
         }
 
 
@@ -321,10 +332,12 @@ def _integral(values: FloatArray, over: FloatArray) -> FloatArray:
 
 
 def _interpolated(x: FloatArray, points: FloatArray, values: FloatArray) -> FloatArray:
-    """Return columns of values, interpolated along axis 0 as powers of x."""
-    logs = np.log(np.maximum(values, TINY)).T
-    powers = [np.interp(np.log(x), np.log(points), column) for column in logs]
-    return np.asarray(np.exp(np.stack(powers, axis=1)))
+    """Return values, shape (points, ...), interpolated along axis 0 as powers of x."""
+    logs = np.log(np.maximum(values, TINY))
+    place = np.interp(np.log(x), np.log(points), np.arange(len(points)))
+    first = np.minimum(place.astype(np.int64), len(points) - 2)
+    part = (place - first).reshape(-1, *(1,) * (values.ndim - 1))
+    return np.asarray(np.exp((1.0 - part) * logs[first] + part * logs[first + 1]))
 
 
 def _median(values: FloatArray) -> FloatArray:
