@@ -7,12 +7,14 @@ import pytest
 from study_examples import PITTING, short
 
 import wearsim
-from wearsim.errors import ScenarioError
+from tests.studies.ensemble_cases import differences
+from wearsim.errors import Interrupted, ScenarioError
 from wearsim.mechanics.fatigue import SHEAR_DEPTH, greatest_von_mises
 from wearsim.report.csv_files import table_text
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.dry_run import dry_run
 from wearsim.studies.dry_run_table import plan
+from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.plausibility import plausibility_warnings
 
 FATIGUE: dict[str, object] = {"fatigue": {"slope": 1.125, "cylinder": PITTING, "roller": PITTING}}
@@ -84,6 +86,40 @@ def test_ensemble_has_the_damage_of_each_realisation(tmp_path):
     drawn = float(tests.inputs["load.normal_force"][number])
     single = wearsim.run(scenario.changed({"load.normal_force": f"{drawn!r} N"}))
     assert tests.at_end("damage")[number] == pytest.approx(single.values("damage")[-1], rel=1e-3)
+    for body in ("cylinder", "roller"):
+        kept = tests.kept_values(f"{body}_damage_profile")
+        assert kept.max(axis=1) == pytest.approx(tests.at_end(f"{body}_damage"), rel=1e-12)
+        last = single.values(f"{body}_damage_profile")[-1].reshape(-1, len(single.y))[0]
+        found = np.interp(tests.y, single.y, last)
+        np.testing.assert_allclose(kept[number], found, rtol=0.0, atol=1e-2 * last.max())
+    table = "".join(table_text(tests.view.columns()["cylinder_damage_profile.csv"]))
+    assert "damage mean,damage std" in table
+    assert "damage" in tests.view.panels().panels
+
+
+def test_stopped_ensemble_with_fatigue_equals_unbroken_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(EnsembleWork, "_batch_size", lambda self: 2)
+    friction = {"distribution": "uniform", "low": 0.1, "high": 0.2}
+    changes = {"fatigue": {"slope": 1.125, "cylinder": PITTING, "roller": PITTING}}
+    scenario = shipped_scenario(
+        "cam-eccentric",
+        {**changes, **COARSE, "friction.coefficient": friction, "operation.passes": 30_000},
+    )
+    whole = wearsim.ensemble(scenario, 3, tmp_path / "whole.h5", scheduler="serial")
+    path, answers = tmp_path / "tests.h5", iter([True])
+    with pytest.raises(Interrupted):
+        wearsim.ensemble(
+            scenario, 3, path, scheduler="serial", stop_requested=lambda: next(answers, True)
+        )
+    tests = wearsim.resume_ensemble(path, scheduler="serial")
+    assert differences(whole, tests) == []
+    greatest = tests.at_end("cylinder_damage")
+    for name in ("cylinder_damage_profile", "damage_curve"):
+        kept = tests.kept_values(name)
+        assert kept.min() >= 0.0
+        assert kept.max(axis=1) == pytest.approx(greatest, rel=1e-4)
+    stored = tests.to_xarray()
+    np.testing.assert_allclose(stored["damage_curve_mean"], stored["damage_curve"].mean("kept"))
 
 
 def test_check_states_pitting_without_wear_and_the_sources():

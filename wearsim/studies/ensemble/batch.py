@@ -30,6 +30,7 @@ from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import cam_observables, lift_curves
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.failures import too_deep_failure
+from wearsim.studies.fatigue.observables import fatigue_curves
 from wearsim.studies.run.assemble import coarse_stepper
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import history_row
@@ -167,7 +168,8 @@ class RunObservations:
         Error estimates, and numbers of steps and contact solutions.
     curves : dict of str to ndarray
         At the end: "depth_profile", the worn depth of the cylinder or of a cam where it is
-        deepest, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m].
+        deepest, shape (strips,) [m], and of a cam "lift_error_curve", shape (angles,) [m]; with
+        fatigue those of `fatigue_curves`.
     grid : Grid
         Strips at the end.
     failure : StepError, optional
@@ -241,16 +243,20 @@ def curves_at_end(
     """
     depths, cam = state.cylinder_depth[:, 0], problem.kinematics.cam
     if cam is None:
-        return [{"depth_profile": profile} for profile in depths[0]]
+        damages = fatigue_curves(problem, state, ())
+        pairs = zip(depths[0], damages, strict=True)
+        return [{"depth_profile": profile, **damage} for profile, damage in pairs]
     angles = cam.greatest(depths.max(axis=-1)).angle.tolist()
-    at_end = [
-        {"depth_profile": np.maximum(cam.at_angle(depths[:, v], angle), 0.0)}
+    stations = [turn_of(scenario).stations for scenario in scenarios]
+    lifts, damages = lift_curves(problem, state, stations), fatigue_curves(problem, state, stations)
+    return [
+        {
+            "depth_profile": np.maximum(cam.at_angle(depths[:, v], angle), 0.0),
+            "lift_error_curve": lifts[v],
+            **damages[v],
+        }
         for v, angle in enumerate(angles)
     ]
-    stations = [turn_of(scenario).stations for scenario in scenarios]
-    for curves, curve in zip(at_end, lift_curves(problem, state, stations), strict=True):
-        curves["lift_error_curve"] = curve
-    return at_end
 
 
 def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:

@@ -48,6 +48,7 @@ from wearsim.studies.cam.panels import ANGLE, segment_marks
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.ensemble.file.data import Effect
 from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.studies.fatigue.panels import DAMAGE
 from wearsim.studies.fatigue.view import readable_scenario, source_text
 from wearsim.studies.run.panels import HEIGHT, Y
 from wearsim.types import FloatArray
@@ -81,11 +82,14 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
     if result.raw.cam and len(result.profiles):
         panels["lift"] = _lift_error(result)
         lower.append("lift")
+    if result.raw.fatigue and len(result.profiles):
+        panels["damage"] = _damage(result)
+        lower.append("damage")
     panels["effects"] = _effects(result)
     panels |= draws_panels(result, "depth", result.at_end("depth"), Axis("depth at the end", "um"))
     lower.append("effects")
     rows = [["course", "density", "convergence"], lower]
-    return Sheet(title, panels, rows, (13.0, 7.5), main="course")
+    return Sheet(title, panels, rows, (13.0 if len(lower) < 4 else 17.0, 7.5), main="course")
 
 
 def _caption(result: EnsembleResult) -> str:
@@ -209,6 +213,26 @@ def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
         f"Mean of {count(profile.kept)} profiles, {deepest} deep, and the band of the tests.",
         legend="lower right",
     )
+
+
+def _damage(result: EnsembleResult) -> Panel:
+    """Return the damage at the end: of a cam along its angle, of a cylinder across the track."""
+    name = "damage_curve" if result.raw.cam else "cylinder_damage_profile"
+    band = result.band(name)
+    curves = result.kept_values(name)
+    marks: list[Mark] = [_some(band.y, curves[:LINES])]
+    if len(curves) > 1:
+        if sufficient_for(len(curves), NINETY_PERCENT[0]):
+            low, high = np.quantile(curves, NINETY_PERCENT, axis=0)
+            marks.append(Band(band.y, low, high, label="5 % to 95 %"))
+        marks.append(Line(band.y, band.mean, colour=BLACK, label="mean"))
+    body = "cam" if result.raw.cam else "cylinder"
+    mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
+    text = (
+        f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests."
+    )
+    x = ANGLE if result.raw.cam else Axis(Y, "mm", limits=worn_limits(band.y, curves.max(axis=0)))
+    return Panel(f"Damage of the {body} at the end", x, DAMAGE, marks, text)
 
 
 def _lift_error(result: EnsembleResult) -> Panel:

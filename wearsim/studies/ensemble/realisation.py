@@ -323,7 +323,8 @@ class RealisationRunner:
             scalars["control"] = float(closed_form_depths(self.scenario, columns, 1)[0])
         curves = dict(observations.curves)
         if not same_strips(observations.grid, self.grid):
-            profile = curves["depth_profile"]
-            curves["depth_profile"] = averaged(profile, observations.grid, self.grid)
+            for name, curve in curves.items():
+                if name.endswith("_profile"):
+                    curves[name] = averaged(curve, observations.grid, self.grid)
         values = {**drawn, **courses, **scalars, **curves}
         return Outcome(number=run.number, values=values)

@@ -231,12 +231,12 @@ class EnsembleResult(EnsembleValues):
             yield from map(np.ascontiguousarray, some[self.numbers][self._independent].T)
 
     def band(self, name: str = "depth_profile") -> Band:
-        """Return mean and 95 % band of the worn profiles, or the lift errors, at the end.
+        """Return mean and 95 % band of the worn profiles, or of another curve, at the end.
 
         Parameters
         ----------
         name : str
-            "depth_profile", or "lift_error_curve" of a cam, over the angle.
+            As of `kept_values`.
 
         Examples
         --------
@@ -246,7 +246,8 @@ class EnsembleResult(EnsembleValues):
         (16, True)
         """
         kept = self.kept_values(name)
-        y = self.y if name == "depth_profile" else np.asarray(self.raw.variables["angle"])
+        axis = self.raw.schema.variables[name].dims[-1]
+        y = self.y if axis == "y" else np.asarray(self.raw.variables[axis])
         unknown = np.full_like(y, np.nan)
         if len(kept) == 0:
             return Band(y, unknown, unknown, unknown, unknown, 0)

@@ -202,12 +202,13 @@ class EnsembleValues(StudyResult[EnsembleData]):
         Parameters
         ----------
         name : str
-            "depth_profile", or "lift_error_curve" of a cam.
+            "depth_profile", or "lift_error_curve" of a cam; with fatigue
+            "cylinder_damage_profile", "roller_damage_profile", or "damage_curve" of a cam.
 
         Returns
         -------
         ndarray, shape (realisations, ...)
-            In SI; the last axis has strips or angles.
+            In SI; the last axis has strips or, of a curve, angles.
 
         Raises
         ------
@@ -219,7 +220,8 @@ class EnsembleValues(StudyResult[EnsembleData]):
         >>> wearsim.open_ensemble("rig-ensemble.h5").kept_values("depth_profile").shape
         (16, 189)
         """
-        if name not in self.raw.schema.variables or name not in KEPT:
-            raise unknown_name(name, "a curve", KEPT[: 1 + self.raw.cam])
+        known = [curve for curve in KEPT if curve in self.raw.schema.variables]
+        if name not in known:
+            raise unknown_name(name, "a curve", known)
         kept = self.raw.variables[name]
         return np.asarray(kept[self.raw.status[: len(kept)] == DONE])

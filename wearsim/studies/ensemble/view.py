@@ -142,6 +142,13 @@ class RealisationsView(StudyView[Shown]):
         if result.count and result.raw.cam:
             band = result.band("lift_error_curve")
             tables["lift_error.csv"] = [_band("angle", "rad", "lift error", band)]
+        if result.count and result.raw.fatigue:
+            names = ["cylinder_damage_profile", "roller_damage_profile"]
+            names += ["damage_curve"] if result.raw.cam else []
+            for name in names:
+                axis, unit = ("angle", "rad") if name == "damage_curve" else ("y", "m")
+                columns = _band(axis, unit, "damage", result.band(name), "1")
+                tables[f"{name}.csv"] = [with_sources(columns, scenario)]
         if result.failed:
             numbers, errors = map(str, result.errors), result.errors.values()
             failures = {"realisation": list(numbers), "error": list(errors)}
@@ -426,8 +433,8 @@ def _courses(result: EnsembleResult) -> Iterator[Column]:
             yield computed(f"{name} {ending}", values, unit, name)
 
 
-def _band(axis: str, unit: str, what: str, band: Band) -> list[Column]:
-    """Return mean and band of a curve at the end."""
+def _band(axis: str, unit: str, what: str, band: Band, of: str = "m") -> list[Column]:
+    """Return mean and band of a curve at the end, in the unit `of`."""
     parts = ("mean", "std", "low", "high")
-    curves = [computed(f"{what} {part}", getattr(band, part), "m") for part in parts]
+    curves = [computed(f"{what} {part}", getattr(band, part), of) for part in parts]
     return [computed(axis, band.y, unit), *curves]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from wearsim.evolution.fatigue import effective_damage, fatigue_of, greatest_damages
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
-from wearsim.studies.cam.observables import at_every_station
+from wearsim.mechanics.cam.stations import Stations
+from wearsim.studies.cam.observables import CURVE_ANGLES, at_every_station
 from wearsim.types import FloatArray
 
 
@@ -45,6 +46,45 @@ def fatigue_record(problem: WearProblem, state: WearState) -> dict[str, FloatArr
         "cylinder_damage_profile": at_every_station(problem, damage[:stations]),
         "roller_damage_profile": damage[stations:],
     }
+
+
+def fatigue_curves(
+    problem: WearProblem, state: WearState, stations: Sequence[Stations]
+) -> list[dict[str, FloatArray]]:
+    """Return the damage of each realisation across the track and, of a cam, along its angle.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    stations : sequence of Stations
+        Stations of the unworn cam of each realisation; none of a cylinder.
+
+    Returns
+    -------
+    list of dict
+        "cylinder_damage_profile", of a cam where it is greatest, and "roller_damage_profile" of the
+        most damaged roller, shape (strips,); "damage_curve" of a cam, shape (angles,). Without
+        fatigue they are empty.
+    """
+    if state.damage is None:
+        return [{} for _ in range(problem.shape[2])]
+    damage, cam = state.damage[0], problem.kinematics.cam
+    cylinder, rollers = damage[: problem.shape[0]], damage[problem.shape[0] :]
+    worst = rollers.max(axis=-1).argmax(axis=0)
+    curves = [
+        {"cylinder_damage_profile": cylinder[0, v], "roller_damage_profile": rollers[worst[v], v]}
+        for v in range(problem.shape[2])
+    ]
+    if cam is None:
+        return curves
+    rows = cylinder.max(axis=-1)
+    along = at_every_station(problem, rows)
+    for v, angle in enumerate(cam.greatest(rows).angle.tolist()):
+        across = np.maximum(cam.at_angle(cylinder[:, v], angle), 0.0)
+        found = stations[v].values_at_angles(along[:, v], CURVE_ANGLES)
+        curves[v] |= {"cylinder_damage_profile": across, "damage_curve": np.maximum(found, 0.0)}
+    return curves
 
 
 def final_fatigue(last: Mapping[str, Any]) -> dict[str, FloatArray]:

@@ -107,7 +107,8 @@ class Outcome:
         success also: every variable of `schema.OBSERVABLES`, shape (records,); steps, solves,
         depth_error, volume_error, and control if the plan has a control variate; depth_profile,
         the worn depth of the cylinder at the end, shape (strips,) [m], and lift_error_curve of a
-        cam, shape (angles,) [m], which are not needed for realisations whose profile is not stored.
+        cam, shape (angles,) [m], with fatigue cylinder_damage_profile, roller_damage_profile and,
+        of a cam, damage_curve, which are not needed for realisations whose profile is not stored.
     """
 
     number: int
@@ -292,14 +293,15 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Worn profile or lift error at the end, over the realisations whose profile is stored.
+    """Profile or curve at the end, over the realisations whose profiles are stored.
 
     Parameters
     ----------
     y : ndarray, shape (strips,) or (angles,)
         Axial position [m], or angle of the cam [rad].
     mean, std, low, high : ndarray, shape as `y`
-        Mean and standard deviation of worn depth or lift error, and 2.5 and 97.5 % quantiles [m].
+        Mean and standard deviation of worn depth, lift error [m] or damage, and 2.5 and 97.5 %
+        quantiles.
     kept : int
         Number of profiles.
     """

@@ -11,7 +11,13 @@ import numpy as np
 from wearsim.results.content import Axis, Schema, Variable, by_name, with_random_inputs
 
 #: Variables that are stored for the first realisations only.
-KEPT = ("depth_profile", "lift_error_curve")
+KEPT = (
+    "depth_profile",
+    "lift_error_curve",
+    "cylinder_damage_profile",
+    "roller_damage_profile",
+    "damage_curve",
+)
 #: Values of the status of a realisation.
 PENDING, DONE, FAILED = 0, 1, 2
 #: Length of the stored error message of a failed realisation, with its final zero.
@@ -101,6 +107,24 @@ _LIFT_ERROR = Variable(
     "record",
 )
 
+_DAMAGE_PROFILES = by_name(
+    Variable(
+        f"{body}_damage_profile", ("kept", "y"), "1", f"damage of {words} at the end", "record"
+    )
+    for body, words in (
+        ("cylinder", "the cylinder, or of a cam where it is greatest,"),
+        ("roller", "the most damaged roller"),
+    )
+)
+
+_DAMAGE_CURVE = Variable(
+    "damage_curve",
+    ("kept", "angle"),
+    "1",
+    "greatest damage of the cam across the track at the end",
+    "record",
+)
+
 _OUTCOMES = by_name(
     (
         Variable("status", _DRAW, "1", "0 pending, 1 done, 2 failed", "record"),
@@ -160,9 +184,9 @@ LIFE_FATIGUE = by_name(
 
 
 def _statistics(
-    observables: Mapping[str, Variable], kept: Variable | None
+    observables: Mapping[str, Variable], curves: Sequence[Variable]
 ) -> Mapping[str, Variable]:
-    """Return the estimates of some observables and of a curve that is kept."""
+    """Return the estimates of some observables and of curves that are kept."""
     return by_name(
         [
             Variable(
@@ -187,23 +211,26 @@ def _statistics(
                 f"{words} over kept realisations: {kept.long_name}",
                 "statistic",
             )
+            for kept in curves
             for ending, words in (
                 ("mean", "mean"),
                 ("std", "standard deviation"),
                 ("low", "2.5 % quantile"),
                 ("high", "97.5 % quantile"),
             )
-            if kept is not None
         ]
     )
 
 
 #: Estimates over the realisations; nan until the ensemble is finished.
-STATISTICS: Mapping[str, Variable] = _statistics(OBSERVABLES, _DEPTH_PROFILE)
+STATISTICS: Mapping[str, Variable] = _statistics(OBSERVABLES, [_DEPTH_PROFILE])
 #: Further estimates of an ensemble of cams.
-CAM_STATISTICS: Mapping[str, Variable] = _statistics(CAM_OBSERVABLES, _LIFT_ERROR)
-#: Further estimates of an ensemble of tests with fatigue.
-FATIGUE_STATISTICS: Mapping[str, Variable] = _statistics(FATIGUE_OBSERVABLES, None)
+CAM_STATISTICS: Mapping[str, Variable] = _statistics(CAM_OBSERVABLES, [_LIFT_ERROR])
+#: Further estimates of an ensemble of tests with fatigue, and of cams with it.
+FATIGUE_STATISTICS: Mapping[str, Variable] = _statistics(
+    FATIGUE_OBSERVABLES, list(_DAMAGE_PROFILES.values())
+)
+CAM_FATIGUE_STATISTICS: Mapping[str, Variable] = _statistics({}, [_DAMAGE_CURVE])
 
 #: Schema without the random inputs, which differ between studies, and the control variate.
 ENSEMBLE = Schema(
@@ -254,7 +281,10 @@ def ensemble_schema(
         last |= {"angle": ANGLE, "lift_error_curve": _LIFT_ERROR}
         last |= {**CAM_OBSERVABLES, **CAM_STATISTICS}
     if fatigue:
-        last |= {**FATIGUE_OBSERVABLES, **FATIGUE_STATISTICS, **(LIFE_FATIGUE if life else {})}
+        last |= {**FATIGUE_OBSERVABLES, **_DAMAGE_PROFILES, **FATIGUE_STATISTICS}
+        last |= LIFE_FATIGUE if life else {}
+    if cam and fatigue:
+        last |= {_DAMAGE_CURVE.name: _DAMAGE_CURVE, **CAM_FATIGUE_STATISTICS}
     axes = {**schema.axes, **({_COURSE.name: _COURSE} if fatigue and life else {})}
     return replace(schema, axes=axes, variables={**schema.variables, **last})
 

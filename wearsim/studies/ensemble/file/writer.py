@@ -35,6 +35,7 @@ from wearsim.studies.ensemble.file.parts import (
     write_part,
 )
 from wearsim.studies.ensemble.file.schema import (
+    CAM_FATIGUE_STATISTICS,
     CAM_STATISTICS,
     ENSEMBLE,
     FATIGUE_STATISTICS,
@@ -319,7 +320,8 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
 
 
 def _put_statistic(dataset: h5py.Dataset, name: str, array: Array) -> None:
-    if name not in {**STATISTICS, **CAM_STATISTICS, **FATIGUE_STATISTICS}:
+    of_cams = {**CAM_STATISTICS, **CAM_FATIGUE_STATISTICS}
+    if name not in {**STATISTICS, **of_cams, **FATIGUE_STATISTICS}:
         raise ValueError(f"{name} is not a statistic of an ensemble")
     if np.shape(array) != dataset.shape:
         raise ValueError(f"{name} has the shape {np.shape(array)}, expected {dataset.shape}")
