@@ -202,10 +202,19 @@ def test_json_schema_requires_text_with_a_unit() -> None:
     assert schema["examples"] == ["20 mm"]
     import re
 
-    for good in ("20 mm", "20mm", "1.1e-11 1/Pa", "-3 µm", "5 (N)", "90°"):
+    (signed,) = (
+        option["pattern"]
+        for option in Both.model_json_schema()["properties"]["offset"]["anyOf"]
+        if "pattern" in option
+    )
+    for good in ("20 mm", "20mm", "1.1e-11 1/Pa", "5 (N)", "90°"):
         assert re.search(schema["pattern"], good), good
+        assert re.search(signed, good), good
     for bad in ("20", "1e3", "mm", ""):
         assert not re.search(schema["pattern"], bad), bad
+        assert not re.search(signed, bad), bad
+    assert re.search(signed, "-3 µm")
+    assert not re.search(schema["pattern"], "-3 µm")  # a positive length
 
 
 @given(

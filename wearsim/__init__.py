@@ -50,6 +50,7 @@ Results
 Errors
     WearsimError                        base class of all others
     ScenarioError, CapabilityError      a scenario, or a model for it, that cannot be used
+    InfeasibleCamError                  a cam that its roller cannot follow
     ResultsFileError                    a file that cannot be read, or must not be replaced
     SolverError                         a failed computation: ContactError, StepError
     Interrupted, WorkerError            a study that was stopped, or lost its workers
@@ -92,6 +93,7 @@ if TYPE_CHECKING:
     from wearsim.errors import (
         CapabilityError as CapabilityError,
         ContactError as ContactError,
+        InfeasibleCamError as InfeasibleCamError,
         Interrupted as Interrupted,
         PluginError as PluginError,
         ResultsFileError as ResultsFileError,
@@ -135,6 +137,7 @@ _NAMES = {
     "wearsim.errors": [
         "CapabilityError",
         "ContactError",
+        "InfeasibleCamError",
         "Interrupted",
         "PluginError",
         "ResultsFileError",

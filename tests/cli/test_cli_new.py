@@ -28,6 +28,8 @@ FILES = {
     "force.csv": "angle [deg], force [N]\n0, 10\n90, 20\n180, 10\n270, 0\n",
     "lift.csv": "angle [deg], lift [mm]\n"
     + "".join(f"{a}, {math.cos(math.radians(a))}\n" for a in range(0, 360, 10)),
+    "worn.csv": "angle [deg], y [mm], height [um]\n"
+    + "".join(f"{a}, {y}, -1\n" for a in range(0, 360, 10) for y in (-10, 0, 10)),
     "cam.csv": "angle [deg], radius [mm]\n" + "".join(f"{a}, 25\n" for a in range(0, 360, 10)),
 }
 
@@ -128,16 +130,32 @@ def test_unwritable_files_are_reported(command: Command) -> None:
         assert "choose another name or folder" in " ".join(refused.stderr.split())
 
 
+def commented_fatigue() -> str:
+    """Return the lines of [fatigue] that the starter scenario has in comments."""
+    text = starter_scenario("starter")
+    lines = text[text.index("# Rolling-contact fatigue") :].splitlines()
+    return "\n".join(line[4:] for line in lines if line.startswith("#   "))
+
+
+def test_commented_fatigue_of_the_starter_scenario_is_valid() -> None:
+    text = f"{starter_scenario('starter')}\n{commented_fatigue()}\n"
+    scenario = parse_scenario(text, "new.toml", FILES.__getitem__)
+    assert scenario.fatigue is not None
+    assert {*scenario.fatigue.laws} == {"cylinder", "roller"}
+
+
 def test_starter_scenario_shows_every_key() -> None:
     sections: dict[str, str] = {}
     for name in STARTERS:
         parts = iter(re.split(r"^\[(\w+)\]", starter_scenario(name), flags=re.M)[1:])
         for table, text in zip(*[parts] * 2, strict=True):
             sections[table] = sections.get(table, "") + text
+    # in comments, since its constants are those of a material
+    sections["fatigue"] = commented_fatigue()
     assert set(sections) == set(TABLES)
     for table, model in TABLES.items():
         shown = set(re.findall(r"^(?:# )?(\w+)(?:\.\w+)? = ", sections[table], flags=re.M))
-        if table == "follower":  # those of a swinging arm are in words
+        if table in {"follower", "limit"}:  # those of a swinging arm and of fatigue are in words
             shown |= set(re.findall(r"\w+", sections[table]))
         assert set(model.model_fields) <= shown, table
 

@@ -185,3 +185,10 @@ def test_example_of_a_study_kind_is_found_by_its_format(example):
     example("wearsim_study_kinds")
     (kind,) = [kind for kind in study_kinds() if kind.format == "my-package-survey"]
     assert registry().registered(StudyKind, kind.name).distribution == "my-package"
+
+
+def test_example_of_a_table_is_read_with_the_scenario(example):
+    example("wearsim_tables")
+    assert rig(survey='spacing = "2 mm"').tables["survey"].spacing == 2e-3
+    with pytest.raises(ScenarioError, match=r"\[survey\] spacing"):
+        rig(survey='spacing = "2 N"')

@@ -20,6 +20,7 @@ from wearsim.plugins import (
     Options,
     RandomInputSpec,
     StudyKind,
+    TableSpec,
     WearLawSpec,
     registry,
 )
@@ -47,11 +48,13 @@ def test_every_kind_of_spec_is_registered():
     def of(kind):
         if kind is StudyKind:
             return lambda: [kind("new", summary="new", result="a:B", view="a:C", protocol=2)]
+        if kind is TableSpec:
+            return lambda: [kind("new", Options, "new", protocol=2)]
         return lambda: [kind("new", Options, "new", factory=lambda options: None, protocol=2)]
 
     specs = (
         *(ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec),
-        *(FatigueLawSpec, AxialProfileSpec, StudyKind),
+        *(FatigueLawSpec, AxialProfileSpec, StudyKind, TableSpec),
     )
     kinds = dict(zip(HOOKS, specs, strict=True))
     plugins = Registry([Point(module(**{hook: of(kind) for hook, kind in kinds.items()}))])

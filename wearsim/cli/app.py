@@ -53,7 +53,7 @@ BUILT_IN = {
     "plot": "Draw the figure of a results file of any kind.",
     "compare": "Compare runs and ensembles, with confidence intervals.",
     "report": "Write one page on results for a browser: answers, interactive figures, inputs.",
-    "export": "Write a results file as CSV with units in the headers, or the surface of a cam.",
+    "export": "Write a results file as CSV with units, or what is worn as a new start.",
     "maxent": "Compute a maximum-entropy distribution from moments.",
     "plugins": "List contact models, wear laws, loads, random inputs and motion laws.",
     "schema": "Write the JSON Schema of a scenario, for editors.",

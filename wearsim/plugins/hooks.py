@@ -360,6 +360,10 @@ class HookSpecs:
     def wearsim_tables(self) -> Iterable[TableSpec]:  # type: ignore[empty-body]
         """Yield tables of the scenario that the plugin owns; see `TableSpec`.
 
+        Returns
+        -------
+        iterable of TableSpec
+
         Examples
         --------
         .. code-block:: python

@@ -8,6 +8,7 @@ from cam_text import SCENARIOS
 
 import wearsim
 from wearsim.evolution.observables import peak_to_peak
+from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.ensemble.api import parse_target
 from wearsim.studies.ensemble.batch import batch_groups, joined_problem
 from wearsim.studies.ensemble.realisation import RealisationRunner, profile_axis
@@ -109,4 +110,4 @@ def test_ensemble_of_cams_is_exported_and_reported(tests_of_cams, tmp_path):
 def test_precision_may_be_that_of_the_lift_error_of_cams_only():
     assert parse_target("lift_error.mean 5%").observable == "lift_error"
     with pytest.raises(ValueError, match="not an observable"):
-        parse_target("lift_error.mean 5%", cam=False)
+        parse_target("lift_error.mean 5%", shipped_scenario("rig-450min"))

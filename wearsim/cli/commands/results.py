@@ -254,7 +254,7 @@ def export(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Write a results file as CSV with units in the headers, or what is worn as a new start."""
+    """Write a results file as CSV with units, or what is worn as a new start."""
     refuse(decimal not in {".", ","}, f"'{decimal}' is neither '.' nor ','", "--decimal")
     sampling = check_surface(
         surface, force, chord=chord, points=points, position=position, spline=spline

@@ -228,7 +228,7 @@ def _leaf(path: Path, part: Mapping[str, Any], value: Any) -> Field:
         slider = slider_of(part, now, float(example[1]) if example else 1.0, signed=signed)
         text = number[1] if number else written
         return Field(key, "quantity", description, text, unit, shown, slider=slider)
-    if types & {"number", "integer"}:
+    if types & {"number", "integer"} or (isinstance(value, int | float) and "const" in part):
         whole = types == {"integer"}
         known = value if isinstance(value, int | float) else default
         now = float(known) if isinstance(known, int | float) else None
