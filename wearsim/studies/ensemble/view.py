@@ -147,8 +147,10 @@ class RealisationsView(StudyView[Shown]):
             names += ["damage_curve"] if result.raw.cam else []
             for name in names:
                 axis, unit = ("angle", "rad") if name == "damage_curve" else ("y", "m")
-                columns = _band(axis, unit, "damage", result.band(name), "1")
-                tables[f"{name}.csv"] = [with_sources(columns, scenario)]
+                band = result.band(name)
+                if band.mean.any():  # of a body that may pit
+                    columns = _band(axis, unit, "damage", band, "1")
+                    tables[f"{name}.csv"] = [with_sources(columns, scenario)]
         if result.failed:
             numbers, errors = map(str, result.errors), result.errors.values()
             failures = {"realisation": list(numbers), "error": list(errors)}
