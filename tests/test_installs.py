@@ -81,7 +81,7 @@ def test_wheels_run_without_the_checkout(wheels: Path, tmp_path: Path):
     where = call(python, "-c", "import wearsim; print(wearsim.__file__)", folder=tmp_path)
     assert Path(where.strip()).is_relative_to(tmp_path)
     wearsim("new", "scenario")
-    wearsim("run", "scenario.toml", *SHORT, *FEW_KERNELS, "-o", "run.h5")
+    wearsim("run", "scenario.toml", *SHORT, "-o", "run.h5")
     wearsim("new", "plugin", "sponge")
     assert (tmp_path / "wearsim-sponge" / "pyproject.toml").exists()
     wearsim("bench", "contact", "--quick", "-o", "bench")

@@ -75,6 +75,8 @@ for stepper in ("implicit", "explicit", "per-pass"):
 run(load={{"kind": "spring", "normal_force": "300 N", "stiffness": "690 N/mm"}})
 for name in ("rig-450min.toml", "rig-three-rollers.toml"):  # grooves, at whose edges strips are cut
     run(name, wear__cylinder__k_over_h="1e-8 1/Pa")
+law = {{"law": "pressure-life", "reference_passes": 1e6, "reference_pressure": "1 GPa"}}
+run(fatigue={{"slope": 1.1, "cylinder": law | {{"exponent": 8.0, "source": "none"}}}})
 run(contact__tangential="fastsim")
 for model in ("hertz-fastsim", "hertz"):
     run(contact__model=model)

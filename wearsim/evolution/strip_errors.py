@@ -104,6 +104,17 @@ def _peaks(depths: FloatArray) -> FloatArray:
     return np.asarray((top + rise).reshape(depths.shape[:-1]))
 
 
+def _means_below_points(depths: FloatArray) -> float:
+    """Return how much the mean over the deepest strip is below the depth in its middle, at most.
+
+    Strips that were joined, or that an edge has crossed, hold means. That of a parabola is a 24th
+    of the second difference below its vertex.
+    """
+    second = 2.0 * depths[:, 1:-1] - depths[:, :-2] - depths[:, 2:]
+    at_deepest = np.where(depths[:, 1:-1] == depths.max(), second, 0.0)
+    return float(at_deepest.max(initial=0.0)) / 24.0
+
+
 def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the depths of all bodies, shape (bodies, realisations, strips) [m]."""
     cam, cylinder = problem.kinematics.cam, state.cylinder_depth[:, 0]
@@ -247,7 +258,8 @@ def strip_errors(
     least = OF_PROFILE * np.array([deepest, partial_slip * sizes[2]])
     found[:2] = np.maximum(found[:2], least * found[2])
     if end.profiles is not None and end.profiles.any():
-        found[0] += deepest * (_peaks(end.profiles).max() / end.profiles.max() - 1.0)
+        top = _peaks(end.profiles).max() + _means_below_points(end.profiles)
+        found[0] += deepest * (top / end.profiles.max() - 1.0)
     return np.asarray(found)
 
 
