@@ -100,7 +100,7 @@ def chosen_of(stages: list[str], extent: str) -> list[int]:
     each = one_of_each(stages)
     if extent == "each stage":
         return each
-    return sorted({*range(0, len(stages), 3), *each})
+    return sorted({*range(0, len(stages), 6), *each})
 
 
 def killing(at: int) -> Storage:

@@ -12,7 +12,7 @@ from killed_scripts import rows_of
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
 
 
-@pytest.mark.parametrize("extent", ["each stage", pytest.param("thirds", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("extent", ["each stage", pytest.param("sixths", marks=pytest.mark.slow)])
 def test_killed_ensemble_resumes_bit_for_bit(tmp_path: Path, extent: str) -> None:
     head, *rows = rows_of("killed_ensemble.py", "stages", tmp_path, extent)
     stages = head["stages"]
@@ -21,7 +21,7 @@ def test_killed_ensemble_resumes_bit_for_bit(tmp_path: Path, extent: str) -> Non
     for row in rows:
         assert row["killed"][0] == signal.SIGKILL
         assert row["differences"] == []
-    if extent == "thirds":
+    if extent == "sixths":
         assert stages.count("before write") > 50
         assert len(killed_at) > len(stages) // 7
     # no file, no realisation, after the first and after the last

@@ -16,7 +16,7 @@ from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.noise import Noise
 from wearsim.uq.hierarchy.pooled import Posterior
 
-REPEATS, SETS = 500, 100
+REPEATS, SETS = 1000, 200
 ENDS = np.array([0.025, 0.975])
 LN_K = np.log(K)
 DEPTH = 48.1e-6  # of the groove with this K
