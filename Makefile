@@ -1,6 +1,6 @@
 # make demo            run the 450-minute wear test: summary, results and figure in out/
-# make test            lint, types, import contracts and the quick tests: 5 minutes on 2 cores
-# make test-slow       the other tests: kills of the writers, hard cases, installs, Dask: 13 minutes
+# make test            lint, types, import contracts and the quick tests: 7 minutes on 2 cores
+# make test-slow       the other tests: kills of the writers, hard cases, installs, Dask, the site: 20 minutes
 # make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; ten minutes,
 #                      and an hour of one core for the references of stated errors, which are kept in out/references
 # make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
