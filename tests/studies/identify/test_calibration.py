@@ -52,7 +52,7 @@ def assert_95_percent(held: int | np.integer, sets: int = SETS) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("length", [0.2e-3, 1.5e-3])
+@pytest.mark.parametrize("length", [1.5e-3])  # the greater, the harder
 def test_intervals_hold_the_truth_with_correlated_noise(length: float):
     rng, noise = np.random.default_rng(31), Noise(1e-6, length, 0.1e-6)
     held = np.zeros(2, dtype=np.int64)
