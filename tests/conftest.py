@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 #: tests.benchmarks imports wearsim_bench
-NAMES = r"wearsim_(?:bench|chevalier2005|explore|halfspace|validation)|tests\.benchmarks import"
+PLUGINS = r"wearsim_(?:bench|chevalier2005|explore|halfspace|optimise|validation)"
+NAMES = rf"{PLUGINS}|tests\.benchmarks import"
 IMPORT = re.compile(rf"^\s*(?:from|import)\s+({NAMES})", re.M)
 
 
