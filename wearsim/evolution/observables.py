@@ -9,7 +9,14 @@ from wearsim.evolution.contacts import at_least, contact_batch
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import CamStations, mean_along, sum_in_order, width, worn_volume
+from wearsim.evolution.quantities import (
+    CamStations,
+    greatest_between,
+    mean_along,
+    sum_in_order,
+    width,
+    worn_volume,
+)
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents
@@ -149,9 +156,24 @@ def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
     return np.asarray(peak_to_peak(cam, lift_errors(problem, state)).max(axis=0))
 
 
+def worn_descents(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the worn descent of each contact's roller, shape (S, C, N) [m].
+
+    Unlike in `loads.descents`, the least gaps are those between strips, which is what a roller
+    descends that is tilted or beside its groove.
+    """
+    worn, unworn = least_gaps(problem.gap(*state.depths)), least_gaps(problem.nominal_gap)
+    return np.asarray(worn - unworn)
+
+
+def least_gaps(gaps: FloatArray) -> FloatArray:
+    """Return the least of gaps between strips, the last axis."""
+    return -greatest_between(-gaps)
+
+
 def clearance(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest worn descent of a roller, shape (realisations,) [m]."""
-    return np.asarray(greatest(problem, descents(problem, state.depths)).max(axis=0))
+    return np.asarray(greatest(problem, worn_descents(problem, state)).max(axis=0))
 
 
 LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest

@@ -4,7 +4,9 @@ The coarse test of `strip_errors` has strips of twice the width and a greater to
 steps. Its observables differ from those of the test by at least the errors of the test where these
 are proportional to the width of the strips, and by three times as much where they are proportional
 to its square. The error estimate is the greatest of the last differences times a safety factor,
-since a peak pressure rises and falls as single strips come into contact.
+since a peak pressure rises and falls as single strips come into contact. What is worn off a roller
+has at least the relative error by strips of what is worn off both bodies: single differences may be
+small by chance, and depths and volumes of both bodies follow from the same contacts.
 """
 
 from __future__ import annotations
@@ -21,10 +23,17 @@ from wearsim.types import FloatArray
 # sign of that of the test. Of the pressures of whole strips in the rig's test, against rigid
 # bodies, a factor of 1 covers 0.7 to 0.8, this one 0.96 or more
 COVER = 1.5
+#: observables whose relative error is at least that of the greatest depth or of the volume worn off
+#: both bodies
+OF_DEPTH, OF_VOLUME = ("roller_depth", "descent"), ("roller_worn_volume",)
 
 
 def observed_errors(
-    coarse: Course | None, passes: FloatArray, observed: Mapping[str, FloatArray]
+    coarse: Course | None,
+    passes: FloatArray,
+    observed: Mapping[str, FloatArray],
+    sizes: FloatArray,
+    by_strips: FloatArray,
 ) -> dict[str, FloatArray]:
     """Return the estimated errors of observables of a test.
 
@@ -36,6 +45,8 @@ def observed_errors(
         Rising, from the start of the test, 0.
     observed : mapping of str to ndarray, shape (points, ...)
         Observables of the test by name; angles end on "angle" [rad].
+    sizes, by_strips : ndarray, shape (3, points)
+        As of `strip_errors`: sizes of the test, and their errors by strips.
     """
     if not observed:
         return {}
@@ -63,9 +74,14 @@ def observed_errors(
     greatest = _greatest_of_last(there, np.concatenate(differences, axis=1))
     part = np.column_stack([np.interp(at_passes, at_there, one) for one in greatest.T])
     columns = np.split(COVER * part, np.cumsum(widths)[:-1], axis=1)
+    worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
+    least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
     for (name, values), relative in zip(observed.items(), columns, strict=True):
         scale = 1.0 if name.endswith("angle") else np.abs(values)
+        for names, one in zip((OF_DEPTH, OF_VOLUME), least, strict=True):
+            if name in names:
+                relative = np.maximum(relative, one[:, None])
         errors[name] = relative.reshape(values.shape) * scale
     return errors
 
