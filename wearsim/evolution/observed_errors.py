@@ -77,11 +77,12 @@ def observed_errors(
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
-    for (name, values), relative in zip(observed.items(), columns, strict=True):
+    for (name, values), found in zip(observed.items(), columns, strict=True):
         scale = 1.0 if name.endswith("angle") else np.abs(values)
-        for names, one in zip((OF_DEPTH, OF_VOLUME), least, strict=True):
-            if name in names:
-                relative = np.maximum(relative, one[:, None])
+        lowest = [
+            one for names, one in zip((OF_DEPTH, OF_VOLUME), least, strict=True) if name in names
+        ]
+        relative = np.maximum(found, lowest[0][:, None]) if lowest else found
         errors[name] = relative.reshape(values.shape) * scale
     return errors
 

@@ -14,6 +14,10 @@ crossed the part f of the strip, the surfaces are in contact at the depth
 
 where u_0 is the depth when the edge reached the strip: l = u - s, and du = f dl. A step with the
 formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear of the strip.
+
+Where edges are not resolved, as under loads that vary, strips are in contact or not as wholes. Past
+points of the depth of a strip that has just come into contact lie before the corner, so that it
+takes steps of first order there too.
 """
 
 from __future__ import annotations
@@ -80,9 +84,33 @@ def without_edges(state: WearState) -> WearState:
     return state.replaced(**dict.fromkeys(FIELDS), past_sums=sums)
 
 
+def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
+    """Return a state that counts for how many steps each strip has been in contact as a whole."""
+    assert state.past_sums is not None
+    assert state.past_wear is not None
+    loaded = state.contacts.line_load.reshape(*problem.shape, problem.grid.strips) > 0.0
+    sums = np.concatenate([over_strips(state.past_wear), state.past_sums[:, -1:]], axis=1)
+    counts = np.where(loaded, SETTLED, 0.0)
+    return state.replaced(separation=None, part=1.0 * loaded, whole_steps=counts, past_sums=sums)
+
+
+def count_whole_strips(
+    problem: WearProblem, start: WearState, end: WearState
+) -> tuple[WearState, FloatArray]:
+    """Return the end of a step of `with_whole_strips`, and `Solved.parts`."""
+    assert start.whole_steps is not None
+    rows, parts = problem.body_rows, np.zeros_like(end.stacked)
+    loaded = 1.0 * (end.contacts.line_load.reshape(start.whole_steps.shape) > 0.0)
+    each = loaded.reshape(len(rows), *parts.shape[1:])
+    for side in (0, 1):
+        np.maximum.at(parts, rows[:, side], each)
+    counts = loaded * np.minimum(start.whole_steps + 1.0, SETTLED)
+    return end.replaced(part=loaded, whole_steps=counts), parts
+
+
 def on_strips(problem: WearProblem, state: WearState) -> WearState:
     """Return a state without edges, of first order, where strips now reach the end of a roller."""
-    if state.part is None or problem.has_crowned_gap:
+    if state.separation is None or problem.has_crowned_gap:
         return state
     assert state.order is not None
     return without_edges(state).replaced(order=np.ones_like(state.order))
@@ -227,7 +255,7 @@ def edges_of_step(
 
 def most(state: WearState) -> int:
     """Return the greatest order of steps from a state."""
-    return MAX_ORDER if state.part is None else EDGE_ORDER
+    return MAX_ORDER if state.separation is None else EDGE_ORDER
 
 
 class MarkedStrips(NamedTuple):
