@@ -171,18 +171,22 @@ def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
     return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))
 
 
+def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
+    """Return which tests have worn to a groove, whose contacts slip."""
+    worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
+    adhering = problem.values_of(state.contacts, "adhesion_fraction").max(axis=(0, 1))
+    deep = sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
+    return np.asarray(deep & (adhering <= MOST_ADHESION))
+
+
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
     """Return a state in which tests that have worn to a groove resolve edges."""
     shape = (*problem.shape, problem.grid.strips)
     assert state.contacts.separation is not None
     assert state.past_sums is not None
     assert state.past_wear is not None
-    worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
     separation = state.contacts.separation.reshape(shape)
-    begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3))
-    adhering = problem.values_of(state.contacts, "adhesion_fraction")
-    begins &= adhering.max(axis=(0, 1)) <= MOST_ADHESION
-    begins &= sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
+    begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3)) & have_groove(problem, state)
     if not begins.any():
         return state
     loaded = state.contacts.line_load.reshape(shape) > 0.0
@@ -290,16 +294,23 @@ class MarkedStrips(NamedTuple):
         return np.where(self.young, YOUNG * self.parts, self.parts)
 
 
-def marked_strips(state: WearState) -> MarkedStrips | None:
-    """Return the strips of a state about the edges, None where edges are not resolved."""
+def marked_strips(problem: WearProblem, state: WearState) -> MarkedStrips | None:
+    """Return the strips of a state about the edges; None where there is no groove."""
     if state.whole_steps is None or state.part is None or state.past_wear is None:
         return None
     assert state.order is not None
+    in_groove = None
+    if state.separation is None:  # edges are not resolved
+        in_groove = have_groove(problem, state)
+        if not in_groove.any():
+            return None
     wear = kernel_input(state.past_wear[0])
     young, crossed = np.empty((2, *wear.shape), dtype=np.bool_)
     marked = MarkedStrips(young, crossed, np.empty_like(wear))
     steps = (YOUNG_STEPS * state.order).astype(np.float64)
     mark_strips(kernel_input(state.part), kernel_input(state.whole_steps), steps, wear, *marked)
+    if in_groove is not None:
+        np.logical_and(young, in_groove[:, None], out=young)
     return marked
 
 

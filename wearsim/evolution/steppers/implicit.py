@@ -168,7 +168,7 @@ class ImplicitStepper(StepDoublingStepper):
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
         left = self._left(problem, state, stop, OF_STEPS)
-        marked = edges.marked_strips(end)
+        marked = None if end.separation is None else edges.marked_strips(problem, end)
         parts = np.ones_like(depths) if marked is None else marked.weights
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
@@ -441,7 +441,7 @@ def _step(
     formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
     added, guess = extrapolated(weights, past.wear)
-    scale, marked = None, edges.marked_strips(state)
+    scale, marked = None, edges.marked_strips(problem, state)
     if marked is not None:
         young = marked.young
         added = np.where(young, half_pass[:, None] * past.wear[0], added)
