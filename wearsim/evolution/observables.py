@@ -159,16 +159,18 @@ def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
 def worn_descents(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the worn descent of each contact's roller, shape (S, C, N) [m].
 
-    Unlike in `loads.descents`, the least gaps are those between strips, which is what a roller
-    descends that is tilted or beside its groove.
+    It is that between strips, by which a roller descends that is tilted or beside its groove.
     """
-    worn, unworn = least_gaps(problem.gap(*state.depths)), least_gaps(problem.nominal_gap)
-    return np.asarray(worn - unworn)
+    worn = least_gaps(problem, problem.gap(*state.depths))
+    return np.asarray(worn - least_gaps(problem, problem.nominal_gap))
 
 
-def least_gaps(gaps: FloatArray) -> FloatArray:
-    """Return the least of gaps between strips, the last axis."""
-    return -greatest_between(-gaps)
+def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:
+    """Return the least of gaps between strips, the last axis; of strips where loads have springs.
+
+    The load of a spring follows from the descent of strips.
+    """
+    return np.asarray(gaps.min(axis=-1) if problem.has_spring else -greatest_between(-gaps))
 
 
 def clearance(problem: WearProblem, state: WearState) -> FloatArray:

@@ -120,9 +120,10 @@ class ImplicitStepper(StepDoublingStepper):
         if state.past_spans is not None:
             return state
         state = with_rates(problem, state)
-        resolved = self._resolves(problem, state)
-        begun = edges.with_unresolved_edges if resolved else edges.with_whole_strips
-        return begun(problem, state)
+        if self._resolves(problem, state):
+            return edges.with_unresolved_edges(problem, state)
+        # local errors do not find those of a lower order in single strips
+        return edges.with_whole_strips(problem, state) if _varies(problem) else state
 
     def _resolves(self, problem: WearProblem, state: WearState) -> bool:
         """Return whether edges of contacts are resolved; step doubling compares whole strips."""
@@ -156,9 +157,8 @@ class ImplicitStepper(StepDoublingStepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step in tests that all resolve edges or all do not."""
-        varies = problem.constant_load is None or len(problem.varying) > 0
         # local errors miss peaks of a load
-        if varies or self.by_doubling or self.forced_step is not None:
+        if _varies(problem) or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
         end = scheme(problem, state, step)
         if end.separation is not None and edges.unresolved(end).all():
@@ -261,6 +261,11 @@ class ImplicitStepper(StepDoublingStepper):
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
         return implicit_step
+
+
+def _varies(problem: WearProblem) -> bool:
+    """Return whether load or inputs vary in time."""
+    return problem.constant_load is None or len(problem.varying) > 0
 
 
 def _estimates(

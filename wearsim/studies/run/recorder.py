@@ -104,7 +104,9 @@ def history_row(
     """Return the observables of every realisation; `threshold` [m] bounds the groove's width."""
     problem, state, loads = present_contacts(stepper, problem, state)
     present = present_problem(problem, state)
-    elastic = problem.values_of(state.contacts, "approach") - least_gaps(present.gap(*state.depths))
+    elastic = problem.values_of(state.contacts, "approach") - least_gaps(
+        present, present.gap(*state.depths)
+    )
     approach = {
         "descent": worn_descents(present, state),
         "elastic_approach": np.where(loads > 0.0, elastic, 0.0),
