@@ -366,10 +366,12 @@ def add_strip_errors(
                 name: np.array([item[name] for item in course.observed])
                 for name in (course.observed[0] if course.observed else ())
             }
-            fresh = np.zeros((3, 1))
+            fresh, crown = np.zeros((3, 1)), problem.crown_radius
+            assert course.grid is not None
             stated = observed_errors(
                 *(other, np.append(0.0, passes), observed),
                 *(np.concatenate([fresh, part], axis=1) for part in (sizes, by_strips)),
+                *(None if crown is None else crown[:, number], course.grid.spacing),
             )
             added[number] = errors, {name: values[-1] for name, values in stated.items()}
             result.scalars["depth_error"] += float(errors[0])

@@ -205,10 +205,11 @@ class RunInProgress:
         profiles = [record[f"{body}_depth_profile"][:, 0] for body in ("cylinder", "roller")]
         end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
         errors = strip_errors(coarse, passes, np.array(sizes), end)
-        observed = self.recorder.observed
+        crown, spacing = problem.crown_radius, problem.grid.spacing
         self.recorder.strip_errors = errors
         self.recorder.observed_errors = observed_errors(
-            coarse, passes, observed, np.array(sizes), errors
+            *(coarse, passes, self.recorder.observed, np.array(sizes), errors),
+            *(None if crown is None else crown[:, 0], spacing),
         )
 
     def _check_errors(self) -> None:
