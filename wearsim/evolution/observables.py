@@ -186,8 +186,12 @@ def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest pressure of the contacts of a state at every station, (S, R, N) [Pa].
 
     A strip that the edge of a contact crosses carries its load on the part that is in contact.
+    Where strips are in contact as wholes, the outermost one also carries the load of the part that
+    the edge has crossed of the next one.
     """
     values = problem.values_of(state.contacts, "peak_pressure")
+    if state.separation is None and state.contacts.separation is not None:
+        return problem.per_roller(values * _on_next_strips(problem, state))
     if state.part is None:
         return problem.per_roller(values)
     load, half = (problem.values_of(state.contacts, n) for n in ("line_load", "half_length"))
@@ -204,6 +208,26 @@ def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
         found = np.minimum(crossed / np.where(at_edge, part[..., 2:], 1.0), most)
         greatest_square = np.maximum(greatest_square, (found * at_edge).max(axis=-1))
     return problem.per_roller(np.maximum(values, np.sqrt(greatest_square)))
+
+
+def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest pressure, with the outermost loads on a part of the next strips too.
+
+    It is relative to that on whole strips, (S, C, N). The edge has crossed the part 1/2 - s/r of a
+    strip with the separation s in its middle, which rises by r to the next one.
+    """
+    names = "line_load", "half_length", "separation"
+    load, half, apart = (problem.values_of(state.contacts, name) for name in names)
+    square = np.square(load / np.where(half > 0.0, half, np.inf))
+    most = square.max(axis=-1)
+    for side in (slice(None), slice(None, None, -1)):
+        own, ahead = square[..., side], apart[..., side]
+        at_edge = (own[..., :-2] > 0.0) & (own[..., 1:-1] == 0.0)
+        rise = ahead[..., 2:] - ahead[..., 1:-1]
+        crossed = 0.5 - ahead[..., 1:-1] / np.where(rise > 0.0, rise, np.inf)
+        known = at_edge & (rise > 0.0)
+        own[..., :-2] /= 1.0 + np.where(known, np.clip(crossed, 0.0, 0.5), 0.0)
+    return np.asarray(np.sqrt(square.max(axis=-1) / np.where(most > 0.0, most, 1.0)))
 
 
 def peak_pressure(stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:
