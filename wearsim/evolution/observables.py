@@ -214,7 +214,8 @@ def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest pressure, with the outermost loads on a part of the next strips too.
 
     It is relative to that on whole strips, (S, C, N). The edge has crossed the part 1/2 - s/r of a
-    strip with the separation s in its middle, which rises by r to the next one.
+    strip with the separation s in its middle, which rises by r to the next one; and half of a strip
+    that has just come into contact, until it carries half the load of the one inside.
     """
     names = "line_load", "half_length", "separation"
     load, half, apart = (problem.values_of(state.contacts, name) for name in names)
@@ -222,11 +223,15 @@ def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
     most = square.max(axis=-1)
     for side in (slice(None), slice(None, None, -1)):
         own, ahead = square[..., side], apart[..., side]
-        at_edge = (own[..., :-2] > 0.0) & (own[..., 1:-1] == 0.0)
-        rise = ahead[..., 2:] - ahead[..., 1:-1]
-        crossed = 0.5 - ahead[..., 1:-1] / np.where(rise > 0.0, rise, np.inf)
-        known = at_edge & (rise > 0.0)
-        own[..., :-2] /= 1.0 + np.where(known, np.clip(crossed, 0.0, 0.5), 0.0)
+        inner, outer, free = own[..., :-3], own[..., 1:-2], own[..., 2:-1]
+        at_edge = (outer > 0.0) & (free == 0.0)
+        rise = ahead[..., 3:] - ahead[..., 2:-1]
+        crossed = 0.5 - ahead[..., 2:-1] / np.where(rise > 0.0, rise, np.inf)
+        known = at_edge & (rise > 0.0) & (rise < np.inf)  # infinite beyond a roller's end
+        young = known & (outer < 0.5 * inner)
+        part = 1.0 + np.where(known & ~young, np.clip(crossed, 0.0, 0.5), 0.0)
+        own[..., :-3] = np.where(young, (inner + outer) / 1.5, inner)
+        own[..., 1:-2] /= part
     return np.asarray(np.sqrt(square.max(axis=-1) / np.where(most > 0.0, most, 1.0)))
 
 
