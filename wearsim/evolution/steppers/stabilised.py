@@ -103,10 +103,12 @@ class StabilisedStepper(StepDoublingStepper):
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the step of the step-size control, limited where there is a groove.
 
-        The width of a groove grows as the cubic root of the passes.
+        The width of a groove grows as the cubic root of the passes. Without the separation of the
+        surfaces, the pressure at the edge is uncertain for any step.
         """
         found = super().proposed(problem, state)
-        if self.forced_step is not None or not np.count_nonzero(state.passes):
+        known = state.contacts.separation is not None and np.count_nonzero(state.passes) > 0
+        if self.forced_step is not None or not known:
             return found
         loaded = np.count_nonzero(problem.values_of(state.contacts, "line_load"), axis=-1)
         longest = 6.0 * ADVANCE * state.passes / loaded.max(axis=(0, 1))
