@@ -124,7 +124,7 @@ def _edge_peaks(
         width = spacing * np.pi * np.sqrt(2.0 * crown_radius * (worn + elastic)) * pressure / force
         in_groove = worn / (worn + elastic)
     peak = ABRUPT_EDGE * np.maximum(1.0 - layer, 0.0) * in_groove * np.minimum(width, 1.0)
-    return np.nan_to_num(peak).reshape(shape)
+    return np.asarray(np.nan_to_num(peak).reshape(shape))
 
 
 def _greatest_of_last(passes: FloatArray, errors: FloatArray) -> FloatArray:

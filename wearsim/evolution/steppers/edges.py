@@ -30,7 +30,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.loads import descents, elastic_approaches, with_feedback
+from wearsim.evolution.steppers.loads import with_feedback
 from wearsim.evolution.steppers.single_step import carried_loads
 from wearsim.mechanics.numerics.edge_strips import (
     SETTLED,
@@ -173,7 +173,11 @@ def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
 
 def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
     """Return which tests have worn to a groove, whose contacts slip."""
-    worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
+    least = problem.gap(*state.depths).min(axis=-1)
+    worn, elastic = (
+        least - problem.nominal_least_gap,
+        problem.values_of(state.contacts, "approach") - least,
+    )
     adhering = problem.values_of(state.contacts, "adhesion_fraction").max(axis=(0, 1))
     deep = sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
     return np.asarray(deep & (adhering <= MOST_ADHESION))

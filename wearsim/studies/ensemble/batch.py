@@ -369,9 +369,13 @@ def add_strip_errors(
             fresh, crown = np.zeros((3, 1)), problem.crown_radius
             assert course.grid is not None
             stated = observed_errors(
-                *(other, np.append(0.0, passes), observed),
-                *(np.concatenate([fresh, part], axis=1) for part in (sizes, by_strips)),
-                *(None if crown is None else crown[:, number], course.grid.spacing),
+                other,
+                np.append(0.0, passes),
+                observed,
+                np.concatenate([fresh, sizes], axis=1),
+                np.concatenate([fresh, by_strips], axis=1),
+                None if crown is None else crown[:, number],
+                course.grid.spacing,
             )
             added[number] = errors, {name: values[-1] for name, values in stated.items()}
             result.scalars["depth_error"] += float(errors[0])

@@ -205,7 +205,7 @@ class RunInProgress:
         profiles = [record[f"{body}_depth_profile"][:, 0] for body in ("cylinder", "roller")]
         end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
         errors = strip_errors(coarse, passes, np.array(sizes), end)
-        crown, spacing = problem.crown_radius, problem.grid.spacing
+        crown, spacing = first.crown_radius, problem.grid.spacing
         self.recorder.strip_errors = errors
         self.recorder.observed_errors = observed_errors(
             *(coarse, passes, self.recorder.observed, np.array(sizes), errors),
