@@ -123,7 +123,8 @@ class ImplicitStepper(StepDoublingStepper):
         if self._resolves(problem, state):
             return edges.with_unresolved_edges(problem, state)
         # local errors do not find those of a lower order in single strips
-        return edges.with_whole_strips(problem, state) if _varies(problem) else state
+        counted = _varies(problem) and not problem.has_nodes
+        return edges.with_whole_strips(problem, state) if counted else state
 
     def _resolves(self, problem: WearProblem, state: WearState) -> bool:
         """Return whether edges of contacts are resolved; step doubling compares whole strips."""
