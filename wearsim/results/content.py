@@ -6,7 +6,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -321,6 +321,18 @@ class StudyResult(Viewed, Generic[Data]):
         return parse_scenario(
             self.raw.scenario_text, self.raw.scenario_file, self.raw.files.__getitem__
         )
+
+    def with_scenario(self, scenario: Scenario) -> Self:
+        """Return the result with the scenario it was computed from, which is not parsed again.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            It is not used if it has another text than the stored one, or values of one draw.
+        """
+        if scenario.text == self.raw.scenario_text and not scenario.drawn:
+            vars(self)["scenario"] = scenario
+        return self
 
     @property
     def title(self) -> str:
