@@ -1,7 +1,7 @@
 """Optimisation against a closed form, bisection and grids, as Markdown tables.
 
 ``python -m tests.benchmarks.optimisation -o out/optimisation.json --grid out/cam-grid.json`` runs
-the 400 lives of a grid, which are kept in its file: the same command goes on with a stopped one.
+the 400 lives of a grid, which are kept in its file: the same command continues a stopped one.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def cam_grid(points: int, realisations: int, kept: Path | None = None) -> list[d
     """Return the designs of a grid of the cam with their B10 and limited quantities in SI.
 
     Every design is run, also those beyond a limit. What is known of a grid is kept in a file, with
-    which a stopped measurement goes on.
+    which a stopped measurement continues.
     """
     scenario = cam_scenario()
     about = {"scenario": scenario.text, "points": points, "realisations": realisations}

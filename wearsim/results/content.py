@@ -329,6 +329,16 @@ class StudyResult(Viewed, Generic[Data]):
         ----------
         scenario : Scenario
             It is not used if it has another text than the stored one, or values of one draw.
+
+        Returns
+        -------
+        StudyResult
+
+        Examples
+        --------
+        >>> scenario = wearsim.load_scenario("rig.toml")
+        >>> wearsim.run(scenario).scenario is scenario
+        True
         """
         if scenario.text == self.raw.scenario_text and not scenario.drawn:
             vars(self)["scenario"] = scenario

@@ -227,8 +227,8 @@ def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
             height = 0.04 * float(np.ptp(mark.y)) * y.scale / longest
             tail_x, tail_y = np.ravel(mark.x) * x.scale, np.ravel(mark.y) * y.scale
             tips = tail_x + width * np.ravel(mark.along_x), tail_y + height * np.ravel(mark.along_y)
-            ends = {"x": tail_x, "y": tail_y, "tip_x": tips[0], "tip_y": tips[1]}
-            data = _source(plot, _single(ends))
+            places = {"x": tail_x, "y": tail_y, "tip_x": tips[0], "tip_y": tips[1]}
+            data = _source(plot, _single(places))
             plot.segment("x", "y", "tip_x", "tip_y", source=data, **style)
         case Patch():
             data = _source(plot, _single({"x": mark.x * x.scale, "y": mark.y * y.scale}))
@@ -389,10 +389,10 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
     mapper.nan_color = "rgba(0, 0, 0, 0)"
     extent = {"x": float(across[0] * x.scale), "y": float(up[0] * y.scale)}
     extent |= {"dw": float(np.ptp(across) * x.scale), "dh": float(np.ptp(up) * y.scale)}
-    columns = {"image": [values.astype(np.float32)]}
-    columns |= {name: [place] for name, place in extent.items()}
-    names = dict(zip(columns, columns, strict=True))
-    picture = plot.image(**names, source=_source(plot, columns), color_mapper=mapper)
+    drawn: dict[str, Any] = {"image": [values.astype(np.float32)]}
+    drawn |= {name: [place] for name, place in extent.items()}
+    names = dict(zip(drawn, drawn, strict=True))
+    picture = plot.image(**names, source=_source(plot, drawn), color_mapper=mapper)
     bar = ColorBar(color_mapper=mapper, width=12, title=plain_label(mark.axis.label))
     bar.title_text_font_style = "normal"
     plot.add_layout(bar, "right")
