@@ -54,6 +54,7 @@ bench-docs: $(VENV)/.installed-dev
 	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
 	$(BIN)/wearsim bench stated-errors --tests 400 --seed 2026 --references out/references -j $$(nproc) -o out/bench --force \
 		&& cp out/bench/stated-errors.json $(MEASURED)
+	$(BIN)/wearsim bench random --tests 300 --seed 5 -j $$(nproc) -o out/bench --force && cp out/bench/random.json $(MEASURED)
 	-$(BIN)/wearsim bench --hard -o out/bench --force
 	cp out/bench/hard.json $(MEASURED)
 	$(BIN)/python -m tests.benchmarks.report -o $(MEASURED)/report.json

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 from wearsim.errors import ScenarioError
@@ -9,7 +10,7 @@ from wearsim_bench.measure.measurement import Measurement
 from wearsim_bench.random.invariants import measured
 from wearsim_bench.stated_errors.random_tests import RandomTest
 
-MOST_TRIALS = 60  # scenarios that are tried for each reproducer
+MOST_SECONDS = 120.0  # process time after which no further change is left out
 
 
 def smallest(test: RandomTest, row: Measurement) -> RandomTest:
@@ -24,12 +25,11 @@ def smallest(test: RandomTest, row: Measurement) -> RandomTest:
     row : Measurement
         Its failed measurement, whose setting is the invariant.
     """
-    trials, reduced = 0, True
+    begin, reduced = time.process_time(), True
     while reduced:
         reduced = False
         for key in list(test.changes):
-            trials += 1
-            if trials > MOST_TRIALS:
+            if time.process_time() - begin > MOST_SECONDS:
                 return test
             less = {name: value for name, value in test.changes.items() if name != key}
             simpler = replace(test, changes=less)
