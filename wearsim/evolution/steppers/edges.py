@@ -14,6 +14,10 @@ crossed the part f of the strip, the surfaces are in contact at the depth
 
 where u_0 is the depth when the edge reached the strip: l = u - s, and du = f dl. A step with the
 formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear of the strip.
+
+Where edges are not resolved, as under loads that vary, strips are in contact or not as wholes. Past
+points of the depth of a strip that has just come into contact lie before the corner, so that it
+takes steps of first order there too.
 """
 
 from __future__ import annotations
@@ -24,7 +28,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState
-from wearsim.evolution.steppers.loads import descents, elastic_approaches, with_feedback
+from wearsim.evolution.steppers.loads import with_feedback
 from wearsim.evolution.steppers.single_step import carried_loads
 from wearsim.mechanics.numerics.edge_strips import SETTLED
 from wearsim.mechanics.numerics.jit import kernel_input
@@ -66,6 +70,16 @@ def without_edges(problem: WearProblem, state: WearState) -> WearState:
     return state.replaced(**fields, past_sums=sums)
 
 
+def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
+    """Return a state that counts for how many steps each strip has been in contact as a whole."""
+    assert state.past_sums is not None
+    assert state.past_wear is not None
+    loaded = state.contacts.line_load.reshape(*problem.shape, problem.grid.strips) > 0.0
+    sums = np.concatenate([state.past_wear.sum(axis=-1), state.past_sums[:, -1:]], axis=1)
+    counts = np.where(loaded, SETTLED, 0.0)
+    return state.replaced(separation=None, part=1.0 * loaded, whole_steps=counts, past_sums=sums)
+
+
 def unresolved(state: WearState) -> BoolArray:
     """Return which tests do not resolve edges, of a state with `FIELDS`."""
     assert state.part is not None
@@ -79,7 +93,7 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
     elasticity, then gives the contact its shape. Where strips now reach the end of a roller, edges
     are never resolved any more. Tests that cease take a step of first order.
     """
-    if state.part is None:
+    if state.separation is None:
         return state
     assert state.order is not None
     assert state.past_sums is not None
@@ -103,22 +117,30 @@ def _unloaded(problem: WearProblem, state: WearState) -> BoolArray | None:
     return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))
 
 
+def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
+    """Return which tests have worn to a groove, whose contacts slip."""
+    least = problem.gap(*state.depths).min(axis=-1)
+    worn, elastic = (
+        least - problem.nominal_least_gap,
+        problem.values_of(state.contacts, "approach") - least,
+    )
+    adhering = problem.values_of(state.contacts, "adhesion_fraction").max(axis=(0, 1))
+    deep = sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
+    return np.asarray(deep & (adhering <= MOST_ADHESION))
+
+
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
     """Return a state in which tests that have worn to a groove resolve edges."""
     shape = (*problem.shape, problem.grid.strips)
     assert state.contacts.separation is not None
     assert state.past_sums is not None
     assert state.past_wear is not None
-    worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
-    groove = sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
-    begins = whole & groove
+    begins = whole & have_groove(problem, state)
     if not np.count_nonzero(begins):
         return state
     separation = state.contacts.separation.reshape(shape)
     begins &= ~np.isnan(separation).any(axis=(0, 1, 3))
-    adhering = problem.values_of(state.contacts, "adhesion_fraction")
-    begins &= adhering.max(axis=(0, 1)) <= MOST_ADHESION
-    if not begins.any():
+    if not np.count_nonzero(begins):
         return state
     loaded = state.contacts.line_load.reshape(shape) > 0.0
     found = {

@@ -80,8 +80,11 @@ class ImplicitStepper(StepDoublingStepper):
         state = with_rates(problem, state)
         # step doubling compares whole strips
         doubled = self.by_doubling or self.forced_step is not None
-        resolves = not doubled and edges.resolves_edges(problem, state.contacts)
-        return edges.without_edges(problem, state) if resolves else state
+        if not doubled and edges.resolves_edges(problem, state.contacts):
+            return edges.without_edges(problem, state)
+        # local errors do not find those of a lower order in single strips
+        counted = _varies(problem) and not problem.has_nodes
+        return edges.with_whole_strips(problem, state) if counted else state
 
     def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the length of the first step, shape (realisations,) [passes]."""
@@ -91,9 +94,8 @@ class ImplicitStepper(StepDoublingStepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step, estimate its error, and choose order and length of the next one."""
-        varies = problem.constant_load is None or len(problem.varying) > 0
         # local errors miss peaks of a load
-        if varies or self.by_doubling or self.forced_step is not None:
+        if _varies(problem) or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
         end = scheme(problem, state, step)
         end = with_pass_errors(problem, state, end, end, scheme, step)
@@ -208,6 +210,11 @@ class ImplicitStepper(StepDoublingStepper):
         return implicit_step
 
 
+def _varies(problem: WearProblem) -> bool:
+    """Return whether load or inputs vary in time."""
+    return problem.constant_load is None or len(problem.varying) > 0
+
+
 def with_rates(problem: WearProblem, state: WearState) -> WearState:
     """Return a state without past points, and with the rates of wear and energy of its contacts."""
     times = problem.time(state.passes)
@@ -265,7 +272,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     except (StepError, ContactError) as error:
         # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
         # on which the contact is not found; strips that are not cut are the simpler problem
-        whole = state.part is None or bool(edges.unresolved(state).all())
+        whole = state.separation is None or bool(edges.unresolved(state).all())
         last = order[0] == 1 and whole
         if len(order) > 1 or last or getattr(error, "cause", "") == "edge":
             raise

@@ -13,7 +13,7 @@ from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.conditions import Conditions
-from wearsim.evolution.steppers.edges import FIELDS
+from wearsim.evolution.steppers.edges import FIELDS, have_groove
 from wearsim.evolution.steppers.loads import (
     APPROACH_EXPONENT,
     advanced_terms,
@@ -105,16 +105,14 @@ class Past(NamedTuple):
         realisations, contacts = len(order), len(state.contacts)
         if feedback is None:
             feedback = np.empty((ROWS, 0, realisations, 1))
-        edges = _EDGES(state)
-        if edges[1] is None:
-            edges = (np.empty((contacts, 0)),) * 3
+        none = np.empty((contacts, 0))
         return cls(
             wear,
             sums.reshape(ROWS, -1, realisations, 1),
             feedback.reshape(ROWS, -1, realisations, 1),
             spans,
             order,
-            *(one.reshape(contacts, -1) for one in edges),
+            *(none if one is None else one.reshape(contacts, -1) for one in _EDGES(state)),
         )
 
 
@@ -155,6 +153,9 @@ def step_by_formula(
     def wear_of(contacts: ContactBatchSolution) -> FloatArray:
         return problem.wear_parts(contacts, 1.0).reshape(2, *shape)
 
+    in_groove = np.zeros(len(passes), dtype=np.bool_)
+    if past.part.size and not past.separation.size:  # strips in contact as wholes are counted
+        in_groove = have_groove(problem, state)
     # line loads and wear about which the wear is linearised
     line_load, wear = contacts.line_load, wear_of(contacts)
     begun = begin_step(
@@ -175,6 +176,7 @@ def step_by_formula(
         past.separation,
         past.part,
         past.whole_steps,
+        in_groove,
     )
     worn_passes, half_pass, spans, scale, level, added, base, guess, sums, feedback = begun[:10]
     resolved, first, rise, greatest, contact_depth = begun[10:]
@@ -194,7 +196,9 @@ def step_by_formula(
         solved = solve_compliant(problem, batch, compliance, contacts, active)
         iterations += active
         new, apart = wear_of(solved), solved.separation
-        apart = past.separation if apart is None or not past.part.size else kernel_input(apart)
+        apart = (
+            past.separation if apart is None or not past.separation.size else kernel_input(apart)
+        )
         linear: tuple[Any, ...] = (gaps, slopes, compliance, constant)
         found: tuple[Any, ...] = (solved.line_load, apart, new, worn_passes, scale, most, active)
         worn, (rest, opening, depth) = compare_step(*of_step, *about, *linear, *found)
@@ -225,15 +229,15 @@ def step_by_formula(
             line_load, wear = solved.line_load, new
         else:  # strips at an edge enter and leave the contact in turn
             line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
-    found = (past.whole_steps, share, contacts.line_load, new, worn, worn_passes, half_pass, spans)
-    energy = energy_per_pass(problem, contacts)
-    rates: tuple[Any, ...] = (scale, level, sums, loads.feedback, energy)
-    past_rates: tuple[Any, ...] = (past.wear, past.sums, past.feedback)
-    ends, fields, *differences, dissipated, decreased = end_step(
-        *of_step, *found, *rates, *past_rates
-    )
+    feedback, energy = loads.feedback, energy_per_pass(problem, contacts)
+    given: tuple[Any, ...] = (past.separation, past.whole_steps, share, contacts.line_load, new)
+    given += worn, worn_passes, half_pass, spans, scale, level, sums, feedback, energy
+    given += past.wear, past.sums, past.feedback
+    ends, fields, *differences, dissipated, decreased = end_step(*of_step, *given)
     by_contact = *problem.shape, strips
     edges = dict(zip(FIELDS, fields.reshape(-1, *by_contact), strict=False))
+    if not past.separation.size:
+        edges["separation"] = None
     past_wear, past_sums, past_feedback = differences
     if loads.vary:
         edges["past_feedback"] = past_feedback.reshape(ROWS, *problem.shape)

@@ -287,6 +287,7 @@ def compare_edges(
 @subroutine
 def end_edges(
     strips: EdgeStrips,
+    counted: bool,
     whole_steps: FloatArray,
     level: FloatArray,
     loads: FloatArray,
@@ -301,6 +302,8 @@ def end_edges(
     Parameters
     ----------
     strips : EdgeStrips
+    counted : bool
+        Whether strips in contact as wholes are counted, where no test resolves edges.
     whole_steps : ndarray, shape (contacts, strips)
         As in `WearState`, at the start of the step.
     level, loads : ndarray, shape (contacts, strips)
@@ -329,6 +332,11 @@ def end_edges(
             if not strips.resolved[v]:
                 for field in range(len(fields)):
                     fields[field, k, i] = np.nan
+                if counted:
+                    fields[1, k, i] = 1.0 if loads[k, i] > 0.0 else 0.0
+                    fields[2, k, i] = fields[1, k, i] * min(whole_steps[k, i] + 1.0, SETTLED)
+                    for b in (one, other):
+                        parts[b, v, i] = max(parts[b, v, i], fields[1, k, i])
                 continue
             _, grown, joint = by_others(strips, wear, sums, k, i)
             before, part, growth = strips.part[k, i], 0.0, 0.0
@@ -426,11 +434,11 @@ def mark_strips(
 
 
 @subroutine
-def resolved_tests(part: FloatArray, realisations: int) -> BoolArray:
-    """Return which tests resolve edges: the parts of the others are not numbers, or missing."""
+def resolved_tests(separation: FloatArray, part: FloatArray, realisations: int) -> BoolArray:
+    """Return which tests resolve edges: the parts of the others are not numbers, or all whole."""
     resolved = np.empty(realisations, np.bool_)
     for v in range(realisations):
-        resolved[v] = part.shape[1] > 0 and not np.isnan(part[v, 0])
+        resolved[v] = separation.shape[1] > 0 and not np.isnan(part[v, 0])
     return resolved
 
 

@@ -50,6 +50,7 @@ def begin_step(
     separation: FloatArray,
     part: FloatArray,
     whole_steps: FloatArray,
+    in_groove: BoolArray,
 ) -> tuple[Any, ...]:
     """Return the formula of a step for all bodies and contacts.
 
@@ -73,6 +74,8 @@ def begin_step(
         Wear of both bodies per pass at the start; overwritten with that by the formula [m].
     separation, part, whole_steps : ndarray, shape (contacts, strips or 0)
         As in `WearState`.
+    in_groove : ndarray of bool, shape (realisations,)
+        Tests in a groove, where strips in contact as wholes are counted: there is no separation.
 
     Returns
     -------
@@ -105,12 +108,15 @@ def begin_step(
     formulas(spans, lengths, orders, half_pass, weights, factor, distances)
     for v in range(realisations):
         worn_passes[v] = factor[v] / exposure[v] - half_pass[v]
-    resolved = resolved_tests(part, realisations)
+    resolved = resolved_tests(separation, part, realisations)
+    marked = np.empty(realisations, np.bool_)
+    for v in range(realisations):
+        marked[v] = resolved[v] or in_groove[v]
     shape = depths.shape
     young, crossed = np.empty(shape, np.bool_), np.empty(shape, np.bool_)
     scale, level, base = np.empty(shape), np.empty(shape), np.empty(shape)
     greatest = np.empty(shape)
-    mark_strips(bodies, resolved, part, whole_steps, orders, past_wear[0], young, crossed, scale)
+    mark_strips(bodies, marked, part, whole_steps, orders, past_wear[0], young, crossed, scale)
     fill_separations(bodies, resolved, separation, share, level)
     added, guess = extrapolated(weights, past_wear)
     for b in range(rows):
@@ -310,6 +316,7 @@ def end_step(
     rise: FloatArray,
     greatest: FloatArray,
     contact_depth: FloatArray,
+    separation: FloatArray,
     whole_steps: FloatArray,
     share: FloatArray,
     loads: FloatArray,
@@ -339,7 +346,7 @@ def end_step(
         As in `begin_step`.
     contact_depth, loads, wear, worn
         Of the solution, from `compare_step`.
-    whole_steps, share, past_wear, past_sums, past_feedback
+    separation, whole_steps, share, past_wear, past_sums, past_feedback
         As in `begin_step`.
     worn_passes, half_pass, distances, scale, level, sums
         From `begin_step`.
@@ -367,9 +374,9 @@ def end_step(
     )
     shape = depths.shape
     ends, parts, rates, change = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    contacts, strips_of_edges = part.shape
-    fields = np.empty((3 if strips_of_edges > 0 else 0, contacts, strips_of_edges))
-    end_edges(strips, whole_steps, contact_depth, loads, wear, worn, ends, parts, fields)
+    fields = np.empty((3 if part.shape[1] > 0 else 0, part.shape[0], part.shape[1]))
+    counted = part.shape[1] > separation.shape[1]
+    end_edges(strips, counted, whole_steps, contact_depth, loads, wear, worn, ends, parts, fields)
     sum_rates = np.empty(sums.shape)
     for b in range(rows):
         for v in range(realisations):
@@ -382,7 +389,7 @@ def end_step(
             if b < len(sums) - 1:
                 sum_rates[b, v, 0] = total
                 sums[b, v, 0] += worn_passes[v] * total
-                if resolved[v] and width > 0.0:
+                if (resolved[v] or counted) and width > 0.0:
                     missing = (sums[b, v, 0] - grown) / width
                     for i in range(n):
                         ends[b, v, i] += missing * parts[b, v, i]
@@ -393,13 +400,17 @@ def end_step(
         sums[last, v, 0] += worn_passes[v] * energy[v]
         dissipated[v] = sums[last, v, 0]
         decreased[v] = dissipated[v] < 0.0
-    if len(fields) > 0:
+    for b in range(rows):
+        for v in range(realisations):
+            for i in range(n):
+                change[b, v, i] = 0.0
+    if separation.shape[1] > 0:
         fill_separations(bodies, resolved, fields[0], share, change)
     for b in range(rows):
         for v in range(realisations):
             for i in range(n):
                 decreased[v] = decreased[v] or ends[b, v, i] < depths[b, v, i]
-                if resolved[v]:
+                if resolved[v] or counted:
                     change[b, v, i] = ends[b, v, i] - change[b, v, i] - level[b, v, i]
                 else:
                     change[b, v, i] = added[b, v, i] + worn[b, v, i]
@@ -420,7 +431,7 @@ def compile_implicit_step() -> None:
     past, sums, spans = np.ones((ROWS, 2, 1, 1)), np.ones((ROWS, 1, 1, 1)), np.ones((ROWS - 1, 1))
     start = begin_step(
         *(spans, order, one, one, one, past, sums, sums, rows, bodies, strip, one, wear, one),
-        *(strip, strip, strip),
+        *(strip, strip, strip, np.ones(1, np.bool_)),
     )
     worn_passes, half_pass, distances, scale, level, added, base, _, totals, feedback = start[:10]
     resolved, first, rise, greatest, depth = start[10:]
@@ -432,7 +443,7 @@ def compile_implicit_step() -> None:
         *(worn_passes, scale, 1.0, resolved),
     )
     end_step(
-        *(*strips, strip, one, strip, wear, worn, worn_passes, half_pass, distances, scale),
+        *(*strips, strip, strip, one, strip, wear, worn, worn_passes, half_pass, distances, scale),
         *(level, totals, feedback, one, past, sums, sums),
     )
 

@@ -142,7 +142,7 @@ def assess_step(
     """
     rows, realisations, n = depths.shape
     most, next_orders = np.empty(realisations, np.int64), np.empty(realisations, np.int64)
-    resolved = resolved_tests(part, realisations)
+    resolved = resolved_tests(part, part, realisations)
     young, crossed = np.empty(depths.shape, np.bool_), np.empty(depths.shape, np.bool_)
     parts, own = np.empty(depths.shape), np.empty(depths.shape)
     mark_strips(bodies, resolved, part, whole_steps, orders, past_wear[0], young, crossed, parts)
