@@ -102,8 +102,9 @@ def count_whole_strips(
     rows, parts = problem.body_rows, np.zeros_like(end.stacked)
     loaded = 1.0 * (end.contacts.line_load.reshape(start.whole_steps.shape) > 0.0)
     each = loaded.reshape(len(rows), *parts.shape[1:])
-    for side in (0, 1):
-        np.maximum.at(parts, rows[:, side], each)
+    for of_bodies, one in zip(rows.tolist(), each, strict=True):
+        for body in of_bodies:
+            np.maximum(parts[body], one, out=parts[body])
     counts = loaded * np.minimum(start.whole_steps + 1.0, SETTLED)
     return end.replaced(part=loaded, whole_steps=counts), parts
 
