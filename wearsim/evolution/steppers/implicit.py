@@ -140,8 +140,8 @@ class ImplicitStepper(StepDoublingStepper):
     ) -> Attempt:
         """Take a step, estimate its error, and choose order and length of the next one."""
         state = edges.on_strips(problem, state)
-        if state.part is None and self._resolves(problem, state):
-            state = edges.with_unresolved_edges(problem, state)
+        if state.separation is None and self._resolves(problem, state):
+            state = edges.with_unresolved_edges(problem, edges.without_edges(state))
         if state.separation is None:
             return self._attempt(problem, state, step, stop, scheme)
         attempts, places = [], []
