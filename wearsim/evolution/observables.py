@@ -227,9 +227,10 @@ def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
         own, ahead = square[..., side], apart[..., side]
         inner, outer, free = own[..., :-3], own[..., 1:-2], own[..., 2:-1]
         at_edge = (outer > 0.0) & (free == 0.0) & several
-        rise = ahead[..., 3:] - ahead[..., 2:-1]
-        crossed = 0.5 - ahead[..., 2:-1] / np.where(rise > 0.0, rise, np.inf)
-        known = at_edge & (rise > 0.0) & (rise < np.inf)  # infinite beyond a roller's end
+        with np.errstate(invalid="ignore"):  # infinite beyond the end of a roller
+            rise = ahead[..., 3:] - ahead[..., 2:-1]
+            known = at_edge & (rise > 0.0) & (rise < np.inf)
+            crossed = 0.5 - ahead[..., 2:-1] / np.where(known, rise, 1.0)
         young = known & (outer < 0.5 * inner)
         part = 1.0 + np.where(known & ~young, np.clip(crossed, 0.0, 0.5), 0.0)
         own[..., :-3] = np.where(young, (inner + outer) / 1.5, inner)
