@@ -97,6 +97,10 @@ class ImplicitStepper(StepDoublingStepper):
         # local errors miss peaks of a load
         if _varies(problem) or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
+        # counted as wholes beside tests that vary, which have left the batch
+        whole = state.separation is None and state.part is not None
+        if whole and edges.resolves_edges(problem, state.contacts):
+            state = edges.without_edges(problem, state)
         end = scheme(problem, state, step)
         end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
