@@ -254,6 +254,17 @@ class WearProblem:
             return False
         return bool(((bend > 0.0) & (bend < UNEVEN * np.median(bend, -1, keepdims=True))).all())
 
+    @property
+    def crown_radius(self) -> FloatArray | None:
+        """Relative radius of the crowns of roller and cylinder, (contacts, realisations) [m].
+
+        None for cams, for rollers with several contacts, and where the gap is not that of crowns.
+        """
+        if self.shape[0] > 1 or self.has_nodes or not self.has_crowned_gap:
+            return None
+        bend = np.median(np.diff(self.nominal_gap, 2, axis=-1), axis=-1)
+        return np.asarray(np.broadcast_to(self.grid.spacing**2 / bend[0], self.shape[1:]))
+
     @cached_property
     def spin(self) -> FloatArray:
         """Spin of every contact, shape (contacts, realisations) [1/m]."""

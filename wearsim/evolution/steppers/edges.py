@@ -14,6 +14,10 @@ crossed the part f of the strip, the surfaces are in contact at the depth
 
 where u_0 is the depth when the edge reached the strip: l = u - s, and du = f dl. A step with the
 formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear of the strip.
+
+Where edges are not resolved, as under loads that vary, strips are in contact or not as wholes. Past
+points of the depth of a strip that has just come into contact lie before the corner, so that it
+takes steps of first order there too.
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.loads import descents, elastic_approaches, with_feedback
+from wearsim.evolution.steppers.loads import with_feedback
 from wearsim.evolution.steppers.single_step import carried_loads
 from wearsim.mechanics.numerics.edge_strips import (
     SETTLED,
@@ -80,9 +84,33 @@ def without_edges(state: WearState) -> WearState:
     return state.replaced(**dict.fromkeys(FIELDS), past_sums=sums)
 
 
+def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
+    """Return a state that counts for how many steps each strip has been in contact as a whole."""
+    assert state.past_sums is not None
+    assert state.past_wear is not None
+    loaded = state.contacts.line_load.reshape(*problem.shape, problem.grid.strips) > 0.0
+    sums = np.concatenate([over_strips(state.past_wear), state.past_sums[:, -1:]], axis=1)
+    counts = np.where(loaded, SETTLED, 0.0)
+    return state.replaced(separation=None, part=1.0 * loaded, whole_steps=counts, past_sums=sums)
+
+
+def count_whole_strips(
+    problem: WearProblem, start: WearState, end: WearState
+) -> tuple[WearState, FloatArray]:
+    """Return the end of a step of `with_whole_strips`, and `Solved.parts`."""
+    assert start.whole_steps is not None
+    rows, parts = problem.body_rows, np.zeros_like(end.stacked)
+    loaded = 1.0 * (end.contacts.line_load.reshape(start.whole_steps.shape) > 0.0)
+    each = loaded.reshape(len(rows), *parts.shape[1:])
+    for side in (0, 1):
+        np.maximum.at(parts, rows[:, side], each)
+    counts = loaded * np.minimum(start.whole_steps + 1.0, SETTLED)
+    return end.replaced(part=loaded, whole_steps=counts), parts
+
+
 def on_strips(problem: WearProblem, state: WearState) -> WearState:
     """Return a state without edges, of first order, where strips now reach the end of a roller."""
-    if state.part is None or problem.has_crowned_gap:
+    if state.separation is None or problem.has_crowned_gap:
         return state
     assert state.order is not None
     return without_edges(state).replaced(order=np.ones_like(state.order))
@@ -143,18 +171,26 @@ def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
     return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))
 
 
+def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
+    """Return which tests have worn to a groove, whose contacts slip."""
+    least = problem.gap(*state.depths).min(axis=-1)
+    worn, elastic = (
+        least - problem.nominal_least_gap,
+        problem.values_of(state.contacts, "approach") - least,
+    )
+    adhering = problem.values_of(state.contacts, "adhesion_fraction").max(axis=(0, 1))
+    deep = sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
+    return np.asarray(deep & (adhering <= MOST_ADHESION))
+
+
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
     """Return a state in which tests that have worn to a groove resolve edges."""
     shape = (*problem.shape, problem.grid.strips)
     assert state.contacts.separation is not None
     assert state.past_sums is not None
     assert state.past_wear is not None
-    worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
     separation = state.contacts.separation.reshape(shape)
-    begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3))
-    adhering = problem.values_of(state.contacts, "adhesion_fraction")
-    begins &= adhering.max(axis=(0, 1)) <= MOST_ADHESION
-    begins &= sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
+    begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3)) & have_groove(problem, state)
     if not begins.any():
         return state
     loaded = state.contacts.line_load.reshape(shape) > 0.0
@@ -227,7 +263,7 @@ def edges_of_step(
 
 def most(state: WearState) -> int:
     """Return the greatest order of steps from a state."""
-    return MAX_ORDER if state.part is None else EDGE_ORDER
+    return MAX_ORDER if state.separation is None else EDGE_ORDER
 
 
 class MarkedStrips(NamedTuple):
@@ -262,16 +298,23 @@ class MarkedStrips(NamedTuple):
         return np.where(self.young, YOUNG * self.parts, self.parts)
 
 
-def marked_strips(state: WearState) -> MarkedStrips | None:
-    """Return the strips of a state about the edges, None where edges are not resolved."""
+def marked_strips(problem: WearProblem, state: WearState) -> MarkedStrips | None:
+    """Return the strips of a state about the edges; None where there is no groove."""
     if state.whole_steps is None or state.part is None or state.past_wear is None:
         return None
     assert state.order is not None
+    in_groove = None
+    if state.separation is None:  # edges are not resolved
+        in_groove = have_groove(problem, state)
+        if not in_groove.any():
+            return None
     wear = kernel_input(state.past_wear[0])
     young, crossed = np.empty((2, *wear.shape), dtype=np.bool_)
     marked = MarkedStrips(young, crossed, np.empty_like(wear))
     steps = (YOUNG_STEPS * state.order).astype(np.float64)
     mark_strips(kernel_input(state.part), kernel_input(state.whole_steps), steps, wear, *marked)
+    if in_groove is not None:
+        np.logical_and(young, in_groove[:, None], out=young)
     return marked
 
 

@@ -120,8 +120,11 @@ class ImplicitStepper(StepDoublingStepper):
         if state.past_spans is not None:
             return state
         state = with_rates(problem, state)
-        resolved = self._resolves(problem, state)
-        return edges.with_unresolved_edges(problem, state) if resolved else state
+        if self._resolves(problem, state):
+            return edges.with_unresolved_edges(problem, state)
+        # local errors do not find those of a lower order in single strips
+        counted = _varies(problem) and not problem.has_nodes
+        return edges.with_whole_strips(problem, state) if counted else state
 
     def _resolves(self, problem: WearProblem, state: WearState) -> bool:
         """Return whether edges of contacts are resolved; step doubling compares whole strips."""
@@ -139,12 +142,12 @@ class ImplicitStepper(StepDoublingStepper):
         state = edges.on_strips(problem, state)
         if state.part is None and self._resolves(problem, state):
             state = edges.with_unresolved_edges(problem, state)
-        if state.part is None:
+        if state.separation is None:
             return self._attempt(problem, state, step, stop, scheme)
         attempts, places = [], []
         for some, here, start in edges.by_resolution(problem, state):
             tried = self._attempt(here, start, step[some], stop, scheme)
-            if tried.path[-1].part is None:
+            if tried.path[-1].separation is None:
                 ends = tuple(edges.with_unresolved_edges(here, end) for end in tried.path)
                 tried = replace(tried, path=ends)
             attempts.append(tried)
@@ -155,19 +158,18 @@ class ImplicitStepper(StepDoublingStepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step in tests that all resolve edges or all do not."""
-        varies = problem.constant_load is None or len(problem.varying) > 0
         # local errors miss peaks of a load
-        if varies or self.by_doubling or self.forced_step is not None:
+        if _varies(problem) or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
         end = scheme(problem, state, step)
-        if end.part is not None and edges.unresolved(end).all():
+        if end.separation is not None and edges.unresolved(end).all():
             end = edges.without_edges(end)
         end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
         past, depths = Past.of(end), end.stacked
         own, order = np.empty_like(depths), np.empty_like(past.order)
         left = self._left(problem, state, stop, OF_STEPS)
-        marked = edges.marked_strips(end)
+        marked = None if end.separation is None else edges.marked_strips(problem, end)
         parts = np.ones_like(depths) if marked is None else marked.weights
         part, aim = (passes / stop) ** PART_EXPONENT / left, SHARE * self.tolerance
         over, ratio = next_steps(
@@ -260,6 +262,11 @@ class ImplicitStepper(StepDoublingStepper):
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
         return implicit_step
+
+
+def _varies(problem: WearProblem) -> bool:
+    """Return whether load or inputs vary in time."""
+    return problem.constant_load is None or len(problem.varying) > 0
 
 
 def _estimates(
@@ -377,9 +384,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     if state.past_spans is None:
         state = with_rates(problem, state)
     state = edges.on_strips(problem, state)
-    if state.part is not None:
+    if state.separation is not None:
         parts = edges.by_resolution(problem, state)
-        if len(parts) > 1 or parts[0][2].part is None:
+        if len(parts) > 1 or parts[0][2].separation is None:
             ends = [_split_step(*part, passes) for part in parts]
             order = np.argsort(np.concatenate([some for some, _, _ in parts]))
             return joined_states(ends).at(order)
@@ -394,11 +401,11 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     except (StepError, ContactError) as error:
         # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
         # on which the contact is not found; strips that are not cut are the simpler problem
-        last = order[0] == 1 and state.part is None
+        last = order[0] == 1 and state.separation is None
         if len(order) > 1 or last or getattr(error, "cause", "") == "edge":
             raise
         first = np.ones_like(order)
-        if state.part is None:
+        if state.separation is None:
             return _step(here, state, passes, conditions, first)[0]
         whole = edges.without_edges(state)
         return edges.with_unresolved_edges(here, _step(here, whole, passes, conditions, first)[0])
@@ -418,7 +425,7 @@ def _split_step(
 ) -> WearState:
     """Return the end of a step of some tests, see `edges.by_resolution`."""
     end = implicit_step(problem, state, passes[places])
-    return edges.with_unresolved_edges(problem, end) if state.part is None else end
+    return edges.with_unresolved_edges(problem, end) if state.separation is None else end
 
 
 def _step(
@@ -440,7 +447,7 @@ def _step(
     formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
     added, guess = extrapolated(weights, past.wear)
-    scale, marked = None, edges.marked_strips(state)
+    scale, marked = None, edges.marked_strips(problem, state)
     if marked is not None:
         young = marked.young
         added = np.where(young, half_pass[:, None] * past.wear[0], added)
@@ -457,6 +464,8 @@ def _step(
         problem, state, level + added, added, conditions.force, passes, worn_passes, scale
     )
     end, worn, feedback, parts = step.solved(level + guess, feedback)
+    if state.separation is None and state.part is not None:
+        end, parts = edges.count_whole_strips(problem, state, end)
     rates, change = worn / worn_passes[:, None], added + worn
     rates = rates if scale is None else rates / scale
     energy_rate = energy_per_pass(problem, end.contacts)
@@ -466,7 +475,9 @@ def _step(
         end = edges.with_volume(
             end, parts, sums[:-1, :, 0] - edges.over_strips(end.stacked - start)
         )
-        change = end.stacked - edges.separated_bodies(problem, end) - level
+        change = end.stacked - level
+        if end.separation is not None:
+            change = change - edges.separated_bodies(problem, end)
     past_feedback = None
     if feedback is not None:
         new = feedback.reshape(-1, realisations, 1)

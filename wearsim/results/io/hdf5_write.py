@@ -257,11 +257,9 @@ def _stored_as(array: Array) -> dict[str, Any]:
     for length, most in zip(array.shape, (CHUNK_ROWS, *array.shape[1:]), strict=True):
         chunks.append(max(min(length, most, left), 1))
         left //= chunks[-1]
-    is_text = array.dtype.kind == "S" and len(array) > 1  # mostly empty
     return {
         "chunks": tuple(chunks),
         "fletcher32": True,
-        "compression": "gzip" if is_text else None,
         "fillvalue": np.nan if array.dtype.kind == "f" else None,
     }
 

@@ -23,6 +23,7 @@ from wearsim.atomic_write import (
     refuse_if_locked,
 )
 from wearsim.results.content import Array, Arrays
+from wearsim.results.io.stored_file import StoredFile
 from wearsim.studies.ensemble.file.data import EnsembleData, Outcome, StoredRows
 from wearsim.studies.ensemble.file.parts import (
     NUMBER,
@@ -300,7 +301,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
                 self._copy_rows(file, start, start + hdf5_write.CHUNK_ROWS)
                 check()
             if complete is not None:
-                rows = StoredRows(lambda take: take(file), header.schema, [])
+                rows = StoredRows(lambda take: take(StoredFile(file)), header.schema, [])
                 merged = replace(header, variables=rows, status=self._status.copy())
                 fields, statistics = complete(merged)
                 for name, array in statistics.items():
