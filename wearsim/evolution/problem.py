@@ -36,7 +36,7 @@ _CONSTANTS = (
     *("shape", "body_rows", "volume_weights", "nominal_least_gap", "cylinder_share", "has_spring"),
     *("constant_load", "pauses", "greatest_load", "_wear_coefficients"),
 )
-_OF_GAP = "nominal_gap", "nominal_least_gap", "has_crowned_gap"
+_OF_GAP = "nominal_gap", "contact_gap", "nominal_least_gap", "has_crowned_gap"
 
 
 @dataclass(frozen=True)
@@ -239,6 +239,23 @@ class WearProblem:
         if self.tilt_shifts and self.inputs.tilt.any():
             gap = gap + self.inputs.tilt[:, :, None] * self.from_apex[self.roller]
         return gap
+
+    @cached_property
+    def contact_gap(self) -> FloatArray:
+        """`nominal_gap` of all contacts as an array of its own, shape (contacts, strips) [m]."""
+        shape = *self.shape, self.grid.strips
+        return np.array(np.broadcast_to(self.nominal_gap, shape)).reshape(-1, shape[-1])
+
+    @cached_property
+    def contact_stiffness(self) -> FloatArray:
+        """Loss of load per descent of each roller, 0 without springs, (contacts,) [N/m]."""
+        stiffness = self.stiffness if self.has_spring else np.zeros(())
+        return np.array(np.broadcast_to(stiffness, self.shape)).ravel()
+
+    @cached_property
+    def contact_wear_share(self) -> FloatArray:
+        """`cylinder_wear_share` of the first station, shape (realisations,)."""
+        return np.array(self.cylinder_wear_share[: self.shape[2], 0])
 
     @cached_property
     def has_crowned_gap(self) -> bool:

@@ -40,6 +40,8 @@ Kind: TypeAlias = Literal["static", "history", "record", "statistic"]
 CHECKPOINT, INPUTS = "checkpoint", "inputs"
 #: Texts in the group of the inputs: the attributes, the scenario and its files.
 ABOUT, SCENARIO, FILES = "about", "scenario", "files"
+#: Attribute of an array of which a stored chunk has zeros only.
+ZEROS = "zeros"
 ERRORS = "surrogatepass"  # so that every Python string can be stored
 Array: TypeAlias = npt.NDArray[Any]
 Arrays: TypeAlias = dict[str, Array]
@@ -120,6 +122,11 @@ class Schema:
     holds: str
     axes: Mapping[str, Axis]
     variables: Mapping[str, Variable]
+
+
+def only_zeros(array: Array) -> bool:
+    """Return whether an array holds zeros or empty texts only."""
+    return not (array != b"" if array.dtype.kind == "S" else array).any()
 
 
 def with_random_inputs(schema: Schema, inputs: Sequence[Mapping[str, str]]) -> Schema:
