@@ -34,6 +34,7 @@ from wearsim_bench.random.transformations import (
 from wearsim_bench.stated_errors.study import (
     CLEAR,
     QUANTITIES,
+    SLOW,
     SMALL,
     STATED,
     stated,
@@ -42,7 +43,7 @@ from wearsim_bench.stated_errors.study import (
 
 _UNITS = ("_m", "_m3", "_J", "_W", "_N", "_Pa")  # of numbers in JSON
 EXCESS = "excess"  # count of a measurement: the deviation over what is allowed
-SECONDS = 60.0  # limit on the process time of one run
+SECONDS = 30.0  # limit on the process time of one run
 ROUND_OFF = 1e-9  # of balances, and of values without a stated error
 IN_UNITS = 0.1  # part of the stated error by which scaled and mirrored tests may differ
 REALISATIONS = 3  # of a batch
@@ -359,7 +360,8 @@ def measured(name: str, scenario: Scenario, row: Measurement) -> Measurement:
     -------
     Measurement
         With the count `EXCESS` where the invariant applies, and the true and stated errors of the
-        last one; failed if the limit is exceeded; with a remark if a run ends with a clear error.
+        last one; failed if the limit is exceeded; with a remark if a run ends with a clear error, or
+        one that the scenario is compared with takes longer than `SECONDS`.
     """
     row = replace(row, setting=name)
     with TemporaryDirectory() as folder:
@@ -370,6 +372,10 @@ def measured(name: str, scenario: Scenario, row: Measurement) -> Measurement:
             return row
         except WearsimError as error:
             return replace(row, remark=CLEAR + failure_reason(error))
+        except TimeoutError as error:
+            if name != next(iter(INVARIANTS)):  # another run than that of the scenario
+                return replace(row, remark=SLOW + failure_reason(error))
+            return replace(row, failed=failure_reason(error))
         except Exception as error:
             return replace(row, failed=failure_reason(error))
     counts = {EXCESS: excess, "tolerance": scenario.evolution.tolerance}

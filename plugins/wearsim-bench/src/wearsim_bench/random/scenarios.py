@@ -191,7 +191,7 @@ def _form(draws: Draws, _base: str) -> None:
 def _stepper(draws: Draws, _base: str) -> None:
     stepper = draws.choice({"stabilised": 0.5, "explicit": 0.3, "per-pass": 0.2})
     draws.changes["evolution.stepper"] = stepper
-    _end_at(draws, MOST_PER_PASS if stepper == "per-pass" else MOST_PER_PASS * 100)
+    _end_at(draws, MOST_PER_PASS if stepper == "per-pass" else MOST_PER_PASS * 10)
 
 
 def _third_body(draws: Draws, _base: str) -> None:
