@@ -360,8 +360,8 @@ def measured(name: str, scenario: Scenario, row: Measurement) -> Measurement:
     -------
     Measurement
         With the count `EXCESS` where the invariant applies, and the true and stated errors of the
-        last one; failed if the limit is exceeded; with a remark if a run ends with a clear error, or
-        one that the scenario is compared with takes longer than `SECONDS`.
+        last one; failed if the limit is exceeded; with a remark if a run ends with a clear error,
+        or one that the scenario is compared with takes longer than `SECONDS`.
     """
     row = replace(row, setting=name)
     with TemporaryDirectory() as folder:
