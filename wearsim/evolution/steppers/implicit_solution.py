@@ -78,8 +78,10 @@ class _Slope:
         return self._exponent
 
 
-_PAST = attrgetter("past_wear", "past_sums", "past_feedback", "past_spans", "order")
-_EDGES = attrgetter("separation", "part", "whole_steps")
+_PAST = attrgetter(
+    *("past_wear", "past_sums", "past_feedback", "past_spans", "order"),
+    *("separation", "part", "whole_steps"),
+)
 
 
 class Past(NamedTuple):
@@ -101,18 +103,22 @@ class Past(NamedTuple):
     @classmethod
     def of(cls, state: WearState) -> Past:
         """Return those of a state of the implicit stepper."""
-        wear, sums, feedback, spans, order = _PAST(state)
-        realisations, contacts = len(order), len(state.contacts)
+        wear, sums, feedback, spans, order, *edges = _PAST(state)
+        realisations, contacts = len(order), len(state.contacts.power)
         if feedback is None:
-            feedback = np.empty((ROWS, 0, realisations, 1))
-        none = np.empty((contacts, 0))
+            feedback = np.empty((ROWS, 0, realisations))
+        if edges[1] is None:
+            edges = [np.empty((contacts, 0))] * len(edges)
+        separation, part, whole_steps = edges
         return cls(
             wear,
             sums.reshape(ROWS, -1, realisations, 1),
             feedback.reshape(ROWS, -1, realisations, 1),
             spans,
             order,
-            *(none if one is None else one.reshape(contacts, -1) for one in _EDGES(state)),
+            np.empty((contacts, 0)) if separation is None else separation.reshape(contacts, -1),
+            part.reshape(contacts, -1),
+            whole_steps.reshape(contacts, -1),
         )
 
 
