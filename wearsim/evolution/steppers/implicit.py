@@ -24,7 +24,11 @@ from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step, joined_attempts
 from wearsim.evolution.steppers.conditions import Conditions, conditions_of, exposure
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
-from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
+from wearsim.evolution.steppers.load_errors import (
+    next_steps_of_energy,
+    next_steps_of_loads,
+    unloading,
+)
 from wearsim.evolution.steppers.loads import (
     abrupt_loads,
     with_feedback,
@@ -183,6 +187,11 @@ class ImplicitStepper(StepDoublingStepper):
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
         over = over * left  # it shortens the next step
+        of_energy, their_order = next_steps_of_energy(
+            state, end, self.tolerance, KEEP, edges.most(end)
+        )
+        order = np.where(of_energy[1] < ratio, their_order, order)
+        over, ratio = np.maximum(over, of_energy[0]), np.minimum(ratio, of_energy[1])
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
