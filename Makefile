@@ -57,7 +57,7 @@ bench-docs: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.first_contact --readme -o $(MEASURED)/first-contact.json
 	$(BIN)/python -m tests.benchmarks.models -o $(MEASURED)/models.json
 	$(BIN)/python -m tests.benchmarks.model_choice -o $(MEASURED)/model-choice.json
-	$(BIN)/python -m tests.benchmarks.optimisation -o $(MEASURED)/optimisation.json
+	$(BIN)/python -m tests.benchmarks.optimisation -o $(MEASURED)/optimisation.json --grid out/cam-grid.json
 	$(BIN)/python -m tests.benchmarks.axial_profiles -o $(MEASURED)/axial-profiles.json
 
 bench: $(VENV)/.installed-dev
