@@ -66,7 +66,7 @@ def measured(wheel: Path) -> dict[str, Any]:
         size = (folder / "rig.png").stat().st_size
     return {
         "date": date.today().isoformat(),
-        "machine": f"{platform.system()}, {os.cpu_count()} cores, Python {platform.python_version()}",
+        "machine": f"{os.cpu_count()} cores, Python {platform.python_version()}",
         "steps": rows,
         "figure_bytes": size,
     }
