@@ -59,6 +59,7 @@ bench-docs: $(VENV)/.installed-dev
 	cp out/bench/hard.json $(MEASURED)
 	$(BIN)/python -m tests.benchmarks.report -o $(MEASURED)/report.json
 	$(BIN)/python -m tests.benchmarks.exploring -o $(MEASURED)/explore.json
+	$(BIN)/python -m tests.benchmarks.first_contact --readme -o $(MEASURED)/first-contact.json
 	$(BIN)/python -m tests.benchmarks.models -o $(MEASURED)/models.json
 	$(BIN)/python -m tests.benchmarks.model_choice -o $(MEASURED)/model-choice.json
 	$(BIN)/python -m tests.benchmarks.optimisation -o $(MEASURED)/optimisation.json --grid out/cam-grid.json

@@ -25,7 +25,7 @@ from wearsim.scenario.parse.random_inputs import validate
 from wearsim.units import ANGLE, VOLUME, QuantityError, as_written
 from wearsim.uq.sampling.sampler import GaussianCopula
 
-DEFAULT_TOLERANCE = 1e-3
+DEFAULT_TOLERANCE, LEAST_TOLERANCE = 1e-3, 1e-7
 DEFAULT_RECORDS = 20
 LARGEST_ANGLE = 0.1  # rad; slip and shift are linear in the angles
 #: keys that hold one value for all rollers, or one per roller
@@ -150,9 +150,10 @@ class EvolutionTable(Options):
     )
     tolerance: float = Field(
         default=DEFAULT_TOLERANCE,
-        gt=0.0,
+        ge=LEAST_TOLERANCE,
         le=0.1,
-        description="Relative error of the final depth and volume.",
+        description="Relative error of the final depth and volume; contacts are solved to 1e-8,"
+        " which is not enough for a lower tolerance.",
     )
     step: int | None = Field(default=None, gt=0, description="Fixed step size, in roller passes.")
     allow_unstable: bool = Field(
