@@ -124,7 +124,7 @@ class Page:
             self._timer.cancel()
 
     def end(self) -> None:
-        """Tell the browser that the server ends: its websocket may stay open in a notebook."""
+        """Say that the server ends, since a websocket of a notebook may stay open."""
         self._reply(ended=True)
 
     # what is asked on the page
