@@ -66,8 +66,8 @@ def test_ensemble_of_this_layout_opens(name):
 @pytest.mark.parametrize(
     ("name", "layout"),
     [
-        ("run", 8),
-        ("dissipation", 1),
+        ("run", 9),
+        ("dissipation", 2),
         ("ensemble", 2),
     ],
 )

@@ -52,6 +52,26 @@ def test_array_of_which_nothing_is_stored_is_refused_by_its_size(run_file):
     assert _error_of(run_file).startswith("(checkpoint/depth is given as 8e+12 bytes, and the file")
 
 
+@pytest.mark.parametrize("name", ["cylinder_depth_profile", "inputs/scenario"])
+def test_block_of_zeros_has_a_right_checksum_and_is_damage(run_file, name):
+    with h5py.File(run_file) as file:
+        chunk = file[name].id.get_chunk_info(0)
+        size = chunk.size
+    content = bytearray(run_file.read_bytes())
+    content[chunk.byte_offset : chunk.byte_offset + size] = bytes(size)
+    run_file.write_bytes(content)
+    with h5py.File(run_file) as file:
+        assert not np.any(file[name][()].view(np.uint8))
+    assert _error_of(run_file) == f"({name} has a block of zeros, which was not written)"
+
+
+def test_array_of_zeros_is_no_damage(tmp_path):
+    data = some_run()
+    data.records["cylinder_depth_profile"][:] = 0.0
+    write_results(tmp_path / "run.h5", data)
+    assert not read_results(tmp_path / "run.h5").records["cylinder_depth_profile"].any()
+
+
 def test_field_of_another_type_is_refused(tmp_path):
     write_results(tmp_path / "run.h5", some_run(warnings=["narrow", 3]))
     assert _error_of(tmp_path / "run.h5") == "(warnings is a list of unknown content)"

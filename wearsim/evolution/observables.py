@@ -179,6 +179,7 @@ def clearance(problem: WearProblem, state: WearState) -> FloatArray:
 
 
 LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
+LEAST_STRIPS = 8  # in contact, of which the outermost do not carry the greatest pressure by chance
 STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
 
 
@@ -221,13 +222,15 @@ def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
     load, half, apart = (problem.values_of(state.contacts, name) for name in names)
     square = np.square(load / np.where(half > 0.0, half, np.inf))
     most = square.max(axis=-1)
+    several = (load > 0.0).sum(axis=-1, keepdims=True) >= LEAST_STRIPS
     for side in (slice(None), slice(None, None, -1)):
         own, ahead = square[..., side], apart[..., side]
         inner, outer, free = own[..., :-3], own[..., 1:-2], own[..., 2:-1]
-        at_edge = (outer > 0.0) & (free == 0.0)
-        rise = ahead[..., 3:] - ahead[..., 2:-1]
-        crossed = 0.5 - ahead[..., 2:-1] / np.where(rise > 0.0, rise, np.inf)
-        known = at_edge & (rise > 0.0) & (rise < np.inf)  # infinite beyond a roller's end
+        at_edge = (outer > 0.0) & (free == 0.0) & several
+        with np.errstate(invalid="ignore"):  # infinite beyond the end of a roller
+            rise = ahead[..., 3:] - ahead[..., 2:-1]
+            known = at_edge & (rise > 0.0) & (rise < np.inf)
+            crossed = 0.5 - ahead[..., 2:-1] / np.where(known, rise, 1.0)
         young = known & (outer < 0.5 * inner)
         part = 1.0 + np.where(known & ~young, np.clip(crossed, 0.0, 0.5), 0.0)
         own[..., :-3] = np.where(young, (inner + outer) / 1.5, inner)

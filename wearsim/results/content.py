@@ -13,7 +13,6 @@ from typing import (
     ClassVar,
     Generic,
     Literal,
-    Self,
     TypeAlias,
     TypeVar,
     Union,
@@ -40,6 +39,8 @@ Kind: TypeAlias = Literal["static", "history", "record", "statistic"]
 CHECKPOINT, INPUTS = "checkpoint", "inputs"
 #: Texts in the group of the inputs: the attributes, the scenario and its files.
 ABOUT, SCENARIO, FILES = "about", "scenario", "files"
+#: Attribute of an array of which a stored chunk has zeros only.
+ZEROS = "zeros"
 ERRORS = "surrogatepass"  # so that every Python string can be stored
 Array: TypeAlias = npt.NDArray[Any]
 Arrays: TypeAlias = dict[str, Array]
@@ -120,6 +121,11 @@ class Schema:
     holds: str
     axes: Mapping[str, Axis]
     variables: Mapping[str, Variable]
+
+
+def only_zeros(array: Array) -> bool:
+    """Return whether an array holds zeros or empty texts only."""
+    return not (array != b"" if array.dtype.kind == "S" else array).any()
 
 
 def with_random_inputs(schema: Schema, inputs: Sequence[Mapping[str, str]]) -> Schema:
@@ -373,28 +379,6 @@ class StudyResult(Viewed, Generic[Data]):
             raise ResultsFileError(
                 f"{self.path}: its scenario has mistakes: {first}{more}"
             ) from error
-
-    def with_scenario(self, scenario: Scenario) -> Self:
-        """Return the result with the scenario it was computed from, which is not parsed again.
-
-        Parameters
-        ----------
-        scenario : Scenario
-            It is not used if it has another text than the stored one, or values of one draw.
-
-        Returns
-        -------
-        StudyResult
-
-        Examples
-        --------
-        >>> scenario = wearsim.load_scenario("rig.toml")
-        >>> wearsim.run(scenario).scenario is scenario
-        True
-        """
-        if scenario.text == self.raw.scenario_text and not scenario.drawn:
-            vars(self)["scenario"] = scenario
-        return self
 
     @property
     def title(self) -> str:

@@ -21,7 +21,11 @@ from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.conditions import Conditions, conditions_of, exposure
 from wearsim.evolution.steppers.implicit_solution import Past, step_by_formula
-from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
+from wearsim.evolution.steppers.load_errors import (
+    next_steps_of_energy,
+    next_steps_of_loads,
+    unloading,
+)
 from wearsim.evolution.steppers.loads import (
     abrupt_loads,
     with_feedback,
@@ -97,6 +101,10 @@ class ImplicitStepper(StepDoublingStepper):
         # local errors miss peaks of a load
         if _varies(problem) or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
+        # counted as wholes beside tests that vary, which have left the batch
+        whole = state.separation is None and state.part is not None
+        if whole and edges.resolves_edges(problem, state.contacts):
+            state = edges.without_edges(problem, state)
         end = scheme(problem, state, step)
         end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
@@ -134,6 +142,12 @@ class ImplicitStepper(StepDoublingStepper):
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
+        of_energy, their_order = next_steps_of_energy(
+            state, end, self.tolerance, KEEP, edges.most(end)
+        )
+        order = np.where(of_energy[1] < ratio, their_order, order)
+        # the error so far shortens the next step
+        over, ratio = np.maximum(over * left, of_energy[0]), np.minimum(ratio, of_energy[1])
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
@@ -145,7 +159,7 @@ class ImplicitStepper(StepDoublingStepper):
             profile_error=estimates[2],
             **others,
         )
-        return Attempt((end,), over * left, ratio)  # the error so far shortens the next step
+        return Attempt((end,), over, ratio)
 
     def _attempt_doubled(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step

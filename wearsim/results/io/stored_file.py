@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.results.content import ERRORS, Array
+from wearsim.results.content import ERRORS, ZEROS, Array, only_zeros
 
 if TYPE_CHECKING:
     import h5py
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 #: Memory that arrays may take beyond the size of the file [bytes]: rows that are not yet written.
 SPARE = 1 << 28
 _LONGEST = 1 << 16  # bytes of an attribute
+_ZEROED = "{} has a block of zeros, which was not written"
 
 
 class StoredFile:
@@ -130,7 +131,10 @@ class StoredFile:
         # a chunk is read as a whole
         least = math.prod(dataset.chunks) if dataset.chunks and numbers else 0
         self._claim(name, max(numbers, least) * dataset.dtype.itemsize, SPARE)
-        return np.asarray(dataset[chosen])
+        found = np.asarray(dataset[chosen])
+        if dataset.chunks and numbers and ZEROS not in dataset.attrs:
+            _check_zeros(name, dataset, chosen, found)
+        return found
 
     def text(self, name: str) -> str:
         """Read a text written by `hdf5_write.put_text`.
@@ -147,6 +151,8 @@ class StoredFile:
             raise ValueError(f"{name} is no text")
         self._claim(name, dataset.dtype.itemsize, 0)
         content: bytes = dataset[:].tobytes()  # a single element would lose zeros at its end
+        if len(content) > 1 and not content.strip(b"\0"):
+            raise ValueError(_ZEROED.format(name))
         return content[:-1].decode("utf-8", ERRORS)
 
     def _claim(self, name: str, size: int, spare: int) -> None:
@@ -177,6 +183,24 @@ def _check_link(folder: Any, last: bytes, name: str) -> None:
         raise KeyError(f"lacks {name}")
     if folder.links.get_info(last).type != h5l.TYPE_HARD:
         raise ValueError(f"{name} is a link to another place")
+
+
+def _check_zeros(name: str, dataset: h5py.Dataset, chosen: tuple[slice, ...], found: Array) -> None:
+    """Raise a ValueError if a stored chunk of an array that should have none has zeros only."""
+    shape, lengths = dataset.shape, dataset.chunks
+    region = [slice(*part.indices(length)) for part, length in zip(chosen, shape, strict=False)]
+    region += [slice(0, length) for length in shape[len(region) :]]
+    starts = [part.start for part in region]
+    for block in dataset.iter_chunks(tuple(region)):
+        part = tuple(slice(b.start - s, b.stop - s) for b, s in zip(block, starts, strict=True))
+        if not only_zeros(found[part]):
+            continue
+        corner = tuple(b.start // length * length for b, length in zip(block, lengths, strict=True))
+        if dataset.id.get_chunk_info_by_coord(corner).byte_offset is None:
+            continue  # rows that are not yet written
+        chunk = tuple(slice(c, c + length) for c, length in zip(corner, lengths, strict=True))
+        if only_zeros(dataset[chunk]):
+            raise ValueError(_ZEROED.format(name))
 
 
 def _is_plain(kind: Any) -> bool:

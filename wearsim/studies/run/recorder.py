@@ -44,7 +44,7 @@ MOST_WAITING = 200_000  # strips of all contacts of the states that wait to be o
 _NOT_OBSERVED = dict.fromkeys(
     (
         *("coarse_step_solution", "half_quadrature_solution", "wear_exponents", "past_wear"),
-        *("separation", "whole_steps", "past_sums", "past_feedback", "stepping_error"),
+        *("whole_steps", "past_sums", "past_feedback", "stepping_error"),
     )
 )
 

@@ -302,8 +302,8 @@ def optimum(
 ) -> tuple[Design, bool]:
     """Search; return the best of all designs, and whether the search has converged.
 
-    A neighbour that is better than the optimum becomes the optimum, and the search continues from it
-    as far as designs are left.
+    A neighbour that is better than the optimum becomes the optimum, and the search continues from
+    it as far as designs are left.
 
     Parameters
     ----------

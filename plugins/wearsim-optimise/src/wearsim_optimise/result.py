@@ -19,7 +19,7 @@ from wearsim_optimise.variables import Variable, from_table, overrides
 
 AXES = {"design": Axis("design", "evaluated design")}
 BASE = Schema(
-    "wearsim-optimisation", 1, "designs of an optimisation, from `wearsim optimise`", AXES, {}
+    "wearsim-optimisation", 2, "designs of an optimisation, from `wearsim optimise`", AXES, {}
 )
 STATUS = ("evaluated", "before wear", "infeasible", "failed")
 
