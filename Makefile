@@ -7,6 +7,7 @@
 # make bench-ensembles the same of persistence, ensembles and intervals of lives; a quarter of an hour
 # make validate        published tests compared: out/validation, docs/measurements/validation.json; less than two minutes
 # make docs            the site: docs/_build/html/index.html; three minutes, no network; make linkcheck looks at external links
+# make release         all distributions as sdist and wheel in dist/, checked, installed in empty environments; SBOM; ten minutes
 # make clean           remove what these targets made, including the environment
 
 PYTHON ?= python3
@@ -14,7 +15,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test test-slow style lint bench bench-docs bench-ensembles validate docs linkcheck clean
+.PHONY: demo test test-slow style lint bench bench-docs bench-ensembles validate docs linkcheck release clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -55,7 +56,7 @@ bench-docs: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.exploring -o $(MEASURED)/explore.json
 	$(BIN)/python -m tests.benchmarks.models -o $(MEASURED)/models.json
 	$(BIN)/python -m tests.benchmarks.model_choice -o $(MEASURED)/model-choice.json
-	$(BIN)/python -m tests.benchmarks.optimisation -o $(MEASURED)/optimisation.json
+	$(BIN)/python -m tests.benchmarks.optimisation -o $(MEASURED)/optimisation.json --grid out/cam-grid.json
 	$(BIN)/python -m tests.benchmarks.axial_profiles -o $(MEASURED)/axial-profiles.json
 
 bench: $(VENV)/.installed-dev
@@ -79,6 +80,22 @@ docs: $(VENV)/.installed-dev
 
 linkcheck: $(VENV)/.installed-dev
 	$(BIN)/python -m sphinx -q -b linkcheck -D nb_execution_mode=off -d docs/_build/linkcheck/doctrees docs docs/_build/linkcheck
+
+# uploaded is what is in dist/, by the workflow release.yml; the SBOM is of wearsim with its newest dependencies
+SBOM := out/release
+release: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[release]'
+	$(BIN)/python release/version.py --check
+	rm -rf dist $(SBOM) && mkdir -p $(SBOM)
+	for folder in . $(filter-out plugins/wearsim-template,$(patsubst %/pyproject.toml,%,$(wildcard plugins/*/pyproject.toml))); do \
+		$(BIN)/python -m build --outdir dist $$folder || exit 1; done
+	$(BIN)/twine check --strict dist/*
+	$(BIN)/check-wheel-contents --ignore W004 dist/*.whl
+	WEARSIM_DIST=dist $(BIN)/pytest -m slow tests/test_installs.py
+	$(PYTHON) -m venv --without-pip $(SBOM)/venv
+	$(BIN)/python -m pip --python $(SBOM)/venv/bin/python install --quiet dist/wearsim-[0-9]*.whl
+	$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --of JSON -o $(SBOM)/wearsim.cdx.json $(SBOM)/venv/bin/python
+	rm -rf $(SBOM)/venv
 
 # the stamps record what the environment holds; a change of any pyproject.toml renews it
 $(VENV)/bin/python:

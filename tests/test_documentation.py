@@ -81,6 +81,15 @@ def test_examples_of_the_guide_run_as_scripts(number: int, tmp_path: Path):
         assert done.returncode == 0, done.stderr
 
 
+def test_example_of_deprecation_runs(tmp_path: Path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, ["new", "scenario", "rig.toml"]).exit_code == 0
+    (code,) = blocks((ROOT / "docs" / "compatibility.md").read_text(encoding="utf-8"), "python")
+    short = code.replace('"rig.toml", {', '"rig.toml", {"operation.duration": "1 min", ')
+    exec(short, {})
+    assert capsys.readouterr().out.strip() == code.rpartition("# ")[2].strip()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_bits_that_are_claimed_are_those_of_numbers(page: Path):
     text = " ".join(page.read_text(encoding="utf-8").split())

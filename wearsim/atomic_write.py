@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import errno
 import os
-import struct
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
+from wearsim import operating_system
 from wearsim.errors import ResultsFileError
 
 #: Added to the name of a file while its new content is written.
@@ -45,13 +45,7 @@ class Storage:
 
     def synchronise_folder(self, folder: Path) -> None:
         """Wait until the names in a folder are on the disk."""
-        if os.name == "nt":  # Windows cannot open folders
-            return
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
+        operating_system.synchronise_folder(folder)
 
     def remove(self, path: Path) -> None:
         """Delete a file, if it exists."""
@@ -110,9 +104,6 @@ def os_errors_converted(path: str | Path) -> Iterator[None]:
 def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
     """Lock an open file until it is closed or the process ends.
 
-    Where available, the lock belongs to the open file description (OFD): HDF5 uses the other
-    kind, flock, when it opens a file for reading.
-
     Parameters
     ----------
     file : binary file
@@ -127,7 +118,7 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
     """
     busy = ResultsFileError(f"{path}: is being written by another process")
     try:
-        _lock(file.fileno())
+        operating_system.lock_file(file.fileno())
     except OSError as error:
         if error.errno in {errno.EAGAIN, errno.EACCES}:
             raise busy from error
@@ -165,21 +156,6 @@ def refuse_if_locked(path: str | Path) -> None:
     if os.access(lock, os.R_OK | os.W_OK):
         with lock.open("r+b", buffering=0) as file:
             lock_or_refuse(file, path)
-
-
-def _lock(handle: int) -> None:
-    if os.name == "nt":  # a lock would block readers on Windows
-        return
-    import fcntl  # noqa: PLC0415  (not on every system)
-
-    if hasattr(fcntl, "F_OFD_SETLK"):
-        whole = struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
-        fcntl.fcntl(handle, fcntl.F_OFD_SETLK, whole)
-    else:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-# suffixes of figures, scenarios and tables, which are refused for results files
 
 
 def refuse_inputs(

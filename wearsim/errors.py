@@ -20,6 +20,13 @@ def described(error: BaseException) -> str:
     return "; ".join(lines)
 
 
+def printable(text: str) -> str:
+    """Return a text with control characters as escape sequences, which a terminal would obey."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
+
+
 class WearsimError(Exception):
     """Base class of the errors raised by wearsim.
 
@@ -50,6 +57,7 @@ class WearsimError(Exception):
     exit_code = 1
 
     def __init__(self, message: str = "", *, python: str = "", shell: str = "") -> None:
+        message, python, shell = printable(message), printable(python), printable(shell)
         self.message = message
         self.at_shell = f"{message}; {shell}" if shell else message
         super().__init__(f"{message}; {python}" if python else message)

@@ -1,13 +1,14 @@
 """Optimisation against a closed form, bisection and grids, as Markdown tables.
 
-``python -m tests.benchmarks.optimisation -o out/optimisation.json`` runs lives on a grid.
+``python -m tests.benchmarks.optimisation -o out/optimisation.json --grid out/cam-grid.json`` runs
+the 400 lives of a grid, which are kept in its file: the same command continues a stopped one.
 """
 
 from __future__ import annotations
 
 import argparse
 import itertools
-import math
+import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 
 import wearsim
 from tests.benchmarks.table import save_tables
+from wearsim.report.page.page import save_text
 from wearsim_bench.figures.table import markdown_table
 from wearsim_optimise.api import optimise
 
@@ -31,9 +33,7 @@ RIG = {
     "limit.depth": "50 um",
 }
 DEPTH, WIDTH, EVALUATIONS = 50e-6, 14e-3, 25
-#: the cam of `scenarios/cam-optimise.toml` with one random input, which one test integrates
-CAM = {"load.preload": "250 N", "friction.coefficient": 0.1, "creepage.yaw": "1 mrad"}
-CAM_RUNS = 40
+CAM_REALISATIONS = 8
 #: fewer strips do not resolve the pressure at the end of a roller with a small drop
 FINE, STRIPS = 485, (125, 245, 485, 965)
 FORM = "roller.axial_profile"
@@ -82,56 +82,70 @@ def crowns() -> list[list[str]]:
     return rows
 
 
-def cam_grid(points: int) -> tuple[list[tuple[float, float]], list[float], int]:
-    """Return the designs of a grid of the cam at the limits, their B10, and the number of lives.
+def cam_scenario(changes: dict[str, Any] | None = None) -> wearsim.Scenario:
+    """Return the cam of the example, without variables of another search."""
+    return wearsim.load_scenario(SCENARIOS / "cam-optimise.toml", changes or {})
 
-    Life, width and outer radius grow with both variables, and the pressure falls with them. In each
-    row of equal base radius the best design within the limits is therefore the one with the
-    greatest crown radius whose groove is narrow enough, which is found by bisection.
+
+def cam_grid(points: int, realisations: int, kept: Path | None = None) -> list[dict[str, float]]:
+    """Return the designs of a grid of the cam with their B10 and limited quantities in SI.
+
+    Every design is run, also those beyond a limit. What is known of a grid is kept in a file, with
+    which a stopped measurement continues.
     """
-    scenario = wearsim.load_scenario(SCENARIOS / "cam-optimise.toml", CAM)
+    scenario = cam_scenario()
+    about = {"scenario": scenario.text, "points": points, "realisations": realisations}
+    rows: list[dict[str, float]] = []
+    if kept is not None and kept.exists():
+        read = json.loads(kept.read_text(encoding="utf-8"))
+        rows = read["rows"] if read["about"] == about else []
+    bases = np.linspace(25.0, 50.0, points).tolist()
     crowns_mm = np.geomspace(200.0, 2000.0, points).tolist()
-    designs, lives, runs = [], [], 0
-    for base in np.linspace(25.0, 50.0, points).tolist():
-        low, high, best = -1, points, math.nan
-        while high - low > 1:
-            middle = (low + high) // 2
-            values = {"cam.base_radius": f"{base!r} mm"}
-            values["roller.crown_radius"] = f"{crowns_mm[middle]!r} mm"
-            tried = scenario.changed(values)
-            before = wearsim.study_cam(tried).view.answers()
-            if before["outer_radius"].value > 50e-3:
-                break
-            runs, found = runs + 1, wearsim.life(tried, 1, scheduler="serial").view.answers()
-            if found["width"].value > 22e-3:
-                high = middle
-                continue
-            low = middle
-            if before["peak_pressure"].value <= 700e6:
-                best = found["b10"].value
-        if not math.isnan(best):
-            designs.append((base, crowns_mm[low]))
-            lives.append(best)
-    return designs, lives, runs
+    for base, crown in list(itertools.product(bases, crowns_mm))[len(rows) :]:
+        values = {"cam.base_radius": f"{base!r} mm", "roller.crown_radius": f"{crown!r} mm"}
+        tried = scenario.changed(values)
+        before = wearsim.study_cam(tried).view.answers()
+        after = wearsim.life(tried, realisations, scheduler="serial").view.answers()
+        found = {name: before[name].value for name in ("outer_radius", "peak_pressure")}
+        found |= {name: after[name].value for name in ("width", "b10")}
+        rows.append({"base": base, "crown": crown, **found})
+        if kept is not None:
+            save_text(json.dumps({"about": about, "rows": rows}) + "\n", kept)
+    return rows
 
 
-def cams(points: int, evaluations: int = CAM_RUNS) -> list[list[str]]:
+def best_of_grid(rows: Sequence[dict[str, float]]) -> tuple[dict[str, float], int]:
+    """Return the design with the greatest B10 within the limits, and how many are within them."""
+    limits = {"outer_radius": 50e-3, "peak_pressure": 700e6, "width": 22e-3}
+    within = [row for row in rows if all(row[name] <= value for name, value in limits.items())]
+    return max(within, key=lambda row: row["b10"]), len(within)
+
+
+def cams(
+    points: int, kept: Path | None = None, realisations: int = CAM_REALISATIONS
+) -> list[list[str]]:
     """Return the row of the cam: the best of grid and search, and runs until 0.998 of it."""
-    scenario = wearsim.load_scenario(SCENARIOS / "cam-optimise.toml", CAM)
-    designs, lives, lives_run = cam_grid(points)
-    best = int(np.argmax(lives))
-    options: dict[str, Any] = {"evaluations": evaluations, "confirm": False}
-    found = optimise(scenario, realisations=1, scheduler="serial", **options)
+    best, within = best_of_grid(cam_grid(points, realisations, kept))
+    found = optimise(
+        cam_scenario(),
+        realisations=realisations,
+        evaluations=points**2 // 10,
+        confirm=False,
+        scheduler="serial",
+    )
     used, reached = 0, 0
     for design in found.designs:
         used += design.purpose in {"start", "search"} and design.is_evaluated
-        good = design.is_feasible and design.values["life.b10"] >= 0.998 * lives[best]
+        good = design.is_feasible and design.values["life.b10"] >= 0.998 * best["b10"]
         reached = reached or (used if good else 0)
-    at_best = ", ".join(f"{number:.1f} mm" for number in designs[best])
-    chosen = ", ".join(f"{number:.1f} mm" for number in found.best.numbers)
+    at_best = f"{best['base']:.1f} mm, {best['crown']:.0f} mm"
+    chosen = ", ".join(
+        variable.shown(number)
+        for variable, number in zip(found.design_variables, found.best.numbers, strict=True)
+    )
     value = found.best.values["life.b10"]
-    cells = [f"{points} x {points}", str(lives_run), at_best, f"{lives[best]:,.0f}", chosen]
-    return [[*cells, str(used), f"{value:,.0f}", f"{value / lives[best]:.4f}", str(reached)]]
+    cells = [f"{points} x {points}", str(within), at_best, f"{best['b10']:,.0f}", chosen]
+    return [[*cells, str(used), f"{value:,.0f}", f"{value / best['b10']:.4f}", str(reached)]]
 
 
 def roller(tilt: str, strips: int) -> wearsim.Scenario:
@@ -175,8 +189,10 @@ def profiles(
     return rows
 
 
-def report(cam_points: int = 20, roller_points: int = 12) -> dict[str, str]:
-    """Return the tables by their titles."""
+def report(
+    kept: Path | None = None, cam_points: int = 20, roller_points: int = 12
+) -> dict[str, str]:
+    """Return the tables by their titles; the grid of the cam is kept in a file."""
     heads = ["width as", "designs", "found [mm]", "bisection [mm]", "closed form [mm]"]
     heads += ["from bisection", "from the closed form"]
     tables = {CLOSED: f"{markdown_table(heads, crowns())}\n"}
@@ -184,9 +200,10 @@ def report(cam_points: int = 20, roller_points: int = 12) -> dict[str, str]:
     heads += [f"{count} strips [MPa]" for count in STRIPS]
     about = f"The grid has {roller_points} values of each, {FINE} strips."
     tables[PROFILES] = f"{markdown_table(heads, profiles(roller_points))}\n\n{about}\n"
-    heads = ["grid", "lives run at its limits", "best of the grid", "B10 [turns]", "found"]
+    heads = ["grid", "within the limits", "best of the grid", "B10 [turns]", "found"]
     heads += ["runs", "B10 found [turns]", "over the grid", "runs until 0.998"]
-    tables[GRID] = f"{markdown_table(heads, cams(cam_points))}\n"
+    about = f"All designs of the grid are run, with {CAM_REALISATIONS} realisations as the search."
+    tables[GRID] = f"{markdown_table(heads, cams(cam_points, kept))}\n\n{about}\n"
     return tables
 
 
@@ -194,8 +211,9 @@ def main(arguments: list[str] | None = None) -> None:
     """Print the tables, and write them to a file if one is named."""
     parser = argparse.ArgumentParser(prog="tests.benchmarks.optimisation", description=__doc__)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.json")
-    output = parser.parse_args(arguments).output
-    tables = report()
+    parser.add_argument("--grid", type=Path, metavar="FILE.json", help="keeps the grid of the cam")
+    given = parser.parse_args(arguments)
+    output, tables = given.output, report(given.grid)
     sys.stdout.write("\n".join(f"{title}\n\n{table}" for title, table in tables.items()))
     if output is not None:
         save_tables(output, "python -m tests.benchmarks.optimisation", tables)

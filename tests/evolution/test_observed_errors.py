@@ -10,6 +10,7 @@ import pytest
 import wearsim
 from wearsim.evolution.observed_errors import COVER, observed_errors
 from wearsim.evolution.strip_errors import Course
+from wearsim.types import FloatArray
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 SPRING: dict[str, object] = {
@@ -57,12 +58,20 @@ def test_errors_are_in_final_state_and_summary(spring: wearsim.Result) -> None:
     assert set(spring.errors) >= {"depth", "worn_volume", "width", "power", "descent"}
 
 
+def of_exact_sizes(
+    course: Course | None, passes: FloatArray, observed: dict[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """Return the errors of observables of a test whose depths and volume have none."""
+    sizes = np.ones((3, len(passes)))
+    return observed_errors(course, passes, observed, sizes, 0.0 * sizes)
+
+
 def test_error_is_the_greatest_of_the_last_differences() -> None:
     passes = np.array([0.0, 10.0, 20.0, 40.0, 80.0])
     pressure = np.array([3.0, 2.0, 2.0, 2.0, 2.0])
     other = pressure * np.array([1.0, 1.1, 1.0, 1.0, 1.0])
     course = Course(passes[1:].tolist(), observed=[{"peak_pressure": v} for v in other])
-    found = observed_errors(course, passes, {"peak_pressure": pressure})["peak_pressure"]
+    found = of_exact_sizes(course, passes, {"peak_pressure": pressure})["peak_pressure"]
     np.testing.assert_allclose(found[[0, 1]], [0.0, COVER * 0.2], atol=1e-12)
     np.testing.assert_allclose(found[3:], 0.0, atol=1e-12)  # it is no longer recent
 
@@ -72,18 +81,26 @@ def test_power_laws_are_compared_without_error_of_interpolation() -> None:
     steps = np.geomspace(2.0, 1e6, 13)
     course = Course(steps.tolist(), observed=[{"descent": np.asarray(n**0.6)} for n in (0, *steps)])
     observed = {"descent": np.append(0.0, passes) ** 0.6}
-    found = observed_errors(course, np.append(0.0, passes), observed)["descent"]
+    found = of_exact_sizes(course, np.append(0.0, passes), observed)["descent"]
     assert (found[2:] <= 2e-2 * observed["descent"][2:]).all()
     assert found[-1] <= 1e-6 * observed["descent"][-1]
 
 
+def test_roller_has_at_least_the_error_of_both_bodies() -> None:
+    course = Course([1.0], observed=[{"descent": np.asarray(1.0)}] * 2)
+    sizes, errors = np.full((3, 2), 2.0), np.full((3, 2), 0.1)
+    ones = np.ones(2)
+    found = observed_errors(course, np.array([0.0, 1.0]), {"descent": ones}, sizes, errors)
+    np.testing.assert_allclose(found["descent"], 0.05)
+
+
 def test_angles_differ_by_less_than_half_a_turn() -> None:
     course = Course([1.0], observed=[{"depth_angle": np.asarray(6.2)}] * 2)
-    found = observed_errors(course, np.array([0.0, 1.0]), {"depth_angle": np.array([0.1, 0.1])})
+    found = of_exact_sizes(course, np.array([0.0, 1.0]), {"depth_angle": np.array([0.1, 0.1])})
     assert found["depth_angle"][-1] == pytest.approx(COVER * (0.1 + 2.0 * np.pi - 6.2))
 
 
 def test_unknown_errors_are_not_a_number() -> None:
-    found = observed_errors(None, np.array([0.0, 1.0]), {"power": np.ones((2, 3))})
+    found = of_exact_sizes(None, np.array([0.0, 1.0]), {"power": np.ones((2, 3))})
     assert np.isnan(found["power"]).all()
     assert found["power"].shape == (2, 3)

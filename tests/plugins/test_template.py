@@ -7,6 +7,7 @@ import importlib
 import importlib.util
 import runpy
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,11 +16,12 @@ from plugin_examples import Point, rig
 import wearsim
 from wearsim.plugins.template import clash, renamed, template_folder, write_plugin
 from wearsim.testing import axial_profile_tests, contact_model_tests
-from wearsim.testing.checks import ConfiguredSpec
+from wearsim.testing.checks import ConfiguredSpec, ConformanceError
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
 from wearsim.testing.kit import CONTACT_MODEL
 from wearsim.testing.study_kinds import STUDY_KIND, StudyKindFixture
+from wearsim.testing.tables import TABLE, TableFixture
 
 FOLDER = template_folder()
 MODULE = FOLDER / "src" / "wearsim_template" / "__init__.py"
@@ -76,7 +78,7 @@ def test_template_imports_public_modules_only(path):
 
 
 def test_template_is_short():
-    assert len(MODULE.read_text().splitlines()) < 145
+    assert len(MODULE.read_text().splitlines()) < 160
 
 
 def test_kind_of_study_of_the_template_has_about_twenty_statements():
@@ -92,6 +94,7 @@ def test_template_tests_use_one_line_of_the_kit():
     text = (FOLDER / "tests" / "test_winkler.py").read_text()
     assert "test_winkler_approach = study_kind_tests(KIND, small_study)\n" in text
     assert "test_winkler = contact_model_tests(SPEC)\n" in text
+    assert 'test_winkler_approach_table = table_tests(TABLE, {"greatest_force": "400 N"})\n' in text
     assert 'test_winkler_quartic = axial_profile_tests(FORM, {"length": "10 mm"})\n' in text
 
 
@@ -108,6 +111,21 @@ def study(template, monkeypatch):
 def test_kind_of_study_meets_the_requirements(study):
     for check in STUDY_KIND.values():
         check(study)
+
+
+@pytest.mark.usefixtures("template")
+def test_table_of_the_template_meets_the_requirements():
+    spec = sys.modules["wearsim_template"].TABLE
+    fixture = TableFixture(ConfiguredSpec(spec, {"greatest_force": "400 N"}))
+    for check in TABLE.values():
+        check(fixture)
+
+
+def test_table_that_is_not_installed_is_reported():
+    spec = replace(load_template().TABLE, name="of-nobody")
+    fixture = TableFixture(ConfiguredSpec(spec))
+    with pytest.raises(ConformanceError, match="of-nobody"):
+        TABLE["scenario-has-the-options"](fixture)
 
 
 @pytest.mark.usefixtures("template")

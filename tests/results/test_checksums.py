@@ -147,15 +147,6 @@ def test_changed_byte_of_an_attribute_is_an_error_or_changes_nothing(case):
     assert refused >= 0.5 * len(places)
 
 
-@pytest.mark.slow
-def test_changed_byte_anywhere_is_an_error_or_changes_nothing(case):
-    path, changed, content = case
-    before, stored = content(path, "depth"), changed.read_bytes()
-    for at in range(0, len(stored), 53):
-        _flip(changed, stored, at)
-        _refused(lambda: content(path, "depth"), path.parent, before)
-
-
 def test_changed_byte_is_an_error_in_xarray_too(tmp_path):
     write_all(tmp_path)
     path = tmp_path / f"run-{LAYOUTS['run']}.h5"

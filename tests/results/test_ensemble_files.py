@@ -28,7 +28,14 @@ from wearsim.results.io.files import write_results
 from wearsim.studies.dissipation.result import read_dissipation
 from wearsim.studies.ensemble.file.data import EnsembleData
 from wearsim.studies.ensemble.file.parts import read_ensemble
-from wearsim.studies.ensemble.file.schema import DONE, FAILED, OBSERVABLES, PENDING, QUANTILES
+from wearsim.studies.ensemble.file.schema import (
+    DONE,
+    ENSEMBLE,
+    FAILED,
+    OBSERVABLES,
+    PENDING,
+    QUANTILES,
+)
 from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.opening import kind_of
 from wearsim.studies.run.result import read_results
@@ -196,7 +203,7 @@ def test_ensemble_truncated_at_any_length_is_refused(ensemble_file):
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 3
+    file.attrs["format_version"] = ENSEMBLE.version + 1
 
 
 def _incomplete(file: h5py.File) -> None:
@@ -226,7 +233,10 @@ def _with_unknown_status(file: h5py.File) -> None:
     [
         (
             _newer,
-            "has layout 3 of wearsim-ensemble, and this wearsim reads layout 2; update wearsim",
+            (
+                f"has layout {ENSEMBLE.version + 1} of wearsim-ensemble, and this wearsim reads"
+                f" layout {ENSEMBLE.version}; update wearsim"
+            ),
         ),
         (_incomplete, "is damaged (lacks depth, inputs/about)"),
         (_without_drawn_values, "is damaged (lacks creepage.yaw)"),

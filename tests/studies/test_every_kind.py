@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 import wearsim
+from tests.stable_names import json_keys, stored
 from wearsim.results.viewed import study_kinds
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.identify.measurements import Measurement
@@ -127,3 +128,12 @@ def test_every_kind_in_every_display(case: Any, check: Any) -> None:
     kind, number = case
     assert kind.name in SAMPLES, f"add a small result of the kind '{kind.name}' to SAMPLES"
     check(StudyKindFixture(kind, made(kind.name, number)))
+
+
+def test_keys_of_the_json_of_every_kind_are_listed() -> None:
+    names = sorted({kind.name for kind, _ in CASES})
+    samples = [(name, n) for name in names for n in range(len(SAMPLES[name]))]
+    found = sorted(
+        {key for name, n in samples for key in json_keys(name, made(name, n).view.data())}
+    )
+    assert found == stored("json-keys"), "stable names have changed, see docs/compatibility.md"

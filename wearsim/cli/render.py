@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from wearsim.cli.shared import note, write_json, write_list, write_notes, write_table
+from wearsim.errors import printable
 
 if TYPE_CHECKING:
     from wearsim.report.panels import Sheet
@@ -50,7 +51,7 @@ def show_view(
         written = {name: path for name, path in (files or {}).items() if path}
         _write_tables(view, written, stored, brief)
         if not stored and (line := view.line()):
-            typer.echo(line)
+            typer.echo(printable(line))
         write_notes([text for text in view.notes if text not in known], view.warnings)
     if view.failures:
         note(f"warning: {view.failures}")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from wearsim.arguments import ArgumentError
-from wearsim.errors import ResultsFileError
+from wearsim.errors import ResultsFileError, printable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -169,19 +169,19 @@ def write_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
     from rich import box
     from rich.table import Table
 
-    screen = console()
+    screen, title = console(), printable(title)
     table = Table(title=title, title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
     table.min_width = min(len(title), screen.width)  # keeps a long title on one line
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(printable, row))
     screen.print(table)
 
 
 def write_list(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Write rows to stdout, one line each, in columns aligned under their heads."""
-    lines = [heads, *rows]
+    lines = [[printable(cell) for cell in line] for line in (heads, *rows)]
     widths = [max(len(line[column]) for line in lines) for column in range(len(heads))]
     for line in lines:
         cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
@@ -197,7 +197,7 @@ def write_json(data: Mapping[str, Any]) -> None:
 
 def note(text: str) -> None:
     """Write a line to stderr."""
-    typer.echo(text, err=True)
+    typer.echo(printable(text), err=True)
 
 
 def write_notes(notes: Iterable[str], warnings: Iterable[str] = ()) -> None:

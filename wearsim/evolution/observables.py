@@ -9,7 +9,14 @@ from wearsim.evolution.contacts import at_least, contact_batch
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import CamStations, mean_along, sum_in_order, width, worn_volume
+from wearsim.evolution.quantities import (
+    CamStations,
+    greatest_between,
+    mean_along,
+    sum_in_order,
+    width,
+    worn_volume,
+)
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents
@@ -149,12 +156,30 @@ def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
     return np.asarray(peak_to_peak(cam, lift_errors(problem, state)).max(axis=0))
 
 
+def worn_descents(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the worn descent of each contact's roller, shape (S, C, N) [m].
+
+    It is that between strips, by which a roller descends that is tilted or beside its groove.
+    """
+    worn = least_gaps(problem, problem.gap(*state.depths))
+    return np.asarray(worn - least_gaps(problem, problem.nominal_gap))
+
+
+def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:
+    """Return the least of gaps between strips, the last axis; of strips where loads have springs.
+
+    The load of a spring follows from the descent of strips.
+    """
+    return np.asarray(gaps.min(axis=-1) if problem.has_spring else -greatest_between(-gaps))
+
+
 def clearance(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest worn descent of a roller, shape (realisations,) [m]."""
-    return np.asarray(greatest(problem, descents(problem, state.depths)).max(axis=0))
+    return np.asarray(greatest(problem, worn_descents(problem, state)).max(axis=0))
 
 
 LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
+LEAST_STRIPS = 8  # in contact, of which the outermost do not carry the greatest pressure by chance
 STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
 
 
@@ -162,8 +187,12 @@ def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest pressure of the contacts of a state at every station, (S, R, N) [Pa].
 
     A strip that the edge of a contact crosses carries its load on the part that is in contact.
+    Where strips are in contact as wholes, the outermost one also carries the load of the part that
+    the edge has crossed of the next one.
     """
     values = problem.values_of(state.contacts, "peak_pressure")
+    if state.separation is None and state.contacts.separation is not None:
+        return problem.per_roller(values * _on_next_strips(problem, state))
     if state.part is None:
         return problem.per_roller(values)
     load, half = (problem.values_of(state.contacts, n) for n in ("line_load", "half_length"))
@@ -180,6 +209,33 @@ def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
         found = np.minimum(crossed / np.where(at_edge, part[..., 2:], 1.0), most)
         greatest_square = np.maximum(greatest_square, (found * at_edge).max(axis=-1))
     return problem.per_roller(np.maximum(values, np.sqrt(greatest_square)))
+
+
+def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest pressure, with the outermost loads on a part of the next strips too.
+
+    It is relative to that on whole strips, (S, C, N). The edge has crossed the part 1/2 - s/r of a
+    strip with the separation s in its middle, which rises by r to the next one; and half of a strip
+    that has just come into contact, until it carries half the load of the one inside.
+    """
+    names = "line_load", "half_length", "separation"
+    load, half, apart = (problem.values_of(state.contacts, name) for name in names)
+    square = np.square(load / np.where(half > 0.0, half, np.inf))
+    most = square.max(axis=-1)
+    several = (load > 0.0).sum(axis=-1, keepdims=True) >= LEAST_STRIPS
+    for side in (slice(None), slice(None, None, -1)):
+        own, ahead = square[..., side], apart[..., side]
+        inner, outer, free = own[..., :-3], own[..., 1:-2], own[..., 2:-1]
+        at_edge = (outer > 0.0) & (free == 0.0) & several
+        with np.errstate(invalid="ignore"):  # infinite beyond the end of a roller
+            rise = ahead[..., 3:] - ahead[..., 2:-1]
+            known = at_edge & (rise > 0.0) & (rise < np.inf)
+            crossed = 0.5 - ahead[..., 2:-1] / np.where(known, rise, 1.0)
+        young = known & (outer < 0.5 * inner)
+        part = 1.0 + np.where(known & ~young, np.clip(crossed, 0.0, 0.5), 0.0)
+        own[..., :-3] = np.where(young, (inner + outer) / 1.5, inner)
+        own[..., 1:-2] /= part
+    return np.asarray(np.sqrt(square.max(axis=-1) / np.where(most > 0.0, most, 1.0)))
 
 
 def peak_pressure(stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:

@@ -4,7 +4,14 @@ The coarse test of `strip_errors` has strips of twice the width and a greater to
 steps. Its observables differ from those of the test by at least the errors of the test where these
 are proportional to the width of the strips, and by three times as much where they are proportional
 to its square. The error estimate is the greatest of the last differences times a safety factor,
-since a peak pressure rises and falls as single strips come into contact.
+since a peak pressure rises and falls as single strips come into contact. What is worn off a roller
+has at least the relative error by strips of what is worn off both bodies: single differences may be
+small by chance, and depths and volumes of both bodies follow from the same contacts.
+
+At the edge of a groove the line load falls within a layer to zero. Where the layer is shorter than
+the contact is long, the contact is shorter there under the same load, and its pressure higher.
+Neither strips wider than the contact is long nor those of the coarse test resolve this peak, which
+is added to the error of the pressure.
 """
 
 from __future__ import annotations
@@ -21,10 +28,22 @@ from wearsim.types import FloatArray
 # sign of that of the test. Of the pressures of whole strips in the rig's test, against rigid
 # bodies, a factor of 1 covers 0.7 to 0.8, this one 0.96 or more
 COVER = 1.5
+#: observables whose relative error is at least that of the greatest depth or of the volume worn off
+#: both bodies
+OF_DEPTH, OF_VOLUME = ("roller_depth", "descent"), ("roller_worn_volume",)
+# relative peak at an edge without a layer; measured on grooves of crowns of 30 to 250 mm, on strips
+# of a sixth of the half-length
+ABRUPT_EDGE = 0.3
 
 
 def observed_errors(
-    coarse: Course | None, passes: FloatArray, observed: Mapping[str, FloatArray]
+    coarse: Course | None,
+    passes: FloatArray,
+    observed: Mapping[str, FloatArray],
+    sizes: FloatArray,
+    by_strips: FloatArray,
+    crown_radius: FloatArray | None = None,
+    spacing: float = math.inf,
 ) -> dict[str, FloatArray]:
     """Return the estimated errors of observables of a test.
 
@@ -36,6 +55,12 @@ def observed_errors(
         Rising, from the start of the test, 0.
     observed : mapping of str to ndarray, shape (points, ...)
         Observables of the test by name; angles end on "angle" [rad].
+    sizes, by_strips : ndarray, shape (3, points)
+        As of `strip_errors`: sizes of the test, and their errors by strips.
+    crown_radius : ndarray, shape (rollers,), optional
+        See `WearProblem.crown_radius` [m]; None where peaks at edges are not estimated.
+    spacing : float
+        Width of the strips at the end [m].
     """
     if not observed:
         return {}
@@ -63,11 +88,43 @@ def observed_errors(
     greatest = _greatest_of_last(there, np.concatenate(differences, axis=1))
     part = np.column_stack([np.interp(at_passes, at_there, one) for one in greatest.T])
     columns = np.split(COVER * part, np.cumsum(widths)[:-1], axis=1)
+    worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
+    least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
-    for (name, values), relative in zip(observed.items(), columns, strict=True):
+    edge_peaks: FloatArray | float = 0.0
+    if crown_radius is not None:
+        edge_peaks = _edge_peaks(observed, crown_radius, spacing)
+    for (name, values), found in zip(observed.items(), columns, strict=True):
         scale = 1.0 if name.endswith("angle") else np.abs(values)
+        lowest = [
+            one for names, one in zip((OF_DEPTH, OF_VOLUME), least, strict=True) if name in names
+        ]
+        relative = np.maximum(found, lowest[0][:, None]) if lowest else found
         errors[name] = relative.reshape(values.shape) * scale
+        if name == "peak_pressure":
+            errors[name] = errors[name] + scale * edge_peaks
     return errors
+
+
+def _edge_peaks(
+    observed: Mapping[str, FloatArray], crown_radius: FloatArray, spacing: float
+) -> FloatArray:
+    """Return relative peaks at the edges of grooves that strips do not resolve, (points, rollers).
+
+    With the elastic approach w, the half-width b and the crown radius R of the groove, the layer is
+    w R/b long. The half-length is N/(pi b p), as the line load is N/(2 b) and the pressure p.
+    """
+    names = "peak_pressure", "normal_force", "elastic_approach", "descent"
+    shape = observed["peak_pressure"].shape
+    pressure, force, elastic, worn = (
+        np.maximum(observed[name].reshape(len(observed[name]), -1), 0.0) for name in names
+    )
+    with np.errstate(divide="ignore", invalid="ignore"):
+        layer = np.pi * crown_radius * elastic * pressure / force  # over the half-length
+        width = spacing * np.pi * np.sqrt(2.0 * crown_radius * (worn + elastic)) * pressure / force
+        in_groove = worn / (worn + elastic)
+    peak = ABRUPT_EDGE * np.maximum(1.0 - layer, 0.0) * in_groove * np.minimum(width, 1.0)
+    return np.asarray(np.nan_to_num(peak).reshape(shape))
 
 
 def _greatest_of_last(passes: FloatArray, errors: FloatArray) -> FloatArray:

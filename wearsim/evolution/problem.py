@@ -36,7 +36,7 @@ _CONSTANTS = (
     *("shape", "body_rows", "volume_weights", "nominal_least_gap", "cylinder_share", "has_spring"),
     *("constant_load", "pauses", "greatest_load", "_wear_coefficients"),
 )
-_OF_GAP = "nominal_gap", "nominal_least_gap", "has_crowned_gap"
+_OF_GAP = "nominal_gap", "contact_gap", "nominal_least_gap", "has_crowned_gap"
 
 
 @dataclass(frozen=True)
@@ -241,6 +241,23 @@ class WearProblem:
         return gap
 
     @cached_property
+    def contact_gap(self) -> FloatArray:
+        """`nominal_gap` of all contacts as an array of its own, shape (contacts, strips) [m]."""
+        shape = *self.shape, self.grid.strips
+        return np.array(np.broadcast_to(self.nominal_gap, shape)).reshape(-1, shape[-1])
+
+    @cached_property
+    def contact_stiffness(self) -> FloatArray:
+        """Loss of load per descent of each roller, 0 without springs, (contacts,) [N/m]."""
+        stiffness = self.stiffness if self.has_spring else np.zeros(())
+        return np.array(np.broadcast_to(stiffness, self.shape)).ravel()
+
+    @cached_property
+    def contact_wear_share(self) -> FloatArray:
+        """`cylinder_wear_share` of the first station, shape (realisations,)."""
+        return np.array(self.cylinder_wear_share[: self.shape[2], 0])
+
+    @cached_property
     def has_crowned_gap(self) -> bool:
         """Whether the gap before wear is that of crowned bodies in all strips.
 
@@ -253,6 +270,17 @@ class WearProblem:
         if bend.size == 0:  # fewer than three strips
             return False
         return bool(((bend > 0.0) & (bend < UNEVEN * np.median(bend, -1, keepdims=True))).all())
+
+    @property
+    def crown_radius(self) -> FloatArray | None:
+        """Relative radius of the crowns of roller and cylinder, (contacts, realisations) [m].
+
+        None for cams, for rollers with several contacts, and where the gap is not that of crowns.
+        """
+        if self.shape[0] > 1 or self.has_nodes or not self.has_crowned_gap:
+            return None
+        bend = np.median(np.diff(self.nominal_gap, 2, axis=-1), axis=-1)
+        return np.asarray(np.broadcast_to(self.grid.spacing**2 / bend[0], self.shape[1:]))
 
     @cached_property
     def spin(self) -> FloatArray:

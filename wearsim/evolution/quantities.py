@@ -416,6 +416,22 @@ def mean_along(values: FloatArray, axis: int) -> FloatArray:
     return values if count == 1 else np.expand_dims(sum_in_order(values, axis) / count, axis)
 
 
+def greatest_between(values: FloatArray) -> FloatArray:
+    """Return the greatest values between strips, the last axis, by parabolas.
+
+    They go through the greatest strip and its neighbours.
+    """
+    rows = values.reshape(-1, values.shape[-1])
+    each, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
+    top, inner = rows[each, place], (place > 0) & (place < last)
+    before, after = rows[each, place - inner], rows[each, place + inner]
+    inner &= np.isfinite(before) & np.isfinite(after)  # a gap is infinite beyond a roller's end
+    before, after = np.where(inner, before, top), np.where(inner, after, top)
+    curvature = 2.0 * top - before - after
+    rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
+    return np.asarray((top + rise).reshape(values.shape[:-1]))
+
+
 def sum_in_order(values: FloatArray, axis: int) -> FloatArray:
     """Return a sum with the same round-off for every batch size.
 

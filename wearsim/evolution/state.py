@@ -223,6 +223,13 @@ class WearState:
         values.update(others)
         return state
 
+    def with_stacked(self, depths: FloatArray, **others: Any) -> WearState:
+        """Return the state with depths given as `stacked` [m], and with other fields replaced."""
+        cylinder, roller = separated(depths, len(self.cylinder_depth))
+        state = self.replaced(cylinder_depth=cylinder, roller_depth=roller, **others)
+        state.__dict__[stacked_depths.__name__] = (cylinder, roller), depths
+        return state
+
     def with_added(self, depths: Depths) -> WearState:
         """Return the state with depths added to those of cylinder and rollers [m]."""
         cylinder, roller = self.cylinder_depth + depths[0], self.roller_depth + depths[1]

@@ -27,6 +27,7 @@ from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import Advance, Evolution
 from wearsim.evolution.observables import greatest
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import greatest_between
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import elastic_approaches
@@ -87,21 +88,10 @@ def sizes_of(problem: WearProblem, state: WearState, between: bool = False) -> F
         Whether the greatest depths are those of parabolas through the deepest strips and their
         neighbours, instead of those of strips.
     """
-    top = _peaks if between else partial(np.max, axis=-1)
+    top = greatest_between if between else partial(np.max, axis=-1)
     cylinder = greatest(problem, top(state.cylinder_depth[:, 0]))
     rollers = top(state.roller_depth).max(axis=(0, 1))
     return np.array([cylinder, rollers, volume_of(problem, state.depths)])
-
-
-def _peaks(depths: FloatArray) -> FloatArray:
-    """Return the greatest depths between strips, the last axis, by parabolas."""
-    rows = depths.reshape(-1, depths.shape[-1])
-    each, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
-    top, inner = rows[each, place], (place > 0) & (place < last)
-    before, after = rows[each, place - inner], rows[each, place + inner]
-    curvature = 2.0 * top - before - after
-    rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
-    return np.asarray((top + rise).reshape(depths.shape[:-1]))
 
 
 def _means_below_points(depths: FloatArray) -> float:
@@ -258,7 +248,7 @@ def strip_errors(
     least = OF_PROFILE * np.array([deepest, partial_slip * sizes[2]])
     found[:2] = np.maximum(found[:2], least * found[2])
     if end.profiles is not None and end.profiles.any():
-        top = _peaks(end.profiles).max() + _means_below_points(end.profiles)
+        top = greatest_between(end.profiles).max() + _means_below_points(end.profiles)
         found[0] += deepest * (top / end.profiles.max() - 1.0)
     return np.asarray(found)
 

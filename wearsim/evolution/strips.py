@@ -231,7 +231,7 @@ def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearStat
     if state.loop_strips is not None:  # line loads; without a factorisation the loop begins again
         arrays["loop_strips"] = averaged(state.loop_strips, old, new)
         arrays["loop_strips"][1:] = 0.0
-    if state.separation is not None:
+    if state.part is not None:
         arrays |= _edges_on_grid(problem, state, old)
     columns: dict[str, Any] = {
         name: averaged(getattr(contacts, name), old, new)
@@ -254,13 +254,19 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
     come closer as there.
     """
     new, gap = problem.grid, problem.nominal_gap
-    assert state.separation is not None
     assert state.part is not None
     assert state.past_sums is not None
     arrays = {
-        name: averaged(getattr(state, name), old, new)
+        name: averaged(values, old, new)
         for name in ("separation", "part", "whole_steps")
+        if (values := getattr(state, name)) is not None
     }
+    # strips partly in contact are not joined with others whole
+    arrays["whole_steps"] = np.where(arrays["part"] < 1.0, 0.0, np.floor(arrays["whole_steps"]))
+    ratio = old.spacing / new.spacing
+    sums = np.concatenate([ratio * state.past_sums[:, :-1], state.past_sums[:, -1:]], axis=1)
+    if state.separation is None:
+        return arrays | {"part": np.ceil(arrays["part"]), "past_sums": sums}
     past = averaged(np.asarray(state.past_wear), old, new)
     cut = ~np.isnan(state.part[0, 0, :, :1])  # tests that resolve edges
     inside = np.flatnonzero(shares(old, new).sum(axis=1) > 0.0)
@@ -271,10 +277,6 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
         beyond = gap[..., added] - gap[..., edge : edge + 1]
         arrays["separation"][..., added] = arrays["separation"][..., edge : edge + 1] + beyond
         past[1:, ..., added] = np.where(cut, past[1:, ..., edge : edge + 1], past[1:, ..., added])
-    # strips partly in contact are not joined with others whole
-    arrays["whole_steps"] = np.where(arrays["part"] < 1.0, 0.0, np.floor(arrays["whole_steps"]))
-    ratio = old.spacing / new.spacing
-    sums = np.concatenate([ratio * state.past_sums[:, :-1], state.past_sums[:, -1:]], axis=1)
     return arrays | {"past_wear": past, "past_sums": sums}
 
 

@@ -6,12 +6,26 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeAlias, TypeVar
+from types import UnionType
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Generic,
+    Literal,
+    Self,
+    TypeAlias,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.errors import unknown_name
+from wearsim.errors import ResultsFileError, ScenarioError, unknown_name
 from wearsim.report.frames import as_dataset
 from wearsim.results.viewed import Viewed
 
@@ -26,6 +40,8 @@ Kind: TypeAlias = Literal["static", "history", "record", "statistic"]
 CHECKPOINT, INPUTS = "checkpoint", "inputs"
 #: Texts in the group of the inputs: the attributes, the scenario and its files.
 ABOUT, SCENARIO, FILES = "about", "scenario", "files"
+#: Attribute of an array of which a stored chunk has zeros only.
+ZEROS = "zeros"
 ERRORS = "surrogatepass"  # so that every Python string can be stored
 Array: TypeAlias = npt.NDArray[Any]
 Arrays: TypeAlias = dict[str, Array]
@@ -106,6 +122,11 @@ class Schema:
     holds: str
     axes: Mapping[str, Axis]
     variables: Mapping[str, Variable]
+
+
+def only_zeros(array: Array) -> bool:
+    """Return whether an array holds zeros or empty texts only."""
+    return not (array != b"" if array.dtype.kind == "S" else array).any()
 
 
 def with_random_inputs(schema: Schema, inputs: Sequence[Mapping[str, str]]) -> Schema:
@@ -219,6 +240,14 @@ class StudyData:
         """Return the names of all fields except those stored separately (long texts, arrays)."""
         return tuple(item.name for item in fields(cls) if item.name not in cls.separately_stored)
 
+    @classmethod
+    def check_types(cls, attributes: Mapping[str, Any]) -> None:
+        """Raise a ValueError unless fields that were read from a file have their types."""
+        hints = get_type_hints(cls)
+        for name, value in attributes.items():
+            if not _has_type(value, hints[name]):
+                raise ValueError(f"{name} is a {type(value).__name__} of unknown content")
+
     #: schema of the file without variables that depend on the study
     base_schema: ClassVar[Schema]
 
@@ -251,6 +280,23 @@ class StudyData:
     def attributes(self) -> dict[str, Any]:
         """Fields by name, without those stored separately."""
         return {name: getattr(self, name) for name in self.attribute_names()}
+
+
+def _has_type(value: Any, hint: Any) -> bool:
+    """Return whether a value of JSON has a type, lists and tables with all they hold."""
+    kind, parts = get_origin(hint), get_args(hint)
+    if hint is Any:
+        return True
+    if kind in {Union, UnionType}:
+        return any(_has_type(value, part) for part in parts)
+    if kind is list:
+        return isinstance(value, list) and all(_has_type(item, parts[0]) for item in value)
+    if kind is dict:
+        items = value.values() if isinstance(value, dict) else ()
+        return isinstance(value, dict) and all(_has_type(item, parts[1]) for item in items)
+    if isinstance(value, bool) or hint is bool:
+        return isinstance(value, bool) and hint is bool
+    return isinstance(value, int | float if hint is float else hint)
 
 
 def as_plain(value: object) -> object:
@@ -315,12 +361,47 @@ class StudyResult(Viewed, Generic[Data]):
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario, parsed from the text and the files stored with the results."""
+        """The scenario, parsed from the text and the files stored with the results.
+
+        Raises
+        ------
+        ResultsFileError
+            If it has mistakes, as one of an earlier version or an altered file.
+        """
         from wearsim.scenario import parse_scenario  # noqa: PLC0415  (reading results needs none)
 
-        return parse_scenario(
-            self.raw.scenario_text, self.raw.scenario_file, self.raw.files.__getitem__
-        )
+        try:
+            return parse_scenario(
+                self.raw.scenario_text, self.raw.scenario_file, self.raw.files.__getitem__
+            )
+        except ScenarioError as error:
+            first, *others = str(error).removeprefix(f"{self.raw.scenario_file}: ").splitlines()
+            more = f", and {len(others)} more" if others else ""
+            raise ResultsFileError(
+                f"{self.path}: its scenario has mistakes: {first}{more}"
+            ) from error
+
+    def with_scenario(self, scenario: Scenario) -> Self:
+        """Return the result with the scenario it was computed from, which is not parsed again.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            It is not used if it has another text than the stored one, or values of one draw.
+
+        Returns
+        -------
+        StudyResult
+
+        Examples
+        --------
+        >>> scenario = wearsim.load_scenario("rig.toml")
+        >>> wearsim.run(scenario).scenario is scenario
+        True
+        """
+        if scenario.text == self.raw.scenario_text and not scenario.drawn:
+            vars(self)["scenario"] = scenario
+        return self
 
     @property
     def title(self) -> str:

@@ -9,7 +9,8 @@ from typing import Any
 from wearsim.errors import PluginError, ResultsFileError
 from wearsim.plugins import StudyKind, registry
 from wearsim.results.content import ABOUT, INPUTS
-from wearsim.results.io.files import format_of, read_file, read_study, read_text
+from wearsim.results.io.files import format_of, read_file, read_study
+from wearsim.results.io.stored_file import StoredFile
 from wearsim.results.viewed import study_kinds
 
 
@@ -29,7 +30,7 @@ def kind_of(path: str | Path) -> StudyKind:
         If it belongs to a plugin that is not installed; the message names it.
     """
     name, about = read_file(path, lambda file: (format_of(file), _about(file)))
-    kinds = [kind for kind in study_kinds() if kind.format == name]
+    kinds = [kind for kind in study_kinds() if kind.format and kind.format == name]
     marked = [kind for kind in kinds if kind.marked_by and about.get(kind.marked_by)]
     plain = [kind for kind in kinds if not kind.marked_by]
     if marked or plain:
@@ -58,11 +59,11 @@ def open_study(path: str | Path, kind: StudyKind | None = None) -> Any:
     return kind.load("result")(data, Path(path))
 
 
-def _about(file: Any) -> dict[str, Any]:
+def _about(file: StoredFile) -> dict[str, Any]:
     """Return the fields of a file, none if it is foreign."""
     place = f"{INPUTS}/{ABOUT}"
     # earlier layouts hold a scalar there
-    about = json.loads(read_text(file[place])) if place in file and file[place].shape else {}
+    about = json.loads(file.text(place)) if place in file and file.dataset(place).shape else {}
     return about if isinstance(about, dict) else {}
 
 

@@ -70,10 +70,9 @@ def kernels_of(
     coarse = evolution.strip_error and not (name == "per-pass" and redrawn)
     compliant, implicit = model in {"slender", "semi-hertzian"}, name in {"auto", "implicit"}
     if steps and compliant and (implicit or coarse):
-        names |= {"formulas", "extrapolated", "new_differences", "next_steps"}
-        names |= {"linearised_wear", "wear_of_bodies"}
+        names |= {"begin_step", "linearise_step", "compare_step", "end_step", "next_steps"}
         by_doubling = varies or theory == "fastsim"
-        names |= {"difference_sizes" if by_doubling else "carried_errors"}
+        names |= {"difference_sizes" if by_doubling else "assess_step"}
     names |= {"damage_of_step"} if steps and scenario.fatigue is not None else set()
     doubled = name != "per-pass" if not (compliant and implicit) else evolution.step is not None
     if steps and (doubled or (coarse and not compliant)):

@@ -15,6 +15,7 @@ from wearsim.testing.kit import (
     motion_law_tests,
     random_input_tests,
     study_kind_tests,
+    table_tests,
     wear_law_tests,
 )
 from wearsim.testing.wear_and_loads import sliding_contact
@@ -33,5 +34,6 @@ __all__ = [
     "random_input_tests",
     "sliding_contact",
     "study_kind_tests",
+    "table_tests",
     "wear_law_tests",
 ]

@@ -23,6 +23,7 @@ from wearsim.plugins import (
     Options,
     Quantity,
     RandomInputSpec,
+    TableSpec,
     WearLawSpec,
     registry,
 )
@@ -40,6 +41,7 @@ S = TypeVar(
     MotionLawSpec,
     AxialProfileSpec,
     FatigueLawSpec,
+    TableSpec,
 )
 
 
@@ -256,8 +258,8 @@ class Fixture(Generic[S]):
 
     def fresh(self) -> Any:
         """Return a new instance."""
-        factory: Callable[..., Any] = self.configured.spec.factory
-        return factory(self.configured.options)
+        spec: Any = self.configured.spec
+        return spec.factory(self.configured.options)
 
     @cached_property
     def instance(self) -> Any:

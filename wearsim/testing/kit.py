@@ -15,6 +15,7 @@ from wearsim.plugins import (
     MotionLawSpec,
     RandomInputSpec,
     StudyKind,
+    TableSpec,
     WearLawSpec,
 )
 from wearsim.scenario.parse.fields import WITH_MARGINAL
@@ -28,6 +29,7 @@ from wearsim.testing.fatigue_laws import FATIGUE_LAW, FatigueLawFixture
 from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
 from wearsim.testing.study_kinds import STUDY_KIND, StudyKindFixture
+from wearsim.testing.tables import TABLE, TableFixture
 from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 from wearsim.units import Kind
 
@@ -286,6 +288,17 @@ def axial_profile_tests(
         AXIAL_PROFILE,
         lambda: AxialProfileFixture(ConfiguredSpec(resolved, options, files=files), pair),
         without,
+    )
+
+
+def table_tests(
+    spec: TableSpec | str,
+    options: Mapping[str, object] = NOTHING,
+    without: Mapping[str, str] = NOTHING,
+) -> Tests[TableFixture]:
+    """Return tests of an installed table of the scenario; see `contact_model_tests`."""
+    return build_tests(
+        TABLE, lambda: TableFixture(ConfiguredSpec(resolve(TableSpec, spec), options)), without
     )
 
 

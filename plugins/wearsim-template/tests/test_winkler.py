@@ -1,11 +1,17 @@
-"""Requirements on contact model, axial profile and kind of study; the modulus of the README."""
+"""Requirements on contact model, axial profile, study and its table; the modulus of the README."""
 
 import numpy as np
 import pytest
-from wearsim_template import FORM, KIND, SPEC
+from wearsim_template import FORM, KIND, SPEC, TABLE
 from wearsim_template.study import Approach
 
-from wearsim.testing import STEEL, axial_profile_tests, contact_model_tests, study_kind_tests
+from wearsim.testing import (
+    STEEL,
+    axial_profile_tests,
+    contact_model_tests,
+    study_kind_tests,
+    table_tests,
+)
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 test_winkler = contact_model_tests(SPEC)
@@ -15,13 +21,15 @@ test_winkler_quartic = axial_profile_tests(FORM, {"length": "10 mm"})
 
 
 def small_study():
-    """Return the approach of a crowned roller under two forces."""
+    """Return the approach of a crowned roller under three forces."""
     grid = Grid.spanning(-3e-3, 3e-3, 41)
     model = SPEC.factory(SPEC.options(), grid, (STEEL, STEEL))
-    return Approach(model, [100.0, 300.0], 5.0 * grid.y**2, 90.0)
+    table = TABLE.options(greatest_force="300 N", forces=3)
+    return Approach(model, table.values, 5.0 * grid.y**2, 90.0)
 
 
 test_winkler_approach = study_kind_tests(KIND, small_study)
+test_winkler_approach_table = table_tests(TABLE, {"greatest_force": "400 N"})
 
 
 def test_strip_of_the_half_length_has_its_hertzian_load():

@@ -23,7 +23,8 @@ def compared(load, old_load, wear, old_wear, exponents, greatest=1.0):
     slopes = np.ones_like(load)
     constant = linearised_wear(old_load, both[1], exponents, slopes, rows, load, compliance, opened)
     arguments = load, old_load, *both, compliance, constant, rows, base, greatest, slopes
-    sizes = wear_of_bodies(*arguments, exponents, worn, np.empty_like(load))
+    active = np.ones(1, np.bool_)
+    sizes = wear_of_bodies(*arguments, active, exponents, worn, np.empty_like(load))
     assert (worn[0] == wear).all()
     return exponents[0], sizes[:, 0]
 
@@ -92,7 +93,7 @@ def test_contacts_on_one_body_add_their_wear():
     base = np.full((3, 1, 1), 100.0)
     sizes = wear_of_bodies(
         *(loads, loads, wear, wear, compliance, constant, rows, base, 1.0, np.ones((2, 1))),
-        *(np.ones((2, 1)), worn, np.empty((2, 1))),
+        *(np.ones(1, np.bool_), np.ones((2, 1)), worn, np.empty((2, 1))),
     )
     assert worn.ravel().tolist() == [3.0, 10.0, 20.0]
     assert sizes[:, 0].tolist() == [0.0, 23.0, 223.0]

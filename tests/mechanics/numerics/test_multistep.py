@@ -130,7 +130,8 @@ def chosen(sizes, order, part=1.0, aim=1.0, keep=0.9):
     for k, size in enumerate(sizes):
         differences[k + 2] = size / unit[k, 0]
     orders, own = np.array([0]), np.empty_like(value)
-    arguments = differences, spans, value, np.array([order]), part * ONE, aim, keep, MAX_ORDER
+    most = np.array([MAX_ORDER])
+    arguments = differences, spans, value, np.array([order]), part * ONE, aim, keep, most
     found = next_steps(*arguments, value, own, orders)
     return found[0, 0], orders[0], found[1, 0]
 

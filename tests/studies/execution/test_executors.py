@@ -28,7 +28,8 @@ from batch_works import (
 
 from tests.interruptible import interruptible
 from wearsim.errors import Mistake, ScenarioError, WorkerError
-from wearsim.studies.execution.factory import available_processors, executor
+from wearsim.operating_system import processors
+from wearsim.studies.execution.factory import executor
 from wearsim.studies.execution.processes import AHEAD, named
 
 HERE = Path(__file__).parents[1]
@@ -114,12 +115,12 @@ def test_no_more_processes_than_realisations_are_started() -> None:
 
 def test_default_is_one_worker_per_available_processor() -> None:
     with executor("threads") as pool:
-        assert pool.workers == available_processors()
+        assert pool.workers == processors()
     if hasattr(os, "sched_setaffinity"):
         ours = os.sched_getaffinity(0)
         try:
             os.sched_setaffinity(0, {min(ours)})
-            assert available_processors() == 1
+            assert processors() == 1
         finally:
             os.sched_setaffinity(0, ours)
 

@@ -14,35 +14,26 @@ crossed the part f of the strip, the surfaces are in contact at the depth
 
 where u_0 is the depth when the edge reached the strip: l = u - s, and du = f dl. A step with the
 formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear of the strip.
+
+Where edges are not resolved, as under loads that vary, strips are in contact or not as wholes. Past
+points of the depth of a strip that has just come into contact lie before the corner, so that it
+takes steps of first order there too.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
-from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.loads import descents, elastic_approaches, with_feedback
+from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.loads import with_feedback
 from wearsim.evolution.steppers.single_step import carried_loads
-from wearsim.mechanics.numerics.edge_strips import (
-    SETTLED,
-    EdgeStrips,
-    mark_strips,
-    start_edges,
-)
+from wearsim.mechanics.numerics.edge_strips import SETTLED
 from wearsim.mechanics.numerics.jit import kernel_input
-from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
-from wearsim.types import BoolArray, FloatArray, IntArray
+from wearsim.types import BoolArray
 
-# greatest order where edges are resolved within a strip: beyond the first derivative the wear of
-# strips that the edge has just crossed is not smooth, and pressures would overshoot
-EDGE_ORDER = 3
-YOUNG_STEPS = 2.0  # steps for which a strip is young, over the order
-YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
 LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
 # part of a contact that adheres up to which edges are resolved: where most of it adheres, wear is
@@ -68,32 +59,25 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     return possible and problem.has_crowned_gap
 
 
-def unresolved_edges(problem: WearProblem) -> dict[str, FloatArray]:
-    """Return `FIELDS` of a state that does not resolve edges yet."""
-    return dict.fromkeys(FIELDS, np.full((*problem.shape, problem.grid.strips), np.nan))
+def without_edges(problem: WearProblem, state: WearState) -> WearState:
+    """Return a state of tests that do not resolve edges, but may later."""
+    fields = dict.fromkeys(FIELDS, np.full((*problem.shape, problem.grid.strips), np.nan))
+    sums = state.past_sums
+    assert sums is not None
+    if state.part is None:
+        bodies = np.full((len(sums), len(state.stacked), len(state.passes)), np.nan)
+        sums = np.concatenate([bodies, sums], axis=1)
+    return state.replaced(**fields, past_sums=sums)
 
 
-def without_edges(state: WearState) -> WearState:
-    """Return a state that steps advance on whole strips."""
+def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
+    """Return a state that counts for how many steps each strip has been in contact as a whole."""
     assert state.past_sums is not None
-    sums = kernel_input(state.past_sums[:, -1:])
-    return state.replaced(**dict.fromkeys(FIELDS), past_sums=sums)
-
-
-def on_strips(problem: WearProblem, state: WearState) -> WearState:
-    """Return a state without edges, of first order, where strips now reach the end of a roller."""
-    if state.part is None or problem.has_crowned_gap:
-        return state
-    assert state.order is not None
-    return without_edges(state).replaced(order=np.ones_like(state.order))
-
-
-def with_unresolved_edges(problem: WearProblem, state: WearState) -> WearState:
-    """Return the result of a step on whole strips with the fields of other tests."""
-    assert state.past_sums is not None
-    bodies = np.full((len(state.past_sums), len(state.stacked), len(state.passes)), np.nan)
-    sums = np.concatenate([bodies, state.past_sums], axis=1)
-    return state.replaced(**unresolved_edges(problem), past_sums=sums)
+    assert state.past_wear is not None
+    loaded = state.contacts.line_load.reshape(*problem.shape, problem.grid.strips) > 0.0
+    sums = np.concatenate([state.past_wear.sum(axis=-1), state.past_sums[:, -1:]], axis=1)
+    counts = np.where(loaded, SETTLED, 0.0)
+    return state.replaced(separation=None, part=1.0 * loaded, whole_steps=counts, past_sums=sums)
 
 
 def unresolved(state: WearState) -> BoolArray:
@@ -102,45 +86,47 @@ def unresolved(state: WearState) -> BoolArray:
     return np.asarray(np.isnan(state.part[0, 0, :, 0]))
 
 
-def by_resolution(
-    problem: WearProblem, state: WearState
-) -> list[tuple[IntArray, WearProblem, WearState]]:
-    """Return the places of tests that resolve edges and of those that do not, with their states.
+def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
+    """Return a state in which tests have begun or ceased to resolve edges.
 
-    Edges are resolved from the step on at whose start the bodies have worn to a groove: wear, not
-    elasticity, then gives the contact its shape.
+    They resolve them from the step on at whose start the bodies have worn to a groove: wear, not
+    elasticity, then gives the contact its shape. Where strips now reach the end of a roller, edges
+    are never resolved any more. Tests that cease take a step of first order.
     """
-    every = np.arange(len(state.passes))
-    if state.part is None:
-        return [(every, problem, state)]
+    if state.separation is None:
+        return state
+    assert state.order is not None
+    assert state.past_sums is not None
+    if not problem.has_crowned_gap:
+        fields, sums = dict.fromkeys(FIELDS), kernel_input(state.past_sums[:, -1:])
+        return state.replaced(**fields, past_sums=sums, order=np.ones_like(state.order))
     whole, low = unresolved(state), _unloaded(problem, state)
-    if (low & ~whole).any():
-        assert state.order is not None
-        fields = unresolved_edges(problem)
-        ended = {n: np.where(low[:, None], one, getattr(state, n)) for n, one in fields.items()}
+    if low is not None and (low & ~whole).any():
+        ended = {n: np.where(low[:, None], np.nan, getattr(state, n)) for n in FIELDS}
         state = state.replaced(**ended, order=np.where(low & ~whole, 1, state.order))
-        whole = unresolved(state)
-    if (whole & ~low).any():
-        state = _with_new_edges(problem, state, whole & ~low)
-        whole = unresolved(state)
-    parts = []
-    if not whole.any():
-        return [(every, problem, state)]
-    for kind in (False, True):
-        places = np.flatnonzero(whole == kind)
-        if places.size:
-            part = state.at(places)
-            parts.append((places, problem.at(places), without_edges(part) if kind else part))
-    return parts
+    begins = whole if low is None else whole & ~low
+    return _with_new_edges(problem, state, begins) if np.count_nonzero(begins) else state
 
 
-def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
-    """Return which tests have a roller whose spring has lost most of its load."""
+def _unloaded(problem: WearProblem, state: WearState) -> BoolArray | None:
+    """Return which tests have a roller whose spring has lost most of its load, None if none can."""
     if not problem.has_spring or problem.shape[0] > 1:
-        return np.zeros(len(state.passes), dtype=np.bool_)
+        return None
     force = problem.force(problem.time(state.passes))
     free = with_feedback(problem, force, np.zeros(()), ())
     return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))
+
+
+def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
+    """Return which tests have worn to a groove, whose contacts slip."""
+    least = problem.gap(*state.depths).min(axis=-1)
+    worn, elastic = (
+        least - problem.nominal_least_gap,
+        problem.values_of(state.contacts, "approach") - least,
+    )
+    adhering = problem.values_of(state.contacts, "adhesion_fraction").max(axis=(0, 1))
+    deep = sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
+    return np.asarray(deep & (adhering <= MOST_ADHESION))
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
@@ -149,13 +135,12 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
     assert state.contacts.separation is not None
     assert state.past_sums is not None
     assert state.past_wear is not None
-    worn, elastic = descents(problem, state.depths), elastic_approaches(problem, state)
+    begins = whole & have_groove(problem, state)
+    if not np.count_nonzero(begins):
+        return state
     separation = state.contacts.separation.reshape(shape)
-    begins = whole & ~np.isnan(separation).any(axis=(0, 1, 3))
-    adhering = problem.values_of(state.contacts, "adhesion_fraction")
-    begins &= adhering.max(axis=(0, 1)) <= MOST_ADHESION
-    begins &= sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
-    if not begins.any():
+    begins &= ~np.isnan(separation).any(axis=(0, 1, 3))
+    if not np.count_nonzero(begins):
         return state
     loaded = state.contacts.line_load.reshape(shape) > 0.0
     found = {
@@ -165,178 +150,5 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
     }
     column, sums = begins[:, None], state.past_sums.copy()
     fields = {n: np.where(column, one, getattr(state, n)) for n, one in found.items()}
-    sums[:, :-1] = np.where(begins, over_strips(state.past_wear), sums[:, :-1])
+    sums[:, :-1] = np.where(begins, state.past_wear.sum(axis=-1), sums[:, :-1])
     return state.replaced(**fields, past_sums=sums)
-
-
-def separated_bodies(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the separation of the contacts as parts of the bodies, as `WearState.stacked` [m].
-
-    The sum of the two bodies of a contact is its separation, which their wear closes together.
-    """
-    separation = state.separation
-    assert separation is not None
-    stations, _, realisations, strips = separation.shape
-    parts = np.zeros((stations + problem.rollers, realisations, strips))
-    parts[:stations] = separation.min(axis=1)
-    if stations == 1:
-        parts[0] *= problem.cylinder_wear_share
-        parts[1:] = separation[0] - parts[0]
-    return parts
-
-
-def edges_of_step(
-    problem: WearProblem, state: WearState, base: FloatArray, added: FloatArray
-) -> EdgeStrips | None:
-    """Return the strips of all contacts at the start of a step, None if its state has no edges.
-
-    Parameters
-    ----------
-    problem : WearProblem
-    state : WearState
-    base, added : ndarray
-        Depths l_0 of the formula, and their increase without the wear at the end, of the bodies as
-        in `WearState.stacked` [m].
-    """
-    if state.separation is None or state.part is None or state.whole_steps is None:
-        return None
-    strips = problem.grid.strips
-    gap = np.broadcast_to(problem.nominal_gap, state.separation.shape)
-    arrays = (gap, state.part, state.separation, state.whole_steps)
-    gap, part, separation, whole_steps = (
-        kernel_input(array).reshape(-1, strips) for array in arrays
-    )
-    rows = state.stacked
-    edges = EdgeStrips(
-        problem.body_rows,
-        gap,
-        kernel_input(state.contacts.approach),
-        rows,
-        added,
-        base,
-        part,
-        separation,
-        whole_steps,
-        np.empty_like(gap),
-        np.empty_like(gap),
-        np.empty_like(rows),
-    )
-    start_edges(edges)
-    return edges
-
-
-def most(state: WearState) -> int:
-    """Return the greatest order of steps from a state."""
-    return MAX_ORDER if state.part is None else EDGE_ORDER
-
-
-class MarkedStrips(NamedTuple):
-    """Strips of the bodies about the edges of their contacts, each an array as `WearState.stacked`.
-
-    Parameters
-    ----------
-    young : ndarray of bool
-        Strips that take steps of first order. Points of formulas of the state's order would lie
-        ahead of the edge or close to it, until as many steps again have been taken. There the
-        surfaces close as the power 3/2 of the distance from it, and higher orders would overshoot.
-        A worn roller of a cam meets the edges at all stations at different times. Its wear by one
-        of them has no past points, and both bodies of a contact must wear by the same formula: no
-        strip is young then.
-    crossed : ndarray of bool
-        Strips that an edge is crossing or has crossed lately.
-    parts : ndarray
-        Greatest part in contact, 0 without wear.
-    """
-
-    young: BoolArray
-    crossed: BoolArray
-    parts: FloatArray
-
-    @property
-    def weights(self) -> FloatArray:
-        """Part of each strip's error that counts.
-
-        The formulas also continue the separation of strips that are not in contact. Young strips
-        are not smooth enough for an estimate, which is too great, see `first_order_errors`.
-        """
-        return np.where(self.young, YOUNG * self.parts, self.parts)
-
-
-def marked_strips(state: WearState) -> MarkedStrips | None:
-    """Return the strips of a state about the edges, None where edges are not resolved."""
-    if state.whole_steps is None or state.part is None or state.past_wear is None:
-        return None
-    assert state.order is not None
-    wear = kernel_input(state.past_wear[0])
-    young, crossed = np.empty((2, *wear.shape), dtype=np.bool_)
-    marked = MarkedStrips(young, crossed, np.empty_like(wear))
-    steps = (YOUNG_STEPS * state.order).astype(np.float64)
-    mark_strips(kernel_input(state.part), kernel_input(state.whole_steps), steps, wear, *marked)
-    return marked
-
-
-def with_sum(end: WearState, errors: FloatArray, marked: MarkedStrips) -> FloatArray:
-    """Return errors of the depths that a step adds, which agree with those of their sums.
-
-    `with_volume` keeps the sums.
-    """
-    past, spans, orders = end.past_sums, end.past_spans, end.order
-    assert past is not None
-    assert spans is not None
-    assert orders is not None
-    parts = np.where(marked.crossed, 0.0, marked.weights)
-    errors = np.where(marked.crossed, 0.0, errors)
-    sums = kernel_input(past[:, :-1, :, None])
-    ones, of_sums, order = np.ones(sums.shape[1:]), np.empty(sums.shape[1:]), orders.copy()
-    scale = np.ones(len(orders))
-    next_steps(sums, spans, ones, orders, scale, 1.0, 1.0, 1, ones, of_sums, order)
-    missing, width = of_sums - over_strips(errors)[..., None], over_strips(parts)[..., None]
-    shift = np.divide(missing, width, out=np.zeros_like(width), where=width > 0.0)
-    return np.asarray(errors + parts * shift)
-
-
-def over_strips(values: FloatArray) -> FloatArray:
-    """Return sums over the last axis, with the same round-off for any layout in memory."""
-    return np.asarray(kernel_input(values).sum(axis=-1))
-
-
-def relative_size(errors: FloatArray, depths: FloatArray) -> FloatArray:
-    """Return the Euclidean norm of errors of all depths over that of the depths, shape (N,)."""
-    size, whole = (sum_in_order(over_strips(values**2), 0) for values in (errors, depths))
-    return np.asarray(np.sqrt(size / np.where(whole > 0.0, whole, np.inf)))
-
-
-def first_order_errors(end: WearState, young: BoolArray) -> FloatArray:
-    """Return the errors that a step adds to young strips in contact, as `WearState.stacked` [m]."""
-    past, spans = end.past_wear, end.past_spans
-    assert past is not None
-    assert spans is not None
-    factor = spans[0] / (1.0 / spans[0] + 1.0 / spans[1])
-    factor = np.where(np.isfinite(spans[1]), factor, 0.0)
-    return np.where(young & (past[0] > 0.0), factor[:, None] * past[2], 0.0)
-
-
-def with_volume(end: WearState, parts: FloatArray, missing: FloatArray) -> WearState:
-    """Return the end of a step with the volume that the formula gives.
-
-    The depths of strips partly in contact follow from their shape, which keeps no volume. What is
-    missing is added evenly where the bodies are in contact, which changes no pressure.
-
-    Parameters
-    ----------
-    end : WearState
-    parts : ndarray
-        Part of each strip that is in contact, as `WearState.stacked`.
-    missing : ndarray, shape (stations + rollers, realisations)
-        Sum over the strips of the depths to be added [m].
-    """
-    width = over_strips(parts)
-    added = np.divide(missing, width, out=np.zeros_like(missing), where=width > 0.0)
-    cylinder, roller = separated(end.stacked + added[..., None] * parts, len(end.cylinder_depth))
-    return end.replaced(cylinder_depth=cylinder, roller_depth=roller)
-
-
-def sums_per_pass(wear: FloatArray | None, energy: FloatArray) -> FloatArray:
-    """Return row 0 of `WearState.past_sums` as (sums, N, 1), from wear and energy per pass."""
-    sums = energy[None] if wear is None else np.concatenate([over_strips(wear), energy[None]])
-    return np.asarray(sums[..., None])

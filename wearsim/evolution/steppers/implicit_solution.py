@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
-from wearsim.evolution.steppers.edges import edges_of_step
+from wearsim.evolution.steppers.conditions import Conditions
+from wearsim.evolution.steppers.edges import FIELDS, have_groove
 from wearsim.evolution.steppers.loads import (
     APPROACH_EXPONENT,
     advanced_terms,
@@ -21,17 +22,17 @@ from wearsim.evolution.steppers.loads import (
     fresh_approach,
     with_feedback,
 )
-from wearsim.evolution.steppers.single_step import REALISATION, carried_loads
-from wearsim.mechanics.numerics.edge_strips import (
-    EdgeStrips,
-    compare_edges,
-    end_edges,
-    linearise_edges,
+from wearsim.evolution.steppers.single_step import carried_loads, energy_per_pass
+from wearsim.mechanics.numerics.implicit_step import (
+    begin_step,
+    compare_step,
+    end_step,
+    linearise_step,
 )
 from wearsim.mechanics.numerics.jit import kernel_input
-from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
+from wearsim.mechanics.numerics.multistep import ROWS
 from wearsim.plugins import SharedWear
-from wearsim.types import BoolArray, FloatArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 
 MAX_FIXED_POINT = 60
 DAMPED_FROM = 10  # iterations; far fewer are usual
@@ -39,7 +40,6 @@ CONVERGED = 500.0  # change of wear over the whole depth, relative to the tolera
 # the same over the wear of the step, from this part of a contact that adheres on: the dissipated
 # power then depends on the line loads
 OF_STEP, ADHERING = 5000.0, 0.1
-OF_EDGES = 10.0  # the same of strips partly in contact, over that of the others
 LEAST_GUESS = 0.1  # first guess of a load over the one before; ratio of its iterates
 # relative change of loads with a spring: part of that in the step, at most this over the tolerance
 # of iterations
@@ -81,257 +81,299 @@ class _Slope:
         return self._exponent
 
 
-class Solved(NamedTuple):
-    """Solution of an implicit step.
+_PAST = attrgetter("past_wear", "past_sums", "past_feedback", "past_spans", "order")
+_EDGES = attrgetter("separation", "part", "whole_steps")
 
-    Parameters
-    ----------
-    end : WearState
-        Depths, contacts, load terms and number of solves at the end.
-    worn : ndarray, shape (stations + rollers, realisations, strips)
-        Wear of the bodies by the formula [m].
-    feedback : ndarray, shape (stations, contacts, realisations), optional
-        Part of the loads due to springs and load terms, in equilibrium with them [N].
-    parts : ndarray, shape (stations + rollers, realisations, strips), optional
-        Part of each strip that is in contact, where edges are resolved within a strip.
+
+class Past(NamedTuple):
+    """Rates, differences, past points and edges of a state as kernels take them; see `WearState`.
+
+    Sums and feedback have the shape (6, rows, realisations, 1), without rows where a state has
+    none; fields of the edges the shape (contacts, strips), without strips where a state has none.
     """
 
-    end: WearState
-    worn: FloatArray
-    feedback: FloatArray | None
-    parts: FloatArray | None
+    wear: FloatArray
+    sums: FloatArray
+    feedback: FloatArray
+    spans: FloatArray
+    order: IntArray
+    separation: FloatArray
+    part: FloatArray
+    whole_steps: FloatArray
+
+    @classmethod
+    def of(cls, state: WearState) -> Past:
+        """Return those of a state of the implicit stepper."""
+        wear, sums, feedback, spans, order = _PAST(state)
+        realisations, contacts = len(order), len(state.contacts)
+        if feedback is None:
+            feedback = np.empty((ROWS, 0, realisations, 1))
+        none = np.empty((contacts, 0))
+        return cls(
+            wear,
+            sums.reshape(ROWS, -1, realisations, 1),
+            feedback.reshape(ROWS, -1, realisations, 1),
+            spans,
+            order,
+            *(none if one is None else one.reshape(contacts, -1) for one in _EDGES(state)),
+        )
 
 
-@dataclass(frozen=True)
-class EndOfStep:
-    """Equations of an implicit step: depths ``base + wear of worn_passes at the end``.
+def step_by_formula(
+    problem: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+    conditions: Conditions,
+    order: IntArray,
+) -> tuple[WearState, BoolArray]:
+    """Return the state after an implicit step, and whether depths or energy decrease.
+
+    The equations are: depths = ``base + wear of worn_passes at the end``. The wear enters the
+    contact problem as a compliance: it is linearised in the line load about an earlier solution.
+    Exponents of the line load, loads and creepage depend on the solution and are iterated.
+    Realisations that have converged are not solved again while others continue.
 
     Parameters
     ----------
     problem : WearProblem
         Problem with every process at its value for the step.
-    start : WearState
+    state : WearState
         State at the start of the step.
-    base, added : ndarray, shape (stations + rollers, realisations, strips)
-        Depths without the wear at the end, and what they exceed those of the start by [m].
-    force : ndarray, shape (realisations,) or (stations, 1, realisations)
-        Load before feedback [N].
     passes : ndarray, shape (realisations,)
         Length of the step.
-    worn_passes : ndarray, shape (realisations,)
-        Passes of the wear at the end.
-    scale : ndarray, shape as `base`, optional
-        What they are multiplied by in strips that follow the formula of first order.
+    conditions : Conditions
+    order : ndarray of int, shape (realisations,)
+
+    Raises
+    ------
+    StepError
+        If the iteration does not converge.
+    """
+    past, contacts, depths = Past.of(state), state.contacts, state.stacked
+    bodies, gap, share = problem.body_rows, problem.contact_gap, problem.contact_wear_share
+    shape, strips = contacts.line_load.shape, problem.grid.strips
+
+    def wear_of(contacts: ContactBatchSolution) -> FloatArray:
+        return problem.wear_parts(contacts, 1.0).reshape(2, *shape)
+
+    in_groove = np.zeros(len(passes), dtype=np.bool_)
+    if past.part.size and not past.separation.size:  # strips in contact as wholes are counted
+        in_groove = have_groove(problem, state)
+    # line loads and wear about which the wear is linearised
+    line_load, wear = contacts.line_load, wear_of(contacts)
+    begun = begin_step(
+        past.spans,
+        order,
+        passes,
+        conditions.own,
+        conditions.mean,
+        past.wear,
+        past.sums,
+        past.feedback,
+        depths,
+        bodies,
+        gap,
+        kernel_input(contacts.approach),
+        wear,
+        share,
+        past.separation,
+        past.part,
+        past.whole_steps,
+        in_groove,
+    )
+    worn_passes, half_pass, spans, scale, level, added, base, guess, sums, feedback = begun[:10]
+    resolved, first, rise, greatest, contact_depth = begun[10:]
+    of_step: tuple[Any, ...] = (
+        *(bodies, resolved, gap, depths, added, base, past.part, first, rise, greatest),
+        contact_depth,
+    )
+    exponents = np.array(state.wear_exponents).reshape(shape)
+    loads = LoadsOfStep(problem, state, conditions.force, passes, feedback)
+    stations, active = problem.shape[0], np.ones(len(passes), dtype=np.bool_)
+    iterations = np.zeros(len(passes), dtype=np.int64)
+    most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
+    for iteration in range(1, MAX_FIXED_POINT + 1):
+        about: tuple[Any, ...] = (line_load, wear, exponents)
+        gaps, slopes, compliance, opened, constant = linearise_step(*of_step, *about)
+        batch = contact_batch(problem, opened, loads.used, *separated(guess, stations))
+        solved = solve_compliant(problem, batch, compliance, contacts, active)
+        iterations += active
+        new, apart = wear_of(solved), solved.separation
+        apart = (
+            past.separation if apart is None or not past.separation.size else kernel_input(apart)
+        )
+        linear: tuple[Any, ...] = (gaps, slopes, compliance, constant)
+        found: tuple[Any, ...] = (solved.line_load, apart, new, worn_passes, scale, most, active)
+        worn, (rest, opening, depth) = compare_step(*of_step, *about, *linear, *found)
+        used, guess, change = guess, base + worn, rest
+        # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
+        relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
+        if loads.vary:
+            change = loads.moved(solved, active, change, opening, base, relaxation)
+        if problem.slip_profile is not None:
+            moved = np.abs(guess - used).max(axis=(0, 2))
+            change = np.maximum(change, opening * (moved / depth))
+        converged = problem.iteration_tolerance * relaxation
+        adhering = problem.values_of(solved, "adhesion_fraction").max(axis=(0, 1)) > ADHERING
+        wear_of_step = np.where(adhering, OF_STEP * opening, np.inf)
+        active &= ~(change <= converged * np.minimum(CONVERGED * depth, wear_of_step))
+        contacts = solved
+        if not np.count_nonzero(active):
+            break
+        # with a relaxed tolerance a step without wear might pass where strips are cut
+        if iteration == MAX_FIXED_POINT or (
+            iteration == RELAXATION_INTERVAL and (active & resolved).any()
+        ):
+            raise StepError(
+                f"an implicit step of {passes[0]:.4g} passes from pass {state.passes[0]:.0f} did"
+                f" not converge (last relative change {(change / depth).max():.1e})",
+                state.to_arrays(),
+            )
+        loads.used = loads.target
+        if iteration < DAMPED_FROM:
+            line_load, wear = solved.line_load, new
+        else:  # strips at an edge enter and leave the contact in turn
+            line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
+    feedback, energy = loads.feedback, energy_per_pass(problem, contacts)
+    given: tuple[Any, ...] = (past.separation, past.whole_steps, share, contacts.line_load, new)
+    given += worn, worn_passes, half_pass, spans, scale, level, sums, feedback, energy
+    given += past.wear, past.sums, past.feedback
+    ends, fields, *differences, dissipated, decreased = end_step(*of_step, *given)
+    by_contact = *problem.shape, strips
+    edges = dict(zip(FIELDS, fields.reshape(-1, *by_contact), strict=False))
+    if not past.separation.size:
+        edges["separation"] = None
+    past_wear, past_sums, past_feedback = differences
+    if loads.vary:
+        edges["past_feedback"] = past_feedback.reshape(ROWS, *problem.shape)
+    end = state.with_stacked(
+        ends,
+        **edges,
+        contacts=contacts,
+        terms=loads.terms(contacts),
+        solves=state.solves + iterations * problem.contacts_each,
+        wear_exponents=exponents.reshape(by_contact),
+        passes=state.passes + passes,
+        energy=state.energy + dissipated,
+        past_wear=past_wear,
+        past_sums=past_sums[..., 0],
+        past_spans=spans,
+        order=order,
+    )
+    return end, decreased
+
+
+class LoadsOfStep:
+    """Loads of the contacts at the end of an implicit step.
+
+    Parameters
+    ----------
+    problem, start, passes
+        As of `step_by_formula`.
+    force : ndarray, shape (realisations,) or (stations, 1, realisations)
+        Load before feedback [N].
+    feedback : ndarray, shape (rows, realisations, 1)
+        Predicted part of the loads due to springs and load terms, without rows if there are none
+        [N].
+
+    Attributes
+    ----------
+    used, target : ndarray, shape (stations, contacts, realisations)
+        Loads of the last solution, and loads closer to equilibrium [N].
+    vary : bool
+        Whether the loads depend on the solution.
     """
 
-    problem: WearProblem
-    start: WearState
-    base: FloatArray
-    added: FloatArray
-    force: FloatArray
-    passes: FloatArray
-    worn_passes: FloatArray
-    scale: FloatArray | None = None
+    def __init__(
+        self,
+        problem: WearProblem,
+        start: WearState,
+        force: FloatArray,
+        passes: FloatArray,
+        feedback: FloatArray,
+    ) -> None:
+        self._problem, self._start, self._force, self._passes = problem, start, force, passes
+        self._prescribed = with_feedback(problem, force, np.zeros(()), ())
+        self.used, self.vary = checked_loads(start, self._prescribed), feedback.size > 0
+        self._none = feedback
+        if self.vary:
+            self._before = carried_loads(problem, start.contacts)
+            self._slope = _Slope(self.used.shape)
+            least = LEAST_GUESS * np.minimum(self._prescribed, self._before)
+            predicted = self._prescribed + feedback.reshape(problem.shape)
+            self.used = np.maximum(predicted, least)
+        self.target = self.used
 
-    def solved(self, guess: FloatArray, feedback: FloatArray | None) -> Solved:
-        """Solve contacts, wear and loads together.
+    @property
+    def feedback(self) -> FloatArray:
+        """Part of the loads due to springs and load terms, (rows, realisations, 1) [N]."""
+        if not self.vary:
+            return self._none
+        return (self.target - self._prescribed).reshape(self._none.shape)
 
-        The wear enters the contact problem as a compliance: it is linearised in the line load about
-        an earlier solution. Exponents of the line load, loads and creepage depend on the solution
-        and are iterated. Realisations that have converged are not solved again while others
-        continue.
+    def moved(
+        self,
+        solved: ContactBatchSolution,
+        active: BoolArray,
+        change: FloatArray,
+        opening: FloatArray,
+        base: FloatArray,
+        relaxation: float,
+    ) -> FloatArray:
+        """Move `target` towards equilibrium with a solution, and return the change with it.
 
         Parameters
         ----------
-        guess : ndarray
-            Predicted depths, shape as `base` [m].
-        feedback : ndarray, shape (stations, contacts, realisations), optional
-            Predicted part of the loads due to springs and load terms, where there are any [N].
-
-        Returns
-        -------
-        Solved
-
-        Raises
-        ------
-        StepError
-            If the iteration does not converge.
+        solved : ContactBatchSolution
+        active : ndarray of bool, shape (realisations,)
+            Realisations whose loads move: those that have converged do not depend on the others.
+        change, opening : ndarray, shape (realisations,)
+            Change of the wear, and the wear of both bodies of a contact, at most [m].
+        base : ndarray
+            As of `step_by_formula` [m].
+        relaxation : float
+            Factor on tolerances.
         """
-        problem, start = self.problem, self.start
-        prescribed = with_feedback(problem, self.force, np.zeros(()), ())
-        loads = checked_loads(start, prescribed)
-        if feedback is not None:
-            before, slope = carried_loads(problem, start.contacts), _Slope(loads.shape)
-            loads = np.maximum(prescribed + feedback, LEAST_GUESS * np.minimum(prescribed, before))
-        target = loads
-        stations, depths, contacts = problem.shape[0], guess, start.contacts
-        edges = edges_of_step(problem, start, self.base, self.added)
-        gap = problem.gap(*separated(self.base, stations))
-        level = guess[problem.body_rows].sum(axis=1).reshape(-1, problem.grid.strips)
-        # line loads and wear about which the wear is linearised
-        line_load, wear = contacts.line_load, self._parts(contacts)
-        shape = line_load.shape
-        exponents = np.asarray(start.wear_exponents).reshape(shape)
-        active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
-        iterations = np.zeros(len(active), dtype=np.int64)
-        gaps, slopes, linear = gap.reshape(shape).copy(), np.ones(shape), np.empty(shape)
-        worn = np.empty_like(self.base)
-        # with a relaxed tolerance a step without wear might pass where strips are cut
-        tries = MAX_FIXED_POINT if edges is None else RELAXATION_INTERVAL
-        for iteration in range(1, tries + 1):
-            if edges is not None:
-                linearise_edges(edges, level, wear, gaps, slopes)
-            opened = np.empty(shape)
-            compliance = np.empty((len(active), len(problem.bodies), 2, shape[1]))
-            constant = linearised_wear(
-                line_load,
-                wear,
-                exponents,
-                slopes,
-                problem.body_rows,
-                gaps,
-                compliance,
-                opened,
-            )
-            batch = contact_batch(problem, opened, loads, *separated(depths, stations))
-            shared = SharedWear(problem.bodies, compliance)
-            solved = solve_compliant(problem, batch, shared, contacts, active)
-            iterations += active
-            new, known, exponents = self._parts(solved), exponents, exponents.copy()
-            rest, opening, depth = wear_of_bodies(
-                solved.line_load,
-                line_load,
-                new,
-                wear,
-                compliance,
-                constant,
-                problem.body_rows,
-                self.base,
-                MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT,
-                slopes,
-                exponents,
-                worn,
-                linear,
-            )
-            if edges is not None:
-                assert solved.separation is not None
-                apart, load = kernel_input(solved.separation), kernel_input(solved.line_load)
-                of_edges = compare_edges(
-                    edges, active, gaps, slopes, linear, apart, load, new, level
-                )
-                rest = np.maximum(rest, of_edges / OF_EDGES)
-            if np.count_nonzero(active) < len(active):  # of realisations that have converged
-                each = exponents.reshape(-1, len(active), shape[1])
-                each[:, ~active] = known.reshape(each.shape)[:, ~active]
-            used, depths, change = depths, self.base + worn, rest
-            # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
-            relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
-            if feedback is not None:
-                # loads of realisations that have converged must not depend on the others
-                found = self._equilibrium(solved, loads, before, gap, slope)
-                target = np.where(active, found, target)
-                moved = np.abs(target / loads - 1.0).max(axis=(0, 1))
-                change = np.maximum(change, opening * moved)
-                if problem.has_spring:
-                    # later loads follow this one, also where the wear of the step is small
-                    least, most = problem.iteration_tolerance * np.array([1.0, LOADS_CONVERGED])
-                    part = RESOLVED * np.abs(target / before - 1.0).max(axis=(0, 1))
-                    change[moved > np.clip(part, least, most) * relaxation] = np.inf
-            if problem.slip_profile is not None:
-                moved = np.abs(depths - used).max(axis=(0, 2))
-                change = np.maximum(change, opening * (moved / depth))
-            converged = problem.iteration_tolerance * relaxation
-            adhering = problem.values_of(solved, "adhesion_fraction").max(axis=(0, 1)) > ADHERING
-            of_step = np.where(adhering, OF_STEP * opening, np.inf)
-            active &= ~(change <= converged * np.minimum(CONVERGED * depth, of_step))
-            if not np.count_nonzero(active):
-                parts = None
-                if edges is not None:
-                    depths, parts, edge_state = self._ended(edges, level, solved, new, worn)
-                cylinder, roller = separated(depths, stations)
-                end = start.replaced(
-                    cylinder_depth=cylinder,
-                    roller_depth=roller,
-                    **({} if edges is None else edge_state),
-                    solves=start.solves + iterations * problem.contacts_each,
-                    contacts=solved,
-                    terms=self._terms(solved),
-                    wear_exponents=exponents.reshape(*problem.shape, -1),
-                )
-                feedback = None if feedback is None else target - prescribed
-                return Solved(end, worn, feedback, parts)
-            contacts, loads = solved, target
-            if iteration < DAMPED_FROM:
-                line_load, wear = solved.line_load, new
-            else:  # strips at an edge enter and leave the contact in turn
-                line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
-        raise StepError(
-            f"an implicit step of {self.passes[0]:.4g} passes from pass {start.passes[0]:.0f} did"
-            f" not converge (last relative change {(change / depth).max():.1e})",
-            start.to_arrays(),
-        )
+        problem = self._problem
+        found = self._equilibrium(solved, base)
+        self.target = np.where(active, found, self.target)
+        moved = np.abs(self.target / self.used - 1.0).max(axis=(0, 1))
+        change = np.maximum(change, opening * moved)
+        if problem.has_spring:
+            # later loads follow this one, also where the wear of the step is small
+            least, most = problem.iteration_tolerance * np.array([1.0, LOADS_CONVERGED])
+            part = RESOLVED * np.abs(self.target / self._before - 1.0).max(axis=(0, 1))
+            change[moved > np.clip(part, least, most) * relaxation] = np.inf
+        return change
 
-    def _ended(
-        self,
-        edges: EdgeStrips,
-        level: FloatArray,
-        solved: ContactBatchSolution,
-        wear: FloatArray,
-        worn: FloatArray,
-    ) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return depths, `Solved.parts`, and fields of the state at the end of the step."""
-        depths, parts = np.empty_like(worn), np.empty_like(worn)
-        ended = np.empty((3, *level.shape))
-        end_edges(edges, level, solved.line_load, wear, worn, depths, parts, ended)
-        separation, part, whole_steps = ended.reshape(3, *self.problem.shape, -1)
-        fields = {"separation": separation, "part": part, "whole_steps": whole_steps}
-        return depths, parts, fields
-
-    def _parts(self, contacts: ContactBatchSolution) -> FloatArray:
-        """Return the contributions of the contacts to the wear, shape (2, contacts, strips) [m]."""
-        parts = self.problem.wear_parts(contacts, self.worn_passes)
-        parts = parts.reshape(2, *contacts.line_load.shape)
-        if self.scale is None:
-            return parts
-        rows = self.problem.body_rows.T
-        return np.asarray(parts * self.scale[rows].reshape(parts.shape))
-
-    def _equilibrium(
-        self,
-        solved: ContactBatchSolution,
-        loads: FloatArray,
-        before: FloatArray,
-        gap: FloatArray,
-        slope: _Slope,
-    ) -> FloatArray:
-        """Return loads closer to equilibrium than those of a solution, shape (S, C, N) [N].
-
-        `before` are the loads before the step.
-        """
-        problem, displacement, approach = self.problem, np.zeros(()), np.zeros(())
+    def _equilibrium(self, solved: ContactBatchSolution, base: FloatArray) -> FloatArray:
+        """Return loads closer to equilibrium than those of a solution, shape (S, C, N) [N]."""
+        problem, displacement, approach = self._problem, np.zeros(()), np.zeros(())
+        loads, before = self.used, self._before
         if problem.has_spring:
             # worn descent less the recovery of the elastic approach
             approach = problem.values_of(solved, "approach")
-            fresh = fresh_approach(problem, self.start, self.force)
+            fresh = fresh_approach(problem, self._start, self._force)
             displacement = approach - problem.nominal_least_gap - fresh
-        target = with_feedback(problem, self.force, displacement, self._terms(solved))
+        target = with_feedback(problem, self._force, displacement, self.terms(solved))
         if not problem.has_spring:
             return np.maximum(target, LEAST_GUESS * loads)
-        pressed = approach - gap.min(axis=-1)
-        exponent = slope.exponent(loads, pressed)
+        least_gap = problem.gap(*separated(base, problem.shape[0])).min(axis=-1)
+        pressed = approach - least_gap
+        exponent = self._slope.exponent(loads, pressed)
         target = corrected_loads(problem, loads, target, pressed, exponent)
-        unloaded = before < UNLOADED * with_feedback(problem, self.force, np.zeros(()), ())
+        unloaded = before < UNLOADED * self._prescribed
         target = np.maximum(target, np.where(unloaded, LEAST_GUESS * before, -np.inf))
         if not (target > 0.0).all():
-            checked_loads(self.start, np.where(loads < LOST * before, target, 1.0))
+            checked_loads(self._start, np.where(loads < LOST * before, target, 1.0))
         return np.maximum(target, LEAST_GUESS * loads)
 
-    def _terms(self, solved: ContactBatchSolution) -> FloatArray:
+    def terms(self, solved: ContactBatchSolution) -> FloatArray:
         """Return the load terms at the end of the step, shape (terms, rollers, realisations).
 
         They advance with the mean of the powers at its start and end.
         """
-        problem, start = self.problem, self.start
+        problem, start = self._problem, self._start
         if not problem.terms:
             return start.terms
         powers = [
@@ -339,13 +381,13 @@ class EndOfStep:
             for contacts in (start.contacts, solved)
         ]
         power = 0.5 * (powers[0] + powers[1])
-        return advanced_terms(problem, start, start.passes + self.passes, power)
+        return advanced_terms(problem, start, start.passes + self._passes, power)
 
 
 def solve_compliant(
     problem: WearProblem,
     batch: ContactBatch,
-    wear: SharedWear,
+    compliance: FloatArray,
     warm: ContactBatchSolution,
     active: BoolArray,
 ) -> ContactBatchSolution:
@@ -356,8 +398,8 @@ def solve_compliant(
     problem : WearProblem
     batch : ContactBatch
         The contacts, in the problem's order.
-    wear : SharedWear
-        Wear compliance with a first axis of realisations.
+    compliance : ndarray, shape (realisations, contacts each, 2, strips)
+        Wear compliance, as of `SharedWear`.
     warm : ContactBatchSolution
         Solutions to start from, in the problem's order.
     active : ndarray of bool, shape (realisations,)
@@ -367,19 +409,18 @@ def solve_compliant(
     ContactBatchSolution
         In the problem's order; those of inactive realisations are taken from `warm`.
     """
-    model, realisations = problem.model, problem.shape[REALISATION]
+    model, realisations = problem.model, len(active)
     coupled = len(batch) // realisations
-    everywhere = np.count_nonzero(active) == realisations
-    if everywhere and coupled == 1:
-        return model.solve(batch, wear.total.reshape(batch.gap.shape), None, warm)
-    if everywhere and realisations == 1:
-        return model.solve(batch, None, wear, warm)
+    if np.count_nonzero(active) == realisations and coupled == 1:
+        return model.solve(batch, compliance.sum(axis=2).reshape(batch.gap.shape), None, warm)
+    if np.count_nonzero(active) == realisations == 1:
+        return model.solve(batch, None, SharedWear(problem.bodies, compliance), warm)
     # the contacts of one realisation next to each other, which the problem has `realisations` apart
     numbers = np.flatnonzero(active)
     order = np.arange(len(batch)).reshape(coupled, realisations)[:, numbers].T.ravel()
-    some, near, part = batch.at(order), warm.at(order), wear.at(numbers)
+    some, near, part = batch.at(order), warm.at(order), compliance[numbers]
     if coupled == 1:
-        solved = model.solve(some, part.total.reshape(some.gap.shape), None, near)
+        solved = model.solve(some, part.sum(axis=2).reshape(some.gap.shape), None, near)
     else:
-        solved = model.solve(some, None, part, near)
+        solved = model.solve(some, None, SharedWear(problem.bodies, part), near)
     return warm.with_others(order, solved)

@@ -6,12 +6,15 @@ import numpy as np
 
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import HERTZ, WearState
+from wearsim.evolution.steppers.edges import unresolved
 from wearsim.evolution.steppers.loads import elastic_approaches, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
+from wearsim.mechanics.numerics.step_errors import EDGE_ORDER
 from wearsim.types import FloatArray, IntArray
 
+LEAST_ENERGY = 0.1  # part of the mean energy that an error of the energy is compared with, at least
 LEAST_LOAD = 0.01  # of the load without feedback; the error of smaller loads is compared with it
 
 
@@ -51,7 +54,8 @@ def next_steps_of_loads(
     relative = (feedback / scale).reshape(ROWS, -1, scale.shape[-1], 1)
     order, own = np.empty_like(orders), np.empty(relative.shape[1:])
     ones = np.ones_like(own)
-    found = next_steps(relative, spans, ones, orders, part, aim, keep, MAX_ORDER, ones, own, order)
+    most = np.full_like(orders, MAX_ORDER)
+    found = next_steps(relative, spans, ones, orders, part, aim, keep, most, ones, own, order)
     errors = np.abs(own.reshape(scale.shape) * scale)
     springs = np.broadcast_to(problem.stiffness, scale.shape)
     displaced = np.divide(errors, springs, out=np.zeros_like(errors), where=springs > 0.0)
@@ -61,20 +65,22 @@ def next_steps_of_loads(
 
 
 def next_steps_of_energy(
-    start: WearState, end: WearState, tolerance: float, keep: float, most: int
+    start: WearState, end: WearState, tolerance: float, keep: float
 ) -> tuple[FloatArray, IntArray]:
     """Choose the next step by the error of the energy, and thus of the worn volume.
 
     In partial slip the power depends on the line loads, which follow from differences of depths
     far below the error that a step may add to a profile. Such errors of the energy add up, since
-    further wear does not correct them. A step may therefore add the tolerance of its own energy.
+    further wear does not correct them. A step may therefore add the tolerance of its own energy, or
+    of a part of the mean energy over as many passes where that is more, as under a spring that has
+    lost its load.
 
     Parameters
     ----------
     start, end : WearState
         States before and after the step.
-    tolerance, keep, most
-        Tolerance of the stepper; others as of `next_steps`.
+    tolerance, keep
+        Tolerance of the stepper, and as of `next_steps`.
 
     Returns
     -------
@@ -87,8 +93,13 @@ def next_steps_of_energy(
     assert sums is not None
     assert spans is not None
     assert orders is not None
-    energy, worn = kernel_input(sums[:, -1:, :, None]), (end.energy - start.energy)[None, :, None]
+    energy = kernel_input(sums[:, -1:, :, None])
+    least = LEAST_ENERGY * end.energy * (1.0 - start.passes / end.passes)
+    worn = np.maximum(end.energy - start.energy, least)[None, :, None]
     ones, order, own = np.ones_like(worn), np.empty_like(orders), np.empty_like(worn)
+    most = np.full_like(orders, MAX_ORDER)
+    if end.part is not None:
+        most = np.where(unresolved(end), MAX_ORDER, EDGE_ORDER)
     found = next_steps(
         *(energy, spans, worn, orders, ones[0, :, 0], tolerance, keep, most, ones, own, order)
     )

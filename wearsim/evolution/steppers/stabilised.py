@@ -13,6 +13,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Step
+from wearsim.evolution.steppers.edges import have_groove
 from wearsim.evolution.steppers.forward_euler import decay_rates
 from wearsim.evolution.steppers.loads import (
     elastic_approaches,
@@ -34,6 +35,10 @@ from wearsim.types import FloatArray
 
 MIN_STAGES = 3  # with two, profiles that decay within a step are inaccurate
 SAFETY = 1.2  # on the greatest decay rate, which is estimated and may grow within the step
+
+# part of a strip by which the edges of a groove advance in a step, at most: the pressure in strips
+# that come into contact within longer steps is far too high
+ADVANCE = 0.5
 
 #: change of the state in a step or in a part of it: depth of cylinder and rollers [m], and the
 #: power of every contact times the part of the step it lasted [W]
@@ -94,6 +99,20 @@ class StabilisedStepper(StepDoublingStepper):
     """
 
     order = 2
+
+    def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
+        """Return the step of the step-size control, limited where there is a groove.
+
+        The width of a groove grows as the cubic root of the passes. Without the separation of the
+        surfaces, the pressure at the edge is uncertain for any step.
+        """
+        found = super().proposed(problem, state)
+        known = state.contacts.separation is not None and np.count_nonzero(state.passes) > 0
+        if self.forced_step is not None or not known:
+            return found
+        loaded = np.count_nonzero(problem.values_of(state.contacts, "line_load"), axis=-1)
+        longest = 6.0 * ADVANCE * state.passes / loaded.max(axis=(0, 1))
+        return np.where(have_groove(problem, state), np.minimum(found, longest), found)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return a step for the decay rates at `state`."""

@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.numerics.multistep import ROWS
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 SETTLED = float(ROWS)  # steps after which all points of a formula lie in contact
+YOUNG_STEPS = 2.0  # steps for which a strip is young, over the order
 ELASTIC = 0.5
 LEAST, FULL, NONE = 0.1, 0.5, 1.0
 FLAT = 1e-15  # least rise of a gap across a strip [m]
@@ -28,17 +29,17 @@ class EdgeStrips(NamedTuple):
     ----------
     bodies : ndarray of int, shape (contacts each, 2)
         Rows of the two bodies of each contact.
+    resolved : ndarray of bool, shape (realisations,)
+        Tests that resolve edges; strips of the others have no u_0 and r.
     gap : ndarray, shape (contacts, strips)
         Gap before wear [m].
-    approach : ndarray, shape (contacts,)
-        Approach of each contact [m].
     rows : ndarray, shape (bodies, realisations, strips)
         Mean depths of the bodies [m].
     added : ndarray, shape (bodies, realisations, strips)
         Increase of the depths in the step without the wear at its end [m].
     base : ndarray, shape (bodies, realisations, strips)
         Depths l_0 of the formula, of the bodies [m].
-    part, separation, whole_steps : ndarray, shape (contacts, strips)
+    part : ndarray, shape (contacts, strips)
         As in `WearState`.
     first, rise : ndarray, shape (contacts, strips)
         u_0 and r [m], from `start_edges`.
@@ -47,26 +48,32 @@ class EdgeStrips(NamedTuple):
     """
 
     bodies: IntArray
+    resolved: BoolArray
     gap: FloatArray
-    approach: FloatArray
     rows: FloatArray
     added: FloatArray
     base: FloatArray
     part: FloatArray
-    separation: FloatArray
-    whole_steps: FloatArray
     first: FloatArray
     rise: FloatArray
     greatest: FloatArray
 
 
-@kernel
-def start_edges(strips: EdgeStrips) -> None:
+@subroutine
+def start_edges(strips: EdgeStrips, separation: FloatArray, approach: FloatArray) -> None:
     """Fill u_0, r and greatest f of all strips.
 
     Ahead of an edge, the deformed surfaces of a strip touch at its inner end or not yet.
+
+    Parameters
+    ----------
+    strips : EdgeStrips
+    separation : ndarray, shape (contacts, strips)
+        As in `WearState`.
+    approach : ndarray, shape (contacts,)
+        Approach of each contact [m].
     """
-    contacts, n = strips.part.shape
+    contacts, n = strips.gap.shape
     rows, realisations, _ = strips.rows.shape
     along_cam = strips.bodies[len(strips.bodies) - 1, 0] > 0
     for b in range(rows):
@@ -77,18 +84,20 @@ def start_edges(strips: EdgeStrips) -> None:
     for k in range(contacts):
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v, least = k % realisations, np.inf
+        if not strips.resolved[v]:
+            continue
         for i in range(n):
             depth = strips.rows[one, v, i] + strips.rows[other, v, i]
             least = min(least, strips.gap[k, i] + depth)
-        elastic = ELASTIC * (strips.approach[k] - least)
+        elastic = ELASTIC * (approach[k] - least)
         for i in range(n):
-            part, apart = strips.part[k, i], strips.separation[k, i]
+            part, apart = strips.part[k, i], separation[k, i]
             rise = 0.0
             if 0.0 < part < 1.0:
                 rise = 2.0 * apart / (1.0 - part) ** 2
             elif part <= 0.0:
-                ahead = strips.separation[k, min(i + 1, n - 1)]
-                ahead = max(ahead, strips.separation[k, max(i - 1, 0)])
+                ahead = separation[k, min(i + 1, n - 1)]
+                ahead = max(ahead, separation[k, max(i - 1, 0)])
                 rise = ahead - apart
                 if rise > 0.0:
                     kept = (NONE - elastic / rise) / (NONE - FULL)
@@ -156,7 +165,7 @@ def by_others(
     return ahead, grown, joint
 
 
-@kernel
+@subroutine
 def linearise_edges(
     strips: EdgeStrips,
     level: FloatArray,
@@ -184,6 +193,10 @@ def linearise_edges(
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
         for i in range(n):
+            if not strips.resolved[v]:
+                gaps[k, i] = strips.gap[k, i] + strips.base[one, v, i] + strips.base[other, v, i]
+                slopes[k, i], scaled[0, k, i], scaled[1, k, i] = 1.0, 0.0, 0.0
+                continue
             ahead, grown, _ = by_others(strips, wear, sums, k, i)
             part = part_at(strips, k, i, level[k, i], grown)
             base = strips.base[one, v, i] + strips.base[other, v, i]
@@ -204,7 +217,7 @@ def linearise_edges(
         return
     sum_of_wear(strips, scaled, sums)
     for k in range(contacts):
-        for i in range(n):
+        for i in range(n if strips.resolved[k % realisations] else 0):
             for side in range(2):
                 b, v = strips.bodies[k // realisations, side], k % realisations
                 part, share = strips.part[k, i], 1.0
@@ -213,7 +226,7 @@ def linearise_edges(
                 gaps[k, i] -= share * (sums[b, v, i] - scaled[side, k, i])
 
 
-@kernel
+@subroutine
 def compare_edges(
     strips: EdgeStrips,
     active: BoolArray,
@@ -254,7 +267,7 @@ def compare_edges(
     for k in range(contacts):
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
-        for i in range(n):
+        for i in range(n if strips.resolved[v] else 0):
             if active[v]:
                 level[k, i] = gaps[k, i] + linear[k, i] - apart[k, i] - strips.gap[k, i]
             ahead, grown, joint = by_others(strips, wear, sums, k, i)
@@ -271,9 +284,11 @@ def compare_edges(
     return rest
 
 
-@kernel
+@subroutine
 def end_edges(
     strips: EdgeStrips,
+    counted: bool,
+    whole_steps: FloatArray,
     level: FloatArray,
     loads: FloatArray,
     wear: FloatArray,
@@ -287,14 +302,19 @@ def end_edges(
     Parameters
     ----------
     strips : EdgeStrips
+    counted : bool
+        Whether strips in contact as wholes are counted, where no test resolves edges.
+    whole_steps : ndarray, shape (contacts, strips)
+        As in `WearState`, at the start of the step.
     level, loads : ndarray, shape (contacts, strips)
         Depth l [m] and line load [N/m] at the end of the step.
     wear : ndarray, shape (2, contacts, strips)
         Wear of both bodies by each contact [m].
     worn, depths, parts : ndarray, shape (bodies, realisations, strips)
         Wear of the bodies by the formula [m]; results: mean depths [m], greatest f.
-    fields : ndarray, shape (3, contacts, strips)
-        Result: `separation`, `part` and `whole_steps` as in `WearState`.
+    fields : ndarray, shape (3, contacts, strips), or (0, 0, 0)
+        Result: `separation`, `part` and `whole_steps` as in `WearState`, not a number in tests
+        that do not resolve edges; none where no test does.
     """
     contacts, n = level.shape
     rows, realisations, _ = worn.shape
@@ -309,6 +329,15 @@ def end_edges(
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
         for i in range(n):
+            if not strips.resolved[v]:
+                for field in range(len(fields)):
+                    fields[field, k, i] = np.nan
+                if counted:
+                    fields[1, k, i] = 1.0 if loads[k, i] > 0.0 else 0.0
+                    fields[2, k, i] = fields[1, k, i] * min(whole_steps[k, i] + 1.0, SETTLED)
+                    for b in (one, other):
+                        parts[b, v, i] = max(parts[b, v, i], fields[1, k, i])
+                continue
             _, grown, joint = by_others(strips, wear, sums, k, i)
             before, part, growth = strips.part[k, i], 0.0, 0.0
             if loads[k, i] > 0.0:
@@ -322,11 +351,11 @@ def end_edges(
             for side in range(2):
                 b = strips.bodies[k // realisations, side]
                 # a strip of a body follows the formula where all of its contacts do
-                crossed[b, v, i] |= strips.whole_steps[k, i] < SETTLED
+                crossed[b, v, i] |= whole_steps[k, i] < SETTLED
                 depths[b, v, i] += ratio * wear[side, k, i]
                 parts[b, v, i] = max(parts[b, v, i], part)
             fields[1, k, i] = part
-            steps = min(strips.whole_steps[k, i] + 1.0, SETTLED)
+            steps = min(whole_steps[k, i] + 1.0, SETTLED)
             fields[2, k, i] = steps if part >= 1.0 else 0.0
     for b in range(rows):
         for v in range(realisations):
@@ -336,7 +365,7 @@ def end_edges(
     for k in range(contacts):
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v = k % realisations
-        for i in range(n):
+        for i in range(n if strips.resolved[v] and len(fields) else 0):
             part = fields[1, k, i]
             apart = max(depths[one, v, i] + depths[other, v, i] - level[k, i], 0.0)
             if part > 0.0:
@@ -344,11 +373,13 @@ def end_edges(
             fields[0, k, i] = apart
 
 
-@kernel
+@subroutine
 def mark_strips(
+    bodies: IntArray,
+    resolved: BoolArray,
     part: FloatArray,
     whole_steps: FloatArray,
-    young_steps: FloatArray,
+    orders: IntArray,
     wear: FloatArray,
     young: BoolArray,
     crossed: BoolArray,
@@ -356,58 +387,98 @@ def mark_strips(
 ) -> None:
     """Fill which strips of the bodies are young, which an edge has crossed, and their parts.
 
+    Young strips take steps of first order. Points of formulas of the state's order would lie ahead
+    of the edge or close to it, until as many steps again have been taken. There the surfaces close
+    as the power 3/2 of the distance from it, and higher orders would overshoot. A worn roller of a
+    cam meets the edges at all stations at different times. Its wear by one of them has no past
+    points, and both bodies of a contact must wear by the same formula: no strip is young then.
+
     Parameters
     ----------
-    part, whole_steps : ndarray, shape (stations, contacts each, realisations, strips)
+    bodies, resolved
+        As in `EdgeStrips`.
+    part, whole_steps : ndarray, shape (contacts, strips)
         As in `WearState`.
-    young_steps : ndarray, shape (realisations,)
-        Steps for which a strip is young after it has come into contact as a whole.
+    orders : ndarray of int, shape (realisations,)
+        Orders of the steps.
     wear : ndarray, shape (bodies, realisations, strips)
         Wear per roller pass [m].
     young, crossed : ndarray of bool, shape as `wear`
-        Results, see `evolution.steppers.edges`.
+        Results: strips that are young, and that an edge is crossing or has crossed lately.
     parts : ndarray, shape as `wear`
-        Result: greatest part in contact, 0 without wear.
+        Result: greatest part in contact, 0 without wear; 1 in tests that do not resolve edges.
     """
-    stations, each, realisations, n = part.shape
-    rows = wear.shape[0]
+    rows, realisations, n = wear.shape
+    stations = bodies[len(bodies) - 1, 0] + 1
     for v in range(realisations):
-        takes_part = True
-        if stations > 1:
-            for b in range(stations, rows):
-                for i in range(n):
-                    takes_part = takes_part and not wear[b, v, i] > 0.0
+        takes_part, young_steps = resolved[v], YOUNG_STEPS * orders[v]
         for b in range(rows):
-            of_station = b < stations
-            first, last = (b, b + 1) if of_station else (0, stations)
             for i in range(n):
-                comes, touches, lately, most = False, False, False, 0.0
-                for s in range(first, last):
-                    for c in range(each if of_station else 1):
-                        k = c if of_station else b - stations
-                        here = part[s, k, v, i]
-                        most = max(most, here)
-                        if here > 0.0:
-                            touches = True
-                            comes = comes or whole_steps[s, k, v, i] < young_steps[v]
-                            lately = lately or whole_steps[s, k, v, i] < SETTLED
-                young[b, v, i] = takes_part and (comes or not touches)
-                crossed[b, v, i] = lately
-                parts[b, v, i] = most if wear[b, v, i] > 0.0 else 0.0
+                if stations > 1 and b >= stations and wear[b, v, i] > 0.0:
+                    takes_part = False
+                young[b, v, i], crossed[b, v, i] = False, False
+                parts[b, v, i] = 0.0 if resolved[v] else 1.0
+        for c in range(len(bodies) if resolved[v] else 0):
+            k = c * realisations + v
+            for side in range(2):
+                b = bodies[c, side]
+                for i in range(n):
+                    if part[k, i] > 0.0:
+                        parts[b, v, i] = max(parts[b, v, i], part[k, i])
+                        young[b, v, i] = young[b, v, i] or whole_steps[k, i] < young_steps
+                        crossed[b, v, i] = crossed[b, v, i] or whole_steps[k, i] < SETTLED
+        for b in range(rows if resolved[v] else 0):
+            for i in range(n):
+                young[b, v, i] = takes_part and (young[b, v, i] or not parts[b, v, i] > 0.0)
+                parts[b, v, i] = parts[b, v, i] if wear[b, v, i] > 0.0 else 0.0
 
 
-def compile_edges() -> None:
-    """Compile the kernels of a step by a call for one contact of one strip."""
-    strip, rows, wear = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
-    bodies = np.array([[0, 1]])
-    strips = EdgeStrips(bodies, strip, np.ones(1), rows, rows, rows, *(strip,) * 5, rows.copy())
-    start_edges(strips)
-    linearise_edges(strips, strip, wear, np.ones((1, 1)), np.ones((1, 1)))
-    one = np.ones(1, np.bool_)
-    compare_edges(strips, one, strip, strip, strip, strip, strip, wear, np.ones((1, 1)))
-    end_edges(strips, strip, strip, wear, rows, rows.copy(), rows.copy(), np.ones((3, 1, 1)))
-    contact, marks = np.ones((1, 1, 1, 1)), np.ones((2, 2, 1, 1), np.bool_)
-    mark_strips(contact, contact, np.ones(1), rows, marks[0], marks[1], rows.copy())
+@subroutine
+def resolved_tests(separation: FloatArray, part: FloatArray, realisations: int) -> BoolArray:
+    """Return which tests resolve edges: the parts of the others are not numbers, or all whole."""
+    resolved = np.empty(realisations, np.bool_)
+    for v in range(realisations):
+        resolved[v] = separation.shape[1] > 0 and not np.isnan(part[v, 0])
+    return resolved
 
 
-compile_alongside("solve_slender", compile_edges)
+@subroutine
+def fill_separations(
+    bodies: IntArray,
+    resolved: BoolArray,
+    separation: FloatArray,
+    share: FloatArray,
+    parts: FloatArray,
+) -> None:
+    """Fill the separation of the contacts as parts of the bodies, 0 without resolved edges [m].
+
+    The sum of the two bodies of a contact is its separation, which their wear closes together.
+
+    Parameters
+    ----------
+    bodies, resolved
+        As in `EdgeStrips`.
+    separation : ndarray, shape (contacts, strips)
+        As in `WearState` [m].
+    share : ndarray, shape (realisations,)
+        Part of the wear of a contact that is the cylinder's.
+    parts : ndarray, shape (bodies, realisations, strips)
+        Result [m].
+    """
+    rows, realisations, n = parts.shape
+    one_station = bodies[len(bodies) - 1, 0] == 0
+    for v in range(realisations):
+        for b in range(rows):
+            for i in range(n):
+                parts[b, v, i] = 0.0
+        for c in range(len(bodies) if resolved[v] else 0):
+            b, k = bodies[c, 0], c * realisations + v
+            for i in range(n):
+                first = c == 0 or bodies[c - 1, 0] != b
+                least = separation[k, i] if first else min(parts[b, v, i], separation[k, i])
+                parts[b, v, i] = least
+        for i in range(n if resolved[v] and one_station else 0):
+            parts[0, v, i] *= share[v]
+            for c in range(len(bodies)):
+                apart = separation[c * realisations + v, i]
+                parts[bodies[c, 1], v, i] = apart - parts[0, v, i]

@@ -19,6 +19,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from wearsim.operating_system import processors
 from wearsim.types import FloatArray
 
 P = ParamSpec("P")
@@ -266,9 +267,7 @@ def _call_elsewhere(functions: Sequence[Callable[[], None]]) -> None:
 
     It ends when the last function returns, also after the end of this process.
     """
-    affinity = getattr(os, "sched_getaffinity", None)  # not on every platform
-    processors = len(affinity(0)) if affinity else os.cpu_count()
-    if not functions or processors == 1 or _cache_folder() is None:
+    if not functions or processors() == 1 or _cache_folder() is None:
         return
     calls = (f"from {one.__module__} import {one.__name__}; {one.__name__}()" for one in functions)
     code = "; ".join([f"import sys; sys.path[:] = {sys.path!r}", *calls])

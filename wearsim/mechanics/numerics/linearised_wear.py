@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 
 LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a steady wear rate
 DEEP = 0.5  # depths are compared where a groove is deeper than this part of its greatest depth
@@ -16,7 +16,7 @@ MIN_LOG_CHANGE = 1e-3
 LEAST = 0.15  # error of the greatest depth, relative to that of the profile, as it crosses zero
 
 
-@kernel
+@subroutine
 def linearised_wear(
     line_load: FloatArray,
     wear: FloatArray,
@@ -91,7 +91,7 @@ def linearised_wear(
     return constant
 
 
-@kernel
+@subroutine
 def wear_of_bodies(
     loads: FloatArray,
     old_loads: FloatArray,
@@ -103,6 +103,7 @@ def wear_of_bodies(
     base: FloatArray,
     greatest: float,
     slopes: FloatArray,
+    active: BoolArray,
     exponents: FloatArray,
     worn: FloatArray,
     linear: FloatArray,
@@ -125,6 +126,8 @@ def wear_of_bodies(
         Upper bound of the exponents.
     slopes : ndarray, shape (contacts, strips)
         As in `linearised_wear`.
+    active : ndarray of bool, shape (realisations,)
+        Realisations whose exponents are updated.
     exponents : ndarray, shape (contacts, strips)
         Updated by the two solutions in strips whose load has changed.
     worn : ndarray, shape (bodies, realisations, strips)
@@ -153,7 +156,7 @@ def wear_of_bodies(
                 worn[body, v, i] += wear[side, k, i]
                 scaled[body, v, i] += wear[side, k, i] / slopes[k, i]
                 part[body, v, i] += constant[side, k, i] + compliance[v, c, side, i] * loads[k, i]
-        for i in range(n):
+        for i in range(n if active[v] else 0):
             new, old = wear[0, k, i] + wear[1, k, i], old_wear[0, k, i] + old_wear[1, k, i]
             if not (new > 0.0 and old > 0.0):
                 continue
@@ -233,7 +236,7 @@ def _sizes(depths: FloatArray, differences: FloatArray, weights: FloatArray) -> 
     return sizes
 
 
-@kernel
+@subroutine
 def carried_errors(
     errors: FloatArray,
     added: FloatArray,
@@ -333,20 +336,9 @@ def carried_errors(
     return carried, found
 
 
-def compile_linearised_wear() -> None:
-    """Compile the kernels of a step by a call for one contact of one strip."""
-    strip, wear, worn = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
-    compliance, rows = np.ones((1, 1, 2, 1)), np.array([[0, 1]])
-    constant = linearised_wear(strip, wear, strip, strip, rows, strip, compliance, np.ones((1, 1)))
-    wear_of_bodies(
-        *(strip, strip, wear, wear, compliance, constant, rows),
-        *(worn, 1.0, strip, np.ones((1, 1)), worn, np.ones((1, 1))),
-    )
-    one = np.ones(1)
-    carried_errors(
-        worn, worn, strip, wear, strip, one, strip, worn, rows, one, 1.0, np.ones((2, 2))
-    )
-    difference_sizes(worn, worn, np.ones((2, 2)))
+def compile_sizes() -> None:
+    """Compile `difference_sizes` by a call for one strip."""
+    difference_sizes(np.ones((2, 1, 1)), np.ones((2, 1, 1)), np.ones((2, 2)))
 
 
-compile_alongside("solve_slender", compile_linearised_wear)
+compile_alongside("solve_slender", compile_sizes)

@@ -17,7 +17,7 @@ SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
 GROW = (2.2, 2.2, 1.8, 1.45)  # greatest ratio of successive steps, by order
 
 
-@kernel
+@subroutine
 def formulas(
     spans: FloatArray,
     steps: FloatArray,
@@ -86,7 +86,7 @@ def formulas(
         weights[0, 0, v] = weights[1, 0, v] = start[v]
 
 
-@kernel
+@subroutine
 def extrapolated(weights: FloatArray, differences: FloatArray) -> FloatArray:
     """Return sums of divided differences with the weights of `formulas`.
 
@@ -113,7 +113,7 @@ def extrapolated(weights: FloatArray, differences: FloatArray) -> FloatArray:
     return sums
 
 
-@kernel
+@subroutine
 def new_differences(
     first: FloatArray,
     change: FloatArray,
@@ -219,7 +219,7 @@ def next_steps(
     part: FloatArray,
     aim: float,
     keep: float,
-    most: int,
+    most: IntArray,
     parts: FloatArray,
     errors: FloatArray,
     next_orders: IntArray,
@@ -236,7 +236,7 @@ def next_steps(
     keep : float
         Part of the length of a step at a lower order that is compared with those at other orders:
         below one, the order is lowered for clearly longer steps only.
-    most : int
+    most : ndarray of int, shape (solutions,)
         Greatest order of the next step, at most `MAX_ORDER`.
     parts : ndarray, shape (rows, solutions, columns)
         As of `local_errors`.
@@ -261,7 +261,7 @@ def next_steps(
         excess, ratio, best, longest = 0.0, 0.0, 1, 0.0
         if known > 0:
             excess = sizes[min(order, known) - 1, v] / LIMIT
-        known = min(known, most)
+        known = min(known, most[v])
         for other in range(max(1, order - 1), min(order + 1, known) + 1):
             size = SAFETY * max(sizes[other - 1, v], 1e-12) ** (-1.0 / (other + 1))
             worth = keep * size if other < order else size
@@ -269,7 +269,7 @@ def next_steps(
                 longest, ratio, best = worth, size, other
         if known == 0:
             best, ratio = order, GROW[0]
-        elif order + 1 > known and order < most and excess <= 1.0:
+        elif order + 1 > known and order < most[v] and excess <= 1.0:
             best = order + 1  # the first steps have no estimate of the next order
         next_orders[v] = best
         found[0, v], found[1, v] = excess, min(ratio, GROW[best - 1])
@@ -287,14 +287,9 @@ def first_differences(rates: FloatArray, exposure: FloatArray) -> FloatArray:
 def compile_multistep() -> None:
     """Compile the kernels of a step by a call for one solution of one value."""
     one, order = np.ones(1), np.ones(1, dtype=np.int64)
-    spans, weights = np.ones((ROWS - 1, 1)), np.empty((2, ROWS, 1))
     differences, value = np.ones((ROWS, 1, 1, 1)), np.ones((1, 1, 1))
-    formulas(spans, one, order, one, weights, np.empty(1), np.empty((ROWS - 1, 1)))
-    extrapolated(weights, differences)
-    new_differences(value, value, one, differences, spans)
-    errors = np.empty((1, 1, 1))
-    arguments = differences, spans, value, order, one, 1.0, 1.0, MAX_ORDER
-    next_steps(*arguments, value, errors, order.copy())
+    arguments = differences, np.ones((ROWS - 1, 1)), value, order, one, 1.0, 1.0, order
+    next_steps(*arguments, value, value.copy(), order.copy())
 
 
 compile_alongside("solve_slender", compile_multistep)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -29,7 +29,9 @@ class _Recorder:
         if mapper := style.pop("color_mapper", None):
             self.mappers.append((mapper.low, mapper.high))
         look = tuple(sorted((name, repr(value)) for name, value in style.items()))
-        self.glyphs.append(((kind, look, bool(legend_label)), dict(source.data), legend_label))
+        self.glyphs.append(
+            ((kind, look, bool(legend_label), _is_plain(source)), source, legend_label)
+        )
 
     def contour(self, *_: Any, **__: Any) -> None:
         """Record contours, whose areas are no columns: such a panel is drawn again."""
@@ -92,6 +94,14 @@ def record(panel: Panel) -> Recording:
     )
 
 
+def _is_plain(columns: Mapping[str, Any]) -> bool:
+    """Return whether all columns are arrays of one dimension in single precision."""
+    return all(
+        isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype == np.float32
+        for values in columns.values()
+    )
+
+
 def _kind(axis: Axis) -> tuple[Any, ...]:
     """Return what cannot be changed in an axis that has been drawn."""
     ends = tuple(end is None for end in axis.limits)
@@ -125,6 +135,7 @@ class LiveFigure:
         panel: Panel,
         recording: Recording | None = None,
         frames: Sequence[Recording] = (),
+        send: Callable[[str, Mapping[str, Any]], object] | None = None,
     ) -> bool:
         """Show another panel with the same marks; return False if its marks differ.
 
@@ -135,6 +146,10 @@ class LiveFigure:
             What it draws, if that is known.
         frames : sequence of Recording
             Further states of the panel, which the columns have under the names "x@0", "x@1".
+        send : callable, optional
+            Takes the id of a data source and its columns, arrays of one dimension in single
+            precision, where the caller brings them to the browser: Bokeh sends a message for each
+            source, and one for each column.
         """
         new = recording or record(panel)
         old = self._recording
@@ -148,7 +163,10 @@ class LiveFigure:
         drawn = zip(self.figure.renderers, new.columns, strict=True)
         for number, (renderer, columns) in enumerate(drawn):
             further = _further(columns, [frame.columns[number] for frame in frames])
-            renderer.data_source.data = {**columns, **further}
+            if send is not None and _is_plain(columns):
+                send(renderer.data_source.id, {**columns, **further})
+            else:
+                renderer.data_source.data = {**columns, **further}
         for item, values in zip(self._annotations, new.annotations, strict=True):
             item.update(**values)
         for mapper, (low, high) in zip(self._mappers, new.scales, strict=True):

@@ -126,7 +126,7 @@ def is_boxed(panel: Panel) -> bool:
 def draw_marks(plot: Any, panel: Panel) -> None:
     """Draw the marks of a panel on a figure that has its axes."""
     if is_boxed(panel):
-        box = _source({"x": limits_of(panel.x), "y": limits_of(panel.y)})
+        box = _source(plot, _single({"x": limits_of(panel.x), "y": limits_of(panel.y)}))
         plot.line("x", "y", source=box, line_alpha=0.0)
     for mark in panel.marks:
         y = panel.right if mark.right and panel.right else panel.y
@@ -173,12 +173,18 @@ def _set_legend(plot: Any) -> None:
         legend.update(**_LEGEND)
 
 
-def _source(columns: Mapping[str, Any]) -> ColumnDataSource:
+def _source(plot: Any, columns: Mapping[str, Any], name: str | None = None) -> Any:
+    """Return the source of columns on a figure, and the columns alone for a recorder."""
+    return ColumnDataSource(columns, name=name) if isinstance(plot, figure) else columns
+
+
+def _single(columns: Mapping[str, Any]) -> dict[str, Any]:
     """Return columns, numbers in single precision."""
     arrays = {name: np.asarray(values) for name, values in columns.items()}
-    floats = {name: array for name, array in arrays.items() if array.dtype.kind == "f"}
-    single = {name: array.astype(np.float32) for name, array in floats.items()}
-    return ColumnDataSource(arrays | single)
+    return {
+        name: array.astype(np.float32) if array.dtype.kind == "f" else array
+        for name, array in arrays.items()
+    }
 
 
 def _colour(colour: Any) -> Any:
@@ -205,7 +211,7 @@ def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
             place, size = (y, x) if mark.horizontal else (x, y)
             at = np.asarray(mark.place, dtype=float) * place.scale
             low, high = (np.asarray(end, dtype=float) * size.scale for end in (mark.low, mark.high))
-            data = _source({"at": at, "low": low, "high": high})
+            data = _source(plot, _single({"at": at, "low": low, "high": high}))
             ends = ("low", "at", "high", "at") if mark.horizontal else ("at", "low", "at", "high")
             plot.segment(*ends, source=data, line_width=max(mark.width, 1.5), **style)
         case Span():
@@ -221,10 +227,11 @@ def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
             height = 0.04 * float(np.ptp(mark.y)) * y.scale / longest
             tail_x, tail_y = np.ravel(mark.x) * x.scale, np.ravel(mark.y) * y.scale
             tips = tail_x + width * np.ravel(mark.along_x), tail_y + height * np.ravel(mark.along_y)
-            data = _source({"x": tail_x, "y": tail_y, "tip_x": tips[0], "tip_y": tips[1]})
+            places = {"x": tail_x, "y": tail_y, "tip_x": tips[0], "tip_y": tips[1]}
+            data = _source(plot, _single(places))
             plot.segment("x", "y", "tip_x", "tip_y", source=data, **style)
         case Patch():
-            data = _source({"x": mark.x * x.scale, "y": mark.y * y.scale})
+            data = _source(plot, _single({"x": mark.x * x.scale, "y": mark.y * y.scale}))
             plot.patch("x", "y", source=data, line_alpha=0.0, **style, **named)
         case Text() if not mark.figure_only:
             _draw_text(plot, mark, x, y)
@@ -261,7 +268,7 @@ def _draw_line(
     if values.ndim > 1:
         some = values[:MOST_CURVES].astype(np.float32)
         across = [places.astype(np.float32)] * len(some)
-        curves = ColumnDataSource({"x": across, "y": list(some)})
+        curves = _source(plot, {"x": across, "y": list(some)})
         plot.multi_line("x", "y", source=curves, line_width=1, **style, **named)
         return
     if not len(places):
@@ -269,7 +276,7 @@ def _draw_line(
     every = evenly_spaced(len(places), len(places) if mark.dash else MOST_POINTS)
     further, more_tips = _more(mark)
     chosen = {name: column[every] for name, column in further.items()}
-    source = _source({"x": places[every], "y": values[every], **chosen})
+    source = _source(plot, _single({"x": places[every], "y": values[every], **chosen}))
     tips = [_tip(x, "x"), _tip(y, "y", mark.label.split("\n")[0]), *more_tips]
     width = max(1.5 * mark.width, 1.0)
     line = {"source": source, "line_width": width, "line_dash": _DASHES.get(mark.dash, "solid")}
@@ -293,8 +300,8 @@ def _draw_records(plot: Any, mark: Records, x: Axis, y: Axis, named: dict[str, A
     chosen = evenly_spaced(len(mark.passes), MOST_RECORDS)
     values = np.asarray(mark.y) * y.scale
     kept = {str(place): values[record] for place, record in enumerate(chosen)}
-    source = _source({"x": np.asarray(mark.x) * x.scale, **kept, "shown": values[chosen[-1]]})
-    source.name = f"{RECORD} {mark.label or y.name}"
+    columns = {"x": np.asarray(mark.x) * x.scale, **kept, "shown": values[chosen[-1]]}
+    source = _source(plot, _single(columns), f"{RECORD} {mark.label or y.name}")
     style = {"color": _colour(mark.colour), "line_dash": _DASHES[mark.dash], "line_width": 2}
     line = plot.line("x", "shown", source=source, **style, **named)
     _hover(plot, [line], _tip(x, "x"), _tip(y, "shown", mark.label), line=True)
@@ -308,7 +315,7 @@ def _draw_band(
     if mark.steps:
         low, high = (np.repeat(end, 2)[:-1] for end in (low, high))
         places = np.repeat(places, 2)[1:]
-    source = _source({"x": places, "low": low, "high": high})
+    source = _source(plot, _single({"x": places, "low": low, "high": high}))
     plot.varea("x", "low", "high", source=source, **style, **named)
     # values under the pointer need a line, which areas do not have
     line = plot.line("x", "high", source=source, line_alpha=0.0)
@@ -342,7 +349,7 @@ def _draw_bars(
         tips.insert(0, ("", "@name"))
     elif place.names is None:
         tips.insert(0, (place.name, f"@low{{%.5g}} to @high{{%.5g}} {plain_label(place.unit)}"))
-    bars = plot.quad(**ends, source=_source(columns), **style, **named)
+    bars = plot.quad(**ends, source=_source(plot, _single(columns)), **style, **named)
     _hover(plot, [bars], *tips, *more_tips)
 
 
@@ -360,7 +367,7 @@ def _draw_span(plot: Any, mark: Span, scale: float, named: dict[str, Any]) -> No
     )  # fmt: skip
     plot.add_layout(rule)
     if named:  # an annotation has no entry in the legend, a line without points has
-        nothing = _source({"x": [], "y": []})
+        nothing = _source(plot, _single({"x": [], "y": []}))
         look = {"color": colour, "line_dash": _DASHES[mark.dash], "line_width": 2}
         plot.line("x", "y", source=nothing, **look, **named)
 
@@ -382,10 +389,10 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
     mapper.nan_color = "rgba(0, 0, 0, 0)"
     extent = {"x": float(across[0] * x.scale), "y": float(up[0] * y.scale)}
     extent |= {"dw": float(np.ptp(across) * x.scale), "dh": float(np.ptp(up) * y.scale)}
-    places = {name: [place] for name, place in extent.items()}
-    source = ColumnDataSource({"image": [values.astype(np.float32)], **places})
-    names = dict(zip(source.data, source.data, strict=True))
-    picture = plot.image(**names, source=source, color_mapper=mapper)
+    drawn: dict[str, Any] = {"image": [values.astype(np.float32)]}
+    drawn |= {name: [place] for name, place in extent.items()}
+    names = dict(zip(drawn, drawn, strict=True))
+    picture = plot.image(**names, source=_source(plot, drawn), color_mapper=mapper)
     bar = ColorBar(color_mapper=mapper, width=12, title=plain_label(mark.axis.label))
     bar.title_text_font_style = "normal"
     plot.add_layout(bar, "right")

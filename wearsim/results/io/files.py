@@ -7,14 +7,11 @@ from collections.abc import Callable, Container, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-
 from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import ResultsFileError
 from wearsim.results.content import (
     ABOUT,
     CHECKPOINT,
-    ERRORS,
     FILES,
     INPUTS,
     SCENARIO,
@@ -23,6 +20,7 @@ from wearsim.results.content import (
     StudyData,
     axis_lengths,
 )
+from wearsim.results.io.stored_file import StoredFile
 
 if TYPE_CHECKING:
     import h5py
@@ -55,28 +53,17 @@ def read_study(path: str | Path, data: type[StudyData]) -> Any:
         If it is missing, foreign, truncated, damaged, of another kind or of another layout.
     """
 
-    def take(file: h5py.File) -> StudyData:
+    def take(file: StoredFile) -> StudyData:
         attributes = read_attributes(path, file, data.base_schema, data)
         schema = data.schema_of(attributes, file)
         check_complete(path, file, schema.variables)
-        variables = {name: np.asarray(file[name][()]) for name in schema.variables}
-        axis_lengths(variables, schema.variables)
-        checkpoint = {name: np.asarray(item[()]) for name, item in file[CHECKPOINT].items()}
+        axis_lengths({name: file.dataset(name) for name in schema.variables}, schema.variables)
+        variables = {name: file.array(name) for name in schema.variables}
+        checkpoint = {name: file.array(f"{CHECKPOINT}/{name}") for name in file.names(CHECKPOINT)}
         content: StudyData = data.from_variables(attributes, variables, checkpoint)
         return content
 
     return read_file(path, take)
-
-
-def format_in(path: str | Path) -> tuple[str, dict[str, Any]]:
-    """Return the name of the format of a file, and its short attributes.
-
-    Raises
-    ------
-    ResultsFileError
-        As `read_study`; if it has no format of wearsim, the name is another text.
-    """
-    return read_file(path, lambda file: (format_of(file), dict(file.attrs)))
 
 
 def as_path(path: str | Path) -> Path:
@@ -95,7 +82,7 @@ def as_path(path: str | Path) -> Path:
     return Path(path)
 
 
-def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
+def read_file(path: str | Path, take: Callable[[StoredFile], Stored]) -> Stored:
     """Open a file and return what `take` reads from it.
 
     Parameters
@@ -115,7 +102,7 @@ def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
     _check_signature(as_path(path))
     try:
         with _opened(path) as file:
-            return take(file)
+            return take(StoredFile(file))
     except _DAMAGE as error:
         if "truncated" in str(error):
             raise ResultsFileError(_truncated(path)) from error
@@ -159,20 +146,22 @@ def _truncated(path: str | Path) -> str:
     return f"{path}: is truncated: its end is missing, as after a copy that was cut short"
 
 
-def format_of(file: h5py.File) -> str:
+def format_of(file: StoredFile) -> str:
     """Return the name of the format of a file, or another text if it has none."""
-    name = file.attrs.get("format")
-    return name.decode(errors="replace") if isinstance(name, bytes) else str(name)
+    try:
+        return str(file.attribute("format"))
+    except (KeyError, ValueError):
+        return ""
 
 
 def read_attributes(
-    path: str | Path, file: h5py.File, schema: Schema, data: type[StudyData]
+    path: str | Path, file: StoredFile, schema: Schema, data: type[StudyData]
 ) -> dict[str, Any]:
     """Return the fields of a file except arrays, after checks of its kind and completeness.
 
     Parameters
     ----------
-    path, file : str or Path, h5py.File
+    path, file : str or Path, StoredFile
         The file.
     schema : Schema
         The required kind of file.
@@ -198,18 +187,20 @@ def read_attributes(
     check_layout(path, file, schema)
     about, scenario, files = (f"{INPUTS}/{name}" for name in (ABOUT, SCENARIO, FILES))
     check_complete(path, file, [*schema.variables, about, scenario, files, CHECKPOINT])
-    attributes: dict[str, Any] = json.loads(read_text(file[about]))
+    attributes: dict[str, Any] = json.loads(file.text(about))
     names = data.attribute_names()
     check_complete(path, attributes, [name for name in names if name not in data.optional])
-    return {name: attributes[name] for name in names if name in attributes} | {
-        "scenario_text": read_text(file[scenario]),
-        "files": json.loads(read_text(file[files])),
+    known = {name: attributes[name] for name in names if name in attributes} | {
+        "scenario_text": file.text(scenario),
+        "files": json.loads(file.text(files)),
     }
+    data.check_types(known)
+    return known
 
 
-def check_layout(path: str | Path, file: h5py.File, schema: Schema) -> None:
+def check_layout(path: str | Path, file: StoredFile, schema: Schema) -> None:
     """Raise a ResultsFileError unless a file has the layout of a schema."""
-    version = int(file.attrs["format_version"])
+    version = int(file.attribute("format_version"))
     if version == schema.version:
         return
     remedy = "update wearsim to read it"
@@ -219,12 +210,6 @@ def check_layout(path: str | Path, file: h5py.File, schema: Schema) -> None:
         f"{path}: has layout {version} of {schema.format}, and this wearsim reads layout"
         f" {schema.version}; {remedy}"
     )
-
-
-def read_text(dataset: h5py.Dataset) -> str:
-    """Return a text written by `hdf5_write.put_text`."""
-    content: bytes = dataset[:].tobytes()  # a single element would lose zeros at its end
-    return content[:-1].decode("utf-8", ERRORS)
 
 
 def check_complete(path: str | Path, present: Container[str], names: Iterable[str]) -> None:

@@ -2,6 +2,10 @@
 
 Arrays are stored in chunks with Fletcher-32 checksums, scalars in the object headers, which have
 checksums since version 1.10 of the format.
+
+The checksum of a chunk of zeros is zero, so that it would not show that a block of the file was
+overwritten by zeros. An array that has such a chunk carries the attribute `ZEROS`; in others one is
+damage.
 """
 
 from __future__ import annotations
@@ -25,12 +29,14 @@ from wearsim.results.content import (
     FILES,
     INPUTS,
     SCENARIO,
+    ZEROS,
     Array,
     Arrays,
     Schema,
     StudyData,
     as_plain,
     axis_lengths,
+    only_zeros,
 )
 
 #: Most rows of a chunk; who writes as many rows at a time writes each chunk once.
@@ -248,7 +254,24 @@ def put_array(group: h5py.Group, name: str, array: Array) -> h5py.Dataset:
         return dataset
     if array.size == 0:
         return group.create_dataset(name, data=array)
-    return group.create_dataset(name, data=array, **_stored_as(array))
+    dataset = group.create_dataset(name, data=array, **_stored_as(array))
+    _mark_zeros(dataset, 0, array)
+    return dataset
+
+
+def put_rows(dataset: h5py.Dataset, start: int, rows: Array) -> None:
+    """Write consecutive rows of a dataset that is described only."""
+    dataset[start : start + len(rows)] = rows
+    _mark_zeros(dataset, start, rows)
+
+
+def _mark_zeros(dataset: h5py.Dataset, start: int, rows: Array) -> None:
+    """Mark a dataset if one of the chunks that rows were written to has zeros only."""
+    chosen = (slice(start, start + len(rows)), *map(slice, [0] * (rows.ndim - 1), rows.shape[1:]))
+    for first, *others in dataset.iter_chunks(chosen):
+        if only_zeros(rows[(slice(first.start - start, first.stop - start), *others)]):
+            dataset.attrs[ZEROS] = 1
+            return
 
 
 def _stored_as(array: Array) -> dict[str, Any]:
@@ -257,11 +280,9 @@ def _stored_as(array: Array) -> dict[str, Any]:
     for length, most in zip(array.shape, (CHUNK_ROWS, *array.shape[1:]), strict=True):
         chunks.append(max(min(length, most, left), 1))
         left //= chunks[-1]
-    is_text = array.dtype.kind == "S" and len(array) > 1  # mostly empty
     return {
         "chunks": tuple(chunks),
         "fletcher32": True,
-        "compression": "gzip" if is_text else None,
         "fillvalue": np.nan if array.dtype.kind == "f" else None,
     }
 

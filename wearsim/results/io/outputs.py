@@ -5,9 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wearsim.atomic_write import refuse_if_locked, refuse_inputs
 from wearsim.errors import ResultsFileError, WearsimError
+
+if TYPE_CHECKING:
+    from wearsim.results.io.stored_file import StoredFile
 
 _OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
 
@@ -61,20 +65,23 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
 
 def _continuing(path: str | Path) -> str:
     """Return the function that continues an unfinished study; "" for any other file."""
-    import h5py  # noqa: PLC0415  (takes 0.2 s to import)
+    from wearsim.results.io.files import read_file  # noqa: PLC0415
+
+    # by a variable that only files of this kind have
+    verbs = {"step": "resume", "life": "resume_life", "realisation": "resume_ensemble"}
+
+    def take(file: StoredFile) -> tuple[bool, str]:
+        finished = bool(file.attribute("finished"))
+        return finished, next((verb for name, verb in verbs.items() if name in file), "")
 
     try:
-        with h5py.File(path, "r", locking=False) as file:
-            if file.attrs.get("finished", 1):
-                return ""
-            # by a variable that only files of this kind have
-            verbs = {"step": "resume", "life": "resume_life", "realisation": "resume_ensemble"}
-            known = next((verb for name, verb in verbs.items() if name in file), "")
+        finished, known = read_file(path, take)
+        if finished:
+            return ""
         from wearsim.results.kinds import kind_of  # noqa: PLC0415  (imports the plugins)
 
         return known or kind_of(path).resume.rpartition(":")[2]
-    # not a results file, damaged, or of a plugin that is not installed
-    except (OSError, RuntimeError, KeyError, ValueError, WearsimError):
+    except WearsimError:  # not a results file, damaged, or of a plugin that is not installed
         return ""
 
 

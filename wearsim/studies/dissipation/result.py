@@ -72,7 +72,7 @@ VARIABLES: Mapping[str, Variable] = by_name(
 #: Schema without the random inputs, which differ between studies; see `with_random_inputs`.
 DISSIPATION = Schema(
     "wearsim-dissipation",
-    2,
+    3,
     "realisations of one contact, from `wearsim dissipation`",
     by_name(
         (

@@ -359,13 +359,24 @@ def add_strip_errors(
     for number, other in zip(ended, coarse, strict=True):
         course, result = courses[number], results[number]
         passes, sizes = np.array(course.passes), np.array(course.sizes).T
-        errors = strip_errors(other, passes, sizes, course)[:, -1]
+        by_strips = strip_errors(other, passes, sizes, course)
+        errors = by_strips[:, -1]
         if isinstance(result, RunObservations) and np.isfinite(errors).all():
             observed = {
                 name: np.array([item[name] for item in course.observed])
                 for name in (course.observed[0] if course.observed else ())
             }
-            stated = observed_errors(other, np.append(0.0, passes), observed)
+            fresh, crown = np.zeros((3, 1)), problem.crown_radius
+            assert course.grid is not None
+            stated = observed_errors(
+                other,
+                np.append(0.0, passes),
+                observed,
+                np.concatenate([fresh, sizes], axis=1),
+                np.concatenate([fresh, by_strips], axis=1),
+                None if crown is None else crown[:, number],
+                course.grid.spacing,
+            )
             added[number] = errors, {name: values[-1] for name, values in stated.items()}
             result.scalars["depth_error"] += float(errors[0])
             result.scalars["volume_error"] += float(errors[1])

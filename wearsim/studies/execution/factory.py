@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import operator
-import os
 import re
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 
 from wearsim.errors import WorkerError
+from wearsim.operating_system import processors
 from wearsim.studies.execution.processes import Executor, InProcess, Notify, Processes, Threads
 
 LOCAL = ("processes", "threads", "serial", "dask")
@@ -55,7 +55,7 @@ def executor(
     Interrupted
         If a stop was requested before a cluster had workers.
     """
-    count = check_scheduler(scheduler, workers) or available_processors()
+    count = check_scheduler(scheduler, workers) or processors()
     if scheduler == "dask" or scheduler not in LOCAL:
         try:
             from wearsim.studies.execution.dask import cluster  # noqa: PLC0415  (optional)
@@ -119,10 +119,3 @@ def check_scheduler(scheduler: str, workers: int | None = None) -> int | None:
             f"there is one worker where the scheduler is 'serial', got {count}; use processes"
         )
     return count
-
-
-def available_processors() -> int:
-    """Return the number of processors available to this process."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -24,6 +24,7 @@ from threading import Thread
 from typing import Any, Protocol, TypeAlias
 
 from wearsim.errors import WorkerError
+from wearsim.operating_system import end_of_process, interrupts_blocked
 
 # function of realisation numbers that returns one result per number; pickled for other processes
 Work: TypeAlias = Callable[[Sequence[int]], list[Any]]
@@ -250,10 +251,7 @@ class _Worker:
     def cause_of_death(self) -> str:
         """Return how the process ended, as a predicate: "was killed by SIGKILL"."""
         code = next((process.exitcode for process in self._processes), None)
-        if code is None or code >= 0:
-            return f"ended with exit code {code}"
-        name = signal.Signals(-code).name
-        return f"was killed by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
+        return end_of_process(code)
 
     def end(self) -> None:
         """Kill the process."""
@@ -322,12 +320,7 @@ def run_batch(work: Work, numbers: Batch) -> Answer:
 @contextmanager
 def sigint_blocked() -> Iterator[None]:
     """Start processes that do not receive Ctrl-C; the parent process ends them."""
-    if sys.platform == "win32":
+    if sys.platform != "win32":
+        resource_tracker.ensure_running()  # unblocks signals when it starts
+    with interrupts_blocked():
         yield
-        return
-    resource_tracker.ensure_running()  # unblocks signals when it starts
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)

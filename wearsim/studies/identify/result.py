@@ -53,7 +53,7 @@ VARIABLES: Mapping[str, Variable] = by_name(
 
 IDENTIFICATION = Schema(
     "wearsim-identification",
-    2,
+    3,
     "wear factors of measured grooves, from `wearsim identify`",
     by_name(
         (

@@ -207,8 +207,13 @@ class RunInProgress:
         record = self.recorder.last_record
         profiles = [record[f"{body}_depth_profile"][:, 0] for body in ("cylinder", "roller")]
         end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
-        self.recorder.strip_errors = strip_errors(coarse, passes, np.array(sizes), end)
-        self.recorder.observed_errors = observed_errors(coarse, passes, self.recorder.observed)
+        errors = strip_errors(coarse, passes, np.array(sizes), end)
+        crown, spacing = first.crown_radius, problem.grid.spacing
+        self.recorder.strip_errors = errors
+        self.recorder.observed_errors = observed_errors(
+            *(coarse, passes, self.recorder.observed, np.array(sizes), errors),
+            *(None if crown is None else crown[:, 0], spacing),
+        )
 
     def _check_errors(self) -> None:
         """Warn if estimated errors exceed the tolerance."""

@@ -13,15 +13,16 @@ from wearsim.evolution.integrate import Advance
 from wearsim.evolution.observables import (
     depth,
     groove_width,
+    least_gaps,
     peak_pressures,
     present_contacts,
     volume,
+    worn_descents,
 )
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import worn_volume
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Stepper
-from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
@@ -43,7 +44,7 @@ MOST_WAITING = 200_000  # strips of all contacts of the states that wait to be o
 _NOT_OBSERVED = dict.fromkeys(
     (
         *("coarse_step_solution", "half_quadrature_solution", "wear_exponents", "past_wear"),
-        *("separation", "whole_steps", "past_sums", "past_feedback", "stepping_error"),
+        *("whole_steps", "past_sums", "past_feedback", "stepping_error"),
     )
 )
 
@@ -103,9 +104,12 @@ def history_row(
     """Return the observables of every realisation; `threshold` [m] bounds the groove's width."""
     problem, state, loads = present_contacts(stepper, problem, state)
     present = present_problem(problem, state)
+    elastic = problem.values_of(state.contacts, "approach") - least_gaps(
+        present, present.gap(*state.depths)
+    )
     approach = {
-        "descent": descents(present, state.depths),
-        "elastic_approach": np.where(loads > 0.0, elastic_approaches(present, state), 0.0),
+        "descent": worn_descents(present, state),
+        "elastic_approach": np.where(loads > 0.0, elastic, 0.0),
     }
     kinematics, spacing = problem.kinematics, problem.grid.spacing
 

@@ -104,7 +104,8 @@ def run(
         )
         for text in warnings:
             started.warn(text)
-        return _run_to_limit(started)
+        result = _run_to_limit(started)
+    return result if limit is not None else result.with_scenario(scenario)
 
 
 def resume(

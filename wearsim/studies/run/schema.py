@@ -283,7 +283,7 @@ ALL_VARIABLES: Mapping[str, Variable] = {
     **CAM_FATIGUE_VARIABLES,
 }
 
-RUN = Schema("wearsim-run", 9, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Schema("wearsim-run", 10, "a wear test, from `wearsim run`", AXES, VARIABLES)
 
 
 @cache

@@ -166,7 +166,8 @@ def answer(
 def _test(request: Request, stop_requested: Callable[[], bool]) -> Answer:
     """Return the wear test of a scenario, or its cam or contact if it has no test."""
     coarse = request.stage == "first"
-    scenario = request.design.scenario(_coarser(request.design) if coarse else None)
+    further = _coarser(request.design) if coarse else None
+    scenario = request.design.scenario(further, comments=not coarse)
     views: list[Any] = []
     if scenario.wear is not None and scenario.has_length:
         views.append(wearsim.run(scenario, stop_requested=stop_requested).view)

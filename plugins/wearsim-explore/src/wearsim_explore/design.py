@@ -71,23 +71,35 @@ class Design:
         ]
         return {name: value for name, value in overrides.items() if name not in nested}
 
-    def scenario(self, further: Mapping[str, object] | None = None) -> Scenario:
+    def scenario(
+        self, further: Mapping[str, object] | None = None, *, comments: bool = True
+    ) -> Scenario:
         """Return the scenario; files outside its folder are refused.
 
         Parameters
         ----------
         further : mapping of str to object, optional
-            Further values by dotted key.
+            Further values by dotted key, which exclude no other key.
+        comments : bool
+            Whether the text of the scenario keeps the comments of the file; without them it is read
+            in a third of the time.
 
         Raises
         ------
         ScenarioError
             With all mistakes.
         """
-        folder, name = self.file.parent, self.file.name
-        overrides = {**self.overrides, **(further or {})}
+        text, overrides = self.text, {**self.overrides, **(further or {})}
+        # a value that is new to the file may exclude another one, which overrides then remove
+        given = all(_value_at(_parsed(self.text), key) is not None for key in self.overrides)
+        if given and not comments:
+            tables = deepcopy(self.tables)
+            for key, value in (further or {}).items():
+                _set(tables, key, value)
+            text = "\n".join(_pairs(tables))
+            overrides = {}
         return Scenario.from_toml(
-            self.text, overrides or None, folder=folder, name=name, confined=True
+            text, overrides or None, folder=self.file.parent, name=self.file.name, confined=True
         )
 
     def options(self) -> str:
@@ -164,11 +176,15 @@ def _as_option(value: object) -> str:
 def _on_a_line(value: object) -> str:
     """Return a value as TOML on one line."""
     if isinstance(value, Mapping):
-        inner = (f"{tomlkit.key(name).as_string()} = {_on_a_line(v)}" for name, v in value.items())
-        return f"{{{', '.join(inner)}}}"
+        return f"{{{', '.join(_pairs(value))}}}"
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_on_a_line, value))}]"
     return str(tomlkit.item(value).as_string())
+
+
+def _pairs(table: Mapping[str, object]) -> Iterable[str]:
+    """Return the keys of a table with their values, as TOML on one line each."""
+    return (f"{tomlkit.key(name).as_string()} = {_on_a_line(v)}" for name, v in table.items())
 
 
 def unknown_keys(design: Design, table: str, known: Iterable[str]) -> list[str]:

@@ -164,6 +164,7 @@
     el("reset").disabled = state.link === "{}";
     if (state.test) show_test(state.test);
     show_lives();
+    if (state.columns) show_columns(state.columns);
     show_figures();
     show_pins();
     if (state.message !== undefined) el("message").textContent = state.message;
@@ -201,6 +202,17 @@
     else if (done !== undefined) el("life-progress").textContent = `computing ${wanted}`;
     else if (state.lives) el("life-progress").textContent = state.lives.tests === 1 && state.lives.last
       ? "the scatter of the wear factor is exact" : `from ${state.lives.tests} tests`;
+  };
+
+  // the numbers of all figures come in one text, since Bokeh sends a message for each of their columns
+  const show_columns = ({ends, numbers}) => {
+    const text = atob(numbers), bytes = new Uint8Array(text.length);
+    for (let place = 0; place < text.length; place++) bytes[place] = text.charCodeAt(place);
+    const all = new Float32Array(bytes.buffer);
+    for (const [id, columns] of Object.entries(ends)) {
+      const data = Object.fromEntries(Object.entries(columns).map(([name, [start, end]]) => [name, all.slice(start, end)]));
+      Bokeh.documents[0].get_model_by_id(id)?.setv({data}, {sync: false});
+    }
   };
 
   const show_figures = () => {
@@ -336,7 +348,7 @@
       catch { el("message").textContent = "the link holds no changes"; }
       history.replaceState(null, "", location.pathname + location.search);
     }
-    if (!fields.length) send({do: "show"});  // a later reply has replaced the one with the fields
+    send({do: "show"});  // a later reply may have replaced the one with fields and columns
   };
   document.addEventListener("DOMContentLoaded", () => { connect(); ready(); });
 })();

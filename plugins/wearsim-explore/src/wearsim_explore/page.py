@@ -8,6 +8,7 @@ import json
 import os
 import re
 import time
+from base64 import b64encode
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -15,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from bokeh.core.properties import String
 from bokeh.document import Document
 from bokeh.model import DataModel
@@ -83,6 +85,8 @@ class Page:
         self._slots = [Column(name=f"slot{n}", sizing_mode="stretch_width") for n in range(SLOTS)]
         self._figures: list[LiveFigure] = []
         self._shown: list[dict[str, Any]] = []
+        self._columns: dict[str, Mapping[str, Any]] = {}  # of the figures, by data source
+        self._sent = True
         self._fields, self._replies = "", itertools.count()
         self._stage: str = "first"
         self._tests, self._frame, self._seen = 0, 0, 0
@@ -291,10 +295,10 @@ class Page:
     # what is shown
 
     def _show_panels(self) -> None:
-        """Show the panels of the session in the slots, in one message to the browser."""
+        """Show the panels of the session in the slots; the next reply has their columns."""
         self.document.hold("combine")
         try:
-            self._shown = []
+            self._shown, self._columns, self._sent = [], {}, False
             panels = list(self.session.panels.items())[:SLOTS]
             for place, (name, item) in enumerate(panels):
                 self._show_panel(place, item)
@@ -309,10 +313,11 @@ class Page:
         panel = item.panel if isinstance(item, Drawn) else item
         recording = item.recording if isinstance(item, Drawn) else record(panel)
         frames = item.frames if isinstance(item, Drawn) else ()
-        if place < len(self._figures) and self._figures[place].show(panel, recording, frames):
+        content = panel, recording, frames, self._columns.__setitem__
+        if place < len(self._figures) and self._figures[place].show(*content):
             return
         drawn = LiveFigure(panel)
-        drawn.show(panel, recording, frames)
+        drawn.show(*content)
         self._figures[place : place + 1] = [drawn]
         self._slots[place].children = [drawn.figure]
 
@@ -352,6 +357,8 @@ class Page:
                     "tests": answer.tests,
                     "last": answer.is_last,
                 }
+        if fields or not self._sent:
+            content["columns"], self._sent = _packed(self._columns), True
         if fields or not self._fields:
             self._fields = self._fields_now()
             shown = session.fields_of(session.design)
@@ -362,6 +369,19 @@ class Page:
                 path.name for path in session.design.file.parent.iterdir() if path.is_file()
             )
         self._exchange.update(reply=json.dumps(content))
+
+
+def _packed(columns: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return columns of data sources for JSON: all numbers as one text, and the ends of each."""
+    ends, parts, count = dict[str, dict[str, tuple[int, int]]](), list[Any](), 0
+    for source, named in columns.items():
+        ends[source] = {}
+        for name, values in named.items():
+            ends[source][name] = count, count + len(values)
+            parts.append(values)
+            count += len(values)
+    numbers = np.concatenate(parts).astype("<f4").tobytes() if parts else b""
+    return {"ends": ends, "numbers": b64encode(numbers).decode()}
 
 
 def _changes(value: Any) -> dict[str, object]:

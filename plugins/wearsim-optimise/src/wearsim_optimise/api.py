@@ -20,9 +20,15 @@ from wearsim.studies.preparation import origin_of
 from wearsim.studies.progress import shown_progress
 from wearsim_optimise.after import active_constraints, confirmation, sensitivity, tolerances
 from wearsim_optimise.designs import Design, Designs
+from wearsim_optimise.fronts import front_of
 from wearsim_optimise.goals import Constraint, Goals, asked_names, parse_constraint
-from wearsim_optimise.program import Plan, best_of, front_of, objective, optimum
-from wearsim_optimise.result import OptimisationData, OptimisationResult, columns_of
+from wearsim_optimise.program import Plan, best_of, objective, optimum
+from wearsim_optimise.result import (
+    OptimisationData,
+    OptimisationResult,
+    columns_of,
+    not_converged,
+)
 from wearsim_optimise.variables import (
     Variable,
     as_table,
@@ -341,10 +347,16 @@ class _Study:
                 stop_requested=self._stop,
             )
             try:
-                best = optimum(designs, plan)
-                rows = sensitivity(designs, best)
+                around = dict[int, Any]()
+
+                def neighbours(design: Design) -> None:
+                    rows = sensitivity(designs, design)
+                    near = tolerances(designs, design, request["tolerances"])
+                    around[design.number] = rows, near
+
+                best, converged = optimum(designs, plan, neighbours)
+                rows, near = around.get(best.number, ([], None))
                 active = active_constraints(designs, best, rows)
-                near = tolerances(designs, best, request["tolerances"])
                 gains = confirmation(designs, designs.all[0], best) if request["confirm"] else []
             except Interrupted as error:
                 raise self._interrupted(error) from error
@@ -357,18 +369,21 @@ class _Study:
             active=active,
             gains=gains,
             robustness=near,
-            warnings=self._warnings(designs),
+            converged=converged,
+            warnings=self._warnings(designs, converged=converged),
         )
         if self.path is not None:
             write_results(self.path, data)
         return OptimisationResult(data, self.path)
 
-    def _warnings(self, designs: Designs) -> list[str]:
+    def _warnings(self, designs: Designs, *, converged: bool) -> list[str]:
+        warnings = [] if converged else [not_converged(self.plan.evaluations)]
         failed = [design for design in designs.all if design.status == "failed"]
-        if not failed:
-            return []
-        reason = failed[0].outcome["reason"].splitlines()[0]
-        return [f"{len(failed)} designs failed, the first, number {failed[0].number}: {reason}"]
+        if failed:
+            reason = failed[0].outcome["reason"].splitlines()[0]
+            text = f"{len(failed)} designs failed, the first, number {failed[0].number}: {reason}"
+            warnings.append(text)
+        return warnings
 
     def _interrupted(self, error: Interrupted) -> Interrupted:
         if self.path is None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from wearsim.errors import WearsimError
 from wearsim_optimise.designs import Design, Designs, completed
+from wearsim_optimise.fronts import front_of, pareto_first
 from wearsim_optimise.goals import ONE_PERCENT, TIGHTER, Constraint, Goals
 from wearsim_optimise.solvers import (
     RADIUS,
@@ -32,6 +33,7 @@ CANDIDATES = 32  # designs among which a feasible start is looked for
 EVOLVED = 0.5  # part of the designs of the evolution strategy; the rest refines its best design
 LEVELS = 5  # of the second objective between the ends of a front
 SECOND = 0.05  # first trust region of a search from a known design
+MOVES = 5  # of the optimum to a better neighbour, at most
 TIMES = 4  # designs asked for over evaluations, at most
 
 Loss = Callable[[Design], float]
@@ -160,7 +162,7 @@ def _known_violation(design: Design) -> float:
     return max(-float(known.min()), 0.0) if len(known) else math.inf
 
 
-@dataclass
+@dataclass(eq=False)
 class Way:
     """A search with the designs that it has asked for, and how they are rated for it."""
 
@@ -193,10 +195,11 @@ class Runner:
         loss: Loss,
         purpose: str,
         radius: float = RADIUS,
-    ) -> None:
+    ) -> bool:
         """Search by COBYQA from several starts until the budget of runs is spent.
 
-        The starts share the first half; the second half is left to the best of them.
+        The starts share the first half; the second half is left to the best of them. Returns
+        whether the search with the best design has converged.
         """
         half = self.designs.runs + (budget - self.designs.runs) // 2
 
@@ -210,7 +213,9 @@ class Runner:
             return [ways[ranks.index(min(ranks))]]
 
         ways = [self.way(start, rated, radius) for start in starts]
-        self.run(ways, budget, purpose, narrowed)
+        left = self.run(ways, budget, purpose, narrowed)
+        ranks = [min(_rank(design, loss) for design in way.found) for way in ways]
+        return ways[ranks.index(min(ranks))] not in left
 
     def way(
         self,
@@ -231,14 +236,20 @@ class Runner:
         budget: int,
         purpose: str,
         narrowed: Callable[[list[Way]], list[Way]] = lambda ways: ways,
-    ) -> None:
-        """Evaluate designs of several searches round by round until they or the budget end."""
-        while ways and self.left(budget):
-            ways = self._round(narrowed(ways), purpose)
+    ) -> list[Way]:
+        """Evaluate designs of several searches round by round until they or the budget end.
 
-    def _round(self, ways: list[Way], purpose: str) -> list[Way]:
-        """Evaluate the next design of each search; return those that have not ended."""
-        asked = [(way, way.search.ask()) for way in ways]
+        Returns the searches that the budget has ended.
+        """
+        while ways and self.left(budget):
+            ways = narrowed(ways)
+            most = max((budget - self.designs.runs) // len(ways), 1)
+            ways = self._round(ways, purpose, most)
+        return ways
+
+    def _round(self, ways: list[Way], purpose: str, most: int) -> list[Way]:
+        """Evaluate the next designs of each search; return the searches that have not ended."""
+        asked = [(way, way.search.ask()[:most]) for way in ways]
         places = [place for _, more in asked for place in more]
         designs = iter(self.designs.at(places, purpose))
         self.asked += len(places)
@@ -249,18 +260,22 @@ class Runner:
                 way.search.tell([way.rated(design) for design in new])
         return [way for way, more in asked if more]
 
-    def evolve(self, budget: int, order: Callable[[Sequence[Any]], Sequence[float]]) -> None:
-        """Search by the evolution strategy until the budget of runs is spent."""
+    def evolve(self, budget: int, order: Callable[[Sequence[Any]], Sequence[float]]) -> bool:
+        """Search by the evolution strategy until the budget of runs is spent.
+
+        Returns whether its designs have become equal.
+        """
         search = Evolution(self.designs.variables, self.plan.seed, order)
         same = 0
         while self.left(budget) and same < 3:
             before, places = self.designs.runs, search.ask()
             if not places:
-                return
+                return True
             new = self.designs.at(places, "search")
             self.asked += len(new)
             search.tell(new)
             same = same + 1 if self.designs.runs == before else 0
+        return same == 3
 
 
 def _rank(design: Design, loss: Loss) -> tuple[float, float]:
@@ -282,8 +297,20 @@ def objective(number: int) -> Loss:
     return lambda design: design.losses[number] if design.losses else math.nan
 
 
-def optimum(designs: Designs, plan: Plan) -> Design:
-    """Search; return the best design.
+def optimum(
+    designs: Designs, plan: Plan, neighbours: Callable[[Design], object]
+) -> tuple[Design, bool]:
+    """Search; return the best of all designs, and whether the search has converged.
+
+    A neighbour that is better than the optimum becomes the optimum, and the search continues from
+    it as far as designs are left.
+
+    Parameters
+    ----------
+    designs : Designs
+    plan : Plan
+    neighbours : callable
+        Evaluates neighbours of an optimum.
 
     Raises
     ------
@@ -292,38 +319,60 @@ def optimum(designs: Designs, plan: Plan) -> Design:
     """
     first = first_goals(designs, plan)
     runner = Runner(designs, plan)
-    main = objective(0)
+    converged = _search(runner, first)
+    best = chosen(designs, plan)
+    for _ in range(MOVES):
+        neighbours(best)
+        better = chosen(designs, plan)
+        if better.number == best.number:
+            return best, converged
+        converged = _go_on(runner, better)
+        best = chosen(designs, plan)
+    return best, False
+
+
+def _search(runner: Runner, first: Design) -> bool:
+    """Search from the beginning; return whether it has converged."""
+    designs, plan, main = runner.designs, runner.plan, objective(0)
     mixed = any(variable.kind != "continuous" for variable in designs.variables)
     rough = any(design.outcome.get("rough") for design in designs.all)
-    evolves = plan.method == "evolution" or (plan.method == "auto" and (mixed or rough))
     budget = plan.evaluations
-    if evolves:
-        order = feasible_first if len(plan.objectives) == 1 else pareto_first
-        share = round(EVOLVED * budget) if len(plan.objectives) == 1 else budget
-        runner.evolve(share, order)
+    if plan.method == "evolution" or (plan.method == "auto" and (mixed or rough)):
+        if len(plan.objectives) == 2:
+            return runner.evolve(budget, pareto_first)
+        converged = runner.evolve(round(EVOLVED * budget), feasible_first)
         best = best_of(designs.all, main)
-        if (
-            best
-            and len(plan.objectives) == 1
-            and any(v.kind == "continuous" for v in designs.variables)
-        ):
-            runner.search([best], budget, main, "search")
-    elif len(plan.objectives) == 2:
-        _front(runner, starts_of(designs, plan, first))
-    else:
-        share = budget if not plan.then else max(budget - budget // 3, 1)
-        starts = starts_of(designs, plan, first)
-        runner.search(starts, share, main, "search")
-        if plan.then and (best := best_of(designs.all, main)):
-            _then(runner, best, budget)
-    return chosen(designs, plan)
+        if best and any(v.kind == "continuous" for v in designs.variables):
+            return runner.search([best], budget, main, "search") and converged
+        return converged
+    if len(plan.objectives) == 2:
+        return _front(runner, starts_of(designs, plan, first))
+    share = budget if not plan.then else max(budget - budget // 3, 1)
+    converged = runner.search(starts_of(designs, plan, first), share, main, "search")
+    if plan.then and (best := best_of(designs.all, main)):
+        return _then(runner, best) and converged
+    return converged
 
 
-def _then(runner: Runner, best: Design, budget: int) -> None:
-    """Search for the least second quantity among designs within 1 % of the best."""
+def _go_on(runner: Runner, better: Design) -> bool:
+    """Search on from a better neighbour; return whether the search has converged."""
+    plan = runner.plan
+    if len(plan.objectives) == 2:  # the front has one design more
+        return not runner.left(plan.evaluations)
+    if plan.then:
+        return _then(runner, better)
+    return runner.search([better], plan.evaluations, objective(0), "search", SECOND)
+
+
+def _then(runner: Runner, start: Design) -> bool:
+    """Search for the least second quantity among designs within 1 % of the best.
+
+    Returns whether the search has converged.
+    """
     designs = runner.designs
-    goals = designs.goals
+    goals, best = designs.goals, best_of(designs.all, objective(0))
     assert goals is not None
+    assert best is not None
     limit = best.loss + ONE_PERCENT - TIGHTER
 
     def loss(design: Design) -> float:
@@ -334,28 +383,33 @@ def _then(runner: Runner, best: Design, budget: int) -> None:
         found, main = (completed(designs, design, each) for each in (loss, objective(0)))
         return Answer(found.loss, np.append(found.slacks, limit - main.loss))
 
-    runner.run([runner.way(best, rated, SECOND, 1)], budget, "then")
+    return not runner.run([runner.way(start, rated, SECOND, 1)], runner.plan.evaluations, "then")
 
 
-def _front(runner: Runner, starts: list[Design]) -> None:
-    """Search for a front: its ends, and the least first objective at levels of the second."""
+def _front(runner: Runner, starts: list[Design]) -> bool:
+    """Search for a front: its ends, and the least first objective at levels of the second.
+
+    Returns whether all these searches have converged.
+    """
     designs, budget = runner.designs, runner.plan.evaluations
     used = designs.runs
+    converged = True
     for number, share in ((0, 0.25), (1, 0.5)):
-        runner.search(starts, used + round(share * (budget - used)), objective(number), "search")
+        most = used + round(share * (budget - used))
+        converged &= runner.search(starts, most, objective(number), "search")
     ends = [best_of(designs.all, objective(number)) for number in (0, 1)]
     if ends[0] is None or ends[1] is None:
-        return
+        return False
     span = ends[0].losses[1] - ends[1].losses[1]
     if not span > 0.0:
-        return
+        return converged
     levels = [ends[1].losses[1] + span * (n + 1.0) / (LEVELS + 1.0) for n in range(LEVELS)]
     feasible = [design for design in designs.all if design.is_feasible]
     ways = []
     for level in levels:
         near = min(feasible, key=partial(_beyond, level))
         ways.append(runner.way(near, partial(_at_level, designs, level), SECOND, 1))
-    runner.run(ways, budget, "front")
+    return not runner.run(ways, budget, "front") and converged
 
 
 def _beyond(level: float, design: Design) -> tuple[float, float]:
@@ -369,42 +423,6 @@ def _at_level(designs: Designs, level: float, design: Design) -> Answer:
     first = completed(designs, design, objective(0))
     second = completed(designs, design, objective(1))
     return Answer(first.loss, np.append(first.slacks, level - second.loss))
-
-
-def pareto_first(rated: Sequence[Any]) -> list[float]:
-    """Return the order of designs by two objectives: fronts, and within them the lonely first."""
-    order = np.array(feasible_first(rated))
-    feasible = [n for n, item in enumerate(rated) if item.is_feasible]
-    if not feasible:
-        return list(map(float, order))
-    losses = np.array([rated[n].losses for n in feasible])
-    spread = np.ptp(losses, axis=0)
-    scaled = losses / np.where(spread > 0.0, spread, 1.0)
-    dominated = [
-        sum(bool(np.all(other <= row) and np.any(other < row)) for other in losses)
-        for row in losses
-    ]
-    for n, row in enumerate(scaled):
-        apart = np.sort(np.abs(scaled - row).sum(axis=1))[1] if len(scaled) > 1 else 1.0
-        order[feasible[n]] = dominated[n] - 0.5 * min(float(apart), 1.0) - 1e6
-    return list(map(float, order))
-
-
-def front_of(designs: Designs) -> list[Design]:
-    """Return the feasible designs that no other surpasses in both objectives, by the first."""
-    feasible = [design for design in designs.all if design.is_feasible]
-    return sorted(
-        (design for design in feasible if not any(_surpasses(other, design) for other in feasible)),
-        key=lambda design: (design.losses, design.number),
-    )
-
-
-def _surpasses(other: Design, design: Design) -> bool:
-    """Return whether a design is at least as good in all objectives, and better in one."""
-    pairs = list(zip(other.losses, design.losses, strict=True))
-    if all(a == b for a, b in pairs):
-        return other.number < design.number
-    return all(a <= b for a, b in pairs)
 
 
 def chosen(designs: Designs, plan: Plan) -> Design:

@@ -19,7 +19,7 @@ from wearsim_optimise.variables import Variable, from_table, overrides
 
 AXES = {"design": Axis("design", "evaluated design")}
 BASE = Schema(
-    "wearsim-optimisation", 1, "designs of an optimisation, from `wearsim optimise`", AXES, {}
+    "wearsim-optimisation", 2, "designs of an optimisation, from `wearsim optimise`", AXES, {}
 )
 STATUS = ("evaluated", "before wear", "infeasible", "failed")
 
@@ -42,6 +42,8 @@ class OptimisationData(StudyData):
         Outcome of each design by its key.
     best : int
         Number of the best design; 0 before it is known.
+    converged : bool
+        Whether the search has converged within its number of designs.
     front : list of int
         Numbers of the designs of a front.
     sensitivity, active, gains : list of dict
@@ -60,6 +62,7 @@ class OptimisationData(StudyData):
     designs: list[dict[str, Any]] = field(default_factory=list)
     outcomes: dict[str, Any] = field(default_factory=dict)
     best: int = 0
+    converged: bool = False
     front: list[int] = field(default_factory=list)
     sensitivity: list[dict[str, Any]] = field(default_factory=list)
     active: list[dict[str, Any]] = field(default_factory=list)
@@ -89,6 +92,14 @@ class OptimisationData(StudyData):
             name: Stored(name, ("design",), unit, text, "record") for name, unit, text in rows
         }
         return replace(BASE, variables=variables)
+
+
+def not_converged(evaluations: int) -> str:
+    """Return that a search ended at its number of designs, and the remedy."""
+    return (
+        f"the search ended at its {evaluations} designs before it converged: better designs may"
+        f" exist; give it more, such as --evaluations {2 * evaluations}"
+    )
 
 
 def si_of(unit: str) -> str:

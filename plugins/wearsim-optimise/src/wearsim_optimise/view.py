@@ -12,7 +12,7 @@ from wearsim.report.text import NOTHING, PER_SI, count, lapse, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table
 from wearsim.results.study_view import StudyView
 from wearsim_optimise.designs import Design
-from wearsim_optimise.result import STATUS, OptimisationResult
+from wearsim_optimise.result import STATUS, OptimisationResult, not_converged
 
 _MOST = 12  # designs in a table
 _BASIS = (
@@ -66,7 +66,13 @@ class OptimisationView(StudyView[OptimisationResult]):
             rows.append(Row("front", f"{count(len(result.raw.front))} designs, see the table"))
         if (near := result.raw.robustness) is not None:
             rows.append(Row("within the tolerances", self._robustness(near)))
+        rows.append(Row("search", self._convergence()))
         return rows
+
+    def _convergence(self) -> str:
+        """Return whether the search has converged, and else what to do."""
+        raw = self.result.raw
+        return "converged" if raw.converged else not_converged(raw.request["evaluations"])
 
     def _so_far(self) -> str:
         """Return the best feasible design of an unfinished optimisation."""
@@ -132,7 +138,7 @@ class OptimisationView(StudyView[OptimisationResult]):
         return [
             Row("variables", bounds),
             Row("designs", f"{words}; {feasible} feasible"),
-            Row("search", f"at most {request['evaluations']} designs, {request['starts']} starts"),
+            Row("budget", f"at most {request['evaluations']} designs, {request['starts']} starts"),
             Row("realisations", f"{request['realisations']}, common draws, seed {result.raw.seed}"),
             Row("contact model", result.described_model),
             Row("wall time", lapse(result.raw.wall_seconds)),
@@ -208,6 +214,7 @@ class OptimisationView(StudyView[OptimisationResult]):
             "objectives": raw.request["objectives"],
             "constraints": [item.text for item in result.goals.constraints] if raw.named else [],
             "best": raw.best or None,
+            "converged": raw.converged,
             "best_values": result.best_values if known else None,
             "quantities": dict(result.best.values) if known else None,
             "units": {name: item["unit"] for name, item in raw.named.items()},
@@ -242,9 +249,10 @@ class OptimisationView(StudyView[OptimisationResult]):
         """Return designs, realisations and time on one line."""
         result = self.result
         evaluated = sum(design.is_evaluated for design in result.designs)
+        ended = ", converged" if result.raw.converged else ", not converged"
         return (
-            f"{count(evaluated)} of {count(len(result.designs))} designs evaluated,"
-            f" {lapse(result.raw.wall_seconds)}"
+            f"{count(evaluated)} of {count(len(result.designs))} designs evaluated"
+            f"{ended if result.raw.best else ''}, {lapse(result.raw.wall_seconds)}"
         )
 
     def columns(self) -> Mapping[str, Columns]:

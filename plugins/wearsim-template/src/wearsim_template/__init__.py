@@ -115,6 +115,21 @@ FORM = ws.AxialProfileSpec(
 )
 
 
+class ApproachTable(ws.Options):
+    """The table `[winkler-approach]` of a scenario: settings of the study of this name."""
+
+    greatest_force: ws.PositiveForce = ws.Field(500.0, description="last force of the study")
+    forces: int = ws.Field(5, ge=1, description="number of forces")
+
+    @property
+    def values(self):
+        """The forces [N]."""
+        return np.linspace(0.0, self.greatest_force, self.forces + 1)[1:]
+
+
+TABLE = ws.TableSpec("winkler-approach", ApproachTable, "forces of the study", protocol=2)
+
+
 @ws.hookimpl
 def wearsim_axial_profiles():
     """Yield the form along the axis."""
@@ -131,3 +146,9 @@ def wearsim_contact_models():
 def wearsim_study_kinds():
     """Yield the kind of study."""
     yield KIND
+
+
+@ws.hookimpl
+def wearsim_tables():
+    """Yield the table that the study owns."""
+    yield TABLE

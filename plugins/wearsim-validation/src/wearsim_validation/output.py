@@ -128,11 +128,11 @@ def as_json(outcomes: Sequence[Outcome], command: str) -> dict[str, Any]:
 
 def _machine() -> dict[str, Any]:
     """Return the machine in the form of `wearsim bench`; no times are stated."""
-    from wearsim.studies.execution.factory import available_processors
+    from wearsim.operating_system import processors
 
     return {
         "processor": platform.processor() or platform.machine(),
-        "cores": available_processors(),
+        "cores": processors(),
         "python": platform.python_version(),
         "libraries": {name: version(name) for name in ("wearsim", "numba", "numpy", "scipy")},
         "yardstick": None,

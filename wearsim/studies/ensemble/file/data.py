@@ -26,8 +26,7 @@ from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.competing import POINTS
 
 if TYPE_CHECKING:
-    import h5py
-
+    from wearsim.results.io.stored_file import StoredFile
     from wearsim.studies.ensemble.file.parts import Part
 
 
@@ -46,7 +45,7 @@ class StoredRows(Mapping[str, "Array"]):
 
     def __init__(
         self,
-        read: Callable[[Callable[[h5py.File], Array]], Array],
+        read: Callable[[Callable[[StoredFile], Array]], Array],
         schema: Schema,
         parts: list[Part],
     ) -> None:
@@ -85,7 +84,7 @@ class StoredRows(Mapping[str, "Array"]):
         ResultsFileError
             If the file or a part is damaged, or was changed since it was opened.
         """
-        rows = self._read(lambda file: np.asarray(file[name][(slice(start, stop), *rest)]))
+        rows = self._read(lambda file: file.array(name, (slice(start, stop), *rest)))
         if is_row(self._schema.variables[name]):
             for part in self.parts:
                 part.put_rows(rows, name, start, *rest)

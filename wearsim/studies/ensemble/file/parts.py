@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,8 +26,8 @@ from wearsim.results.io.files import (
     format_of,
     read_attributes,
     read_file,
-    read_text,
 )
+from wearsim.results.io.stored_file import StoredFile
 from wearsim.studies.ensemble.file.data import EnsembleData, Outcome, StoredRows
 from wearsim.studies.ensemble.file.schema import (
     DONE,
@@ -42,15 +42,12 @@ from wearsim.studies.ensemble.file.schema import (
 )
 from wearsim.types import IntArray
 
-if TYPE_CHECKING:
-    import h5py
-
-
 PART = Schema(f"{ENSEMBLE.format}-part", ENSEMBLE.version, "rows of an ensemble", {}, {})
 NUMBER, STATE, RUN_ID = "number", "state", "run_id"
 
 _DAMAGED = ("is truncated", "is damaged", "is empty")
 _REMOVE = "remove all parts of greater numbers: resume then repeats the tests that are lost"
+ERROR_ROWS = 1 << 16  # of error messages that are read at a time
 _CUT = "…"  # ends a text that is too long
 
 
@@ -95,7 +92,7 @@ class Part:
         first, last = np.searchsorted(self.numbers, (start, start + len(rows))).tolist()
         if first < last:
             chosen = (slice(first, last), *rest)
-            stored = read_file(self.path, lambda file: np.asarray(file[name][chosen]))
+            stored = read_file(self.path, lambda file: file.array(name, chosen))
             # not all profiles are kept
             rows[self.numbers[first : first + len(stored)] - start] = stored
 
@@ -146,28 +143,33 @@ def _without(path: Path, missing: Path) -> str:
 
 
 def _read_part(part: Path, path: Path, data: EnsembleData) -> Part:
-    def take(file: h5py.File) -> Part:
+    def take(file: StoredFile) -> Part:
         if format_of(file) != PART.format:
             raise ResultsFileError(f"{part}: is not a part of an ensemble; remove it")
         check_layout(part, file, PART)
-        if file.attrs[RUN_ID] != data.run_id.encode():
+        if file.attribute(RUN_ID) != data.run_id:
             raise ResultsFileError(
                 f"{part}: belongs to another ensemble than {path}",
                 python="move the parts of this one there, or repeat the ensemble with force=True",
                 shell="move the parts of this one there, or repeat the ensemble with --force",
             )
-        rows = [name for name, item in data.schema.variables.items() if is_row(item)]
+        known = data.schema.variables
+        rows = [name for name, item in known.items() if is_row(item)]
         check_complete(part, file, [NUMBER, STATE, *rows])
-        numbers, status = file[NUMBER][:], file["status"][:]
-        if np.any(numbers >= data.requested) or np.any(status > FAILED):
-            raise ValueError("a realisation has an unknown number or status")
-        return Part(
-            part,
-            numbers,
-            status,
-            {n: text_of(file["error"][k]) for k, n in enumerate(numbers) if status[k] == FAILED},
-            json.loads(read_text(file[STATE])),
-        )
+        for name in rows:
+            stored = file.dataset(name)
+            if stored.shape[1:] != data.shapes[name][1:] or stored.dtype != type_of(known[name]):
+                raise ValueError(f"{name} has another shape or type than in {path}")
+        numbers, status = file.array(NUMBER), file.array("status")
+        ascending = numbers.ndim == 1 and numbers.dtype.kind == "i" and np.all(np.diff(numbers) > 0)
+        if not ascending or np.any((numbers < 0) | (numbers >= data.requested)):
+            raise ValueError("a realisation has an unknown number")
+        if len(status) != len(numbers) or np.any(status > FAILED):
+            raise ValueError("a realisation has an unknown status")
+        state = json.loads(file.text(STATE))
+        EnsembleData.check_types(state)
+        errors = {int(numbers[row]): text for row, text in _errors_of(file, status).items()}
+        return Part(part, numbers, status, errors, state)
 
     try:
         return read_file(part, take)
@@ -177,6 +179,18 @@ def _read_part(part: Path, path: Path, data: EnsembleData) -> Part:
         # without this part and the later ones, the ensemble is as it was before they were written
         remedy = f"copy it again, or remove it and {_REMOVE.removeprefix('remove ')}"
         raise ResultsFileError(f"{error.message}; {remedy}") from error
+
+
+def _errors_of(file: StoredFile, status: Array) -> dict[int, str]:
+    """Return the error messages of failed realisations by their row."""
+    errors: dict[int, str] = {}
+    failed = np.flatnonzero(status == FAILED)
+    for block in np.unique(failed // ERROR_ROWS).tolist():
+        first = block * ERROR_ROWS
+        texts = file.array("error", (slice(first, first + ERROR_ROWS),))
+        chosen = failed[(failed >= first) & (failed < first + ERROR_ROWS)].tolist()
+        errors |= {row: text_of(texts[row - first]) for row in chosen}
+    return errors
 
 
 def write_part(
@@ -338,7 +352,7 @@ def _read(path: Path) -> EnsembleData:
     return replace(data, errors={number: errors[number] for number in failed}, **changed)
 
 
-def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
+def _merged(path: Path, file: StoredFile) -> tuple[EnsembleData, StoredRows]:
     """Return the content of the file of an ensemble without its parts."""
     attributes = read_attributes(path, file, ENSEMBLE, EnsembleData)
     schema = ensemble_schema(
@@ -349,30 +363,29 @@ def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
         attributes.get("fatigue", False),
     )
     check_complete(path, file, schema.variables)
-    datasets = {name: file[name] for name in schema.variables}
+    datasets = {name: file.dataset(name) for name in schema.variables}
     rows = axis_lengths(datasets, schema.variables)["realisation"]
     if rows != attributes["requested"]:
         raise ValueError(f"{rows} rows for {attributes['requested']} realisations")
     for name, variable in schema.variables.items():
         if datasets[name].dtype != type_of(variable):
             raise ValueError(f"{name} is stored as {datasets[name].dtype}")
-    status = datasets["status"][:]
+    status = file.array("status")
     if (status > FAILED).any():
         raise ValueError(f"a realisation has the status {status.max()}")
-    failed = np.flatnonzero(status == FAILED).tolist()
-    errors = {number: text_of(datasets["error"][number]) for number in failed}
-    identity = os.fstat(file.id.get_vfd_handle())
+    errors = _errors_of(file, status)
+    identity = os.fstat(file.handle)
     stored = StoredRows(partial(_read_unchanged, path, identity), schema, [])
     return EnsembleData(**attributes, variables=stored, status=status, errors=errors), stored
 
 
 def _read_unchanged(
-    path: Path, identity: os.stat_result, take: Callable[[h5py.File], Array]
+    path: Path, identity: os.stat_result, take: Callable[[StoredFile], Array]
 ) -> Array:
     """Apply `take` to a file after checking that it has not been replaced."""
 
-    def checked(file: h5py.File) -> Array:
-        if not os.path.samestat(os.fstat(file.id.get_vfd_handle()), identity):
+    def checked(file: StoredFile) -> Array:
+        if not os.path.samestat(os.fstat(file.handle), identity):
             raise ResultsFileError(f"{path}: was replaced by another; open it again")
         return take(file)
 

@@ -235,7 +235,7 @@ CAM_FATIGUE_STATISTICS: Mapping[str, Variable] = _statistics({}, [_DAMAGE_CURVE]
 #: Schema without the random inputs, which differ between studies, and the control variate.
 ENSEMBLE = Schema(
     "wearsim-ensemble",
-    2,
+    3,
     "an ensemble of wear tests, from `wearsim ensemble`",
     by_name(
         (

@@ -23,6 +23,7 @@ from wearsim.atomic_write import (
     refuse_if_locked,
 )
 from wearsim.results.content import Array, Arrays
+from wearsim.results.io.stored_file import StoredFile
 from wearsim.studies.ensemble.file.data import EnsembleData, Outcome, StoredRows
 from wearsim.studies.ensemble.file.parts import (
     NUMBER,
@@ -300,7 +301,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
                 self._copy_rows(file, start, start + hdf5_write.CHUNK_ROWS)
                 check()
             if complete is not None:
-                rows = StoredRows(lambda take: take(file), header.schema, [])
+                rows = StoredRows(lambda take: take(StoredFile(file)), header.schema, [])
                 merged = replace(header, variables=rows, status=self._status.copy())
                 fields, statistics = complete(merged)
                 for name, array in statistics.items():
@@ -310,19 +311,23 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         self._load()
 
     def _copy_rows(self, file: h5py.File, start: int, stop: int) -> None:
+        from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
+
         if (self._status[start:stop] == PENDING).all():
             return
         for name, variable in self.data.schema.variables.items():
             if is_row(variable):
                 rows = self._stored.rows(name, start, stop)
                 if len(rows) and (name != "error" or np.any(rows != b"")):
-                    file[name][start : start + len(rows)] = rows
+                    hdf5_write.put_rows(file[name], start, rows)
 
 
 def _put_statistic(dataset: h5py.Dataset, name: str, array: Array) -> None:
+    from wearsim.results.io.hdf5_write import put_rows  # noqa: PLC0415
+
     of_cams = {**CAM_STATISTICS, **CAM_FATIGUE_STATISTICS}
     if name not in {**STATISTICS, **of_cams, **FATIGUE_STATISTICS}:
         raise ValueError(f"{name} is not a statistic of an ensemble")
     if np.shape(array) != dataset.shape:
         raise ValueError(f"{name} has the shape {np.shape(array)}, expected {dataset.shape}")
-    dataset[...] = array
+    put_rows(dataset, 0, array)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from wearsim.operating_system import processors
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
-from wearsim.studies.execution.factory import available_processors
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import strips_of_run
 from wearsim_bench.contact.methods import DEFAULT_MODEL
@@ -148,7 +148,7 @@ def _realisations(sizes: Sizes, model: str, repetitions: int) -> Iterator[Point]
 
 
 def _workers(sizes: Sizes, model: str, repetitions: int) -> Iterator[Point]:
-    most = min(available_processors(), sizes.workers)
+    most = min(processors(), sizes.workers)
     doubling: Sequence[int] = [2**k for k in range(most.bit_length())]
     for count in sorted({*doubling, most}):
         work = _ensemble(model, sizes.tests, count, repetitions)

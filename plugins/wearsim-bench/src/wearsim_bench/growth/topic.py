@@ -13,7 +13,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from wearsim.studies.execution.factory import available_processors
+from wearsim.operating_system import processors
 from wearsim.studies.execution.processes import ONE_THREAD
 from wearsim_bench.growth.cases import (
     QUICK,
@@ -66,7 +66,7 @@ def growth(effort: Effort, on_progress: OnProgress) -> Topic:
     names = [*("reference" for _ in models), *(f"{p.group}: {p.setting}" for p in studies)]
     costs: list[Cost | str] = []
     # timings of a quick benchmark may disturb each other
-    with ThreadPoolExecutor(available_processors() if effort.quick else 1) as pool:
+    with ThreadPoolExecutor(processors() if effort.quick else 1) as pool:
         for name, cost in zip(names, pool.map(measured, works), strict=True):
             costs.append(cost)
             on_progress(name, len(costs) / len(works))

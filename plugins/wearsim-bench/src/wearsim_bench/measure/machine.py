@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel
-from wearsim.studies.execution.factory import available_processors
+from wearsim.operating_system import processors
 from wearsim.types import FloatArray
 from wearsim_bench.measure.timing import best_short
 
@@ -63,7 +63,7 @@ def this_machine(repetitions: int = 5) -> Machine:
     seconds = yardstick_seconds(repetitions)
     return Machine(
         _processor(),
-        available_processors(),
+        processors(),
         platform.python_version(),
         libraries,
         seconds,

@@ -1,0 +1,47 @@
+"""Fronts of two objectives: the designs that no other surpasses in both, and orders by them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wearsim_optimise.designs import Design, Designs
+from wearsim_optimise.solvers import feasible_first
+
+
+def pareto_first(rated: Sequence[Any]) -> list[float]:
+    """Return the order of designs by two objectives: fronts, and within them the lonely first."""
+    order = np.array(feasible_first(rated))
+    feasible = [n for n, item in enumerate(rated) if item.is_feasible]
+    if not feasible:
+        return list(map(float, order))
+    losses = np.array([rated[n].losses for n in feasible])
+    spread = np.ptp(losses, axis=0)
+    scaled = losses / np.where(spread > 0.0, spread, 1.0)
+    dominated = [
+        sum(bool(np.all(other <= row) and np.any(other < row)) for other in losses)
+        for row in losses
+    ]
+    for n, row in enumerate(scaled):
+        apart = np.sort(np.abs(scaled - row).sum(axis=1))[1] if len(scaled) > 1 else 1.0
+        order[feasible[n]] = dominated[n] - 0.5 * min(float(apart), 1.0) - 1e6
+    return list(map(float, order))
+
+
+def front_of(designs: Designs) -> list[Design]:
+    """Return the feasible designs that no other surpasses in both objectives, by the first."""
+    feasible = [design for design in designs.all if design.is_feasible]
+    return sorted(
+        (design for design in feasible if not any(_surpasses(other, design) for other in feasible)),
+        key=lambda design: (design.losses, design.number),
+    )
+
+
+def _surpasses(other: Design, design: Design) -> bool:
+    """Return whether a design is at least as good in all objectives, and better in one."""
+    pairs = list(zip(other.losses, design.losses, strict=True))
+    if all(a == b for a, b in pairs):
+        return other.number < design.number
+    return all(a <= b for a, b in pairs)

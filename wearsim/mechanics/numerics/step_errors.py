@@ -1,0 +1,239 @@
+"""Error of an implicit step, of the test so far, and the choice of the next step.
+
+Arrays are those of `implicit_step`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wearsim.mechanics.numerics.edge_strips import mark_strips, resolved_tests
+from wearsim.mechanics.numerics.implicit_step import WHOLE_PASSES
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
+from wearsim.mechanics.numerics.linearised_wear import carried_errors
+from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
+from wearsim.types import BoolArray, FloatArray, IntArray
+
+SHARE = 0.35  # part of the tolerance that a step may add to the profiles
+COVER = (4.0, 2.0, 6.0)  # safety factors on the errors of depth, volume, profile
+# least errors of depth and profile, over that of the volume, all relative and with their factors: a
+# groove of wrong volume has the wrong depth and width, which further wear does not correct
+OF_VOLUME = (0.33, 0.5)
+# of a step at a lower order, compared with other orders: the differences that a step leaves are
+# less smooth after a change of order; where inputs vary they are not smooth at any order
+KEEP = 0.9
+# safety factors on local errors of strips that the edge crosses, and on errors of depth and volume
+EDGES, OF_EDGES = 8.0, 3.0
+# greatest order where edges are resolved within a strip: beyond the first derivative the wear of
+# strips that the edge has just crossed is not smooth, and pressures would overshoot
+EDGE_ORDER = 3
+YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
+
+
+@subroutine
+def with_sum(
+    errors: FloatArray,
+    parts: FloatArray,
+    crossed: BoolArray,
+    resolved: BoolArray,
+    past_sums: FloatArray,
+    spans: FloatArray,
+    orders: IntArray,
+) -> FloatArray:
+    """Return errors of the depths that agree with those of their sums, which a step keeps.
+
+    Parameters
+    ----------
+    errors, parts : ndarray, shape (bodies, realisations, strips)
+        Errors of the depths that a step adds [m], and the part of each that counts.
+    crossed, resolved
+        From `mark_strips` and `resolved_tests`.
+    past_sums, spans, orders
+        At the end of the step.
+    """
+    rows, realisations, n = errors.shape
+    found = np.empty(errors.shape)
+    for b in range(rows):
+        for v in range(realisations):
+            total, width, product, inverse, of_sum = 0.0, 0.0, 1.0, 0.0, 0.0
+            for k in range(orders[v] if resolved[v] else 0):
+                product, inverse = product * spans[k, v], inverse + 1.0 / spans[k, v]
+                if np.isfinite(spans[k + 1, v]):
+                    of_sum = product / (inverse + 1.0 / spans[k + 1, v]) * past_sums[k + 2, b, v, 0]
+            for i in range(n):
+                found[b, v, i] = errors[b, v, i]
+                if resolved[v]:
+                    found[b, v, i] = 0.0 if crossed[b, v, i] else errors[b, v, i]
+                    total += found[b, v, i]
+                    width += 0.0 if crossed[b, v, i] else parts[b, v, i]
+            if width > 0.0:
+                shift = (of_sum - total) / width
+                for i in range(n):
+                    found[b, v, i] += 0.0 if crossed[b, v, i] else parts[b, v, i] * shift
+    return found
+
+
+@kernel
+def assess_step(
+    tolerance: float,
+    scale: FloatArray,
+    passes: FloatArray,
+    displaced: FloatArray,
+    volume_error: FloatArray,
+    irreducible: FloatArray,
+    stepping_error: FloatArray,
+    depths: FloatArray,
+    orders: IntArray,
+    spans: FloatArray,
+    past_wear: FloatArray,
+    past_sums: FloatArray,
+    part: FloatArray,
+    whole_steps: FloatArray,
+    bodies: IntArray,
+    gap: FloatArray,
+    approach: FloatArray,
+    loads: FloatArray,
+    wear: FloatArray,
+    exponents: FloatArray,
+    stiffness: FloatArray,
+    spacing: float,
+    volume_weights: FloatArray,
+) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
+    """Return excess of error and length of the next step, its order, and errors of the test.
+
+    Parameters
+    ----------
+    tolerance : float
+    scale : ndarray, shape (realisations,)
+        Part of the error that the step should add is one over this.
+    passes : ndarray, shape (realisations,)
+        Length of the step.
+    displaced : ndarray, shape (realisations,)
+        Displacement of a roller that the error of its load corresponds to [m]: a stiff spring holds
+        the depth, and errors of its load remain.
+    volume_error : ndarray, shape (realisations,)
+        Before the step [m^3].
+    irreducible : ndarray, shape (3, realisations)
+        Errors of depth, volume and profile that no step reduces.
+    stepping_error : ndarray, shape (bodies, realisations, strips)
+        Errors of the depths before the step [m].
+    depths : ndarray, shape (bodies, realisations, strips)
+        After the step [m].
+    orders, spans, past_wear, past_sums, part, whole_steps, bodies, gap
+        After the step, as of `begin_step`.
+    approach, loads, exponents
+        Of the contacts after the step, as of `carried_errors`.
+    wear : ndarray, shape (2, contacts, strips)
+        Their wear per pass; overwritten with that of the step [m].
+    stiffness, spacing, volume_weights
+        As of `carried_errors`.
+
+    Returns
+    -------
+    found : ndarray, shape (2, realisations)
+        Excess of error and ratio of the next step, as of `next_steps`.
+    next_orders : ndarray of int, shape (realisations,)
+    errors : ndarray, shape (bodies, realisations, strips)
+        Errors of the depths after the step [m].
+    estimates : ndarray, shape (3, realisations)
+        Errors of depth, volume and profile after the step.
+    """
+    rows, realisations, n = depths.shape
+    most, next_orders = np.empty(realisations, np.int64), np.empty(realisations, np.int64)
+    resolved = resolved_tests(part, part, realisations)
+    young, crossed = np.empty(depths.shape, np.bool_), np.empty(depths.shape, np.bool_)
+    parts, own = np.empty(depths.shape), np.empty(depths.shape)
+    mark_strips(bodies, resolved, part, whole_steps, orders, past_wear[0], young, crossed, parts)
+    for b in range(rows):
+        for v in range(realisations):
+            most[v] = EDGE_ORDER if resolved[v] else MAX_ORDER
+            # young strips are not smooth enough for an estimate, which is too great
+            for i in range(n):
+                if young[b, v, i]:
+                    parts[b, v, i] *= YOUNG
+    found = next_steps(
+        past_wear,
+        spans,
+        depths,
+        orders,
+        scale,
+        SHARE * tolerance,
+        KEEP,
+        most,
+        parts,
+        own,
+        next_orders,
+    )
+    # without half a pass, the wear of a pass is that after it instead of before it
+    for b in range(rows):
+        for v in range(realisations):
+            for i in range(n if passes[v] <= WHOLE_PASSES else 0):
+                own[b, v, i] *= 2.0
+    added = with_sum(own, parts, crossed, resolved, past_sums, spans, orders)
+    for k in range(len(gap)):
+        for side in range(2):
+            for i in range(n):
+                wear[side, k, i] *= passes[k % realisations]
+    errors, sizes = carried_errors(
+        stepping_error,
+        added,
+        loads,
+        wear,
+        exponents,
+        approach,
+        gap,
+        depths,
+        bodies,
+        stiffness,
+        spacing,
+        volume_weights,
+    )
+    estimates = np.empty((3, realisations))
+    for v in range(realisations):
+        deepest, volume, of_edges, square = 0.0, 0.0, 0.0, 0.0
+        # error of steps of first order
+        factor = spans[0, v] / (1.0 / spans[0, v] + 1.0 / spans[1, v])
+        factor = factor if np.isfinite(spans[1, v]) else 0.0
+        for b in range(rows):
+            total = 0.0
+            for i in range(n):
+                depth, at_edge = depths[b, v, i], 0.0
+                deepest, total, square = max(deepest, depth), total + depth, square + depth**2
+                if resolved[v]:
+                    at_edge = own[b, v, i] if crossed[b, v, i] else 0.0
+                    if young[b, v, i] and past_wear[0, b, v, i] > 0.0:
+                        at_edge += factor * past_wear[2, b, v, i]
+                of_edges += (EDGES * at_edge) ** 2
+            volume += volume_weights[1, b] * total
+        sizes[0, v] += displaced[v]
+        if displaced[v] > 0.0:
+            sizes[2, v] += displaced[v] / deepest
+        if resolved[v]:
+            part_of_edges = math.sqrt(of_edges / square) if square > 0.0 else 0.0
+            sizes[2, v] = math.hypot(sizes[2, v], part_of_edges)
+            sizes[0, v], sizes[1, v] = OF_EDGES * sizes[0, v], OF_EDGES * sizes[1, v]
+        # the error of the volume may cross zero
+        of_test = COVER[1] * sizes[1, v] + volume_error[v] - irreducible[1, v]
+        relative_size = of_test / volume if volume > 0.0 else 0.0
+        depth = max(COVER[0] * sizes[0, v], OF_VOLUME[0] * relative_size * deepest)
+        profile = max(COVER[2] * sizes[2, v], OF_VOLUME[1] * relative_size)
+        estimates[0, v] = depth + irreducible[0, v]
+        estimates[1, v] = of_test + irreducible[1, v]
+        estimates[2, v] = profile + irreducible[2, v]
+    return found, next_orders, errors, estimates
+
+
+def compile_step_errors() -> None:
+    """Compile `assess_step` by a call for one contact of one strip."""
+    one, order, errors = np.ones(1), np.ones(1, np.int64), np.ones((3, 1))
+    strip, wear, rows = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
+    past, sums, spans = np.ones((ROWS, 2, 1, 1)), np.ones((ROWS, 3, 1, 1)), np.ones((ROWS - 1, 1))
+    assess_step(
+        *(1e-3, one, one, one, one, errors, rows, rows, order, spans, past, sums, strip, strip),
+        *(np.array([[0, 1]]), strip, one, strip, wear, strip, one, 1.0, np.ones((2, 2))),
+    )
+
+
+compile_alongside("solve_slender", compile_step_errors)

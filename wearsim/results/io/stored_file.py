@@ -1,0 +1,211 @@
+"""An open results file, of which numbers and texts are read and nothing else.
+
+A file may come from anyone. HDF5 can hold links to other files, arrays that are stored in other
+files, compressed arrays that become a thousand times as long in memory, and arrays of any size of
+which nothing is stored. Files of wearsim hold none of them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from wearsim.results.content import ERRORS, ZEROS, Array, only_zeros
+
+if TYPE_CHECKING:
+    import h5py
+
+#: Memory that arrays may take beyond the size of the file [bytes]: rows that are not yet written.
+SPARE = 1 << 28
+_LONGEST = 1 << 16  # bytes of an attribute
+_ZEROED = "{} has a block of zeros, which was not written"
+
+
+class StoredFile:
+    """An open results file.
+
+    All that is read from it takes at most `SPARE` bytes more than the file.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The file, open.
+    """
+
+    def __init__(self, file: h5py.File) -> None:
+        self._file = file
+        self._size: int = file.id.get_filesize()
+        self._read = 0  # [bytes]
+
+    @property
+    def handle(self) -> int:
+        """Number of the open file of the operating system."""
+        number: int = self._file.id.get_vfd_handle()
+        return number
+
+    def attribute(self, name: str) -> Any:
+        """Return an attribute of the file, a number or a short text.
+
+        Raises
+        ------
+        KeyError
+            If there is none.
+        ValueError
+            If it is neither a number nor a text of fixed length.
+        """
+        from h5py import h5a  # noqa: PLC0415  (takes 0.2 s to import)
+
+        if not h5a.exists(self._file.id, name.encode()):
+            raise KeyError(f"lacks the attribute {name}")
+        attribute = h5a.open(self._file.id, name.encode())
+        plain = attribute.shape == () and _is_plain(attribute.get_type())
+        if not plain or attribute.get_storage_size() > _LONGEST:
+            raise ValueError(f"the attribute {name} is neither a number nor a short text")
+        value = self._file.attrs[name]
+        return value.decode("utf-8", ERRORS) if isinstance(value, bytes) else value
+
+    def __contains__(self, name: object) -> bool:
+        try:
+            folder, last = self._folder(str(name))
+        except (KeyError, ValueError):
+            return False
+        return bool(folder.links.exists(last))
+
+    def names(self, folder: str) -> list[str]:
+        """Return the names in a folder of the file."""
+        return [name.decode("utf-8", ERRORS) for name in self._folder(f"{folder}/*")[0]]
+
+    def dataset(self, name: str) -> h5py.Dataset:
+        """Return a stored array, of which shape and type are known and nothing is read.
+
+        Raises
+        ------
+        KeyError
+            If there is none.
+        ValueError
+            If it is in another place or another file, compressed, or holds neither numbers nor
+            texts of fixed length.
+        """
+        import h5py  # noqa: PLC0415  (takes 0.2 s to import)
+        from h5py import h5d, h5z  # noqa: PLC0415
+
+        folder, last = self._folder(name)
+        _check_link(folder, last, name)
+        stored = h5d.open(folder, last)
+        made = stored.get_create_plist()
+        if made.get_layout() == h5d.VIRTUAL or made.get_external_count():
+            raise ValueError(f"{name} is stored in another file")
+        filters = {made.get_filter(number)[0] for number in range(made.get_nfilters())}
+        if filters - {h5z.FILTER_FLETCHER32}:
+            raise ValueError(f"{name} is compressed or changed by a filter")
+        if not _is_plain(stored.get_type()):
+            raise ValueError(f"{name} holds neither numbers nor texts of fixed length")
+        return h5py.Dataset(stored)
+
+    def array(self, name: str, chosen: tuple[slice, ...] | int = ()) -> Array:
+        """Read an array.
+
+        Parameters
+        ----------
+        name : str
+            Its path in the file.
+        chosen : tuple of slice or int
+            The entries along each axis, by default all; or one entry.
+
+        Raises
+        ------
+        KeyError
+            If there is none.
+        ValueError
+            As `dataset`; or if it is too long.
+        """
+        dataset = self.dataset(name)
+        chosen = (slice(chosen, chosen + 1),) if isinstance(chosen, int) else chosen
+        lengths = [
+            len(range(*part.indices(length)))
+            for part, length in zip(chosen, dataset.shape, strict=False)
+        ]
+        numbers = math.prod([*lengths, *dataset.shape[len(lengths) :]])
+        # a chunk is read as a whole
+        least = math.prod(dataset.chunks) if dataset.chunks and numbers else 0
+        self._claim(name, max(numbers, least) * dataset.dtype.itemsize, SPARE)
+        found = np.asarray(dataset[chosen])
+        if dataset.chunks and numbers and ZEROS not in dataset.attrs:
+            _check_zeros(name, dataset, chosen, found)
+        return found
+
+    def text(self, name: str) -> str:
+        """Read a text written by `hdf5_write.put_text`.
+
+        Raises
+        ------
+        KeyError
+            If there is none.
+        ValueError
+            As `dataset`; or if it is longer than the file.
+        """
+        dataset = self.dataset(name)
+        if dataset.shape != (1,) or dataset.dtype.kind != "S":
+            raise ValueError(f"{name} is no text")
+        self._claim(name, dataset.dtype.itemsize, 0)
+        content: bytes = dataset[:].tobytes()  # a single element would lose zeros at its end
+        if len(content) > 1 and not content.strip(b"\0"):
+            raise ValueError(_ZEROED.format(name))
+        return content[:-1].decode("utf-8", ERRORS)
+
+    def _claim(self, name: str, size: int, spare: int) -> None:
+        """Raise a ValueError if what is read becomes longer than the file and some spare memory."""
+        self._read += size
+        if max(size, self._read - SPARE) > self._size + spare:
+            raise ValueError(
+                f"{name} is given as {size:.3g} bytes, and the file has {self._size:.3g}"
+            )
+
+    def _folder(self, name: str) -> tuple[Any, bytes]:
+        """Return the folder of an object in the file, and the last part of its name."""
+        from h5py import h5g  # noqa: PLC0415  (takes 0.2 s to import)
+
+        *parents, last = name.encode("utf-8", ERRORS).split(b"/")
+        folder = h5g.open(self._file.id, b"/")
+        for parent in parents:
+            _check_link(folder, parent, name)
+            folder = h5g.open(folder, parent)
+        return folder, last
+
+
+def _check_link(folder: Any, last: bytes, name: str) -> None:
+    """Raise an error unless a name in a folder is that of an object in the file itself."""
+    from h5py import h5l  # noqa: PLC0415  (takes 0.2 s to import)
+
+    if not folder.links.exists(last):
+        raise KeyError(f"lacks {name}")
+    if folder.links.get_info(last).type != h5l.TYPE_HARD:
+        raise ValueError(f"{name} is a link to another place")
+
+
+def _check_zeros(name: str, dataset: h5py.Dataset, chosen: tuple[slice, ...], found: Array) -> None:
+    """Raise a ValueError if a stored chunk of an array that should have none has zeros only."""
+    shape, lengths = dataset.shape, dataset.chunks
+    region = [slice(*part.indices(length)) for part, length in zip(chosen, shape, strict=False)]
+    region += [slice(0, length) for length in shape[len(region) :]]
+    starts = [part.start for part in region]
+    for block in dataset.iter_chunks(tuple(region)):
+        part = tuple(slice(b.start - s, b.stop - s) for b, s in zip(block, starts, strict=True))
+        if not only_zeros(found[part]):
+            continue
+        corner = tuple(b.start // length * length for b, length in zip(block, lengths, strict=True))
+        if dataset.id.get_chunk_info_by_coord(corner).byte_offset is None:
+            continue  # rows that are not yet written
+        chunk = tuple(slice(c, c + length) for c, length in zip(corner, lengths, strict=True))
+        if only_zeros(dataset[chunk]):
+            raise ValueError(_ZEROED.format(name))
+
+
+def _is_plain(kind: Any) -> bool:
+    """Return whether a type of HDF5 is that of numbers or of texts of fixed length."""
+    from h5py import h5t  # noqa: PLC0415  (takes 0.2 s to import)
+
+    of_text = kind.get_class() == h5t.STRING and not kind.is_variable_str()
+    return of_text or kind.get_class() in {h5t.INTEGER, h5t.FLOAT, h5t.ENUM}
