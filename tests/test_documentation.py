@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests.benchmarks.first_contact import MEASURED, sentence
 from wearsim.cli.app import app
 from wearsim.studies.dissipation.result import DISSIPATION
 from wearsim.studies.ensemble.file.schema import ENSEMBLE
@@ -36,6 +38,10 @@ def blocks(text: str, language: str) -> list[str]:
 
 def test_readme_is_one_and_a_half_screens():
     assert len(README.splitlines()) <= 120
+
+
+def test_readme_states_the_measured_way_to_a_first_figure():
+    assert sentence(json.loads(MEASURED.read_text(encoding="utf-8"))) in README
 
 
 def test_readme_scenario_gives_the_printed_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from rig_text import short_rig
 
 import wearsim
+from tests.fixed_batches import batches_of
 from wearsim import Profile, Scenario, ScenarioError
 from wearsim.studies.ensemble import driver
 
@@ -147,7 +148,7 @@ def test_last_progress_has_the_final_estimate(
     scenario: Scenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(driver, "BETWEEN_ESTIMATES", 1e9)
-    monkeypatch.setattr(driver.EnsembleWork, "_batch_size", lambda self: 1)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
     random = scenario.changed(
         {"friction.coefficient": {"distribution": "uniform", "low": 0.08, "high": 0.12}}
     )

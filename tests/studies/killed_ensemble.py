@@ -21,12 +21,12 @@ from killed_run import (
     write_line,
 )
 
+from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import differences, small
 from wearsim.atomic_write import DISK, Storage
 from wearsim.scenario import Scenario
-from wearsim.studies.ensemble import realisation
+from wearsim.studies.ensemble import driver, realisation
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
-from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.opening import open_ensemble
 
 
@@ -86,7 +86,7 @@ def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) ->
 
 
 if __name__ == "__main__":
-    EnsembleWork._batch_size = lambda self: 1
+    driver.BatchSizes = batches_of(1)
     realisation.GRID_REALISATIONS = 3  # computed again after every kill
     mode, where = sys.argv[1], Path(sys.argv[2])
     tests = small(passes=400, contact__strips=31)

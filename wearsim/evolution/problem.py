@@ -212,9 +212,10 @@ class WearProblem:
 
     @cached_property
     def volume_weights(self) -> FloatArray:
-        """Whether a body of `stacked` is the cylinder, and its volume per sum of depths [m^2].
+        """Kind and volume of the bodies of `WearState.stacked`, shape (2, stations + rollers).
 
-        Shape (2, stations + rollers).
+        Row 0 is 1 for the cylinder or a station of the cam and 0 for a roller; row 1 is the worn
+        volume of the body over the sum of its depths over the strips [m^2].
         """
         kinematics, stations = self.kinematics, self.shape[0]
         cylinder = np.broadcast_to(np.ravel(kinematics.track_radius) / stations, stations)

@@ -385,17 +385,16 @@ def refuse_unclaimed(
     CapabilityError
         With the name of the missing capability.
     """
-    rank = batch.friction.ndim
-    needed = {
-        "wear_compliance": wear_compliance is not None,
-        "coupled": coupling is not None,
-        "creepage_variation": batch.variation is not None,
-        "bearing_torque": batch.bearing_torque is not None,
-        "local_friction": rank == 2,
-        "friction_field": rank > 2,
-    }
-    for name, need in needed.items():
-        if need and not getattr(model.capabilities, name):
+    rank, capabilities = batch.friction.ndim, model.capabilities
+    for name, need, has in (
+        ("wear_compliance", wear_compliance is not None, capabilities.wear_compliance),
+        ("coupled", coupling is not None, capabilities.coupled),
+        ("creepage_variation", batch.variation is not None, capabilities.creepage_variation),
+        ("bearing_torque", batch.bearing_torque is not None, capabilities.bearing_torque),
+        ("local_friction", rank == 2, capabilities.local_friction),
+        ("friction_field", rank > 2, capabilities.friction_field),
+    ):
+        if need and not has:
             what, also = _QUANTITIES[name]
             raise CapabilityError(
                 f"{type(model).__name__} does not support {what}, since its capabilities do not"

@@ -21,7 +21,9 @@ def compared(load, old_load, wear, old_wear, exponents, greatest=1.0):
     compliance, worn = np.empty((1, 1, 2, load.shape[1])), np.empty((2, 1, load.shape[1]))
     rows, base, opened = np.array([[0, 1]]), np.zeros_like(worn), np.empty_like(load)
     slopes = np.ones_like(load)
-    constant = linearised_wear(old_load, both[1], exponents, slopes, rows, load, compliance, opened)
+    constant = np.empty_like(both[0])
+    arguments = exponents, slopes, rows, load, compliance, opened, constant
+    linearised_wear(old_load, both[1], *arguments)
     arguments = load, old_load, *both, compliance, constant, rows, base, greatest, slopes
     active = np.ones(1, np.bool_)
     sizes = wear_of_bodies(*arguments, active, exponents, worn, np.empty_like(load))
@@ -33,7 +35,8 @@ def test_ratio_is_extended_to_strips_without_load():
     compliance = np.empty((1, 1, 2, 6))
     opened = np.empty_like(LOAD)
     ones = np.ones((1, 6))
-    constant = linearised_wear(LOAD, WEAR, ones, ones, ROWS, 7.0 * LOAD, compliance, opened)
+    constant = np.empty_like(WEAR)
+    linearised_wear(LOAD, WEAR, ones, ones, ROWS, 7.0 * LOAD, compliance, opened, constant)
     assert (opened == 7.0 * LOAD).all()
     assert compliance[0, 0, 0] == pytest.approx([2.0, 2.0, 3.0, 4.0, 5.0, 5.0])
     assert not compliance[0, 0, 1].any()
@@ -44,7 +47,8 @@ def test_contact_without_load_has_no_compliance():
     compliance = np.empty((2, 1, 2, 3))
     none = np.zeros((2, 3))
     ones = np.ones((2, 3))
-    linearised_wear(none, np.zeros((2, 2, 3)), ones, ones, ROWS, none, compliance, none)
+    wear = np.zeros((2, 2, 3))
+    linearised_wear(none, wear, ones, ones, ROWS, none, compliance, none, wear.copy())
     assert not compliance.any()
 
 
@@ -54,7 +58,8 @@ def test_linearisation_has_value_and_slope_of_a_power_law():
     compliance = np.empty((1, 1, 2, 3))
     opened, gap = np.empty_like(load), np.array([[5.0, 4.0, 6.0]])
     exponents, slopes = np.full((1, 3), exponent), np.ones((1, 3))
-    constant = linearised_wear(load, wear, exponents, slopes, ROWS, gap, compliance, opened)
+    constant = np.empty_like(wear)
+    linearised_wear(load, wear, exponents, slopes, ROWS, gap, compliance, opened, constant)
     slope = compliance[0, 0]
     assert constant[:, 0] + slope * load == pytest.approx(wear[:, 0])
     assert opened == pytest.approx(gap + constant.sum(axis=0))
@@ -84,9 +89,11 @@ def test_contacts_on_one_body_add_their_wear():
     loads, rows = np.array([[1.0], [2.0]]), np.array([[0, 1], [0, 2]])
     wear = np.array([[[1.0], [2.0]], [[10.0], [20.0]]])
     compliance, worn = np.empty((1, 2, 2, 1)), np.empty((3, 1, 1))
-    constant = linearised_wear(
+    constant = np.empty_like(wear)
+    linearised_wear(
         *(loads, wear, np.full((2, 1), 0.5), np.ones((2, 1)), rows, loads, compliance),
         opened := np.empty((2, 1)),
+        constant,
     )
     # both contacts wear the first body
     assert opened.ravel().tolist() == [1.0 + 0.5 * (3.0 + 10.0), 2.0 + 0.5 * (3.0 + 20.0)]

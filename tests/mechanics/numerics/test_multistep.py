@@ -37,10 +37,13 @@ class Solution:
         weights, factor = np.empty((2, ROWS, 1)), np.empty(1)
         distances = np.empty((ROWS - 1, 1))
         formulas(self.spans, length * ONE, np.array([order]), NONE, weights, factor, distances)
-        added, guess = extrapolated(weights, self.differences)
+        added, guess = np.empty((2, 1, 1, 1))
+        for found, own in zip((added, guess), weights, strict=True):
+            extrapolated(own, self.differences, found)
         new = (self.value + added + factor[0] * constant) / (1.0 - factor[0] * slope)
         change = new - self.value
-        self.differences = new_differences(0.0 * new, change, NONE, self.differences, distances)
+        differences, self.differences = self.differences, np.empty_like(self.differences)
+        new_differences(0.0 * new, change, NONE, differences, distances, self.differences)
         guess, self.value, self.spans = self.value + guess, new, distances
         return guess.item()
 

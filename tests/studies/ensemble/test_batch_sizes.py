@@ -2,42 +2,39 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
+import math
 
-import numpy as np
-import pytest
-
-from wearsim.studies.ensemble import driver
-from wearsim.studies.ensemble.file.schema import PENDING
+from wearsim.studies.ensemble.batch_sizes import SECONDS, BatchSizes
 
 START, EACH = 3.0, 0.05  # s: start of a worker, and a realisation
 
 
-def batch_sizes(monkeypatch: pytest.MonkeyPatch, total: int, batches: int) -> list[int]:
+def batch_sizes(total: int, batches: int) -> list[int]:
     """Return the sizes of the first batches of an ensemble that one worker runs."""
-    clock = [0.0]
-    monkeypatch.setattr(driver, "time", SimpleNamespace(monotonic=lambda: clock[0]))
-    file: Any = SimpleNamespace(
-        status=np.full(total, PENDING),
-        data=SimpleNamespace(wall_seconds=0.0, finished=True, life={}),
-        put=lambda outcomes: None,
-    )
-    runner: Any = SimpleNamespace(plan="monte-carlo")
-    pool: Any = SimpleNamespace(workers=1, describe="1 process")
-    work = driver.EnsembleWork(file, runner, None, pool, None, None)
-    sizes = []
+    now = 0.0
+    policy = BatchSizes(lambda: now)
+    sizes: list[int] = []
     for number in range(batches):
-        sizes.append(work._batch_size())
-        clock[0] += sizes[-1] * EACH + (START if number == 0 else 0.0)
-        work._take([SimpleNamespace(number=0)] * sizes[-1])  # type: ignore[list-item]
+        sizes.append(policy.next(total - sum(sizes), workers=1))
+        now += sizes[-1] * EACH + (START if number == 0 else 0.0)
+        policy.finished(sizes[-1])
     return sizes
 
 
-def test_batches_grow_to_their_duration_despite_a_slow_start(monkeypatch):
-    sizes = batch_sizes(monkeypatch, 10_000, 6)
-    assert sizes == [1, 1, 4, 16, 64, round(driver.SECONDS / EACH)]
+def test_batches_grow_to_their_duration_despite_a_slow_start():
+    assert batch_sizes(10_000, 6) == [1, 1, 4, 16, 64, round(SECONDS / EACH)]
 
 
-def test_last_batches_are_small_so_that_all_workers_end_together(monkeypatch):
-    assert max(batch_sizes(monkeypatch, 12, 6)) == 6
+def test_last_batches_are_small_so_that_all_workers_end_together():
+    assert batch_sizes(12, 6) == [1, 1, 4, 3, 2, 1]
+
+
+def test_time_left_does_not_include_the_start_of_a_worker():
+    now = 0.0
+    policy = BatchSizes(lambda: now)
+    for duration in (START, EACH, EACH):
+        assert math.isnan(policy.time_left(100))
+        now += duration
+        policy.finished(1)
+    assert math.isclose(policy.time_left(100), 100 * EACH)
+    assert math.isclose(policy.rate, 3 / now)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wearsim
+from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import differences, partly_failing, small
-from wearsim.studies.ensemble import driver as ensemble_work
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
 from wearsim.studies.opening import open_ensemble
 
@@ -76,7 +76,7 @@ def test_only_failed_realisations_run_again(tmp_path, monkeypatch):
 def test_kill_during_repetition_of_failed_loses_nothing(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
-    monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
     whole = ensemble(small(), 6, tmp_path / "whole.h5", **SERIAL)
     run = RealisationRunner.prepare
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wearsim
+from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import LOGNORMAL, differences, small
 from tests.studies.random_examples import CREEPAGE, FRICTION, LOAD, SLACK, scenario_of
 from wearsim.errors import CapabilityError, Interrupted, ResultsFileError, ScenarioError
@@ -76,7 +77,7 @@ def test_results_are_bitwise_independent_of_workers(twelve, tmp_path, options):
 
 @pytest.mark.parametrize("size", [1, 5])
 def test_results_are_bitwise_independent_of_batches(twelve, tmp_path, monkeypatch, size):
-    monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: size)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(size))
     assert differences(twelve, ensemble(small(), 12, tmp_path / "other.h5", **SERIAL)) == []
 
 
@@ -117,7 +118,7 @@ def test_seed_changes_the_ensemble(twelve, tmp_path):
 
 @pytest.mark.parametrize("scheduler", ["serial", "processes"])
 def test_resumed_ensemble_equals_unbroken_ensemble(twelve, tmp_path, monkeypatch, scheduler):
-    monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 2)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(2))
     path = tmp_path / "part.h5"
     answers = iter([True])
     with pytest.raises(Interrupted, match=r"wearsim\.resume_ensemble.*part\.h5"):
@@ -142,7 +143,7 @@ def test_existing_file_is_not_overwritten(twelve):
 
 
 def test_time_left_is_estimated_from_three_batches_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
     left: list[float] = []
     ensemble(
         small(), 5, tmp_path / "few.h5", on_progress=lambda now: left.append(now.left), **SERIAL
@@ -153,7 +154,7 @@ def test_time_left_is_estimated_from_three_batches_on(tmp_path, monkeypatch):
 def test_slow_batch_defers_few_outcomes(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.driver import AHEAD, EnsembleWork
 
-    monkeypatch.setattr(EnsembleWork, "_batch_size", lambda self: 1)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
     taken, greatest = EnsembleWork._take, []
 
     def watched(self, outcomes):

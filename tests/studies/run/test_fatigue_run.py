@@ -7,6 +7,7 @@ import pytest
 from study_examples import PITTING, short
 
 import wearsim
+from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import differences
 from wearsim.errors import Interrupted, ScenarioError
 from wearsim.mechanics.fatigue import SHEAR_DEPTH, greatest_von_mises
@@ -14,7 +15,6 @@ from wearsim.report.csv_files import table_text
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.dry_run import dry_run
 from wearsim.studies.dry_run_table import plan
-from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.plausibility import plausibility_warnings
 
 FATIGUE: dict[str, object] = {"fatigue": {"slope": 1.125, "cylinder": PITTING, "roller": PITTING}}
@@ -98,7 +98,7 @@ def test_ensemble_has_the_damage_of_each_realisation(tmp_path):
 
 
 def test_stopped_ensemble_with_fatigue_equals_unbroken_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(EnsembleWork, "_batch_size", lambda self: 2)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(2))
     friction = {"distribution": "uniform", "low": 0.1, "high": 0.2}
     changes = {"fatigue": {"slope": 1.125, "cylinder": PITTING, "roller": PITTING}}
     scenario = shipped_scenario(

@@ -142,9 +142,12 @@ class ImplicitStepper(StepDoublingStepper):
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
-        of_energy, their_order = next_steps_of_energy(state, end, self.tolerance, KEEP)
+        of_energy, their_order = next_steps_of_energy(
+            state, end, self.tolerance, KEEP, edges.most(end)
+        )
         order = np.where(of_energy[1] < ratio, their_order, order)
-        over, ratio = np.maximum(over, of_energy[0]), np.minimum(ratio, of_energy[1])
+        # the error so far shortens the next step
+        over, ratio = np.maximum(over * left, of_energy[0]), np.minimum(ratio, of_energy[1])
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
@@ -156,7 +159,7 @@ class ImplicitStepper(StepDoublingStepper):
             profile_error=estimates[2],
             **others,
         )
-        return Attempt((end,), over * left, ratio)  # the error so far shortens the next step
+        return Attempt((end,), over, ratio)
 
     def _attempt_doubled(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step

@@ -81,8 +81,10 @@ class _Slope:
         return self._exponent
 
 
-_PAST = attrgetter("past_wear", "past_sums", "past_feedback", "past_spans", "order")
-_EDGES = attrgetter("separation", "part", "whole_steps")
+_PAST = attrgetter(
+    *("past_wear", "past_sums", "past_feedback", "past_spans", "order"),
+    *("separation", "part", "whole_steps"),
+)
 
 
 class Past(NamedTuple):
@@ -104,18 +106,22 @@ class Past(NamedTuple):
     @classmethod
     def of(cls, state: WearState) -> Past:
         """Return those of a state of the implicit stepper."""
-        wear, sums, feedback, spans, order = _PAST(state)
-        realisations, contacts = len(order), len(state.contacts)
+        wear, sums, feedback, spans, order, *edges = _PAST(state)
+        realisations, contacts = len(order), len(state.contacts.power)
         if feedback is None:
-            feedback = np.empty((ROWS, 0, realisations, 1))
-        none = np.empty((contacts, 0))
+            feedback = np.empty((ROWS, 0, realisations))
+        if edges[1] is None:
+            edges = [np.empty((contacts, 0))] * len(edges)
+        separation, part, whole_steps = edges
         return cls(
             wear,
             sums.reshape(ROWS, -1, realisations, 1),
             feedback.reshape(ROWS, -1, realisations, 1),
             spans,
             order,
-            *(none if one is None else one.reshape(contacts, -1) for one in _EDGES(state)),
+            np.empty((contacts, 0)) if separation is None else separation.reshape(contacts, -1),
+            part.reshape(contacts, -1),
+            whole_steps.reshape(contacts, -1),
         )
 
 
@@ -161,7 +167,11 @@ def step_by_formula(
         in_groove = have_groove(problem, state)
     # line loads and wear about which the wear is linearised
     line_load, wear = contacts.line_load, wear_of(contacts)
-    begun = begin_step(
+    realisations = len(passes)
+    resolved, of_tests = np.empty(realisations, dtype=np.bool_), np.empty((7, realisations))
+    sums, feedback = np.empty(past.sums.shape[1:]), np.empty(past.feedback.shape[1:])
+    of_bodies, of_contacts = np.empty((6, *depths.shape)), np.empty((3, *shape))
+    begin_step(
         past.spans,
         order,
         passes,
@@ -180,31 +190,36 @@ def step_by_formula(
         past.part,
         past.whole_steps,
         in_groove,
+        resolved,
+        of_tests,
+        sums,
+        feedback,
+        of_bodies,
+        of_contacts,
     )
-    worn_passes, half_pass, spans, scale, level, added, base, guess, sums, feedback = begun[:10]
-    resolved, first, rise, greatest, contact_depth = begun[10:]
     of_step: tuple[Any, ...] = (
-        *(bodies, resolved, gap, depths, added, base, past.part, first, rise, greatest),
-        contact_depth,
+        *(bodies, resolved, gap, depths, past.part, of_bodies, of_contacts),
     )
+    base, guess = of_bodies[3], of_bodies[4]
+    worn = np.empty(depths.shape)
     exponents = np.array(state.wear_exponents).reshape(shape)
     loads = LoadsOfStep(problem, state, conditions.force, passes, feedback)
     stations, active = problem.shape[0], np.ones(len(passes), dtype=np.bool_)
     iterations = np.zeros(len(passes), dtype=np.int64)
     most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        about: tuple[Any, ...] = (line_load, wear, exponents)
-        gaps, slopes, compliance, opened, constant = linearise_step(*of_step, *about)
-        batch = contact_batch(problem, opened, loads.used, *separated(guess, stations))
+        about, compliance = np.empty((5, *shape)), np.empty((realisations, len(bodies), 2, strips))
+        given: tuple[Any, ...] = (line_load, wear, exponents, about, compliance)
+        linearise_step(*of_step, *given)
+        batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
         solved = solve_compliant(problem, batch, compliance, contacts, active)
         iterations += active
         new, apart = wear_of(solved), solved.separation
         apart = (
             past.separation if apart is None or not past.separation.size else kernel_input(apart)
         )
-        linear: tuple[Any, ...] = (gaps, slopes, compliance, constant)
-        found: tuple[Any, ...] = (solved.line_load, apart, new, worn_passes, scale, most, active)
-        worn, (rest, opening, depth) = compare_step(*of_step, *about, *linear, *found)
+        given += solved.line_load, apart, new, of_tests[0], most, active, worn
+        rest, opening, depth = compare_step(*of_step, *given)
         used, guess, change = guess, base + worn, rest
         # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
         relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
@@ -234,16 +249,18 @@ def step_by_formula(
             line_load, wear = solved.line_load, new
         else:  # strips at an edge enter and leave the contact in turn
             line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
-    feedback, energy = loads.feedback, energy_per_pass(problem, contacts)
-    given: tuple[Any, ...] = (past.separation, past.whole_steps, share, contacts.line_load, new)
-    given += worn, worn_passes, half_pass, spans, scale, level, sums, feedback, energy
-    given += past.wear, past.sums, past.feedback
-    ends, fields, *differences, dissipated, decreased = end_step(*of_step, *given)
+    energy, ends = energy_per_pass(problem, contacts), np.empty(depths.shape)
+    fields = np.empty((3, *past.part.shape) if past.part.size else (0, 0, 0))
+    past_wear, past_sums = np.empty(past.wear.shape), np.empty(past.sums.shape)
+    past_feedback, decreased = np.empty(past.feedback.shape), np.empty_like(resolved)
+    ended: list[Any] = [past.separation, past.whole_steps, share, contacts.line_load, new, worn]
+    ended += of_tests, sums, loads.feedback, energy, past.wear, past.sums, past.feedback
+    ended += ends, fields, past_wear, past_sums, past_feedback, decreased
+    end_step(*of_step, *ended)
     by_contact = *problem.shape, strips
     edges = dict(zip(FIELDS, fields.reshape(-1, *by_contact), strict=False))
     if not past.separation.size:
         edges["separation"] = None
-    past_wear, past_sums, past_feedback = differences
     if loads.vary:
         edges["past_feedback"] = past_feedback.reshape(ROWS, *problem.shape)
     end = state.with_stacked(
@@ -254,10 +271,10 @@ def step_by_formula(
         solves=state.solves + iterations * problem.contacts_each,
         wear_exponents=exponents.reshape(by_contact),
         passes=state.passes + passes,
-        energy=state.energy + dissipated,
+        energy=state.energy + energy,
         past_wear=past_wear,
         past_sums=past_sums[..., 0],
-        past_spans=spans,
+        past_spans=of_tests[2:],
         order=order,
     )
     return end, decreased

@@ -6,12 +6,10 @@ import numpy as np
 
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import HERTZ, WearState
-from wearsim.evolution.steppers.edges import unresolved
 from wearsim.evolution.steppers.loads import elastic_approaches, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
-from wearsim.mechanics.numerics.step_errors import EDGE_ORDER
 from wearsim.types import FloatArray, IntArray
 
 LEAST_ENERGY = 0.1  # part of the mean energy that an error of the energy is compared with, at least
@@ -65,7 +63,7 @@ def next_steps_of_loads(
 
 
 def next_steps_of_energy(
-    start: WearState, end: WearState, tolerance: float, keep: float
+    start: WearState, end: WearState, tolerance: float, keep: float, most: IntArray
 ) -> tuple[FloatArray, IntArray]:
     """Choose the next step by the error of the energy, and thus of the worn volume.
 
@@ -79,8 +77,8 @@ def next_steps_of_energy(
     ----------
     start, end : WearState
         States before and after the step.
-    tolerance, keep
-        Tolerance of the stepper, and as of `next_steps`.
+    tolerance, keep, most
+        Tolerance of the stepper; others as of `next_steps`.
 
     Returns
     -------
@@ -97,9 +95,6 @@ def next_steps_of_energy(
     least = LEAST_ENERGY * end.energy * (1.0 - start.passes / end.passes)
     worn = np.maximum(end.energy - start.energy, least)[None, :, None]
     ones, order, own = np.ones_like(worn), np.empty_like(orders), np.empty_like(worn)
-    most = np.full_like(orders, MAX_ORDER)
-    if end.part is not None:
-        most = np.where(unresolved(end), MAX_ORDER, EDGE_ORDER)
     found = next_steps(
         *(energy, spans, worn, orders, ones[0, :, 0], tolerance, keep, most, ones, own, order)
     )

@@ -60,6 +60,22 @@ class EdgeStrips(NamedTuple):
 
 
 @subroutine
+def edge_strips(
+    bodies: IntArray,
+    resolved: BoolArray,
+    gap: FloatArray,
+    depths: FloatArray,
+    part: FloatArray,
+    of_bodies: FloatArray,
+    of_contacts: FloatArray,
+) -> EdgeStrips:
+    """Return `EdgeStrips` from the arrays of `implicit_step.begin_step`."""
+    added, base, greatest = of_bodies[2], of_bodies[3], of_bodies[5]
+    first, rise = of_contacts[0], of_contacts[1]
+    return EdgeStrips(bodies, resolved, gap, depths, added, base, part, first, rise, greatest)
+
+
+@subroutine
 def start_edges(strips: EdgeStrips, separation: FloatArray, approach: FloatArray) -> None:
     """Fill u_0, r and greatest f of all strips.
 
@@ -434,12 +450,10 @@ def mark_strips(
 
 
 @subroutine
-def resolved_tests(separation: FloatArray, part: FloatArray, realisations: int) -> BoolArray:
-    """Return which tests resolve edges: the parts of the others are not numbers, or all whole."""
-    resolved = np.empty(realisations, np.bool_)
-    for v in range(realisations):
+def fill_resolved(separation: FloatArray, part: FloatArray, resolved: BoolArray) -> None:
+    """Fill which tests resolve edges: the parts of the others are not numbers, or all whole."""
+    for v in range(len(resolved)):
         resolved[v] = separation.shape[1] > 0 and not np.isnan(part[v, 0])
-    return resolved
 
 
 @subroutine

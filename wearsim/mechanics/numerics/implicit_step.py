@@ -8,21 +8,19 @@ resolves edges, see `evolution.steppers.edges`.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from wearsim.mechanics.numerics.edge_strips import (
-    EdgeStrips,
     compare_edges,
+    edge_strips,
     end_edges,
+    fill_resolved,
     fill_separations,
     linearise_edges,
     mark_strips,
-    resolved_tests,
     start_edges,
 )
-from wearsim.mechanics.numerics.jit import borrowed, compile_alongside, kept, kernel
+from wearsim.mechanics.numerics.jit import borrowed, compile_alongside, kernel
 from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
 from wearsim.mechanics.numerics.multistep import ROWS, extrapolated, formulas, new_differences
 from wearsim.types import BoolArray, FloatArray, IntArray
@@ -51,8 +49,14 @@ def begin_step(
     part: FloatArray,
     whole_steps: FloatArray,
     in_groove: BoolArray,
-) -> tuple[Any, ...]:
-    """Return the formula of a step for all bodies and contacts.
+    resolved: BoolArray,
+    of_tests: FloatArray,
+    sums: FloatArray,
+    feedback: FloatArray,
+    of_bodies: FloatArray,
+    of_contacts: FloatArray,
+) -> None:
+    """Compute the formula of a step for all bodies and contacts.
 
     Parameters
     ----------
@@ -76,49 +80,41 @@ def begin_step(
         As in `WearState`.
     in_groove : ndarray of bool, shape (realisations,)
         Tests in a groove, where strips in contact as wholes are counted: there is no separation.
-
-    Returns
-    -------
-    worn_passes, half_pass : ndarray, shape (realisations,)
-        Passes of the wear at the end, and half a pass in long steps.
-    distances : ndarray, shape (5, realisations)
-        `spans` of the end.
-    scale : ndarray, shape (bodies, realisations, strips)
-        What `worn_passes` are multiplied by in strips that follow the formula of first order.
-    level, added, base, guess : ndarray, shape (bodies, realisations, strips)
-        Depths less separations at the start, their increase without the wear at the end, the sum of
-        both, and predicted depths [m].
-    sums, feedback : ndarray, shape (rows, realisations, 1)
-        Increase of the sums without the wear at the end, and predicted feedback [N].
     resolved : ndarray of bool, shape (realisations,)
-        Tests that resolve edges.
-    first, rise : ndarray, shape (contacts, strips)
-    greatest : ndarray, shape (bodies, realisations, strips)
-        As in `EdgeStrips`.
-    contact_depth : ndarray, shape (contacts, strips)
-        Predicted depth of both bodies of each contact [m].
+        Result: tests that resolve edges.
+    of_tests : ndarray, shape (7, realisations)
+        Results: passes of the wear at the end, half a pass in long steps, and `spans` of the end.
+    sums, feedback : ndarray, shape (rows, realisations, 1)
+        Results: increase of the sums without the wear at the end, and predicted feedback [N].
+    of_bodies : ndarray, shape (6, bodies, realisations, strips)
+        Results: what the passes of the wear are multiplied by in strips that follow the formula of
+        first order; depths less separations at the start, their increase without the wear at the
+        end, the sum of both, and predicted depths [m]; `greatest` of `EdgeStrips`.
+    of_contacts : ndarray, shape (3, contacts, strips)
+        Results: `first` and `rise` of `EdgeStrips`, and the predicted depth of both bodies [m].
     """
     rows, realisations, n = depths.shape
-    lengths, half_pass = np.empty(realisations), np.empty(realisations)
-    factor, worn_passes = np.empty(realisations), np.empty(realisations)
-    weights, distances = np.empty((2, ROWS, realisations)), np.empty((ROWS - 1, realisations))
+    lengths, factor = np.empty(realisations), np.empty(realisations)
+    worn_passes, half_pass, distances = of_tests[0], of_tests[1], of_tests[2:]
+    scale, level, added = of_bodies[0], of_bodies[1], of_bodies[2]
+    base, guess, contact_depth = of_bodies[3], of_bodies[4], of_contacts[2]
+    weights = np.empty((2, ROWS, realisations))
     for v in range(realisations):
         lengths[v] = mean_exposure[v] * passes[v]
         half_pass[v] = 0.5 if passes[v] > WHOLE_PASSES else 0.0
     formulas(spans, lengths, orders, half_pass, weights, factor, distances)
     for v in range(realisations):
         worn_passes[v] = factor[v] / exposure[v] - half_pass[v]
-    resolved = resolved_tests(separation, part, realisations)
+    fill_resolved(separation, part, resolved)
     marked = np.empty(realisations, np.bool_)
     for v in range(realisations):
         marked[v] = resolved[v] or in_groove[v]
     shape = depths.shape
     young, crossed = np.empty(shape, np.bool_), np.empty(shape, np.bool_)
-    scale, level, base = np.empty(shape), np.empty(shape), np.empty(shape)
-    greatest = np.empty(shape)
     mark_strips(bodies, marked, part, whole_steps, orders, past_wear[0], young, crossed, scale)
     fill_separations(bodies, resolved, separation, share, level)
-    added, guess = extrapolated(weights, past_wear)
+    extrapolated(weights[0], past_wear, added)
+    extrapolated(weights[1], past_wear, guess)
     for b in range(rows):
         for v in range(realisations):
             first_order = (lengths[v] / exposure[v] - half_pass[v]) / worn_passes[v]
@@ -130,14 +126,12 @@ def begin_step(
                 level[b, v, i] = depths[b, v, i] - level[b, v, i]
                 base[b, v, i] = level[b, v, i] + added[b, v, i]
                 guess[b, v, i] += level[b, v, i]
-    sums, feedback = extrapolated(weights, past_sums)[0], extrapolated(weights, past_feedback)[1]
+    extrapolated(weights[0], past_sums, sums)
+    extrapolated(weights[1], past_feedback, feedback)
     for f in range(feedback.shape[0]):
         for v in range(realisations):
             feedback[f, v, 0] += (1.0 - half_pass[v]) * past_feedback[0, f, v, 0]
-    first, rise, contact_depth = np.empty(gap.shape), np.empty(gap.shape), np.empty(gap.shape)
-    strips = borrowed(
-        EdgeStrips(bodies, resolved, gap, depths, added, base, part, first, rise, greatest)
-    )
+    strips = borrowed(edge_strips(bodies, resolved, gap, depths, part, of_bodies, of_contacts))
     start_edges(strips, separation, approach)
     for k in range(len(gap)):
         v = k % realisations
@@ -146,24 +140,6 @@ def begin_step(
             contact_depth[k, i] = guess[one, v, i] + guess[other, v, i]
             wear[0, k, i] *= worn_passes[v] * scale[one, v, i]
             wear[1, k, i] *= worn_passes[v] * scale[other, v, i]
-    kept((resolved, added, base, first, rise, greatest))
-    return (
-        worn_passes,
-        half_pass,
-        distances,
-        scale,
-        level,
-        added,
-        base,
-        guess,
-        sums,
-        feedback,
-        resolved,
-        first,
-        rise,
-        greatest,
-        contact_depth,
-    )
 
 
 @kernel
@@ -172,44 +148,36 @@ def linearise_step(
     resolved: BoolArray,
     gap: FloatArray,
     depths: FloatArray,
-    added: FloatArray,
-    base: FloatArray,
     part: FloatArray,
-    first: FloatArray,
-    rise: FloatArray,
-    greatest: FloatArray,
-    contact_depth: FloatArray,
+    of_bodies: FloatArray,
+    of_contacts: FloatArray,
     line_load: FloatArray,
     wear: FloatArray,
     exponents: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    about: FloatArray,
+    compliance: FloatArray,
+) -> None:
     """Linearise the wear of a step about a solution of the contacts.
 
     Parameters
     ----------
-    bodies, resolved, gap, depths, added, base, part, first, rise, greatest, contact_depth
+    bodies, resolved, gap, depths, part, of_bodies, of_contacts
         As in `begin_step`.
     line_load, exponents : ndarray, shape (contacts, strips)
     wear : ndarray, shape (2, contacts, strips)
         As in `linearised_wear`.
-
-    Returns
-    -------
-    gaps, slopes : ndarray, shape (contacts, strips)
-        From `linearise_edges`.
+    about : ndarray, shape (5, contacts, strips)
+        Results: `gaps` and `slopes` of `linearise_edges`; `opened` and both rows of `constant` of
+        `linearised_wear`.
     compliance : ndarray, shape (realisations, contacts each, 2, strips)
-    opened : ndarray, shape (contacts, strips)
-    constant : ndarray, shape (2, contacts, strips)
-        From `linearised_wear`.
+        Result of `linearised_wear`.
     """
-    gaps, slopes, opened = np.empty(gap.shape), np.empty(gap.shape), np.empty(gap.shape)
-    strips = borrowed(
-        EdgeStrips(bodies, resolved, gap, depths, added, base, part, first, rise, greatest)
+    gaps, slopes = about[0], about[1]
+    strips = borrowed(edge_strips(bodies, resolved, gap, depths, part, of_bodies, of_contacts))
+    linearise_edges(strips, of_contacts[2], wear, gaps, slopes)
+    linearised_wear(
+        line_load, wear, exponents, slopes, bodies, gaps, compliance, about[2], about[3:]
     )
-    linearise_edges(strips, contact_depth, wear, gaps, slopes)
-    compliance = np.empty((len(resolved), len(bodies), 2, gap.shape[1]))
-    constant = linearised_wear(line_load, wear, exponents, slopes, bodies, gaps, compliance, opened)
-    return gaps, slopes, compliance, opened, constant
 
 
 @kernel
@@ -218,73 +186,67 @@ def compare_step(
     resolved: BoolArray,
     gap: FloatArray,
     depths: FloatArray,
-    added: FloatArray,
-    base: FloatArray,
     part: FloatArray,
-    first: FloatArray,
-    rise: FloatArray,
-    greatest: FloatArray,
-    contact_depth: FloatArray,
+    of_bodies: FloatArray,
+    of_contacts: FloatArray,
     line_load: FloatArray,
     wear: FloatArray,
     exponents: FloatArray,
-    gaps: FloatArray,
-    slopes: FloatArray,
+    about: FloatArray,
     compliance: FloatArray,
-    constant: FloatArray,
     loads: FloatArray,
     apart: FloatArray,
     new_wear: FloatArray,
     worn_passes: FloatArray,
-    scale: FloatArray,
     greatest_exponent: float,
     active: BoolArray,
-) -> tuple[FloatArray, FloatArray]:
+    worn: FloatArray,
+) -> FloatArray:
     """Compare the wear of a new solution of the contacts with that linearised about another one.
 
     Parameters
     ----------
-    bodies, ..., greatest
+    bodies, resolved, gap, depths, part, of_bodies, of_contacts
         As in `begin_step`.
-    contact_depth, exponents : ndarray, shape (contacts, strips)
-        Updated by the solution.
-    line_load, wear, gaps, slopes, compliance, constant
+    exponents : ndarray, shape (contacts, strips)
+        Updated by the solution, as is the depth of both bodies in `of_contacts`.
+    line_load, wear, about, compliance
         Arguments and results of `linearise_step`.
     loads, apart : ndarray, shape (contacts, strips)
         Line loads [N/m] and separations of the solution [m].
     new_wear : ndarray, shape (2, contacts, strips)
         Its wear per pass; overwritten with that by the formula [m].
-    worn_passes, scale
+    worn_passes : ndarray, shape (realisations,)
         From `begin_step`.
     greatest_exponent : float
         Upper bound of the exponents.
     active : ndarray of bool, shape (realisations,)
         Realisations that have not converged yet.
+    worn : ndarray, shape (bodies, realisations, strips)
+        Result: wear of the bodies by the formula [m].
 
     Returns
     -------
-    worn : ndarray, shape (bodies, realisations, strips)
-        Wear of the bodies by the formula [m].
-    sizes : ndarray, shape (3, realisations)
+    ndarray, shape (3, realisations)
         As of `wear_of_bodies`.
     """
-    realisations, n = len(active), gap.shape[1]
+    realisations, n, scale = len(active), gap.shape[1], of_bodies[0]
+    slopes, linear = about[1], np.empty(gap.shape)
     for k in range(len(gap)):
         v = k % realisations
         for side in range(2):
             b = bodies[k // realisations, side]
             for i in range(n):
                 new_wear[side, k, i] *= worn_passes[v] * scale[b, v, i]
-    worn, linear = np.empty(depths.shape), np.empty(gap.shape)
     sizes = wear_of_bodies(
         loads,
         line_load,
         new_wear,
         wear,
         compliance,
-        constant,
+        about[3:],
         bodies,
-        base,
+        of_bodies[3],
         greatest_exponent,
         slopes,
         active,
@@ -292,15 +254,13 @@ def compare_step(
         worn,
         linear,
     )
-    strips = borrowed(
-        EdgeStrips(bodies, resolved, gap, depths, added, base, part, first, rise, greatest)
-    )
+    strips = borrowed(edge_strips(bodies, resolved, gap, depths, part, of_bodies, of_contacts))
     of_edges = compare_edges(
-        strips, active, gaps, slopes, linear, apart, loads, new_wear, contact_depth
+        strips, active, about[0], slopes, linear, apart, loads, new_wear, of_contacts[2]
     )
     for v in range(realisations):
         sizes[0, v] = max(sizes[0, v], of_edges[v] / OF_EDGES)
-    return worn, sizes
+    return sizes
 
 
 @kernel
@@ -309,32 +269,30 @@ def end_step(
     resolved: BoolArray,
     gap: FloatArray,
     depths: FloatArray,
-    added: FloatArray,
-    base: FloatArray,
     part: FloatArray,
-    first: FloatArray,
-    rise: FloatArray,
-    greatest: FloatArray,
-    contact_depth: FloatArray,
+    of_bodies: FloatArray,
+    of_contacts: FloatArray,
     separation: FloatArray,
     whole_steps: FloatArray,
     share: FloatArray,
     loads: FloatArray,
     wear: FloatArray,
     worn: FloatArray,
-    worn_passes: FloatArray,
-    half_pass: FloatArray,
-    distances: FloatArray,
-    scale: FloatArray,
-    level: FloatArray,
+    of_tests: FloatArray,
     sums: FloatArray,
     feedback: FloatArray,
     energy: FloatArray,
     past_wear: FloatArray,
     past_sums: FloatArray,
     past_feedback: FloatArray,
-) -> tuple[Any, ...]:
-    """Return depths, fields about the edges, and differences at the end of a step.
+    ends: FloatArray,
+    fields: FloatArray,
+    new_wear: FloatArray,
+    new_sums: FloatArray,
+    new_feedback: FloatArray,
+    decreased: BoolArray,
+) -> None:
+    """Compute depths, fields about the edges, and differences at the end of a step.
 
     The depths of strips partly in contact follow from their shape, which keeps no volume. What is
     missing to the volume by the formula is added evenly where the bodies are in contact, which
@@ -342,41 +300,35 @@ def end_step(
 
     Parameters
     ----------
-    bodies, ..., greatest
+    bodies, resolved, gap, depths, part, of_bodies, of_contacts
         As in `begin_step`.
-    contact_depth, loads, wear, worn
+    loads, wear, worn
         Of the solution, from `compare_step`.
     separation, whole_steps, share, past_wear, past_sums, past_feedback
         As in `begin_step`.
-    worn_passes, half_pass, distances, scale, level, sums
+    of_tests, sums
         From `begin_step`.
     feedback : ndarray, shape (rows, realisations, 1)
         At the end [N].
     energy : ndarray, shape (realisations,)
-        Dissipated energy per pass at the end [J].
-
-    Returns
-    -------
+        Dissipated energy per pass at the end; overwritten with that of the step [J].
     ends : ndarray, shape (bodies, realisations, strips)
-        Depths at the end [m].
-    fields : ndarray, shape (3, contacts, strips)
-        As of `end_edges`.
+        Result: depths at the end [m].
+    fields : ndarray, shape (3, contacts, strips), or (0, 0, 0)
+        Result, as of `end_edges`.
     new_wear, new_sums, new_feedback : ndarray
-        Rates and differences at the end.
-    dissipated : ndarray, shape (realisations,)
-        Energy of the step [J].
+        Results: rates and differences at the end.
     decreased : ndarray of bool, shape (realisations,)
-        Whether a depth or the energy has decreased.
+        Result: whether a depth or the energy has decreased.
     """
     rows, realisations, n = depths.shape
-    strips = borrowed(
-        EdgeStrips(bodies, resolved, gap, depths, added, base, part, first, rise, greatest)
-    )
+    strips = borrowed(edge_strips(bodies, resolved, gap, depths, part, of_bodies, of_contacts))
     shape = depths.shape
-    ends, parts, rates, change = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    fields = np.empty((3 if part.shape[1] > 0 else 0, part.shape[0], part.shape[1]))
+    parts, rates, change = np.empty(shape), np.empty(shape), np.empty(shape)
+    worn_passes, half_pass, distances = of_tests[0], of_tests[1], of_tests[2:]
+    scale, level, added = of_bodies[0], of_bodies[1], of_bodies[2]
     counted = part.shape[1] > separation.shape[1]
-    end_edges(strips, counted, whole_steps, contact_depth, loads, wear, worn, ends, parts, fields)
+    end_edges(strips, counted, whole_steps, of_contacts[2], loads, wear, worn, ends, parts, fields)
     sum_rates = np.empty(sums.shape)
     for b in range(rows):
         for v in range(realisations):
@@ -393,13 +345,12 @@ def end_step(
                     missing = (sums[b, v, 0] - grown) / width
                     for i in range(n):
                         ends[b, v, i] += missing * parts[b, v, i]
-    last, dissipated = len(sums) - 1, np.empty(realisations)
-    decreased = np.empty(realisations, np.bool_)
+    last = len(sums) - 1
     for v in range(realisations):
         sum_rates[last, v, 0] = energy[v]
         sums[last, v, 0] += worn_passes[v] * energy[v]
-        dissipated[v] = sums[last, v, 0]
-        decreased[v] = dissipated[v] < 0.0
+        energy[v] = sums[last, v, 0]
+        decreased[v] = energy[v] < 0.0
     for b in range(rows):
         for v in range(realisations):
             for i in range(n):
@@ -414,14 +365,13 @@ def end_step(
                     change[b, v, i] = ends[b, v, i] - change[b, v, i] - level[b, v, i]
                 else:
                     change[b, v, i] = added[b, v, i] + worn[b, v, i]
-    new_wear = new_differences(rates, change, half_pass, past_wear, distances)
-    new_sums = new_differences(sum_rates, sums, half_pass, past_sums, distances)
+    new_differences(rates, change, half_pass, past_wear, distances, new_wear)
+    new_differences(sum_rates, sums, half_pass, past_sums, distances, new_sums)
     moved, whole = np.empty(feedback.shape), np.zeros(realisations)
     for f in range(feedback.shape[0]):
         for v in range(realisations):
             moved[f, v, 0] = feedback[f, v, 0] - past_feedback[0, f, v, 0]
-    new_feedback = new_differences(feedback, moved, whole, past_feedback, distances)
-    return ends, fields, new_wear, new_sums, new_feedback, dissipated, decreased
+    new_differences(feedback, moved, whole, past_feedback, distances, new_feedback)
 
 
 def compile_implicit_step() -> None:
@@ -429,22 +379,24 @@ def compile_implicit_step() -> None:
     one, order, bodies = np.ones(1), np.ones(1, np.int64), np.array([[0, 1]])
     strip, wear, rows = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     past, sums, spans = np.ones((ROWS, 2, 1, 1)), np.ones((ROWS, 1, 1, 1)), np.ones((ROWS - 1, 1))
-    start = begin_step(
+    resolved, of_tests, total = np.ones(1, np.bool_), np.ones((7, 1)), np.ones((1, 1, 1))
+    of_bodies, of_contacts = np.ones((6, 2, 1, 1)), np.ones((3, 1, 1))
+    begin_step(
         *(spans, order, one, one, one, past, sums, sums, rows, bodies, strip, one, wear, one),
-        *(strip, strip, strip, np.ones(1, np.bool_)),
+        *(strip, strip, strip, resolved, resolved, of_tests, total, total),
+        *(of_bodies, of_contacts),
     )
-    worn_passes, half_pass, distances, scale, level, added, base, _, totals, feedback = start[:10]
-    resolved, first, rise, greatest, depth = start[10:]
-    strips = bodies, resolved, strip, rows, added, base, strip, first, rise, greatest, depth
-    about = strip, wear, strip.copy()
-    gaps, slopes, compliance, _, constant = linearise_step(*strips, *about)
-    worn, _ = compare_step(
-        *(*strips, *about, gaps, slopes, compliance, constant, strip, strip, wear.copy()),
-        *(worn_passes, scale, 1.0, resolved),
+    strips = bodies, resolved, strip, rows, strip, of_bodies, of_contacts
+    about, compliance, apart = np.ones((5, 1, 1)), np.ones((1, 1, 2, 1)), strip.copy()
+    linearise_step(*strips, strip, wear, apart, about, compliance)
+    compare_step(
+        *(*strips, strip, wear, apart, about, compliance, strip, strip, wear.copy(), one, 1.0),
+        *(resolved, rows.copy()),
     )
     end_step(
-        *(*strips, strip, strip, one, strip, wear, worn, worn_passes, half_pass, distances, scale),
-        *(level, totals, feedback, one, past, sums, sums),
+        *(*strips, strip, strip, one, strip, wear, rows, of_tests, total, total, one.copy()),
+        *(past, sums, sums, rows.copy(), np.ones((3, 1, 1)), past.copy(), sums.copy()),
+        *(sums.copy(), resolved),
     )
 
 

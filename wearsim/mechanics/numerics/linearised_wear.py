@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a steady wear rate
@@ -26,7 +26,8 @@ def linearised_wear(
     gap: FloatArray,
     compliance: FloatArray,
     opened: FloatArray,
-) -> FloatArray:
+    constant: FloatArray,
+) -> None:
     """Linearise the wear u of each strip about its line load q_0.
 
     u = (1 - e) u_0 + e (u_0/q_0) q, with the exponent e of u ~ q^e. In a strip partly in contact
@@ -50,16 +51,13 @@ def linearised_wear(
         Result: e u_0/(s q_0) [m/(N/m)]; u_0/q_0 is interpolated to strips without load.
     opened : ndarray, shape (contacts, strips)
         Result: gap opened by the constant part of the wear of all contacts [m].
-
-    Returns
-    -------
-    ndarray, shape (2, contacts, strips)
-        The constant part (1 - e) u_0/s [m].
+    constant : ndarray, shape (2, contacts, strips)
+        Result: the constant part (1 - e) u_0/s [m].
     """
     contacts, n = line_load.shape
     realisations = len(compliance)
     # written as loops in this file: np.zeros and array expressions take longer to compile
-    constant, worn = np.empty((2, contacts, n)), np.empty((2 * len(bodies), realisations, n))
+    worn = np.empty((2 * len(bodies), realisations, n))
     for b in range(2 * len(bodies)):
         for v in range(realisations):
             for i in range(n):
@@ -88,7 +86,6 @@ def linearised_wear(
         c, v = k // realisations, k % realisations
         for i in range(n):
             opened[k, i] = gap[k, i] + (worn[bodies[c, 0], v, i] + worn[bodies[c, 1], v, i])
-    return constant
 
 
 @subroutine
@@ -334,11 +331,3 @@ def carried_errors(
         found[0, v] = max(sizes[0, v], LEAST * profile * deepest)
         found[1, v], found[2, v] = abs(volume), profile
     return carried, found
-
-
-def compile_sizes() -> None:
-    """Compile `difference_sizes` by a call for one strip."""
-    difference_sizes(np.ones((2, 1, 1)), np.ones((2, 1, 1)), np.ones((2, 2)))
-
-
-compile_alongside("solve_slender", compile_sizes)

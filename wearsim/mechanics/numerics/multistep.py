@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import FloatArray, IntArray
 
 MAX_ORDER = 4
@@ -87,30 +87,26 @@ def formulas(
 
 
 @subroutine
-def extrapolated(weights: FloatArray, differences: FloatArray) -> FloatArray:
-    """Return sums of divided differences with the weights of `formulas`.
+def extrapolated(weights: FloatArray, differences: FloatArray, sums: FloatArray) -> None:
+    """Fill sums of divided differences with the weights of `formulas`.
 
     Parameters
     ----------
-    weights : ndarray, shape (2, 6, solutions)
+    weights : ndarray, shape (6, solutions)
+        Those of the formula, or of the prediction.
     differences : ndarray, shape (6, rows, solutions, columns)
-
-    Returns
-    -------
-    ndarray, shape (2, rows, solutions, columns)
+    sums : ndarray, shape (rows, solutions, columns)
+        Result.
     """
-    _, rows, solutions, columns = differences.shape
-    sums = np.empty((2, rows, solutions, columns))
-    for m in range(2):
-        for r in range(rows):
-            for v in range(solutions):
-                for i in range(columns):
-                    total = weights[m, 0, v] * differences[0, r, v, i]
-                    for k in range(1, ROWS):
-                        if weights[m, k, v] != 0.0:
-                            total += weights[m, k, v] * differences[k, r, v, i]
-                    sums[m, r, v, i] = total
-    return sums
+    rows, solutions, columns = sums.shape
+    for r in range(rows):
+        for v in range(solutions):
+            for i in range(columns):
+                total = weights[0, v] * differences[0, r, v, i]
+                for k in range(1, ROWS):
+                    if weights[k, v] != 0.0:
+                        total += weights[k, v] * differences[k, r, v, i]
+                sums[r, v, i] = total
 
 
 @subroutine
@@ -120,8 +116,9 @@ def new_differences(
     part: FloatArray,
     old: FloatArray,
     distances: FloatArray,
-) -> FloatArray:
-    """Return the divided differences at the end of a step.
+    new: FloatArray,
+) -> None:
+    """Fill the divided differences at the end of a step.
 
     Parameters
     ----------
@@ -134,9 +131,10 @@ def new_differences(
         Divided differences at its start.
     distances : ndarray, shape (5, solutions)
         Distances from the end of the step back to the other points.
+    new : ndarray, shape (6, rows, solutions, columns)
+        Result.
     """
     _, rows, solutions, columns = old.shape
-    new = np.empty((ROWS, rows, solutions, columns))
     for r in range(rows):
         for v in range(solutions):
             for i in range(columns):
@@ -147,7 +145,6 @@ def new_differences(
                 for k in range(2, ROWS):
                     value = (value - old[k - 1, r, v, i]) / distances[k - 1, v]
                     new[k, r, v, i] = value
-    return new
 
 
 @subroutine
@@ -282,14 +279,3 @@ def first_differences(rates: FloatArray, exposure: FloatArray) -> FloatArray:
     differences[0] = rates
     differences[1] = rates / exposure.reshape(-1, *(1,) * (rates.ndim - 2))
     return differences
-
-
-def compile_multistep() -> None:
-    """Compile the kernels of a step by a call for one solution of one value."""
-    one, order = np.ones(1), np.ones(1, dtype=np.int64)
-    differences, value = np.ones((ROWS, 1, 1, 1)), np.ones((1, 1, 1))
-    arguments = differences, np.ones((ROWS - 1, 1)), value, order, one, 1.0, 1.0, order
-    next_steps(*arguments, value, value.copy(), order.copy())
-
-
-compile_alongside("solve_slender", compile_multistep)

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from wearsim.mechanics.numerics.edge_strips import mark_strips, resolved_tests
+from wearsim.mechanics.numerics.edge_strips import fill_resolved, mark_strips
 from wearsim.mechanics.numerics.implicit_step import WHOLE_PASSES
 from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
@@ -49,7 +49,7 @@ def with_sum(
     errors, parts : ndarray, shape (bodies, realisations, strips)
         Errors of the depths that a step adds [m], and the part of each that counts.
     crossed, resolved
-        From `mark_strips` and `resolved_tests`.
+        From `mark_strips` and `fill_resolved`.
     past_sums, spans, orders
         At the end of the step.
     """
@@ -142,7 +142,8 @@ def assess_step(
     """
     rows, realisations, n = depths.shape
     most, next_orders = np.empty(realisations, np.int64), np.empty(realisations, np.int64)
-    resolved = resolved_tests(part, part, realisations)
+    resolved = np.empty(realisations, np.bool_)
+    fill_resolved(part, part, resolved)
     young, crossed = np.empty(depths.shape, np.bool_), np.empty(depths.shape, np.bool_)
     parts, own = np.empty(depths.shape), np.empty(depths.shape)
     mark_strips(bodies, resolved, part, whole_steps, orders, past_wear[0], young, crossed, parts)

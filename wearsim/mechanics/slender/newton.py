@@ -367,7 +367,7 @@ def solve_slender(
     separation: FloatArray,
     status: IntArray,
     iterations: IntArray,
-) -> None:
+) -> int:
     """Solve sets of slender contacts, from starting line loads.
 
     The contacts of a set are independent or wear shared bodies. Strips on an elastic foundation
@@ -404,8 +404,13 @@ def solve_slender(
         Filled: distance between the deformed surfaces in strips without load [m].
     status, iterations : ndarray of int, shape (sets,)
         Filled: CONVERGED or the cause of failure; iterations of Newton's method.
+
+    Returns
+    -------
+    int
+        Number of contacts without a solution, or that reach their first or last strip.
     """
-    contacts, n = gap.shape[1], gap.shape[2]
+    contacts, n, failed = gap.shape[1], gap.shape[2], 0
     unit = 1.0 / (np.pi * contact_modulus)
     gap, compliance, loads = borrowed((gap, compliance, loads))
     line_load, approach = borrowed((line_load, approach))
@@ -471,6 +476,10 @@ def solve_slender(
                     fill_separation(k, gap[number], delta[k], total, state, separation[number])
                     delta[k] += state.lowest[k]
                 break
+        for k in range(contacts):
+            at_end = total[k, 0] != 0.0 or total[k, n - 1] != 0.0
+            failed += int(status[number] != CONVERGED or at_end)
     if bodies is not None:
         kept(depths)
     kept(owned)
+    return failed

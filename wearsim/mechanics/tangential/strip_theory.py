@@ -218,9 +218,10 @@ def strip_contacts(
     elasticity : StripElasticity
     rolling_speed, longitudinal, lateral, spin : ndarray, shape (contacts,)
         V [m/s], mean longitudinal creepage, lateral creepage, and spin phi [1/m].
-    variation, friction : ndarray, shape (contacts, strips)
-        Variation of the longitudinal creepage, whose load-weighted mean is subtracted here;
-        friction coefficient.
+    variation : ndarray, shape (contacts, strips), or (contacts, 0) for that by the spin
+        Variation of the longitudinal creepage, whose load-weighted mean is subtracted here.
+    friction : ndarray, shape (contacts, strips or 1)
+        Friction coefficient.
     dissipation : ndarray, shape (contacts, strips)
         Filled: P_l [W/m].
     sums : ndarray, shape (6, contacts)
@@ -228,22 +229,24 @@ def strip_contacts(
         load [N m], power [W], greatest pressure [Pa], and adhering fraction of the area.
     """
     contacts, n = line_load.shape
-    slip_x, tractions = np.empty(n), new_tractions(n)
+    slip_x, local_friction, tractions = np.empty(n), np.empty(n), new_tractions(n)
     for k in range(contacts):
         total, centre, mean = 0.0, 0.0, 0.0
         for i in range(n):
             q = line_load[k, i]
+            slip_x[i] = variation[k, i] if variation.shape[1] > 0 else -spin[k] * y[i]
+            local_friction[i] = friction[k, i if friction.shape[1] > 1 else 0]
             total += q
             centre += q * y[i]
-            mean += q * variation[k, i]
+            mean += q * slip_x[i]
         centre /= total
         mean = longitudinal[k] - mean / total
         for i in range(n):
-            slip_x[i] = mean + variation[k, i]
+            slip_x[i] += mean
         solve_strips(
             half_length[k],
             line_load[k],
-            friction[k],
+            local_friction,
             slip_x,
             lateral[k],
             spin[k],

@@ -8,12 +8,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from wearsim.contact_batch import NO_BODY, ContactBatch, ContactBatchSolution
-from wearsim.mechanics.numerics.jit import kernel_input, own_array
+from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.slender import newton as kernels
 from wearsim.plugins import SharedWear
 from wearsim.types import FloatArray, IntArray
-
-_NONE = np.zeros(0, dtype=np.int64)
 
 #: Strip width [m], E* [Pa] and the two tables of `mechanics.slender.newton.solve_slender`.
 Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray]
@@ -88,13 +86,15 @@ class NormalContacts(NamedTuple):
         cls, batch: ContactBatch, size: int, start: ContactBatchSolution | None
     ) -> NormalContacts:
         """Return the normal problems of sets of `size` contacts, with an initial guess if any."""
-        shape = len(batch) // size, size
+        shape = len(batch.gap) // size, size
         wide = *shape, batch.gap.shape[1]
-        if start is None:
-            line_load, approach = np.zeros(wide), np.zeros(shape)
-        else:
-            line_load = own_array(start.line_load).reshape(wide)
-            approach = own_array(start.approach).reshape(shape)
+        line_load, half_length, separation = np.zeros((3, *wide))
+        approach = np.zeros(shape)
+        if start is not None:
+            line_load[:], approach[:] = (
+                start.line_load.reshape(wide),
+                start.approach.reshape(shape),
+            )
         status, iterations = np.zeros((2, *shape), np.int64)
         return cls(
             kernel_input(batch.gap).reshape(wide),
@@ -102,8 +102,8 @@ class NormalContacts(NamedTuple):
             kernel_input(batch.normal_force).reshape(shape),
             line_load,
             approach,
-            np.zeros(wide),
-            np.zeros(wide),
+            half_length,
+            separation,
             status,
             iterations,
         )
@@ -111,15 +111,14 @@ class NormalContacts(NamedTuple):
     @property
     def failed(self) -> IntArray:
         """Sets without a solution, or with a contact that reaches its first or last strip."""
-        # counted, since any() takes three times as long on short arrays
         first, last = self.line_load[..., 0], self.line_load[..., -1]
-        if not sum(map(np.count_nonzero, (self.status, first, last))):
-            return _NONE
         ends = (first != 0.0) | (last != 0.0)
         return np.flatnonzero(((self.status != kernels.CONVERGED) | ends).any(axis=1))
 
-    def solve(self, wear: SharedWear | FloatArray | None, constants: Constants) -> None:
-        """Solve all sets in place; contacts that wear no common body are solved apart.
+    def solve(self, wear: SharedWear | FloatArray | None, constants: Constants) -> int:
+        """Solve all sets in place, and return the number of contacts that fail, see `failed`.
+
+        Contacts that wear no common body are solved apart.
 
         Parameters
         ----------
@@ -128,10 +127,9 @@ class NormalContacts(NamedTuple):
         constants : Constants
         """
         if not isinstance(wear, SharedWear):
-            own = np.zeros(self.gap.shape) if wear is None else kernel_input(wear)
-            self._solve(own.reshape(self.gap.shape), None, None, constants)
-            return
-        sets, contacts = self.gap.shape[:2]
+            own = np.zeros(self.gap.shape) if wear is None else wear
+            return self._solve(own.reshape(self.gap.shape), None, None, constants)
+        failed, (sets, contacts) = 0, self.gap.shape[:2]
         for numbers, own, members, shared in wear.groups:
             for coupled, bodies in _coupled_contacts(members.tobytes(), contacts):
                 chosen, size = coupled.ravel(), coupled.shape[1]
@@ -145,9 +143,10 @@ class NormalContacts(NamedTuple):
                     worn = (shared if whole else shared[:, chosen]).reshape(
                         -1, size, *shared.shape[2:]
                     )
-                apart._solve(softness.reshape(apart.gap.shape), bodies, worn, constants)
+                failed += apart._solve(softness.reshape(apart.gap.shape), bodies, worn, constants)
                 for array, solved in () if whole else zip(self, taken, strict=True):
                     array[places] = solved
+        return failed
 
     def _solve(
         self,
@@ -155,11 +154,13 @@ class NormalContacts(NamedTuple):
         members: IntArray | None,
         shared: FloatArray | None,
         constants: Constants,
-    ) -> None:
-        """Solve sets in place; `members` and `shared` are those of `SharedWear.groups`."""
+    ) -> int:
+        """Solve sets in place, as `solve`; `members` and `shared` are those of `SharedWear.groups`.
+
+        Contacts chosen from sets have arrays of another layout, for which numba would compile.
+        """
         status, iterations = np.zeros((2, len(self.gap)), np.int64)
-        # contacts chosen from sets have arrays of another layout, for which numba would compile
-        kernels.solve_slender(
+        failed = kernels.solve_slender(
             self.gap,
             kernel_input(own),
             members,
@@ -174,4 +175,5 @@ class NormalContacts(NamedTuple):
             status,
             iterations,
         )
-        self.status[:], self.iterations[:] = status[:, None], iterations[:, None]
+        self.status.T[:], self.iterations.T[:] = status, iterations
+        return failed

@@ -104,10 +104,9 @@ class Slender(StripModel):
         """
         refuse_unclaimed(self, batch, wear_compliance, coupling)
         normal = self._solve_normal(batch, wear_compliance, coupling, warm)
-        line_load = normal.line_load.reshape(batch.gap.shape)
-        half_length = normal.half_length.reshape(batch.gap.shape)
-        separation = normal.separation.reshape(batch.gap.shape)
-        approach = normal.approach.reshape(len(batch))
+        shape = batch.gap.shape
+        line_load, half_length = normal.line_load.reshape(shape), normal.half_length.reshape(shape)
+        separation, approach = normal.separation.reshape(shape), normal.approach.reshape(shape[0])
         iterations = normal.iterations.ravel()
         free = batch.bearing_torque is not None
         if not isinstance(self.theory, StripTheory) or (free and not batch.mean_radius):
@@ -160,7 +159,8 @@ class Slender(StripModel):
         constants = self._grid.spacing, self._pair.contact_modulus, self._table, self._bend
         size = 1 if coupling is None else len(coupling.bodies)
         normal = NormalContacts.starting(batch, size, warm)
-        normal.solve(wear_compliance if coupling is None else coupling, constants)
+        if not normal.solve(wear_compliance if coupling is None else coupling, constants):
+            return normal
         for number in normal.failed.tolist():
             try:
                 self._check(

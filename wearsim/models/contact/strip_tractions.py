@@ -35,9 +35,8 @@ def strip_tractions(
     grid : Grid
     pair : ElasticPair
     """
-    friction, variation = np.empty(line_load.shape), batch.variation
-    friction[:] = batch.friction if batch.friction.ndim > 1 else batch.friction[:, None]
-    dissipation, sums = np.empty(line_load.shape), np.empty((len(SUMS), len(line_load)))
+    contacts, variation = len(line_load), batch.variation
+    dissipation, sums = np.empty(line_load.shape), np.empty((len(SUMS), contacts))
     strip_contacts(
         line_load,
         half_length,
@@ -48,8 +47,8 @@ def strip_tractions(
         kernel_input(batch.longitudinal),
         kernel_input(batch.lateral),
         kernel_input(batch.spin),
-        -batch.spin[:, None] * grid.y if variation is None else kernel_input(variation),
-        friction,
+        np.empty((contacts, 0)) if variation is None else kernel_input(variation),
+        kernel_input(batch.friction).reshape(contacts, -1),
         dissipation,
         sums,
     )

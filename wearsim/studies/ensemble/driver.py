@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import Interrupted, WorkerError
+from wearsim.studies.ensemble.batch_sizes import BatchSizes
 from wearsim.studies.ensemble.designs import interim_sizes
 from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
 from wearsim.studies.ensemble.file.schema import DONE, FAILED, PENDING
@@ -26,13 +26,8 @@ from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 
-SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
-GROWTH = 4  # greatest ratio of the size of a batch to the greatest before it
-MOST_IN_BATCH = 256
 AHEAD = 3  # batches for each worker that may be beyond the next interim analysis
 BETWEEN_ESTIMATES = 0.5  # s
-BATCHES = 3  # finished batches from which the time left is estimated,
-RECENT = 8  # and the greatest number of them
 DEFAULT_TARGET, DEFAULT_OF_LIVES = Target.parse("depth.mean 1%"), Target.parse("b10 3%")
 
 
@@ -173,9 +168,7 @@ class EnsembleWork:
         self._deferred: dict[int, Outcome] = {}
         self._stopping = self._reached = False
         self._ahead = AHEAD * max(pool.workers, 1)
-        self._run, self._rate, self._largest = 0, 0.0, 0
-        # time and number of realisations after each of the last batches
-        self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
+        self._batch_sizes = BatchSizes()
         self._next_estimate, self._estimate = -math.inf, UNKNOWN
 
     def warn(self, texts: Iterable[str]) -> None:
@@ -278,34 +271,21 @@ class EnsembleWork:
     def _batches(self, numbers: Iterable[int]) -> Iterator[list[int]]:
         """Yield batches of numbers; results do not depend on their composition."""
         remaining = iter(numbers)
-        while batch := list(islice(remaining, self._batch_size())):
+        while True:
+            workers = max(self.pool.workers, 1)
+            left = self.total - int((self.file.status != PENDING).sum())
+            size = self._batch_sizes.next(left, workers)
+            self._ahead = AHEAD * workers * size
+            batch = list(islice(remaining, size))
+            if not batch:
+                return
             yield batch
-
-    def _batch_size(self) -> int:
-        """Return the batch size for `SECONDS`, limited so that all workers end together.
-
-        The last batches give the rate: before the first ones the workers load the kernels,
-        and a realisation takes longer in a small batch.
-        """
-        workers = max(self.pool.workers, 1)
-        left = self.total - int((self.file.status != PENDING).sum())
-        most = max(min(-(-left // (2 * workers)), MOST_IN_BATCH, GROWTH * self._largest), 1)
-        rate = self._rate
-        if len(self._recent) > 1:
-            (start, before), (end, run) = self._recent[0], self._recent[-1]
-            rate = (run - before) / max(end - start, 1e-9)
-        size = int(np.clip(SECONDS * rate / workers, 1, most))
-        self._ahead = AHEAD * workers * size
-        return size
 
     def _take(self, outcomes: Sequence[Outcome]) -> None:
         """Write outcomes, or defer those beyond the next analysis; report the progress."""
         now = [item for item in outcomes if item.number < self._limit]
         self._deferred |= {item.number: item for item in outcomes if item.number >= self._limit}
-        self._run += len(outcomes)
-        self._largest = max(self._largest, len(outcomes))
-        self._recent.append((time.monotonic(), self._run))
-        self._rate = self._run / max(time.monotonic() - self.started, 1e-9)
+        self._batch_sizes.finished(len(outcomes))
         if now and not self._reached:
             self.file.put(now)
         self._analyse()
@@ -364,17 +344,13 @@ class EnsembleWork:
             self._estimate = target.interval(self.result().estimate_for(target))
             # at most 5 % of the time
             self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * (time.monotonic() - now))
-        left = math.nan
-        if len(self._recent) >= BATCHES:  # without the first one, which loads the kernels
-            (start, before), (end, run) = self._recent[0], self._recent[-1]
-            left = (self.total - done - failed) * (end - start) / (run - before)
         self.on_progress(
             EnsembleProgress(
                 done=done,
                 failed=failed,
                 requested=self.total,
-                rate=self._rate,
-                left=left,
+                rate=self._batch_sizes.rate,
+                left=self._batch_sizes.time_left(self.total - done - failed),
                 what=target.what,
                 estimate=self._estimate,
                 workers=self.pool.describe,

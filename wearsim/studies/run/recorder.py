@@ -223,10 +223,22 @@ def _rows_of(
 ) -> list[Variables]:
     """Return the row of each realisation of a state in the form of the results file."""
     row = history_row(stepper, problem, state, threshold) | {"step_passes": step}
-    return [
-        {n: v[place] if n in _WITHOUT_REALISATION else v[..., place, None] for n, v in row.items()}
-        for place in range(len(step))
-    ]
+    return _each(row, len(step))
+
+
+def _each(row: Variables, realisations: int) -> list[Variables]:
+    """Return the row of each of some realisations in the form of the results file."""
+    rows: list[Variables] = [{} for _ in range(realisations)]
+    for name, values in row.items():
+        dims = ALL_VARIABLES[name].dims
+        for place, one in enumerate(rows):
+            if name in _WITHOUT_REALISATION:
+                one[name] = values[place]
+            elif dims[-1] == "y":
+                one[name] = values[..., place : place + 1, :]
+            else:
+                one[name] = values[..., place : place + 1]
+    return rows
 
 
 def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Variables:
@@ -356,14 +368,13 @@ class Recorder:
             stepper, problem = self.stepper, waiting[0][0]
             starts, passes = [one[1] for one in waiting], np.array([one[2] for one in waiting])
             several = problem.at(np.zeros(len(waiting), dtype=np.int64))
-            each = np.arange(len(waiting))[:, None]
             try:
                 state = state_at(stepper, several, joined_states(starts), passes)
-                states = [state.at(place) for place in each]
             except (StepError, ContactError):  # a step that fails is halved for a single test
-                one_by_one = zip(starts, each, strict=True)
-                states = [state_at(stepper, problem, s, passes[k]) for s, k in one_by_one]
-            rows = [self._row(problem, problem, state) for state in states]
+                each = zip(starts, passes[:, None], strict=True)
+                state = joined_states([state_at(stepper, problem, *one) for one in each])
+            found = _each(record_row(stepper, several, state), len(waiting))
+            rows = [(problem.grid, row) for row in found]
             self._records[-len(waiting) :] = rows
         return self._records
 

@@ -152,12 +152,12 @@ def stated_errors(
             f"{test.name}-{name}" if name != "toml" else f"{test.name}.toml": text
             for test in tests
             if test.name in listed
-            for name, text in _scenario_files(test.name, test.scenario())
+            for name, text in scenario_files(test.name, test.scenario())
         },
     )
 
 
-def _scenario_files(name: str, scenario: Scenario) -> list[tuple[str, str]]:
+def scenario_files(name: str, scenario: Scenario) -> list[tuple[str, str]]:
     """Return the text of a scenario as "toml", and its files, which carry the name of the test."""
     text = scenario.text
     for file in scenario.files:
