@@ -72,8 +72,9 @@ class Trial:
         """
         shortest = max(SMALLEST_STEP, _SMALLEST_PART * passes)
         if self.proposed < shortest:
-            if isinstance(self._cause, ContactError):
-                raise self._cause
+            cause = self._cause
+            if cause and (isinstance(cause, ContactError) or cause.cause == "lost"):
+                raise cause
             raise StepError(
                 f"no step is short enough at pass {passes:.0f} (tried down to {shortest:.2g}"
                 f" passes); {self._cause or 'the error does not fall with the step'}"
