@@ -89,5 +89,12 @@ def write(name: str, lines: Iterable[str]) -> None:
 
 
 if __name__ == "__main__":
+    import tempfile
+
+    from tests.studies import test_every_kind
+
     write("python-names", python_names())
     write("scenario-keys", scenario_keys())
+    with tempfile.TemporaryDirectory() as samples:
+        test_every_kind.FOLDER[:] = [Path(samples)]
+        write("json-keys", test_every_kind.json_of_every_kind())

@@ -22,6 +22,7 @@ from wearsim.evolution.quantities import (
     sum_in_order,
     values_between,
 )
+from wearsim.mechanics.numerics.jit import own_array
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import BoolArray, FloatArray, Grid, IntArray
 
@@ -303,7 +304,7 @@ class WearProblem:
             cam, torque = self.kinematics.cam, self.inputs.bearing_torque
             columns |= cam.free_rolling(self.inputs) if cam else {"bearing_torque": torque}
         filled: dict[str, Any] = {
-            n: np.broadcast_to(c, self.shape).ravel() for n, c in columns.items()
+            n: own_array(np.broadcast_to(c, self.shape)).ravel() for n, c in columns.items()
         }
         shape, free = (*self.shape, self.grid.strips), self.free
         return ContactBatch(

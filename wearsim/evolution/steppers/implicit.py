@@ -278,7 +278,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     state = edges.at_start_of_step(problem, state)
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = conditions_of(here, problem, state, passes)
-    order = Past.of(state).order
+    order = np.asarray(state.order)
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:

@@ -12,6 +12,7 @@ from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
 from wearsim.types import FloatArray, IntArray
 
+LEAST_ENERGY = 0.1  # part of the mean energy that an error of the energy is compared with, at least
 LEAST_LOAD = 0.01  # of the load without feedback; the error of smaller loads is compared with it
 
 
@@ -68,7 +69,9 @@ def next_steps_of_energy(
 
     In partial slip the power depends on the line loads, which follow from differences of depths
     far below the error that a step may add to a profile. Such errors of the energy add up, since
-    further wear does not correct them. A step may therefore add the tolerance of its own energy.
+    further wear does not correct them. A step may therefore add the tolerance of its own energy, or
+    of a part of the mean energy over as many passes where that is more, as under a spring that has
+    lost its load.
 
     Parameters
     ----------
@@ -88,7 +91,9 @@ def next_steps_of_energy(
     assert sums is not None
     assert spans is not None
     assert orders is not None
-    energy, worn = kernel_input(sums[:, -1:, :, None]), (end.energy - start.energy)[None, :, None]
+    energy = kernel_input(sums[:, -1:, :, None])
+    least = LEAST_ENERGY * end.energy * (1.0 - start.passes / end.passes)
+    worn = np.maximum(end.energy - start.energy, least)[None, :, None]
     ones, order, own = np.ones_like(worn), np.empty_like(orders), np.empty_like(worn)
     found = next_steps(
         *(energy, spans, worn, orders, ones[0, :, 0], tolerance, keep, most, ones, own, order)
