@@ -92,7 +92,7 @@ def observed_errors(
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
     edge_peaks: FloatArray | float = 0.0
-    if crown_radius is not None:
+    if crown_radius is not None and "peak_pressure" in observed:  # lives have what is asked for
         edge_peaks = _edge_peaks(observed, crown_radius, spacing)
     for (name, values), found in zip(observed.items(), columns, strict=True):
         scale = 1.0 if name.endswith("angle") else np.abs(values)
