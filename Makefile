@@ -1,6 +1,7 @@
 # make demo            run the 450-minute wear test: summary, results and figure in out/
 # make test            lint, types, import contracts and the quick tests: 7 minutes on 2 cores
 # make test-slow       the other tests: kills of the writers, hard cases, installs, Dask, the site: 20 minutes
+# make test-coverage   how often stated intervals hold the truth, by hundreds of data sets: 10 minutes, before a release
 # make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; ten minutes,
 #                      and an hour of one core for the references of stated errors, which are kept in out/references
 # make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
@@ -15,7 +16,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test test-slow style lint bench bench-docs bench-ensembles validate docs linkcheck release clean
+.PHONY: demo test test-slow test-coverage style lint bench bench-docs bench-ensembles validate docs linkcheck release clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -25,16 +26,19 @@ demo: $(VENV)/.installed
 
 # threads of BLAS in each of the test processes would wait for each other; bytecode of the tests is
 # kept for the processes that start later, also where PYTHONDONTWRITEBYTECODE is set
-test test-slow: export OPENBLAS_NUM_THREADS = 1
-test test-slow: export PYTHONDONTWRITEBYTECODE =
+test test-slow test-coverage: export OPENBLAS_NUM_THREADS = 1
+test test-slow test-coverage: export PYTHONDONTWRITEBYTECODE =
 
 # mypy, which takes one core for a minute, runs beside the tests
 test: style
-	$(BIN)/mypy & types=$$!; $(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow"; tests=$$?; \
+	$(BIN)/mypy & types=$$!; $(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow and not coverage"; tests=$$?; \
 		wait $$types && exit $$tests
 
 test-slow: $(VENV)/.installed-dev
 	$(BIN)/pytest -n $(JOBS) --dist worksteal -m slow
+
+test-coverage: $(VENV)/.installed-dev
+	$(BIN)/pytest -n $(JOBS) --dist worksteal -m coverage
 
 style: $(VENV)/.installed-dev
 	$(BIN)/ruff check
@@ -50,6 +54,7 @@ bench-docs: $(VENV)/.installed-dev
 	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
 	$(BIN)/wearsim bench stated-errors --tests 400 --seed 2026 --references out/references -j $$(nproc) -o out/bench --force \
 		&& cp out/bench/stated-errors.json $(MEASURED)
+	$(BIN)/wearsim bench random --tests 300 --seed 5 -j $$(nproc) -o out/bench --force && cp out/bench/random.json $(MEASURED)
 	-$(BIN)/wearsim bench --hard -o out/bench --force
 	cp out/bench/hard.json $(MEASURED)
 	$(BIN)/python -m tests.benchmarks.report -o $(MEASURED)/report.json

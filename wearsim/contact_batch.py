@@ -281,12 +281,13 @@ class ContactBatchSolution:
     def joined_with(self, *others: ContactBatchSolution, rows: int) -> ContactBatchSolution:
         """Return these solutions joined with others row by row, all divided into equal `rows`."""
         every = all(part.separation is not None for part in (self, *others))
-        joined = {}
+        joined, fields = {}, [vars(part) for part in (self, *others)]
         for name in (*_OUTPUTS, "separation") if every else _OUTPUTS:
-            columns = [getattr(part, name) for part in (self, *others)]
-            parts = [column.reshape(rows, -1, *column.shape[1:]) for column in columns]
-            whole = np.concatenate(parts, axis=1)
-            joined[name] = whole.reshape(-1, *whole.shape[2:])
+            columns = [values[name] for values in fields]
+            if rows > 1:
+                columns = [column.reshape(rows, -1, *column.shape[1:]) for column in columns]
+            whole = np.concatenate(columns, axis=int(rows > 1))
+            joined[name] = whole.reshape(-1, *whole.shape[2:]) if rows > 1 else whole
         return ContactBatchSolution(self.y, **joined)
 
 

@@ -10,6 +10,7 @@ import argparse
 import itertools
 import json
 import sys
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -94,7 +95,9 @@ def cam_grid(points: int, realisations: int, kept: Path | None = None) -> list[d
     which a stopped measurement continues.
     """
     scenario = cam_scenario()
-    about = {"scenario": scenario.text, "points": points, "realisations": realisations}
+    tables = tomllib.loads(scenario.text)
+    del tables["optimise"]  # of the search, not of the designs
+    about = {"scenario": tables, "points": points, "realisations": realisations}
     rows: list[dict[str, float]] = []
     if kept is not None and kept.exists():
         read = json.loads(kept.read_text(encoding="utf-8"))

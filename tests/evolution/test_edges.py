@@ -178,6 +178,7 @@ def test_peak_pressure_under_a_load_that_varies_is_that_of_rigid_bodies(
     assert (np.abs(pressure - expected) < stated).mean() >= 0.92
 
 
+@pytest.mark.slow
 def test_abrupt_edge_of_a_tightly_crowned_groove_is_part_of_the_stated_error() -> None:
     crowned = {"roller.crown_radius": "30 mm", "load.normal_force": "50 N"}
     short = {"operation.duration": "98 min"}

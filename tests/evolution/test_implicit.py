@@ -171,6 +171,25 @@ def test_errors_of_all_steps_are_at_most_twice_the_tolerance(changes):
     assert state.depth_error < 2e-3 * exact.stacked.max()  # known without a wide margin
 
 
+@pytest.mark.slow
+def test_power_of_an_adhering_contact_does_not_jump_from_step_to_step():
+    # a tilted roller has a line of pure rolling, on which a ridge carries most of the load
+    problem, stepper, stop = built(
+        operation__rollers=1,
+        operation__passes=30_000_000,
+        roller__radius="20 mm",
+        roller__crown_radius="50 mm",
+        cylinder__radius="10 mm",
+        load__normal_force="10 N",
+        friction__coefficient=0.1,
+        creepage={"longitudinal": 1e-5, "tilt": "-1 mrad"},
+        wear__cylinder__k_over_h="1e-9 1/Pa",
+    )
+    states = path_of(problem, stepper, stop)
+    late = [state.contacts.power[0] for state in states if state.passes[0] > 0.3 * stop]
+    assert np.abs(np.diff(late) / late[1:]).max() < 0.1
+
+
 def test_step_in_which_a_logged_load_jumps_is_of_first_order(tmp_path):
     path = tmp_path / "log.csv"
     rows = ["0, 300", "59.9, 300", "60, 150", "90, 150", "120, 250"]

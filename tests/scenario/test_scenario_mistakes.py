@@ -251,7 +251,7 @@ rig.toml: [wear.cylinder] k_ov: unknown key (did you mean 'k_over_h'?)""",
         ),
         """\
 rig.toml: [evolution] stepper: unknown choice (did you mean 'implicit'?), got "implict", expected one of "auto", "implicit", "stabilised", "explicit", "per-pass"
-rig.toml: [evolution] tolerance: is out of range, got 0.5, expected a number above 0 and at most 0.1
+rig.toml: [evolution] tolerance: is out of range, got 0.5, expected a number of at least 1e-07 and at most 0.1
 rig.toml: [evolution] step: is out of range, got 0, expected a whole number above 0
 rig.toml: [outputs] records or every_passes or every: exactly one is needed, got records and every
 rig.toml: [outputs] spacing: unknown choice, got "lin", expected one of "even", "log\"""",

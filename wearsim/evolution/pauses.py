@@ -44,24 +44,32 @@ def at_rest(problem: WearProblem, passes: FloatArray) -> BoolArray:
     -------
     ndarray of bool, shape (realisations,)
     """
-    found = np.zeros(len(passes), dtype=np.bool_)
-    for place, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
-        found[place] = done < _end_of_pause(pauses, done) - _margin(done)
-    return found
+    rests = np.zeros(len(passes), dtype=np.bool_)
+    for v, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
+        rests[v] = done < _end_of_pause(pauses, done) - _margin(done)
+    return rests
 
 
 def next_boundaries(problem: WearProblem, passes: FloatArray) -> FloatArray:
-    """Return the start or end of a pause that follows, shape (realisations,) [passes].
+    """Return at how many passes the next pause of each realisation starts, or the present one ends.
 
-    It is infinite if there is none; parameters as of `at_rest`.
+    Parameters
+    ----------
+    problem, passes
+        As of `at_rest`.
+
+    Returns
+    -------
+    ndarray, shape (realisations,)
+        Roller passes; infinite where no pause follows.
     """
-    found = np.full(len(passes), np.inf)
-    for place, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
-        boundaries = pauses.ravel()
-        number = int(np.searchsorted(boundaries, done + _margin(done), side="right"))
-        if number < len(boundaries):
-            found[place] = boundaries[number]
-    return found
+    boundaries = np.full(len(passes), np.inf)
+    for v, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
+        starts_and_ends = pauses.ravel()
+        following = int(np.searchsorted(starts_and_ends, done + _margin(done), side="right"))
+        if following < len(starts_and_ends):
+            boundaries[v] = starts_and_ends[following]
+    return boundaries
 
 
 def _long(problem: WearProblem) -> list[FloatArray]:

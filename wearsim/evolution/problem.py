@@ -22,6 +22,7 @@ from wearsim.evolution.quantities import (
     sum_in_order,
     values_between,
 )
+from wearsim.mechanics.numerics.jit import own_array
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import BoolArray, FloatArray, Grid, IntArray
 
@@ -212,9 +213,10 @@ class WearProblem:
 
     @cached_property
     def volume_weights(self) -> FloatArray:
-        """Whether a body of `stacked` is the cylinder, and its volume per sum of depths [m^2].
+        """Kind and volume of the bodies of `WearState.stacked`, shape (2, stations + rollers).
 
-        Shape (2, stations + rollers).
+        Row 0 is 1 for the cylinder or a station of the cam and 0 for a roller; row 1 is the worn
+        volume of the body over the sum of its depths over the strips [m^2].
         """
         kinematics, stations = self.kinematics, self.shape[0]
         cylinder = np.broadcast_to(np.ravel(kinematics.track_radius) / stations, stations)
@@ -302,7 +304,7 @@ class WearProblem:
             cam, torque = self.kinematics.cam, self.inputs.bearing_torque
             columns |= cam.free_rolling(self.inputs) if cam else {"bearing_torque": torque}
         filled: dict[str, Any] = {
-            n: np.broadcast_to(c, self.shape).ravel() for n, c in columns.items()
+            n: own_array(np.broadcast_to(c, self.shape)).ravel() for n, c in columns.items()
         }
         shape, free = (*self.shape, self.grid.strips), self.free
         return ContactBatch(

@@ -67,7 +67,7 @@ def relocated(problem: WearProblem, state: WearState) -> tuple[WearProblem, Wear
     if (np.abs(change - last[1]) <= LOOK * force).all():
         return problem, state
     slips = (np.abs(change - last[0]) > FALLEN * force).any()
-    if not slips and not _differ(cam.skids, cam.moved_skids(change[:, 0])):
+    if not slips and not _skids_differ(cam.skids, cam.moved_skids(change[:, 0])):
         return problem, state.replaced(skid_loads=np.stack([last[0], change]))
     new = cam.relocated(change[:, 0])
     moved = _at_stations(problem, new)
@@ -89,15 +89,22 @@ def _changes(problem: WearProblem, state: WearState, cam: CamStations) -> FloatA
     return -cam.at_unworn(problem.per_roller(feedback).mean(axis=1))
 
 
-def _differ(one: FloatArray, other: FloatArray) -> bool:
-    """Return whether the roller rolls in one and skids in the other, over more than `MOVED`."""
-    edges = np.unique(np.concatenate([one.ravel(), other.ravel()]))
-    middles = 0.5 * (edges[:-1] + edges[1:])
-    inside = [
-        ((skids[:, :1] <= middles) & (middles <= skids[:, 1:])).any(axis=0)
-        for skids in (one, other)
-    ]
-    return bool((np.diff(edges)[inside[0] != inside[1]] > MOVED).any())
+def _skids_differ(skids: FloatArray, others: FloatArray) -> bool:
+    """Return whether the roller rolls by one set of skids and slides by the other.
+
+    Parameters
+    ----------
+    skids, others : ndarray, shape (skids, 2)
+        First and last angle of each range in which the roller skids [rad]. Ranges up to `MOVED`
+        are not compared.
+    """
+    angles = np.unique(np.concatenate([skids.ravel(), others.ravel()]))
+    middles = 0.5 * (angles[:-1] + angles[1:])
+    slides, slides_by_others = (
+        ((ranges[:, :1] <= middles) & (middles <= ranges[:, 1:])).any(axis=0)
+        for ranges in (skids, others)
+    )
+    return bool((np.diff(angles)[slides != slides_by_others] > MOVED).any())
 
 
 def _at_stations(problem: WearProblem, cam: CamStations) -> WearProblem:

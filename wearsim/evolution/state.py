@@ -306,7 +306,8 @@ def joined_states(states: Sequence[WearState]) -> WearState:
     if len(states) == 1:
         return first
     present = [name for name in _AXES if getattr(first, name) is not None]
-    arrays = {name: [getattr(state, name) for state in states] for name in present}
+    fields = [vars(state) for state in states]
+    arrays = {name: [values[name] for values in fields] for name in present}
     contacts = [state.contacts for state in states]
     rows = len(first.contacts) // len(first.passes)
     # the coarse-step solution of a test begins as the test itself

@@ -244,6 +244,8 @@ def strip_errors(
     fresh = coarse.approach / (coarse.approach + 3.0 * deepest) if coarse.approach > 0.0 else 0.0
     cover = COVER + (PARTIAL_COVER - COVER) * partial_slip
     found = (cover + (FRESH_COVER - cover) * fresh) * np.array([depth, part[2] * sizes[2], profile])
+    # profiles are compared at the end alone, where their difference may cross zero too
+    found[2] = np.maximum(found[2], found[0] / np.where(deepest > 0.0, deepest, np.inf))
     # the differences of depth and volume may be small by chance, that of one strip more often
     least = OF_PROFILE * np.array([deepest, partial_slip * sizes[2]])
     found[:2] = np.maximum(found[:2], least * found[2])

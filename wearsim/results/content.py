@@ -13,7 +13,6 @@ from typing import (
     ClassVar,
     Generic,
     Literal,
-    Self,
     TypeAlias,
     TypeVar,
     Union,
@@ -380,28 +379,6 @@ class StudyResult(Viewed, Generic[Data]):
             raise ResultsFileError(
                 f"{self.path}: its scenario has mistakes: {first}{more}"
             ) from error
-
-    def with_scenario(self, scenario: Scenario) -> Self:
-        """Return the result with the scenario it was computed from, which is not parsed again.
-
-        Parameters
-        ----------
-        scenario : Scenario
-            It is not used if it has another text than the stored one, or values of one draw.
-
-        Returns
-        -------
-        StudyResult
-
-        Examples
-        --------
-        >>> scenario = wearsim.load_scenario("rig.toml")
-        >>> wearsim.run(scenario).scenario is scenario
-        True
-        """
-        if scenario.text == self.raw.scenario_text and not scenario.drawn:
-            vars(self)["scenario"] = scenario
-        return self
 
     @property
     def title(self) -> str:

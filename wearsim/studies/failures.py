@@ -11,6 +11,7 @@ from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.scenario import Scenario
 from wearsim.studies.plausibility import greatest_load
 from wearsim.studies.run.groove import widest_patch
+from wearsim.units import in_engineers_unit
 
 DEEPEST = 0.1  # worn depth over the radius of the roller, up to which the surfaces are shallow
 
@@ -30,10 +31,10 @@ def explained(
     forecast : bool
         Whether they are forecast.
     """
-    remedies = {"edge": _edge, "too fine": _too_fine, "skid": _skid}
+    remedies = {"edge": _edge, "too fine": _too_fine, "skid": _skid, "lost": _lost}
     if error.cause not in remedies:
         return error
-    when = f"after pass {passes:.0f}: " if passes else ""
+    when = f"after pass {passes:.0f}: " if passes and error.cause != "lost" else ""
     if forecast:
         when = f"forecast after about {passes:.2g} of {scenario.total_passes:.3g} passes: "
     message, remedy = remedies[error.cause](error, scenario)
@@ -134,6 +135,17 @@ def _too_fine(error: SolverError, scenario: Scenario) -> tuple[str, str]:
     width = choice.width or 2.4 * patch.b
     most = math.floor(math.exp(HIGHEST) * width / patch.a)
     return error.message, f"lower contact.strips = {choice.strips} to at most {most}"
+
+
+def _lost(error: SolverError, scenario: Scenario) -> tuple[str, str]:
+    stiffness = getattr(scenario.load.options, "stiffness", 0.0)
+    if scenario.cam is not None:
+        return error.message, f"raise load.preload, or lower {length_key(scenario)}"
+    if stiffness:
+        spring = f"load.stiffness = {in_engineers_unit(stiffness, 'N/m')}"
+        what = f"{error.message}, as the spring ({spring}) has run out of travel"
+        return what, f"lower load.stiffness or {length_key(scenario)}"
+    return error.message, "raise the load or lower its scatter"
 
 
 def _skid(error: SolverError, scenario: Scenario) -> tuple[str, str]:

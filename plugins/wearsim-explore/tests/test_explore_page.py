@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import json
+from base64 import b64decode
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from bokeh.document import Document
 
 import wearsim
+from wearsim.report import Axis, Line, Panel, record
 from wearsim_explore import page as page_module
-from wearsim_explore.answers import Answer, FieldMistake, Quantity, Request
+from wearsim_explore.answers import Answer, Drawn, FieldMistake, Quantity, Request
 from wearsim_explore.design import Design
 from wearsim_explore.page import Page
 
@@ -112,6 +116,28 @@ def test_lives_take_more_and_more_tests_until_a_change(opened: Any) -> None:
     before = reply(page)
     page.receive(last, 50)  # progress of the former state
     assert reply(page) == before
+
+
+def test_numbers_of_figures_come_with_the_reply(opened: Any) -> None:
+    page, asked = opened()
+    x = np.linspace(0.0, 1.0, 5)
+    panel = Panel("a", Axis("x", "mm"), Axis("y", "um"), [Line(1e-3 * x, 1e-6 * x**2)], "caption")
+    drawn = replace(DONE, panels={"a": Drawn(panel, record(panel))})
+
+    async def receive() -> None:
+        page.receive(asked.requests[-1], drawn)
+
+    asyncio.run(receive())
+    sent = reply(page)["columns"]
+    (ends,) = sent["ends"].values()
+    numbers = np.frombuffer(b64decode(sent["numbers"]), "<f4")
+    for name, expected in (("x", x), ("y", x**2)):
+        assert numbers[slice(*ends[name])] == pytest.approx(expected, rel=1e-6)
+    page.act("show")  # of a browser that connects later
+    assert reply(page)["columns"] == sent
+    page.end()
+    assert reply(page)["ended"]
+    assert "columns" not in reply(page)
 
 
 def test_mistakes_ask_for_nothing_more(opened: Any) -> None:

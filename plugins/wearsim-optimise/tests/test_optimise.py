@@ -57,6 +57,7 @@ def test_active_limit_is_where_root_finding_has_it(folder):
 
     assert found.best.numbers[0] == pytest.approx(brentq(excess, 300.0, 900.0), rel=1e-3)
     assert found.best.values["peak_pressure"] < 650e6
+    assert found.raw.converged
     (active,) = found.raw.active
     assert active["constraint"] == LIMIT
     # p ~ R^-0.25 or less steep: 1 % more pressure allows a smaller radius, and less power
@@ -80,6 +81,25 @@ def test_sqrt_law_of_the_crown_radius_gives_the_closed_form():
     assert 1e-3 * found.best.numbers[0] == pytest.approx(closed, rel=0.01)
     # the width is as the root of the radius, which is then within 0.1 % of the crossing
     assert found.best.values["life.width"] == pytest.approx(14e-3, rel=5e-4)
+
+
+def test_search_that_does_not_converge_says_so_and_states_the_best_of_all():
+    found = optimise(
+        shipped_scenario("rig-450min", CONTACT),
+        CROWN,
+        minimise="peak_pressure",
+        evaluations=3,
+        starts=1,
+        scheduler="serial",
+    )
+    assert not found.raw.converged
+    assert not found.view.data()["converged"]
+    assert "not converged" in found.view.line()
+    assert "--evaluations 6" in found.warnings[0]
+    assert any(row.label == "search" and "--evaluations 6" in row.text for row in found.view.rows())
+    # the pressure falls up to the bound: of each optimum a neighbour is better
+    assert found.best is min(found.designs, key=lambda design: design.loss)
+    assert found.best.purpose == "sensitivity"
 
 
 def test_cams_that_cannot_be_followed_guide_the_search():

@@ -51,7 +51,7 @@ def assert_95_percent(held: int | np.integer, sets: int = SETS) -> None:
     assert abs(held / sets - 0.95) <= 2.0 * np.sqrt(0.95 * 0.05 / sets), held
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 @pytest.mark.parametrize("length", [1.5e-3])  # the greater, the harder
 def test_intervals_hold_the_truth_with_correlated_noise(length: float):
     rng, noise = np.random.default_rng(31), Noise(1e-6, length, 0.1e-6)
@@ -64,7 +64,7 @@ def test_intervals_hold_the_truth_with_correlated_noise(length: float):
     assert_95_percent(held[1])
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 def test_intervals_hold_the_truth_without_shoulders():
     rng, found, refused = np.random.default_rng(31), [], []
     for _ in range(SETS):
@@ -78,7 +78,7 @@ def test_intervals_hold_the_truth_without_shoulders():
     assert_95_percent(sum(map(holds, found)), len(found))
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 def test_bow_of_a_trace_is_fitted_or_warned_of():
     rng = np.random.default_rng(31)
     fitted = seen = warned = 0
@@ -96,7 +96,7 @@ def test_bow_of_a_trace_is_fitted_or_warned_of():
     assert warned <= 0.15 * SETS
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 def test_intervals_hold_the_truth_with_scattered_inputs():
     scenario = rig().changed(SCATTERED)
     profiles = Grower(scenario, 48).grow((28e-6, 62e-6), [PASSES]).by_passes[PASSES]
@@ -119,7 +119,7 @@ def test_intervals_hold_the_truth_with_scattered_inputs():
     assert_95_percent(held)
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 @pytest.mark.parametrize("tests", [3, 8])
 def test_next_life_lies_in_its_predictive_interval(tests: int):
     # truth: m ~ N(-25, 0.5^2), t half-normal(0.5); inputs scatter ln of the energy by 0.3; a life

@@ -29,7 +29,7 @@ def identified(*words: str) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 def test_intervals_of_the_tutorial_hold_the_truth(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):

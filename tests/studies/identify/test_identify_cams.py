@@ -201,7 +201,7 @@ def covered(rows: list[Identified], ln_k: float) -> bool:
     return bool(low < ln_k < high)
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 def test_intervals_hold_the_truth_by_grooves_of_cams(grown_cams):
     model, truth, passes = grown_cams
     rng, held = np.random.default_rng(12), 0
@@ -223,7 +223,7 @@ def test_intervals_hold_the_truth_by_grooves_of_cams(grown_cams):
     assert abs(held / SETS - 0.95) <= 2.0 * math.sqrt(0.95 * 0.05 / SETS), held
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 def test_intervals_hold_the_truth_by_lifts_of_cams(grown_cams):
     model, truth, passes = grown_cams
     rng, held = np.random.default_rng(13), 0

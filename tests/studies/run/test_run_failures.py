@@ -156,6 +156,8 @@ def test_lost_contact_keeps_the_last_accepted_state(stepper: str, path: Path) ->
     with pytest.raises(SolverError, match="contact is lost at pass") as caught:
         studies.run(scenario, path)
     assert caught.value.state
+    spring = "(load.stiffness = 20000 N/mm) has run out of travel; lower load.stiffness or"
+    assert spring in str(caught.value)
     left = open_results(path)
     assert not left.finished
     # the load falls below the loss of the spring after the second minute

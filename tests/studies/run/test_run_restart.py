@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from study_examples import LOADS, OTHERS, ROLLERS, STEPPERS, run_differences, ru
 
 from wearsim.errors import Interrupted
 from wearsim.studies.opening import open_results
-from wearsim.studies.run import run as studies
+from wearsim.studies.run import in_progress, run as studies
 from wearsim.studies.run.recorder import Checkpointed, Event
 
 pytestmark = pytest.mark.usefixtures("small_chunks")
@@ -97,17 +99,29 @@ def _checkpoints(events: list[Event]) -> list[float]:
 
 @pytest.mark.usefixtures("quick_disk")
 @pytest.mark.parametrize("stepper", STEPPERS)
-def test_checkpoints_do_not_change_steps(stepper: str, path: Path, tmp_path: Path) -> None:
+def test_checkpoints_do_not_change_steps(
+    stepper: str, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scenario = short(**STEPPERS[stepper])
     often: list[Event] = []
     every = short(**STEPPERS[stepper], outputs__checkpoint_every="1e-9 s")
     many = studies.run(every, path, on_event=often.append)
     seldom: list[Event] = []
+    monkeypatch.setattr(in_progress, "FIRST_CHECKPOINT", 30.0)
     few = studies.run(scenario, tmp_path / "few.h5", on_event=seldom.append)
     # at the start, after every step, and at the end of the run
     assert _checkpoints(often) == [*many.passes, many.passes[-1]]
     assert _checkpoints(seldom) == [0.0, few.passes[-1]]
     assert run_differences(many, few) == ["sha256", "scenario_text"]
+
+
+@pytest.mark.usefixtures("quick_disk")
+def test_first_checkpoints_come_soon(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = itertools.count(0.0, 0.1)  # each reading of the clock takes 0.1 s
+    monkeypatch.setattr(in_progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    events: list[Event] = []
+    result = studies.run(short(), path, on_event=events.append)
+    assert len(result.passes) > len(_checkpoints(events)) > 2
 
 
 def test_slow_disk_limits_the_checkpoints(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from tests.uq.survival import coverage_study
 BOUNDS = ("P(B > A), two specimens", "P(B > A), same machine")
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 @pytest.mark.parametrize("censored", [False, True])
 def test_intervals_of_36_lives_hold_the_truth(censored):
     for (what, method), case in coverage_study.study(36, censored).items():

@@ -167,7 +167,7 @@ def test_fit_finds_another_distribution():
     assert check_fleet([KAPPA], spoilt.before, spoilt.after, odd).fit < 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 def test_intervals_of_fleets_hold_the_truth():
     rng, kept, fleets = np.random.default_rng(46), 0, 100
     for number in range(fleets):

@@ -31,7 +31,7 @@ def least_held(stated: int) -> float:
     return 0.95 * stated - 2.0 * math.sqrt(0.95 * 0.05 * stated)
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 @pytest.mark.parametrize("count", SIZES)
 @pytest.mark.parametrize("factor", FRICTION)
 @pytest.mark.parametrize("form", FORMS)
@@ -48,7 +48,7 @@ def test_the_few_studies_that_state_a_probability_hold_the_truth() -> None:
     assert cell.held >= least_held(cell.stated)
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 @pytest.mark.parametrize("factor", FRICTION)
 @pytest.mark.parametrize("form", FORMS)
 def test_further_tests_hold_the_truth(form: str, factor: float) -> None:

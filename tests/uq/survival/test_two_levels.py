@@ -111,7 +111,7 @@ def held(rng: np.random.Generator, m: float, t: float, kappa: np.ndarray) -> boo
     return found.low < life_of(m, t) < found.high
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 def test_intervals_of_campaigns_hold_the_truth():
     rng, kept = np.random.default_rng(43), 0
     for number in range(CAMPAIGNS):
@@ -120,7 +120,7 @@ def test_intervals_of_campaigns_hold_the_truth():
     assert 0.93 <= kept / CAMPAIGNS <= 0.97
 
 
-@pytest.mark.slow
+@pytest.mark.coverage
 @pytest.mark.parametrize("t", [0.2, 0.4])
 def test_intervals_at_a_fixed_scatter_hold_the_truth(t: float):
     rng, kept = np.random.default_rng(44), 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -13,9 +13,9 @@ import numpy as np
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.pauses import rest, step_or_rest
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, joined_states
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.damage import damage_excess, with_damage
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 
 SMALLEST_STEP = 1e-6  # passes; with a great wear factor ten passes wear a whole groove
 _SMALLEST_PART = 1e-8  # of the passes done; with shorter steps a test would not end
@@ -72,8 +72,9 @@ class Trial:
         """
         shortest = max(SMALLEST_STEP, _SMALLEST_PART * passes)
         if self.proposed < shortest:
-            if isinstance(self._cause, ContactError):
-                raise self._cause
+            cause = self._cause
+            if cause and (isinstance(cause, ContactError) or cause.cause == "lost"):
+                raise cause
             raise StepError(
                 f"no step is short enough at pass {passes:.0f} (tried down to {shortest:.2g}"
                 f" passes); {self._cause or 'the error does not fall with the step'}"
@@ -141,18 +142,6 @@ class Attempt:
     excess: FloatArray
     ratio: FloatArray
     warning: str | None = None
-
-
-def joined_attempts(attempts: Sequence[Attempt], places: Sequence[IntArray]) -> Attempt:
-    """Return one step of all tests from steps of some of them, given by their places."""
-    if len(attempts) == 1:
-        return attempts[0]
-    order = np.argsort(np.concatenate(places))
-    path = tuple(
-        joined_states(ends).at(order) for ends in zip(*(one.path for one in attempts), strict=True)
-    )
-    excess = np.concatenate([one.excess for one in attempts])[order]
-    return Attempt(path, excess, np.concatenate([one.ratio for one in attempts])[order])
 
 
 class Stepper(ABC):

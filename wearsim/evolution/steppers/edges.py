@@ -32,7 +32,9 @@ from wearsim.evolution.steppers.loads import with_feedback
 from wearsim.evolution.steppers.single_step import carried_loads
 from wearsim.mechanics.numerics.edge_strips import SETTLED
 from wearsim.mechanics.numerics.jit import kernel_input
-from wearsim.types import BoolArray
+from wearsim.mechanics.numerics.multistep import MAX_ORDER
+from wearsim.mechanics.numerics.step_errors import EDGE_ORDER
+from wearsim.types import BoolArray, IntArray
 
 LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
@@ -84,6 +86,15 @@ def unresolved(state: WearState) -> BoolArray:
     """Return which tests do not resolve edges, of a state with `FIELDS`."""
     assert state.part is not None
     return np.asarray(np.isnan(state.part[0, 0, :, 0]))
+
+
+def most(state: WearState) -> IntArray:
+    """Return the greatest order of steps of each test, shape (realisations,)."""
+    assert state.order is not None
+    greatest = np.full_like(state.order, MAX_ORDER)
+    if state.separation is not None:
+        greatest[~unresolved(state)] = EDGE_ORDER
+    return greatest
 
 
 def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:

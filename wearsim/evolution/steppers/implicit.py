@@ -21,7 +21,11 @@ from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.conditions import Conditions, conditions_of, exposure
 from wearsim.evolution.steppers.implicit_solution import Past, step_by_formula
-from wearsim.evolution.steppers.load_errors import next_steps_of_loads, unloading
+from wearsim.evolution.steppers.load_errors import (
+    next_steps_of_energy,
+    next_steps_of_loads,
+    unloading,
+)
 from wearsim.evolution.steppers.loads import (
     abrupt_loads,
     with_feedback,
@@ -138,6 +142,12 @@ class ImplicitStepper(StepDoublingStepper):
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
+        of_energy, their_order = next_steps_of_energy(
+            state, end, self.tolerance, KEEP, edges.most(end)
+        )
+        order = np.where(of_energy[1] < ratio, their_order, order)
+        # the error so far shortens the next step
+        over, ratio = np.maximum(over * left, of_energy[0]), np.minimum(ratio, of_energy[1])
         others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
@@ -149,7 +159,7 @@ class ImplicitStepper(StepDoublingStepper):
             profile_error=estimates[2],
             **others,
         )
-        return Attempt((end,), over * left, ratio)  # the error so far shortens the next step
+        return Attempt((end,), over, ratio)
 
     def _attempt_doubled(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
@@ -268,7 +278,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     state = edges.at_start_of_step(problem, state)
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = conditions_of(here, problem, state, passes)
-    order = Past.of(state).order
+    order = np.asarray(state.order)
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:

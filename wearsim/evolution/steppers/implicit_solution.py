@@ -37,6 +37,9 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 MAX_FIXED_POINT = 60
 DAMPED_FROM = 10  # iterations; far fewer are usual
 CONVERGED = 500.0  # change of wear over the whole depth, relative to the tolerance of iterations
+# the same over the wear of the step, from this part of a contact that adheres on: the dissipated
+# power then depends on the line loads
+OF_STEP, ADHERING = 5000.0, 0.1
 LEAST_GUESS = 0.1  # first guess of a load over the one before; ratio of its iterates
 # relative change of loads with a spring: part of that in the step, at most this over the tolerance
 # of iterations
@@ -225,8 +228,10 @@ def step_by_formula(
         if problem.slip_profile is not None:
             moved = np.abs(guess - used).max(axis=(0, 2))
             change = np.maximum(change, opening * (moved / depth))
-        converged = CONVERGED * problem.iteration_tolerance * relaxation
-        active &= ~(change <= converged * depth)
+        converged = problem.iteration_tolerance * relaxation
+        adhering = problem.values_of(solved, "adhesion_fraction").max(axis=(0, 1)) > ADHERING
+        wear_of_step = np.where(adhering, OF_STEP * opening, np.inf)
+        active &= ~(change <= converged * np.minimum(CONVERGED * depth, wear_of_step))
         contacts = solved
         if not np.count_nonzero(active):
             break

@@ -1,4 +1,4 @@
-"""Loads by springs in the step-size control: their error, and their change at the start."""
+"""Loads by springs and energy in the step-size control: their errors, and a first change."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import HERTZ, WearState
 from wearsim.evolution.steppers.loads import elastic_approaches, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement
+from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
 from wearsim.types import FloatArray, IntArray
 
+LEAST_ENERGY = 0.1  # part of the mean energy that an error of the energy is compared with, at least
 LEAST_LOAD = 0.01  # of the load without feedback; the error of smaller loads is compared with it
 
 
@@ -58,6 +60,45 @@ def next_steps_of_loads(
     # after the first step the differences hang on the estimated slope of the loads at its start
     known = spans[1] > spans[0]
     return found, order, np.where(known, displaced.max(axis=(0, 1)), 0.0)
+
+
+def next_steps_of_energy(
+    start: WearState, end: WearState, tolerance: float, keep: float, most: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """Choose the next step by the error of the energy, and thus of the worn volume.
+
+    In partial slip the power depends on the line loads, which follow from differences of depths
+    far below the error that a step may add to a profile. Such errors of the energy add up, since
+    further wear does not correct them. A step may therefore add the tolerance of its own energy, or
+    of a part of the mean energy over as many passes where that is more, as under a spring that has
+    lost its load.
+
+    Parameters
+    ----------
+    start, end : WearState
+        States before and after the step.
+    tolerance, keep, most
+        Tolerance of the stepper; others as of `next_steps`.
+
+    Returns
+    -------
+    ndarray, shape (2, realisations)
+        Excess of error and ratio of the next step, as of `next_steps`.
+    order : ndarray of int, shape (realisations,)
+        Its order.
+    """
+    sums, spans, orders = end.past_sums, end.past_spans, end.order
+    assert sums is not None
+    assert spans is not None
+    assert orders is not None
+    energy = kernel_input(sums[:, -1:, :, None])
+    least = LEAST_ENERGY * end.energy * (1.0 - start.passes / end.passes)
+    worn = np.maximum(end.energy - start.energy, least)[None, :, None]
+    ones, order, own = np.ones_like(worn), np.empty_like(orders), np.empty_like(worn)
+    found = next_steps(
+        *(energy, spans, worn, orders, ones[0, :, 0], tolerance, keep, most, ones, own, order)
+    )
+    return found, order
 
 
 def unloading(here: WearProblem, state: WearState, exposure: FloatArray) -> FloatArray:

@@ -84,8 +84,7 @@ def checked_loads(state: WearState, loads: FloatArray) -> FloatArray:
     if np.count_nonzero(loads > 0.0) < loads.size:
         raise StepError(
             f"contact is lost at pass {state.passes[0]:.0f}: the load has fallen to"
-            f" {loads.min():.4g} N; the spring has run out of travel, or the recorded load or a"
-            " random input falls to zero",
+            f" {loads.min():.4g} N",
             {"normal_force": loads, "passes": state.passes},
             cause="lost",
         )

@@ -337,7 +337,9 @@ def _solve_pass(
     (stiffness, free, zero), lowest, solution = spring, float(gap.min()), warm
     most = free - stiffness * (lowest - zero)  # without elastic approach
     if not most > 0.0:
-        raise StepError(f"contact is lost: the load of a pass has fallen to {most:.4g} N")
+        raise StepError(
+            f"contact is lost: the load of a pass has fallen to {most:.4g} N", cause="lost"
+        )
     load = free - stiffness * (warm.approach - zero)
     load = load if load > 0.0 else 0.1 * most
     for _ in range(MAX_LOAD_ITERATIONS):

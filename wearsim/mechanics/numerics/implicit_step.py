@@ -20,7 +20,7 @@ from wearsim.mechanics.numerics.edge_strips import (
     mark_strips,
     start_edges,
 )
-from wearsim.mechanics.numerics.jit import borrowed, compile_alongside, kernel
+from wearsim.mechanics.numerics.jit import borrowed, kernel
 from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
 from wearsim.mechanics.numerics.multistep import ROWS, extrapolated, formulas, new_differences
 from wearsim.types import BoolArray, FloatArray, IntArray
@@ -375,29 +375,30 @@ def end_step(
 
 
 def compile_implicit_step() -> None:
-    """Compile the kernels of a step by calls for one contact of one strip."""
+    """Compile the kernels of a step by calls for one contact of one strip.
+
+    The last one comes first: a process that solves the first contacts meanwhile then compiles the
+    first ones itself.
+    """
     one, order, bodies = np.ones(1), np.ones(1, np.int64), np.array([[0, 1]])
     strip, wear, rows = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     past, sums, spans = np.ones((ROWS, 2, 1, 1)), np.ones((ROWS, 1, 1, 1)), np.ones((ROWS - 1, 1))
     resolved, of_tests, total = np.ones(1, np.bool_), np.ones((7, 1)), np.ones((1, 1, 1))
     of_bodies, of_contacts = np.ones((6, 2, 1, 1)), np.ones((3, 1, 1))
-    begin_step(
-        *(spans, order, one, one, one, past, sums, sums, rows, bodies, strip, one, wear, one),
-        *(strip, strip, strip, resolved, resolved, of_tests, total, total),
-        *(of_bodies, of_contacts),
-    )
     strips = bodies, resolved, strip, rows, strip, of_bodies, of_contacts
     about, compliance, apart = np.ones((5, 1, 1)), np.ones((1, 1, 2, 1)), strip.copy()
-    linearise_step(*strips, strip, wear, apart, about, compliance)
-    compare_step(
-        *(*strips, strip, wear, apart, about, compliance, strip, strip, wear.copy(), one, 1.0),
-        *(resolved, rows.copy()),
-    )
     end_step(
         *(*strips, strip, strip, one, strip, wear, rows, of_tests, total, total, one.copy()),
         *(past, sums, sums, rows.copy(), np.ones((3, 1, 1)), past.copy(), sums.copy()),
         *(sums.copy(), resolved),
     )
-
-
-compile_alongside("solve_slender", compile_implicit_step)
+    compare_step(
+        *(*strips, strip, wear, apart, about, compliance, strip, strip, wear.copy(), one, 1.0),
+        *(resolved, rows.copy()),
+    )
+    linearise_step(*strips, strip, wear, apart, about, compliance)
+    begin_step(
+        *(spans, order, one, one, one, past, sums, sums, rows, bodies, strip, one, wear, one),
+        *(strip, strip, strip, resolved, resolved, of_tests, total, total),
+        *(of_bodies, of_contacts),
+    )

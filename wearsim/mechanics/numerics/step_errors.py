@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from wearsim.mechanics.numerics.edge_strips import fill_resolved, mark_strips
-from wearsim.mechanics.numerics.implicit_step import WHOLE_PASSES
+from wearsim.mechanics.numerics.implicit_step import WHOLE_PASSES, compile_implicit_step
 from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
 from wearsim.mechanics.numerics.linearised_wear import carried_errors
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
@@ -227,7 +227,7 @@ def assess_step(
 
 
 def compile_step_errors() -> None:
-    """Compile `assess_step` by a call for one contact of one strip."""
+    """Compile `assess_step`, and then the other kernels of a step, for one contact of one strip."""
     one, order, errors = np.ones(1), np.ones(1, np.int64), np.ones((3, 1))
     strip, wear, rows = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     past, sums, spans = np.ones((ROWS, 2, 1, 1)), np.ones((ROWS, 3, 1, 1)), np.ones((ROWS - 1, 1))
@@ -235,6 +235,7 @@ def compile_step_errors() -> None:
         *(1e-3, one, one, one, one, errors, rows, rows, order, spans, past, sums, strip, strip),
         *(np.array([[0, 1]]), strip, one, strip, wear, strip, one, 1.0, np.ones((2, 2))),
     )
+    compile_implicit_step()
 
 
 compile_alongside("solve_slender", compile_step_errors)

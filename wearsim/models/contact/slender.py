@@ -239,6 +239,7 @@ class Slender(StripModel):
             raise ContactError(
                 f"contact is lost at pass {loop.first_pass + done}: the load is not positive",
                 {"line_load": loop.line_load, "gap": gap},
+                cause="lost",
             )
         loads = loop.line_load.sum(axis=1) * self._grid.spacing
         self._check(status, gap, loads, loop.line_load, loop.approach)

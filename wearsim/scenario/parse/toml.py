@@ -59,6 +59,7 @@ from wearsim.scenario.tables.plain import (
     TopTable,
     check_alternatives,
     check_correlation,
+    check_limits,
     check_lists,
     read_creepage,
     read_outputs,
@@ -323,7 +324,8 @@ def parse_fields(
     owned = _read_owned(mistakes, data)
     assemble_cam(mistakes, sections, "cam" in tables)
     sections |= check_axial(mistakes, sections)
-    check_lists(mistakes, data, sections["limit"])
+    check_limits(mistakes, data, sections["limit"])
+    check_lists(mistakes, data)
     check_correlation(mistakes, sections["sampling"])
     check_contained(mistakes)
     mistakes.raise_any()

@@ -25,7 +25,7 @@ from wearsim.scenario.parse.random_inputs import validate
 from wearsim.units import ANGLE, VOLUME, QuantityError, as_written
 from wearsim.uq.sampling.sampler import GaussianCopula
 
-DEFAULT_TOLERANCE = 1e-3
+DEFAULT_TOLERANCE, LEAST_TOLERANCE = 1e-3, 1e-7
 DEFAULT_RECORDS = 20
 LARGEST_ANGLE = 0.1  # rad; slip and shift are linear in the angles
 #: keys that hold one value for all rollers, or one per roller
@@ -150,9 +150,10 @@ class EvolutionTable(Options):
     )
     tolerance: float = Field(
         default=DEFAULT_TOLERANCE,
-        gt=0.0,
+        ge=LEAST_TOLERANCE,
         le=0.1,
-        description="Relative error of the final depth and volume.",
+        description="Relative error of the final depth and volume; contacts are solved to 1e-8,"
+        " which is not enough for a lower tolerance.",
     )
     step: int | None = Field(default=None, gt=0, description="Fixed step size, in roller passes.")
     allow_unstable: bool = Field(
@@ -314,20 +315,21 @@ def read_outputs(mistakes: Mistakes, raw: Mapping[str, object]) -> OutputsTable 
     return validate(mistakes, OutputsTable, raw, "outputs")
 
 
-def check_lists(
-    mistakes: Mistakes, data: Mapping[str, Any], limits: LimitTable | None = None
-) -> None:
-    """Add a mistake for each list of the tables `data` without one value per roller.
-
-    A limit of the lift error is one without a cam, that of damage or pitting one without fatigue.
-    """
-    if limits and limits.lift_error and "cam" not in data:
+def check_limits(mistakes: Mistakes, tables: Mapping[str, Any], limits: LimitTable | None) -> None:
+    """Add the mistakes of limits that need a table which the scenario does not have."""
+    if limits is None:
+        return
+    if limits.lift_error and "cam" not in tables:
         mistakes.add("limit", "lift_error", "is a quantity of cams", None, "depth or clearance")
-    for key in ("damage", "pitting") if limits and "fatigue" not in data else ():
-        if getattr(limits, key) is not None:
+    for key in () if "fatigue" in tables else ("damage", "pitting"):
+        if (limit := getattr(limits, key)) is not None:
             what, remedy = "needs the fatigue of the bodies", "a table [fatigue]"
-            mistakes.add("limit", key, what, as_written(getattr(limits, key)), remedy)
-    tables = {table: keys for table, keys in data.items() if isinstance(keys, dict)}
+            mistakes.add("limit", key, what, as_written(limit), remedy)
+
+
+def check_lists(mistakes: Mistakes, document: Mapping[str, Any]) -> None:
+    """Add a mistake for each list of a document that does not have one value per roller."""
+    tables = {table: keys for table, keys in document.items() if isinstance(keys, dict)}
     rollers = tables.get("operation", {}).get("rollers", 1)
     for table, key in _LISTS:
         value: Any = tables.get(table, {}).get(key)

@@ -55,6 +55,8 @@ from wearsim.types import FloatArray, Grid
 
 Watcher = Callable[[Event], None]
 
+FIRST_CHECKPOINT = 1.0  # s after the start of a run
+
 
 class RunInProgress:
     """A run in this process, with its recorder, clock and file.
@@ -97,7 +99,7 @@ class RunInProgress:
             datetime.now(UTC).isoformat(timespec="seconds") if data is None else data.created
         )
         self.wall_before = 0.0 if data is None else data.wall_seconds
-        self.started = time.monotonic()
+        self.started = self._written = time.monotonic()  # time of the last checkpoint too
         self.record_base = self.stop if data is None else float(data.checkpoint["record_base"])
         self.recorder = Recorder(
             self.problem,
@@ -112,6 +114,7 @@ class RunInProgress:
             for text in plausibility_warnings(scenario):
                 self.warn(text)
             self._write()
+            self._last_write = 0.0  # it has imported the library that writes
         else:
             for text in changed_origins(data, scenario):
                 self.warn(text)
@@ -257,7 +260,6 @@ class RunInProgress:
             )
 
     def _step_to_end(self) -> None:
-        written = time.monotonic()
         self._check_depth()
         for advance in evolve(
             self.problem,
@@ -291,11 +293,21 @@ class RunInProgress:
             self._check_depth()
             if self.stop_requested() and self._passes < self.stop:
                 self._interrupt()
-            # with a slow disk, at most 2 % of the time is spent on writing
-            every = max(self.scenario.outputs.checkpoint_every, 50.0 * self._last_write)
-            if time.monotonic() - written > every:
-                self._write()
-                written = time.monotonic()
+            self._write_in_time()
+
+    def _write_in_time(self) -> None:
+        """Write a checkpoint if the last one is long ago.
+
+        A short run has some too: until their interval is reached, as much time passes before a
+        checkpoint as had passed before the last one.
+        """
+        every = min(
+            self.scenario.outputs.checkpoint_every,
+            max(FIRST_CHECKPOINT, self._written - self.started),
+        )
+        # with a slow disk, at most 2 % of the time is spent on writing
+        if time.monotonic() - self._written > max(every, 50.0 * self._last_write):
+            self._write()
 
     def _check_depth(self) -> None:
         """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
@@ -366,7 +378,8 @@ class RunInProgress:
             return
         begin = time.monotonic()
         write_results(self.path, self.data(finished), self.storage)
-        self._last_write = time.monotonic() - begin
+        self._written = time.monotonic()
+        self._last_write = self._written - begin
         self.on_event(Checkpointed(str(self.path), self._passes))
 
     def data(self, finished: bool) -> RunData:

@@ -105,7 +105,9 @@ def run(
         for text in warnings:
             started.warn(text)
         result = _run_to_limit(started)
-    return result if limit is not None else result.with_scenario(scenario)
+    if scenario.text == result.raw.scenario_text and not scenario.drawn:
+        vars(result)["scenario"] = scenario  # its cached property, which would parse it again
+    return result
 
 
 def resume(

@@ -28,14 +28,16 @@ class TopicName(StrEnum):
     growth = "growth"
     savings = "savings"
     stated_errors = "stated-errors"
+    random = "random"
 
 
 MODEL_TOPICS = (TopicName.contact, TopicName.stepping, TopicName.growth)  # accept --plugin
+RANDOM_TOPICS = (TopicName.stated_errors, TopicName.random)  # accept --tests, --seed and --jobs
 Topics: TypeAlias = Annotated[
     list[TopicName] | None,
     typer.Argument(
         metavar="[TOPIC]...",
-        help="contact, stepping, sampling, growth, savings, stated-errors; all of them by default.",
+        help="contact, stepping, sampling, growth, savings, stated-errors, random; all by default.",
         show_default=False,
     ),
 ]
@@ -69,7 +71,10 @@ Folder: TypeAlias = Annotated[
 Tests: TypeAlias = Annotated[
     int | None,
     typer.Option(
-        metavar="N", min=1, help="Random tests of stated-errors, by default 40.", show_default=False
+        metavar="N",
+        min=1,
+        help="Random tests of stated-errors and random, by default 40.",
+        show_default=False,
     ),
 ]
 Seed: TypeAlias = Annotated[
@@ -133,10 +138,15 @@ def bench(
         selected = _topics_of_model(selected, topics, plugin)
     options = {"number": tests, "seed": seed, "references": references, "jobs": jobs}
     study = {name: value for name, value in options.items() if value is not None}
-    if study and TopicName.stated_errors not in selected:
+    if study and not set(RANDOM_TOPICS) & set(selected):
         raise typer.BadParameter(
-            f"applies to the topic {TopicName.stated_errors.value}, which is not selected",
+            f"applies to the topics {' and '.join(RANDOM_TOPICS)}, which are not selected",
             param_hint="--tests, --seed, --references or --jobs",
+        )
+    if references is not None and TopicName.stated_errors not in selected:
+        raise typer.BadParameter(
+            f"applies to the topic {TopicName.stated_errors}, which is not selected",
+            param_hint="--references",
         )
     endings = (".json", ".md", ".png")
     paths = [output / (topic.value + ending) for topic in selected for ending in endings]
@@ -158,6 +168,9 @@ def bench(
                 measure = _measuring_function(topic)
                 if topic == TopicName.stated_errors:
                     measure = partial(measure, **study)
+                elif topic == TopicName.random:
+                    own = {key: study[key] for key in study if key != "references"}
+                    measure = partial(measure, **own)
                 measured = measure(effort, on_progress)
             results.topic(measured)
         passed = not hard or _run_hard_cases(effort, results, quiet)

@@ -170,6 +170,7 @@
     if (state.message !== undefined) el("message").textContent = state.message;
     el("replace").hidden = !state.exists;
     if (state.page) save_page(state.page);
+    if (state.ended) window.wearsim_lost();
   };
 
   const show_test = test => {

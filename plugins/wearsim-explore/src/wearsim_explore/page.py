@@ -123,6 +123,10 @@ class Page:
         if self._timer is not None:
             self._timer.cancel()
 
+    def end(self) -> None:
+        """Tell the browser that the server ends: its websocket may stay open in a notebook."""
+        self._reply(ended=True)
+
     # what is asked on the page
 
     def _on_request(self, _: str, __: str, new: str) -> None:

@@ -30,6 +30,7 @@ from wearsim_explore.pool import Pool
 
 LOCAL = "127.0.0.1"
 _LIFETIME = 10_000  # ms that a session without a browser is kept
+_FAREWELL = 0.2  # s, for the last message to the pages
 _MOST_MESSAGE = 2**20  # bytes of a message from a browser
 
 
@@ -215,6 +216,10 @@ class Exploration:
         self._server.start()
 
     async def _end(self) -> None:
+        for page in self.pages:
+            page.document.add_next_tick_callback(page.end)
+        if self.pages:
+            await asyncio.sleep(_FAREWELL)
         self._server.stop()
         await self.pool.close()
         self._loop.stop()

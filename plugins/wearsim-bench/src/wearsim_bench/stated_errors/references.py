@@ -41,7 +41,7 @@ LEAST_STRIPS = 241  # for the contacts of a cylinder
 MOST_STRIPS = ((3, 601), (8, 321), (10_000, 161))
 PILOT_TOLERANCE, PILOT_STRIPS, WIDENED = 1e-2, 8.0, 1.6
 MOST_PILOTS = 14
-SECONDS = 300.0  # limit on the process time of one solution, which other work does not change
+SECONDS = 300.0  # limit on the process time of a reference, which other work does not change
 SETTINGS = hashlib.sha256(
     repr(
         (EACH_PASS, LOOSE_FROM, LONGEST_STEP, PER_PATCH, PER_GROOVE, LEAST_STRIPS, MOST_STRIPS)
@@ -153,6 +153,7 @@ def worn_at_end(
     tolerance: float,
     longest: float = np.inf,
     *,
+    until: float = np.inf,
     grows: bool = False,
 ) -> tuple[str, WearProblem, WearState]:
     """Return method, problem and final state of a test on given strips.
@@ -167,13 +168,15 @@ def worn_at_end(
         Tolerance of the steps; tests with few passes are solved pass by pass for any.
     longest : float
         Greatest ratio of an implicit step to the passes done.
+    until : float
+        Process time by which it must be done [s], see `time_limit`.
     grows : bool
         Whether the strips grow with the groove, from the given ones.
 
     Raises
     ------
     SolverError
-        If it cannot be computed, or takes longer than `SECONDS`.
+        If it cannot be computed, or not in time.
     """
     prepared = PreparedTest(test.scenario(evolution__tolerance=tolerance), grid)
     stepper, method = prepared.stepper, f"{prepared.name}, {tolerance:g}"
@@ -186,13 +189,17 @@ def worn_at_end(
             stepper = CappedStepper(tolerance, longest)
     problem = prepared.problem if grows else replace(prepared.problem, growth=())
     state = fresh_state(problem)
-    begin = time.process_time()
     most = test.scenario().evolution.max_steps
     for advance in evolve(problem, state, stepper, prepared.stop, lambda _: np.inf, 10 * most):
         state, final = advance.end, advance.problem
-        if time.process_time() - begin > SECONDS:
+        if time.process_time() > until:
             raise SolverError(f"the reference takes longer than {SECONDS:g} s")
     return method, final, state
+
+
+def time_limit() -> float:
+    """Return the process time by which a reference that begins now must be done [s]."""
+    return time.process_time() + SECONDS
 
 
 def worn_of(problem: WearProblem, state: WearState) -> Worn:
@@ -209,7 +216,7 @@ def at_all_stations(problem: WearProblem, state: WearState) -> Depths:
     return (cylinder if cam is None else cam.at_unworn(cylinder)), roller
 
 
-def final_grid(test: RandomTest) -> tuple[Grid, float, float]:
+def final_grid(test: RandomTest, until: float) -> tuple[Grid, float, float]:
     """Return coarse strips over the final groove, and the half-widths of fresh patch and groove.
 
     The groove is that of a run at a loose tolerance; its strips are widened until the outermost
@@ -229,7 +236,7 @@ def final_grid(test: RandomTest) -> tuple[Grid, float, float]:
         grid = Grid.spanning(centre - half, centre + half, strips)
         half *= WIDENED
         try:
-            _, _, state = worn_at_end(test, grid, PILOT_TOLERANCE)
+            _, _, state = worn_at_end(test, grid, PILOT_TOLERANCE, until=until)
         except ContactError as error:  # the contact is wider than the strips
             reason = str(error)
             continue
@@ -294,23 +301,23 @@ def computed_reference(test: RandomTest) -> Reference:
     Every pass is solved individually where they are few; otherwise implicit steps are taken at a
     low tolerance, none longer than a part of the passes done.
     """
-    start = time.process_time()
-    coarse, patch, groove = final_grid(test)
+    until = time_limit()
+    coarse, patch, groove = final_grid(test, until)
     contacts = PreparedTest(test.scenario(), coarse).problem.shape
     grid = fine_grid(coarse, patch, groove, contacts[0] * contacts[1])
     tolerance = TRUE_TOLERANCE * (10.0 if contacts[0] * contacts[1] >= LOOSE_FROM else 1.0)
     half = Grid.spanning(*grid.edges, grid.strips // 2 + (grid.strips // 2 + 1) % 2)
-    method, problem, end = worn_at_end(test, grid, tolerance, LONGEST_STEP)
+    method, problem, end = worn_at_end(test, grid, tolerance, LONGEST_STEP, until=until)
     fine = worn_of(problem, end)
-    halved = worn_of(*worn_at_end(test, half, tolerance, LONGEST_STEP)[1:])
+    halved = worn_of(*worn_at_end(test, half, tolerance, LONGEST_STEP, until=until)[1:])
     by_steps = np.zeros(3)
     if method != EVERY_PASS:
-        loose = worn_at_end(test, half, 10.0 * tolerance, 2.0 * LONGEST_STEP)[1:]
+        loose = worn_at_end(test, half, 10.0 * tolerance, 2.0 * LONGEST_STEP, until=until)[1:]
         by_steps = worn_of(*loose).changes_from(halved)
     depths = dict(zip(DEPTHS, at_all_stations(problem, end), strict=True))
     return Reference(
         method=method,
-        seconds=time.process_time() - start,
+        seconds=time.process_time() - until + SECONDS,
         y=grid.y,
         **depths,
         passes=float(end.passes[0]),
@@ -340,7 +347,7 @@ def on_strips(test: RandomTest, start: Grid, end: Grid, folder: Path | None) -> 
     def compute() -> dict[str, Any]:
         grows = not same_strips(start, end)
         steps = TRUE_TOLERANCE, LONGEST_STEP
-        _, problem, state = worn_at_end(test, start, *steps, grows=grows)
+        _, problem, state = worn_at_end(test, start, *steps, until=time_limit(), grows=grows)
         return vars(worn_of(problem, state))
 
     return Worn(**kept(path, compute))

@@ -12,6 +12,7 @@ from wearsim.studies.execution.factory import executor
 from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic
 from wearsim_bench.stated_errors.observed import OBSERVED
 from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE
+from wearsim_bench.stated_errors.references import SECONDS
 from wearsim_bench.stated_errors.strata import STRATA, random_test
 from wearsim_bench.stated_errors.study import (
     CLEAR,
@@ -35,6 +36,7 @@ WORST = 5  # tests listed for each quantity
 #: required parts of the tests that are covered, of all tests and in each stratum; greatest true
 #: error by steps over the tolerance; greatest median ratio; greatest part of clear errors
 COVERED, COVERED_IN_STRATUM, MOST_BY_STEPS, MOST_RATIO, MOST_CLEAR = 0.93, 0.9, 2.0, 10.0, 0.05
+MOST_LACKING = 0.05  # greatest part of tests without a reference
 ERRORS = {
     prefix + name: head.format(name)
     for name in QUANTITIES
@@ -83,7 +85,8 @@ ABOUT = (
     " the test; errors of angles are in radians."
     " The true errors by steps alone, on the strips of the run, and by strips alone, without"
     " stepping error, are given for every test. Tests that end with a clear error are counted"
-    " apart. The tests whose true error exceeds the stated one most are listed with their settings,"
+    f" apart, and so are those without a reference, as after {SECONDS:g} s of processor time. The"
+    " tests whose true error exceeds the stated one most are listed with their settings,"
     " and their scenarios are written to files."
 )
 
@@ -149,12 +152,12 @@ def stated_errors(
             f"{test.name}-{name}" if name != "toml" else f"{test.name}.toml": text
             for test in tests
             if test.name in listed
-            for name, text in _scenario_files(test.name, test.scenario())
+            for name, text in scenario_files(test.name, test.scenario())
         },
     )
 
 
-def _scenario_files(name: str, scenario: Scenario) -> list[tuple[str, str]]:
+def scenario_files(name: str, scenario: Scenario) -> list[tuple[str, str]]:
     """Return the text of a scenario as "toml", and its files, which carry the name of the test."""
     text = scenario.text
     for file in scenario.files:
@@ -196,7 +199,9 @@ def requirements(rows: Sequence[Measurement]) -> str:
         _verdict(clear <= MOST_CLEAR * len(rows), f"{clear} of {len(rows)} end with an error")
     )
     lacking = sum(row.failed.startswith(LACKS) for row in rows)
-    lines.append(f"- not counted: {lacking} without a reference")
+    lines.append(
+        _verdict(lacking <= MOST_LACKING * len(rows), f"{lacking} of {len(rows)} lack a reference")
+    )
     return "\n".join(lines)
 
 

@@ -1,0 +1,1 @@
+"""Invariants of random scenarios over the whole scenario language."""
