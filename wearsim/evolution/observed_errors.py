@@ -36,6 +36,9 @@ OF_DEPTH, OF_VOLUME = ("roller_depth", "descent"), ("roller_worn_volume",)
 ABRUPT_EDGE = 0.3
 
 
+_OF_EDGES = ("peak_pressure", "normal_force", "elastic_approach", "descent")
+
+
 def observed_errors(
     coarse: Course | None,
     passes: FloatArray,
@@ -92,7 +95,8 @@ def observed_errors(
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
     edge_peaks: FloatArray | float = 0.0
-    if crown_radius is not None and "peak_pressure" in observed:  # lives have what is asked for
+    # a life observes the quantities of its limits only
+    if crown_radius is not None and observed.keys() >= set(_OF_EDGES):
         edge_peaks = _edge_peaks(observed, crown_radius, spacing)
     for (name, values), found in zip(observed.items(), columns, strict=True):
         scale = 1.0 if name.endswith("angle") else np.abs(values)
@@ -114,10 +118,9 @@ def _edge_peaks(
     With the elastic approach w, the half-width b and the crown radius R of the groove, the layer is
     w R/b long. The half-length is N/(pi b p), as the line load is N/(2 b) and the pressure p.
     """
-    names = "peak_pressure", "normal_force", "elastic_approach", "descent"
     shape = observed["peak_pressure"].shape
     pressure, force, elastic, worn = (
-        np.maximum(observed[name].reshape(len(observed[name]), -1), 0.0) for name in names
+        np.maximum(observed[name].reshape(len(observed[name]), -1), 0.0) for name in _OF_EDGES
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         layer = np.pi * crown_radius * elastic * pressure / force  # over the half-length
