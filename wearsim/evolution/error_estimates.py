@@ -213,8 +213,13 @@ def half_quadrature(problem: WearProblem, state: WearState) -> tuple[WearProblem
     nodes = np.arange(len(problem.roller)).reshape(problem.rollers, -1)
     first = nodes[:, : nodes.shape[1] // 2].ravel()
     contacts = np.arange(len(state.contacts)).reshape(problem.shape)[:, first].ravel()
-    half = problem.with_contacts(first)
-    return replace(half, weight=2.0 * half.weight), state.replaced(
+    half = replace(
+        problem,
+        inputs=problem.inputs.at(first),
+        roller=problem.roller[first],
+        weight=2.0 * problem.weight[first],
+    )
+    return half, state.replaced(
         contacts=state.contacts.at(contacts),
         coarse_step_solution=None,
         half_quadrature_solution=None,

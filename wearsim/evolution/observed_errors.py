@@ -21,6 +21,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.strip_errors import BACK, Course
 from wearsim.types import FloatArray
 
@@ -34,9 +35,22 @@ OF_DEPTH, OF_VOLUME = ("roller_depth", "descent"), ("roller_worn_volume",)
 # relative peak at an edge without a layer; measured on grooves of crowns of 30 to 250 mm, on strips
 # of a sixth of the half-length
 ABRUPT_EDGE = 0.3
-
-
 _OF_EDGES = ("peak_pressure", "normal_force", "elastic_approach", "descent")
+
+
+def relative_crown_radius(problem: WearProblem) -> FloatArray | None:
+    """Return the relative radius of the crowns of roller and cylinder.
+
+    Returns
+    -------
+    ndarray, shape (contacts, realisations), optional
+        [m]; None for cams, for rollers with several contacts, and where the gap is not that of
+        crowns.
+    """
+    if problem.shape[0] > 1 or problem.has_nodes or not problem.has_crowned_gap:
+        return None
+    bend = np.median(np.diff(problem.nominal_gap, 2, axis=-1), axis=-1)
+    return np.asarray(np.broadcast_to(problem.grid.spacing**2 / bend[0], problem.shape[1:]))
 
 
 def observed_errors(
@@ -61,7 +75,7 @@ def observed_errors(
     sizes, by_strips : ndarray, shape (3, points)
         As of `strip_errors`: sizes of the test, and their errors by strips.
     crown_radius : ndarray, shape (rollers,), optional
-        See `WearProblem.crown_radius` [m]; None where peaks at edges are not estimated.
+        See `relative_crown_radius` [m]; None where peaks at edges are not estimated.
     spacing : float
         Width of the strips at the end [m].
     """

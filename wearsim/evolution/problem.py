@@ -58,8 +58,7 @@ class WearProblem:
     laws : tuple of WearLaw
         Wear law of both bodies, one per realisation; none where contacts are only solved.
     loads : tuple of Load
-        Normal load of every roller over time, one per realisation; one for all of them where
-        contacts are only solved.
+        Normal load of every roller over time, one per realisation; one where none is stepped.
     terms : mapping of str to LoadTerm
         Terms added to the load, in a fixed order.
     kinematics : Kinematics
@@ -92,8 +91,7 @@ class WearProblem:
     passes_per_draw : float
         Passes that share one draw of the inputs drawn at every pass.
     quadrature_error : float
-        Relative error of wear by the quadrature over inputs drawn at every pass, as far as it is
-        known before the test.
+        Known part of the relative error of wear by the quadrature over inputs of every pass.
     growth : tuple of Growth
         How the strips of each realisation grow with its groove; none where they do not.
     fatigue : Fatigue, optional
@@ -151,15 +149,6 @@ class WearProblem:
     def at_contacts(self, values: FloatArray) -> FloatArray:
         """Return the value of each contact's roller: (S, R, ...) to (S, C, ...)."""
         return values if self._one_contact_per_roller else values[:, self.roller]
-
-    def with_contacts(self, chosen: IntArray) -> WearProblem:
-        """Return the problem with some of its contacts, by number."""
-        return replace(
-            self,
-            inputs=self.inputs.at(chosen),
-            roller=self.roller[chosen],
-            weight=self.weight[chosen],
-        )
 
     def at(self, realisations: IntArray) -> WearProblem:
         """Return the problem of some realisations, by number and in that order."""
@@ -244,7 +233,7 @@ class WearProblem:
 
     @cached_property
     def contact_gap(self) -> FloatArray:
-        """`nominal_gap` of all contacts as an array of its own, shape (contacts, strips) [m]."""
+        """Copy of `nominal_gap` for kernels, shape (contacts, strips) [m]."""
         shape = *self.shape, self.grid.strips
         return np.array(np.broadcast_to(self.nominal_gap, shape)).reshape(-1, shape[-1])
 
@@ -253,11 +242,6 @@ class WearProblem:
         """Loss of load per descent of each roller, 0 without springs, (contacts,) [N/m]."""
         stiffness = self.stiffness if self.has_spring else np.zeros(())
         return np.array(np.broadcast_to(stiffness, self.shape)).ravel()
-
-    @cached_property
-    def contact_wear_share(self) -> FloatArray:
-        """`cylinder_wear_share` of the first station, shape (realisations,)."""
-        return np.array(self.cylinder_wear_share[: self.shape[2], 0])
 
     @cached_property
     def has_crowned_gap(self) -> bool:
@@ -272,17 +256,6 @@ class WearProblem:
         if bend.size == 0:  # fewer than three strips
             return False
         return bool(((bend > 0.0) & (bend < UNEVEN * np.median(bend, -1, keepdims=True))).all())
-
-    @property
-    def crown_radius(self) -> FloatArray | None:
-        """Relative radius of the crowns of roller and cylinder, (contacts, realisations) [m].
-
-        None for cams, for rollers with several contacts, and where the gap is not that of crowns.
-        """
-        if self.shape[0] > 1 or self.has_nodes or not self.has_crowned_gap:
-            return None
-        bend = np.median(np.diff(self.nominal_gap, 2, axis=-1), axis=-1)
-        return np.asarray(np.broadcast_to(self.grid.spacing**2 / bend[0], self.shape[1:]))
 
     @cached_property
     def spin(self) -> FloatArray:

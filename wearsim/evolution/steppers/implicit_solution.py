@@ -156,7 +156,8 @@ def step_by_formula(
         If the iteration does not converge.
     """
     past, contacts, depths = Past.of(state), state.contacts, state.stacked
-    bodies, gap, share = problem.body_rows, problem.contact_gap, problem.contact_wear_share
+    bodies, gap = problem.body_rows, problem.contact_gap
+    share = np.array(problem.cylinder_wear_share[: len(passes), 0])  # at the first station
     shape, strips = contacts.line_load.shape, problem.grid.strips
 
     def wear_of(contacts: ContactBatchSolution) -> FloatArray:

@@ -69,9 +69,9 @@ def next_steps_of_energy(
 
     In partial slip the power depends on the line loads, which follow from differences of depths
     far below the error that a step may add to a profile. Such errors of the energy add up, since
-    further wear does not correct them. A step may therefore add the tolerance of its own energy, or
-    of a part of the mean energy over as many passes where that is more, as under a spring that has
-    lost its load.
+    further wear does not correct them. A step may therefore add the tolerance of the energy of the
+    step, or of a part of the mean energy over as many passes where that is more, as under a spring
+    that has lost its load.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.observables import depth_error_by_stations, volume_error_by_stations
-from wearsim.evolution.observed_errors import observed_errors
+from wearsim.evolution.observed_errors import observed_errors, relative_crown_radius
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
@@ -366,7 +366,7 @@ def add_strip_errors(
                 name: np.array([item[name] for item in course.observed])
                 for name in (course.observed[0] if course.observed else ())
             }
-            fresh, crown = np.zeros((3, 1)), problem.crown_radius
+            fresh, crown = np.zeros((3, 1)), relative_crown_radius(problem)
             assert course.grid is not None
             stated = observed_errors(
                 other,

@@ -20,7 +20,7 @@ from wearsim.evolution.observables import (
     present_batch,
     volume_error_by_stations,
 )
-from wearsim.evolution.observed_errors import observed_errors
+from wearsim.evolution.observed_errors import observed_errors, relative_crown_radius
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
@@ -208,7 +208,7 @@ class RunInProgress:
         profiles = [record[f"{body}_depth_profile"][:, 0] for body in ("cylinder", "roller")]
         end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
         errors = strip_errors(coarse, passes, np.array(sizes), end)
-        crown, spacing = first.crown_radius, problem.grid.spacing
+        crown, spacing = relative_crown_radius(first), problem.grid.spacing
         self.recorder.strip_errors = errors
         self.recorder.observed_errors = observed_errors(
             *(coarse, passes, self.recorder.observed, np.array(sizes), errors),
