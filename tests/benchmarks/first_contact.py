@@ -9,15 +9,16 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
 import re
 import subprocess
 import sys
 import tempfile
 import time
-from datetime import date
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+from wearsim_bench.measure.machine import this_machine
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
@@ -65,8 +66,8 @@ def measured(wheel: Path) -> dict[str, Any]:
                          "wall_s": time.perf_counter() - start})  # fmt: skip
         size = (folder / "rig.png").stat().st_size
     return {
-        "date": date.today().isoformat(),
-        "machine": f"{os.cpu_count()} cores, Python {platform.python_version()}",
+        "machine": asdict(this_machine()),
+        "command": "python -m tests.benchmarks.first_contact",
         "steps": rows,
         "figure_bytes": size,
     }

@@ -195,7 +195,7 @@ def test_new_plugin_is_the_renamed_template(command: Command) -> None:
     module = ast.parse((folder / "src/wearsim_soft_layer/__init__.py").read_text())
     classes = [node.name for node in module.body if isinstance(node, ast.ClassDef)]
     forms = ["SoftLayerFormOptions", "SoftLayerForm"]
-    assert classes == ["SoftLayerOptions", "SoftLayer", *forms]
+    assert classes == ["SoftLayerOptions", "SoftLayer", *forms, "ApproachTable"]
     compile((folder / "tests/test_soft_layer.py").read_text(), "test_soft_layer.py", "exec")
     assert "pip install -e" in done.stderr
 

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.evolution.problem import WearProblem
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
 
 GRIP = 0.98  # greatest traction of a rolling roller, of friction: at the ends of a skid
 LEAST_LOAD = 1e-3  # next to a pause, of the greatest load
+
+
+def with_contacts(problem: WearProblem, chosen: IntArray) -> WearProblem:
+    """Return a problem with some of its contacts, by number."""
+    return replace(
+        problem,
+        inputs=problem.inputs.at(chosen),
+        roller=problem.roller[chosen],
+        weight=problem.weight[chosen],
+    )
 
 
 def contact_batch(

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wearsim.evolution.contacts import with_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, sum_in_order, values_between, worn_volume
 from wearsim.evolution.state import Depths, WearState
@@ -213,13 +214,8 @@ def half_quadrature(problem: WearProblem, state: WearState) -> tuple[WearProblem
     nodes = np.arange(len(problem.roller)).reshape(problem.rollers, -1)
     first = nodes[:, : nodes.shape[1] // 2].ravel()
     contacts = np.arange(len(state.contacts)).reshape(problem.shape)[:, first].ravel()
-    half = replace(
-        problem,
-        inputs=problem.inputs.at(first),
-        roller=problem.roller[first],
-        weight=2.0 * problem.weight[first],
-    )
-    return half, state.replaced(
+    half = with_contacts(problem, first)
+    return replace(half, weight=2.0 * half.weight), state.replaced(
         contacts=state.contacts.at(contacts),
         coarse_step_solution=None,
         half_quadrature_solution=None,

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from wearsim.errors import PluginError, ScenarioError
+from wearsim.errors import PluginError, ResultsFileError
 from wearsim.report.text import count
 from wearsim.report.view import ORIGIN, STUDY, Repetition, Row, Rows, Table, View
 from wearsim.results.content import StudyResult
@@ -164,7 +164,7 @@ def varying_inputs(result: StudyResult[Any], drawn: Mapping[str, Any] | None) ->
     """
     try:
         random = result.scenario.random
-    except (PluginError, ScenarioError) as error:
+    except (PluginError, ResultsFileError) as error:
         return {"inputs": f"unknown, since the scenario cannot be read here: {error}"}
     if drawn is None:
         chosen = [item for item in random if item.role in {"field", "process"}]

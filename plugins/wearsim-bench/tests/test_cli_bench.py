@@ -94,6 +94,9 @@ def test_options_of_random_tests_reach_their_topic(command, monkeypatch, tmp_pat
     assert (tmp_path / "bench" / "stated-errors.json").exists()
     refused = command("bench", "growth", "--seed", 2, "-q")
     assert refused.exit_code == 2
+    assert "applies to the topics stated-errors and random" in " ".join(refused.stderr.split())
+    refused = command("bench", "random", "--references", "kept", "-q")
+    assert refused.exit_code == 2
     assert "applies to the topic stated-errors" in " ".join(refused.stderr.split())
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import contact_batch
+from wearsim.evolution.contacts import contact_batch, with_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import Redraw
 from wearsim.evolution.state import HERTZ, WearState, joined_states
@@ -261,7 +261,7 @@ def run_in_python(
     (law,) = problem.laws
     turn = kinematics.physical_rollers / kinematics.pass_rate
     for number, r in enumerate(passes.roller):
-        one = passes.with_contacts(np.array([number]))
+        one = with_contacts(passes, np.array([number]))
         multiplicity = float(kinematics.multiplicity[r])
         for s in range(stations):
             speed, part = kinematics.rolling_speed, 1.0 / stations
