@@ -131,7 +131,7 @@ def test_wrong_kind_of_file_raises_one_line_error(study_file, tmp_path):
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 3
+    file.attrs["format_version"] = 4
 
 
 def _without_power(file: h5py.File) -> None:
@@ -150,7 +150,7 @@ def _with_wrong_shape(file: h5py.File) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_newer, "has layout 3 of wearsim-dissipation, and this wearsim reads layout 2; update"),
+        (_newer, "has layout 4 of wearsim-dissipation, and this wearsim reads layout 3; update"),
         (_without_power, "is damaged (lacks power)"),
         (_without_drawn_values, "is damaged (lacks load.normal_force)"),
         (_with_wrong_shape, "is damaged ("),

@@ -145,6 +145,8 @@ def _lost(error: SolverError, scenario: Scenario) -> tuple[str, str]:
         spring = f"load.stiffness = {in_engineers_unit(stiffness, 'N/m')}"
         what = f"{error.message}, as the spring ({spring}) has run out of travel"
         return what, f"lower load.stiffness or {length_key(scenario)}"
+    if scenario.load.kind == "recorded":
+        return error.message, "raise the recorded load, or lower what load terms take from it"
     return error.message, "raise the load or lower its scatter"
 
 

@@ -344,7 +344,7 @@ def _refused(duration: float) -> list[RobustnessCase]:
             "spring that lifts the roller off under load",
             {"load": sprung},
             "contact is lost",
-            "spring has run out of travel",
+            "has run out of travel",
         ),
         case(
             "tilt that moves the contact off the strips",
