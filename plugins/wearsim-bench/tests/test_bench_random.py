@@ -138,7 +138,12 @@ def test_topic_counts_and_lists_broken_invariants():
 @pytest.mark.parametrize("seed", [11, 12, 13, 14])
 def test_ten_random_scenarios_meet_their_invariants(seed: int):
     topic = random(Effort(repetitions=1), lambda what, part: None, seed=seed, number=10)
-    assert topic.conclusions[SUMMARY] == "All invariants hold."
+    counts = {row.method: row.counts for row in topic.of(SUMMARY)}
+    truth = counts.pop("truth within stated errors")
+    assert not any(found["broken"] for found in counts.values()), topic.conclusions[SUMMARY]
+    # errors are estimates of three quantities of each test
+    assert truth["covered"] >= 0.8 * 3 * truth["tests"], topic.conclusions[SUMMARY]
+    assert counts["runs to its end, finite and not negative"]["clear"] <= 2
 
 
 def test_scenarios_of_a_seed_meet_their_invariants():

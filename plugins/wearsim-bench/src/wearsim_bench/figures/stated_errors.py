@@ -24,7 +24,7 @@ def stated_errors_figure(topic: Topic, under: str) -> Figure:
     under : str
         Text under the title.
     """
-    rows = [row for row in topic.of(TESTS) if not row.failed]
+    rows = [row for row in topic.of(TESTS) if QUANTITIES[0] in row.errors]
     tolerances = sorted({row.counts["tolerance"] for row in rows}, reverse=True)
     shown = [prefix + name for name in QUANTITIES for prefix in ("", STATED)]
     values = [max(row.errors[name], _LOWEST) for row in rows for name in shown] or [_LOWEST, 1.0]

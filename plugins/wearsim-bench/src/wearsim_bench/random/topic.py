@@ -38,7 +38,8 @@ ABOUT = (
     " all steppers. Each is run once and must meet the invariants that apply to it. Scaled and"
     " mirrored tests may differ by a tenth of their stated errors, and the halves of a test by"
     " these errors; true errors are relative to a run with a tolerance of 0.03 times that of the"
-    " test on three times as many strips. Runs that end with a clear error are counted apart."
+    " test on three times as many strips. An error is an estimate, which a few of a hundred true"
+    " errors exceed: such tests are listed too. Runs that end with a clear error are counted apart."
 )
 
 
@@ -140,7 +141,9 @@ def topic_of(rows: Sequence[Measurement], seed: int, number: int, files: dict[st
         summary.append(Measurement(SUMMARY, name, "", counts=counts))
     broken = [row for row in rows if row.failed]
     lines = [f"- {row.method}, {row.setting}: {row.failed}" for row in broken]
-    texts = [f"{name}:\n{text}" for name, text in files.items() if name.endswith(".toml")]
+    texts = [
+        f"\n{name}:\n\n```toml\n{text}```" for name, text in files.items() if name.endswith(".toml")
+    ]
     return Topic(
         name="random",
         title=f"Invariants of {number} random scenarios, seed {seed}",
