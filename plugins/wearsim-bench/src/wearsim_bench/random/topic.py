@@ -69,7 +69,7 @@ def random(
     rows: dict[int, list[Measurement]] = {}
     files: dict[str, str] = {}
     scheduler = "serial" if jobs == 1 else "processes"
-    work = partial(measured_scenario, seed=seed)
+    work = partial(measured_scenario, seed=seed, reduce=not effort.quick)
     with executor(scheduler, None if jobs == 1 else jobs, realisations=number) as processes:
         for (place,), found in processes.results(work, iter([place] for place in range(number))):
             rows[place] = [row for row, _ in found]
@@ -79,7 +79,9 @@ def random(
     return topic_of([row for place in range(number) for row in rows[place]], seed, number, files)
 
 
-def measured_scenario(places: Sequence[int], seed: int) -> list[tuple[Measurement, dict[str, str]]]:
+def measured_scenario(
+    places: Sequence[int], seed: int, *, reduce: bool
+) -> list[tuple[Measurement, dict[str, str]]]:
     """Return the measurements of a scenario by all invariants, with the files of reproducers.
 
     Parameters
@@ -88,6 +90,8 @@ def measured_scenario(places: Sequence[int], seed: int) -> list[tuple[Measuremen
         Number of the scenario.
     seed : int
         Seed of the scenarios.
+    reduce : bool
+        Whether reproducers are reduced, which takes up to two minutes each.
     """
     (place,) = places
     first = Measurement(TESTS, f"{seed}-{place}", next(iter(INVARIANTS)))
@@ -98,18 +102,19 @@ def measured_scenario(places: Sequence[int], seed: int) -> list[tuple[Measuremen
     found = []
     for name in INVARIANTS:
         row = measured(name, test.scenario(), first)
-        found.append((row, reproducer(test, row) if row.failed else {}))
+        reduced = smallest(test, row) if reduce and row.failed else test
+        found.append((row, reproducer(reduced, row) if row.failed else {}))
         if row.remark and name == first.setting:
             break  # the run itself ends with a clear error
     return found
 
 
 def reproducer(test: RandomTest, row: Measurement) -> dict[str, str]:
-    """Return the files of the smallest scenario that breaks the invariant of a row."""
+    """Return the files of a scenario that breaks the invariant of a row, by name."""
     stem = f"{row.method}-{row.setting.partition(',')[0].replace(' ', '-')}"
     return {
         f"{stem}.toml" if name == "toml" else f"{stem}-{name}": text
-        for name, text in scenario_files(stem, smallest(test, row).scenario())
+        for name, text in scenario_files(stem, test.scenario())
     }
 
 
