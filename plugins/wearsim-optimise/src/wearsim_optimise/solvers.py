@@ -18,7 +18,7 @@ from wearsim.errors import PluginError
 from wearsim_optimise.variables import Variable, Vector
 
 RADIUS = 0.2  # first trust region, of the range of a variable
-FINAL = 8e-4  # last one; the error of an optimum is much smaller
+FINAL = 4e-4  # last one; the error of an optimum is much smaller
 _MOST = 10_000  # evaluations of one search; the budget ends it before
 
 
