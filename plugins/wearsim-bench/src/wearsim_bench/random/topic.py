@@ -7,17 +7,20 @@ from dataclasses import replace
 from functools import partial
 
 from wearsim.errors import ScenarioError
-from wearsim.studies.execution.factory import executor
 from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic
 from wearsim_bench.random.invariants import EXCESS, INVARIANTS, measured
 from wearsim_bench.random.scenarios import random_scenario
 from wearsim_bench.random.smallest import smallest
 from wearsim_bench.stated_errors.random_tests import RandomTest
 from wearsim_bench.stated_errors.study import QUANTITIES, STATED, TESTS, coverage
-from wearsim_bench.stated_errors.topic import scenario_files
+from wearsim_bench.stated_errors.topic import (
+    NUMBER,
+    QUICK_NUMBER,
+    results_of_tests,
+    scenario_files,
+)
 
-NUMBER, QUICK_NUMBER = 40, 5  # of tests
-SUMMARY, BROKEN = "invariants", "broken invariants"
+SUMMARY = "invariants"
 ERRORS = {
     prefix + name: f"{name}, {kind}"
     for name in QUANTITIES
@@ -68,32 +71,35 @@ def random(
     number = number or (QUICK_NUMBER if effort.quick else NUMBER)
     rows: dict[int, list[Measurement]] = {}
     files: dict[str, str] = {}
-    scheduler = "serial" if jobs == 1 else "processes"
-    work = partial(measured_scenario, seed=seed, reduce=not effort.quick)
-    with executor(scheduler, None if jobs == 1 else jobs, realisations=number) as processes:
-        for (place,), found in processes.results(work, iter([place] for place in range(number))):
-            rows[place] = [row for row, _ in found]
-            for _, reproducer in found:
-                files |= reproducer
-            on_progress(f"scenario {len(rows)} of {number}", len(rows) / number)
+    work = partial(measured_scenarios, seed=seed, reduce=not effort.quick)
+    for place, found in results_of_tests(work, number, jobs, on_progress):
+        rows[place] = [row for row, _ in found]
+        for _, reproducers in found:
+            files |= reproducers
     return topic_of([row for place in range(number) for row in rows[place]], seed, number, files)
 
 
-def measured_scenario(
+def measured_scenarios(
     places: Sequence[int], seed: int, *, reduce: bool
+) -> list[list[tuple[Measurement, dict[str, str]]]]:
+    """Return what `measured_scenario` returns of some scenarios, by number."""
+    return [measured_scenario(place, seed, reduce=reduce) for place in places]
+
+
+def measured_scenario(
+    place: int, seed: int, *, reduce: bool
 ) -> list[tuple[Measurement, dict[str, str]]]:
     """Return the measurements of a scenario by all invariants, with the files of reproducers.
 
     Parameters
     ----------
-    places : sequence of int
+    place : int
         Number of the scenario.
     seed : int
         Seed of the scenarios.
     reduce : bool
         Whether reproducers are reduced, which takes up to two minutes each.
     """
-    (place,) = places
     first = Measurement(TESTS, f"{seed}-{place}", next(iter(INVARIANTS)))
     try:
         test, _ = random_scenario(seed, place)

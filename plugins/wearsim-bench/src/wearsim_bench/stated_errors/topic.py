@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from wearsim.scenario import Scenario
 from wearsim.studies.execution.factory import executor
@@ -28,6 +29,7 @@ from wearsim_bench.stated_errors.study import (
     worst,
 )
 
+T = TypeVar("T")
 NUMBER, QUICK_NUMBER = 40, 5  # of tests
 QUICK_SHARE = 0.02  # of the passes
 UNCOVERED, FAILED = "not covered, {}", "without a result"
@@ -119,13 +121,8 @@ def stated_errors(
     number = number or (QUICK_NUMBER if effort.quick else NUMBER)
     share = QUICK_SHARE if effort.quick else 1.0
     tests = [random_test(seed, place, share) for place in range(number)]
-    rows: dict[int, Measurement] = {}
     work = partial(measured_tests, seed=seed, share=share, references=references)
-    scheduler = "serial" if jobs == 1 else "processes"
-    with executor(scheduler, None if jobs == 1 else jobs, realisations=number) as processes:
-        for places, found in processes.results(work, iter([place] for place in range(number))):
-            rows |= dict(zip(places, found, strict=True))
-            on_progress(f"test {len(rows)} of {number}", len(rows) / number)
+    rows = dict(results_of_tests(work, number, jobs, on_progress))
     summary = statistics([rows[place] for place in range(number)])
     settings = {test.name: test.settings for test in tests}
     described = {
@@ -155,6 +152,31 @@ def stated_errors(
             for name, text in scenario_files(test.name, test.scenario())
         },
     )
+
+
+def results_of_tests(
+    work: Callable[[Sequence[int]], list[T]], number: int, jobs: int, on_progress: OnProgress
+) -> Iterator[tuple[int, T]]:
+    """Yield the number and the result of every test, in the order in which they end.
+
+    Parameters
+    ----------
+    work : callable
+        Returns the results of some tests, by number.
+    number : int
+        Number of tests.
+    jobs : int
+        Processes in which they are run.
+    on_progress : callable
+        Called with a description and the completed fraction.
+    """
+    scheduler, done = "serial" if jobs == 1 else "processes", 0
+    with executor(scheduler, None if jobs == 1 else jobs, realisations=number) as processes:
+        for places, found in processes.results(work, iter([place] for place in range(number))):
+            for place, result in zip(places, found, strict=True):
+                done += 1
+                yield place, result
+            on_progress(f"test {done} of {number}", done / number)
 
 
 def scenario_files(name: str, scenario: Scenario) -> list[tuple[str, str]]:
