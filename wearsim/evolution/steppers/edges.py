@@ -85,7 +85,8 @@ def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
 def unresolved(state: WearState) -> BoolArray:
     """Return which tests do not resolve edges, of a state with `FIELDS`."""
     assert state.part is not None
-    return np.asarray(np.isnan(state.part[0, 0, :, 0]))
+    found: BoolArray = np.isnan(state.part[0, 0, :, 0])
+    return found
 
 
 def most(state: WearState) -> IntArray:
@@ -116,7 +117,7 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
         ended = {n: np.where(low[:, None], np.nan, getattr(state, n)) for n in FIELDS}
         state = state.replaced(**ended, order=np.where(low & ~whole, 1, state.order))
     begins = whole if low is None else whole & ~low
-    return _with_new_edges(problem, state, begins) if np.count_nonzero(begins) else state
+    return _with_new_edges(problem, state, begins) if begins.nonzero()[0].size else state
 
 
 def _unloaded(problem: WearProblem, state: WearState) -> BoolArray | None:

@@ -217,7 +217,8 @@ class ImplicitStepper(StepDoublingStepper):
         of_profile = (state.profile_error - fixed[2]) / cover[1] * grown**DEPTH_EXPONENT
         worst = np.maximum(of_volume, np.where(volumes > 0.0, of_profile, 0.0))
         low, high = ADDED_UP
-        return np.asarray(np.clip((high - worst / self.tolerance) / (high - low), LEAST_AIM, 1.0))
+        left: FloatArray = (high - worst / self.tolerance) / (high - low)
+        return np.minimum(np.maximum(left, LEAST_AIM), 1.0)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
@@ -293,7 +294,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         start = state if whole else edges.without_edges(here, state)
         return step_by_formula(here, start, passes, conditions, np.ones_like(order))[0]
     # strips that leave the contact: their depth can decrease from the third order on
-    for lower in (2, 1) if np.count_nonzero(decreased) else ():
+    for lower in (2, 1) if decreased.nonzero()[0].size else ():
         again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
         if again.size:
             columns = (column[..., again] for column in vars(conditions).values())

@@ -35,7 +35,7 @@ def strip_tractions(
     grid : Grid
     pair : ElasticPair
     """
-    contacts, variation = len(line_load), batch.variation
+    contacts, variation = line_load.shape[0], batch.variation
     dissipation, sums = np.empty(line_load.shape), np.empty((len(SUMS), contacts))
     strip_contacts(
         line_load,
