@@ -277,7 +277,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     if state.past_spans is None:
         state = with_rates(problem, state)
     state = edges.at_start_of_step(problem, state)
-    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+    here = problem
+    if problem.varying:
+        here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = conditions_of(here, problem, state, passes)
     order = np.asarray(state.order)
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps

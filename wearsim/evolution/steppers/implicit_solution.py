@@ -172,7 +172,8 @@ def step_by_formula(
     resolved, decreased = np.empty((2, realisations), dtype=np.bool_)
     of_tests = np.empty((7, realisations))
     sums, feedback = np.empty(past.sums.shape[1:]), np.empty(past.feedback.shape[1:])
-    of_bodies, of_contacts = np.empty((6, *depths.shape)), np.empty((3, *shape))
+    work, of_contacts = np.empty((7, *depths.shape)), np.empty((3, *shape))
+    of_bodies, worn = work[:6], work[6]
     begin_step(
         past.spans,
         order,
@@ -203,7 +204,6 @@ def step_by_formula(
         *(bodies, resolved, gap, depths, past.part, of_bodies, of_contacts),
     )
     base, guess = of_bodies[3], of_bodies[4]
-    worn = np.empty(depths.shape)
     exponents = np.array(state.wear_exponents).reshape(shape)
     loads = LoadsOfStep(problem, state, conditions.force, passes, feedback)
     stations, active = problem.shape[0], np.ones(realisations, dtype=np.bool_)
