@@ -38,10 +38,10 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 
 LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
-# part of a contact that adheres up to which edges are resolved: where most of it adheres, wear is
-# greatest at the edge, and the line load is not uniform up to the layer in which it falls
-MOST_ADHESION = 0.5
-CEASING_ADHESION = 0.55  # the same from which edges are not resolved any more
+# part of a contact that adheres up to which edges are resolved, and from which they are not any
+# more: where much of it adheres, wear is greatest at the edge, the line load is not uniform up to
+# the layer in which it falls, and errors of the power add up
+MOST_ADHESION, CEASING_ADHESION = 0.3, 0.4
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
 
