@@ -41,6 +41,9 @@ from wearsim.mechanics.numerics.step_errors import COVER, KEEP, SHARE, assess_st
 from wearsim.types import FloatArray, IntArray
 
 DOUBLED_SHARE = 0.9  # part of the tolerance that a step may add to the profiles, by step doubling
+# least relative error of the energy that a step aims at, by step doubling: where the power changes
+# by jumps, no step is short enough for a smaller one
+LEAST_OF_ENERGY = 1e-4
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 # factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
 # of the volume, which do not add up
@@ -189,6 +192,11 @@ class ImplicitStepper(StepDoublingStepper):
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
         over = np.where(unknown, over, over * left)
+        if self.by_doubling and not _varies(problem):
+            least = max(self.tolerance, LEAST_OF_ENERGY)
+            of_energy, their_order = next_steps_of_energy(half, end, least, KEEP, most)
+            order = np.where(of_energy[1] < ratio, their_order, order)
+            over, ratio = np.maximum(over, of_energy[0]), np.minimum(ratio, of_energy[1])
         if self.forced_step is not None:  # fixed steps may be too long for higher orders
             order = np.minimum(order, MAX_ORDER - 2)
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
