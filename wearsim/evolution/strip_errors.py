@@ -44,8 +44,8 @@ COVER, PARTIAL_COVER, FRESH_COVER = (
     np.array(factors)[:, None] for factors in ((0.3, 0.5, 0.9), (0.8, 1.1, 1.3), (1.6, 1.8, 1.8))
 )
 OF_PROFILE = 0.1  # estimates of depth and volume over that of the profile, all relative, at least
-# difference of the mean over a strip from the depth in its middle, over that of a parabola: the edge
-# of a groove within a strip, from 1 to 4 by the angle at which the depth begins
+# difference of the mean over a strip from the depth in its middle, over that of a parabola, at the
+# edge of a groove within a strip: from 1 to 4 by the angle at which the depth begins
 IN_MIDDLE = 2.0
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
 COARSE_TOLERANCE = 1e-5  # of the iterations of a step

@@ -41,7 +41,7 @@ GROOVE = 4.0  # worn descent over the elastic approach from which edges are reso
 # part of a contact that adheres up to which edges are resolved, and from which they are not any
 # more: where much of it adheres, wear is greatest at the edge, the line load is not uniform up to
 # the layer in which it falls, and errors of the power add up
-MOST_ADHESION, CEASING_ADHESION = 0.3, 0.4
+MOST_ADHESION, CEASING_ADHESION = 0.4, 0.5
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
 
