@@ -41,6 +41,9 @@ from wearsim.mechanics.numerics.step_errors import COVER, KEEP, SHARE, assess_st
 from wearsim.types import FloatArray, IntArray
 
 DOUBLED_SHARE = 0.9  # part of the tolerance that a step may add to the profiles, by step doubling
+# least relative error of the energy that a step aims at: no step is short enough for a smaller one,
+# as iterations are not more accurate, and by step doubling where the power changes by jumps
+LEAST_OF_ENERGY, LEAST_OF_JUMPS = 1e-5, 1e-4
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 # factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
 # of the volume, which do not add up
@@ -142,9 +145,8 @@ class ImplicitStepper(StepDoublingStepper):
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
-        of_energy, their_order = next_steps_of_energy(
-            state, end, self.tolerance, KEEP, edges.most(end)
-        )
+        least = max(self.tolerance, LEAST_OF_ENERGY)
+        of_energy, their_order = next_steps_of_energy(state, end, least, KEEP, edges.most(end))
         order = np.where(of_energy[1] < ratio, their_order, order)
         # the error so far shortens the next step
         over, ratio = np.maximum(over * left, of_energy[0]), np.minimum(ratio, of_energy[1])
@@ -189,6 +191,11 @@ class ImplicitStepper(StepDoublingStepper):
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
         over = np.where(unknown, over, over * left)
+        if self.by_doubling and not _varies(problem):
+            least = max(self.tolerance, LEAST_OF_JUMPS)
+            of_energy, their_order = next_steps_of_energy(half, end, least, KEEP, most)
+            order = np.where(of_energy[1] < ratio, their_order, order)
+            over, ratio = np.maximum(over, of_energy[0]), np.minimum(ratio, of_energy[1])
         if self.forced_step is not None:  # fixed steps may be too long for higher orders
             order = np.minimum(order, MAX_ORDER - 2)
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
