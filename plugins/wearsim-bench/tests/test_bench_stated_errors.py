@@ -175,7 +175,7 @@ def test_failure_of_a_reference_is_kept_too(tmp_path, monkeypatch):
         raise SolverError("it takes longer")
 
     monkeypatch.setattr(references, "computed_reference", fails)
-    with pytest.raises(SolverError, match="it takes longer$"):
+    with pytest.raises(SolverError, match=r"it takes longer$"):
         reference_of(TEST, tmp_path)
     monkeypatch.undo()
     with pytest.raises(SolverError, match=r"it takes longer \(kept in small-"):
