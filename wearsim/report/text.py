@@ -85,9 +85,16 @@ def count(value: float) -> str:
     return f"{value:,.0f}"
 
 
+def count_of(number: int, noun: str, none: str = "") -> str:
+    """Return a number of things, "1 unit" or "1,000 units"; of zero another text if it is given."""
+    if not number and none:
+        return none
+    return f"{count(number)} {noun}{'' if number == 1 else 's'}"
+
+
 def number_of_realisations(number: int) -> str:
     """Return "1 realisation" or "1,000 realisations"."""
-    return f"{count(number)} realisation{'' if number == 1 else 's'}"
+    return count_of(number, "realisation")
 
 
 def pass_unit(greatest: float) -> tuple[float, str]:

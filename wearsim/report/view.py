@@ -52,6 +52,11 @@ class Row(NamedTuple):
     error: float | None = None
     answers: Mapping[str, tuple[float | None, str]] = {}
 
+    @classmethod
+    def answer(cls, label: str, name: str, value: float, unit: str) -> Row:
+        """Return the row of one number [SI] that other studies ask for by a name."""
+        return cls(label, value, unit, answers={name: (value, unit)})
+
     @property
     def text(self) -> str:
         """The quantity with its unit and error."""

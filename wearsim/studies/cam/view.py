@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.mechanics.cam import surface_points
+from wearsim.mechanics.cam import extreme, surface_points
 from wearsim.report.text import NOTHING, PER_SI, in_unit, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
+from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import harmonic_depth
-from wearsim.studies.cam.study import CamStudy
+from wearsim.studies.cam.study import CamStudy, peak_pressures
+from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.fatigue.unworn import lives_at, stresses_below
 from wearsim.studies.fatigue.view import source_rows, with_sources
 from wearsim.types import FloatArray
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from wearsim.report.surfaces import Sampling, Surface
 
 
+#: what wear tests of cams do not contain, beside what is not in those of cylinders
+CAM_EXCLUDED = ("vibration of the follower", "uneven wear around the roller")
 # titles of the columns of the motion table, names of their values, and units
 _MOTION = (
     ("angle", "angle_rad", "deg"),
@@ -308,3 +312,17 @@ def _without_rounding(values: FloatArray) -> list[float]:
     """Return values, with 0 for those that are zero to the rounding of the greatest."""
     size = np.abs(values)
     return [float(value) for value in np.where(size > 1e-11 * size.max(), values, 0.0)]
+
+
+def loads(scenario: Scenario) -> Rows:
+    """Return speed, force, torque and pressure of a cam before wear."""
+    turn = CamTurn(scenario)
+    least, greatest = turn.normal_range
+    pressure, theta = extreme(turn.panels, lambda p, x: peak_pressures(scenario, turn.at(p, x)))
+    torque, _ = extreme(turn.panels, lambda p, x: np.abs(turn.at(p, x).drive_torque))
+    return [
+        Row("speed", turn.speed, "rpm"),
+        Row("normal force", f"{shown(least, 'N', 3)} to {shown(greatest, 'N', 3)}"),
+        Row("peak pressure, new", f"{shown(pressure, 'MPa', 3)} at {turn.place(theta)}"),
+        Row("drive torque", f"up to {shown(torque, 'N m', 3)}, without losses"),
+    ]

@@ -333,7 +333,7 @@ def demonstration(
     >>> wearsim.demonstration(lives, "R=0.9 C=0.95 at 5e5")
     <Demonstration 'a wear test': R = 0.9, C = 0.95 at 500000 passes, 29 specimens>
     """
-    designs = [lives] if isinstance(lives, LifeResult) else list(lives)
+    designs = list(lives) if isinstance(lives, Sequence) else [lives]
     need = Requirement.parse(requirement, designs[0].unit)
     share = 1.0 - need.survival
     for design in designs:

@@ -19,7 +19,7 @@ from wearsim.mechanics.numerics.jit import not_cached
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
-from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, sources
+from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, parse_plan, sources
 from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
 from wearsim.studies.failures import explained
 from wearsim.studies.kernels import kernels_of
@@ -213,6 +213,30 @@ class RealisationRunner:
         self.text, self.file, self.files = scenario.text, scenario.file, dict(scenario.files)
         self.plan, self.total, self.grid = plan, total, grid
         self._prepared: dict[object, ContactModel] = {}
+
+    @classmethod
+    def continuing(cls, result: EnsembleResult, total: int | None) -> RealisationRunner:
+        """Return the runner of the realisations in a file.
+
+        Parameters
+        ----------
+        result : EnsembleResult
+            Content of the file.
+        total : int, optional
+            New number of realisations; by default that of the file.
+        """
+        data = result.raw
+        grid = Grid(data.variables["y"], data.strip_width)
+        return cls(result.scenario, parse_plan(data.plan), total or data.requested, grid)
+
+    @property
+    def state(self) -> dict[str, object]:
+        """Fields of the file that depend on the number of realisations."""
+        return {}
+
+    def further(self, result: EnsembleResult) -> RealisationRunner | None:
+        """Return the runner of realisations that follow from earlier ones, None without any."""
+        return None
 
     def result(self, data: EnsembleData, path: Path | None) -> EnsembleResult:
         """Return the result of the realisations in a file."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -126,6 +126,30 @@ class LifeRunner(RealisationRunner):
         super().__init__(scenario, "monte-carlo", total, grid)
         self.settings, self.base = settings, base
         self._levels: dict[tuple[int, int], LevelRunner] = {}
+
+    @classmethod
+    def continuing(cls, result: LifeResult, total: int | None) -> LifeRunner:  # type: ignore[override]
+        """Return the runner of the tests in a file; parameters as of `RealisationRunner`."""
+        data, settings = result.raw, result.settings
+        plain = total or settings.plain
+        grid = Grid(data.variables["y"], data.strip_width)
+        changed = replace(settings, plain=plain)
+        return cls(result.scenario, plain, grid, changed, data.life["base"])
+
+    @property
+    def state(self) -> dict[str, object]:
+        """Fields of the file that depend on the number of tests."""
+        return {"life": {**asdict(self.settings), "base": self.base}}
+
+    def further(self, result: LifeResult) -> LifeRunner | None:  # type: ignore[override]
+        """Return the runner of the next tests for rare events, None after the last ones."""
+        from wearsim.studies.life.rare.stages import next_stages  # noqa: PLC0415  (not of workers)
+
+        if not (stages := next_stages(result)):
+            return None
+        settings = replace(self.settings, stages=(*self.settings.stages, *stages))
+        total = stages[-1]["first"] + stages[-1]["count"]
+        return LifeRunner(self.scenario, total, self.grid, settings, self.base)
 
     def result(self, data: EnsembleData, path: Path | None) -> LifeResult:
         """Return the result of the realisations in a file."""

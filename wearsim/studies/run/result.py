@@ -88,6 +88,11 @@ class RunData(StudyData):
         """Schema of the results file."""
         return self.schema_of({}, {*self.static, *self.history})
 
+    @property
+    def fatigue(self) -> bool:
+        """Whether it has the damage of its bodies."""
+        return "damage" in self.history
+
     @classmethod
     def schema_of(cls, attributes: Mapping[str, Any], names: Container[str]) -> Schema:
         """Return the schema of a file by its attributes and the names of its variables."""

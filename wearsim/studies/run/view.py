@@ -28,10 +28,10 @@ from wearsim.report.view import Column, Columns, Frame, Overview, Row, Rows, wid
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
 from wearsim.studies.fatigue.view import (
     EXCLUDED as NO_FATIGUE,
+    fatigue_data,
     fatigue_rows,
-    has_fatigue,
-    sourced_table,
-    sources_of,
+    fatigue_scenario,
+    with_sources,
 )
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.schema import ALL_VARIABLES, AXES
@@ -163,9 +163,6 @@ class RunView(StudyView[Result]):
             error = final[f"{name}_error_{key}"]
             return with_error(np.asarray(final[f"{name}_{key}"]), float(np.max(error)), unit)
 
-        def of(name: str, unit: str, key: str) -> dict[str, tuple[float | None, str]]:
-            return {name: (float(np.max(final[f"{name}_{key}"])), unit)}
-
         arm, greatest = self._arm_length(), float(np.max(final["lift_error_m"]))
         of_arm = f", {shown(greatest / arm, 'deg', 3)} of the arm" if arm else ""
         return [
@@ -175,7 +172,7 @@ class RunView(StudyView[Result]):
             Row(
                 "lift error, peak to peak",
                 stated("lift_error", "um", "m") + of_arm,
-                answers=of("lift_error", "um", "m"),
+                answers={"lift_error": (greatest, "um")},
             ),
             Row("least wear of the lift", f"at {stated('least_wear_angle', 'deg', 'rad')}"),
             Row("greatest wear of the lift", f"at {stated('greatest_wear_angle', 'deg', 'rad')}"),
@@ -236,7 +233,7 @@ class RunView(StudyView[Result]):
             "random": varying_inputs(result, result.raw.drawn),
             **self.ending(),
             "limits": result.limits,
-            **({"fatigue_sources": of_bodies} if (of_bodies := sources_of(result)) else {}),
+            **fatigue_data(result),
         }
 
     def _of_arm(self) -> dict[str, Any]:
@@ -284,11 +281,11 @@ class RunView(StudyView[Result]):
     def overview(self) -> Overview:
         """Return the worn body, its loads, and limits that are passed or not."""
         result, excluded = self.result, [*EXCLUDED, "scatter of the inputs"]
-        if has_fatigue(result):
+        if result.raw.fatigue:
             excluded.remove(NO_FATIGUE)
         sheet = self.panels()
         if result.is_cam:
-            from wearsim.studies.cam.overview import CAM_EXCLUDED, loads  # noqa: PLC0415
+            from wearsim.studies.cam.view import CAM_EXCLUDED, loads  # noqa: PLC0415
 
             found, main = loads(result.scenario), sheet.panels["shape"]
             excluded += CAM_EXCLUDED
@@ -315,11 +312,12 @@ class RunView(StudyView[Result]):
             if variable.kind == "history"
             for column in _columns(name, raw.history[name], variable.dims, name, self._angles())
         ]
-        tables: dict[str, Columns] = {"history.csv": [sourced_table(self.result, history)]}
+        scenario = fatigue_scenario(self.result)
+        tables: dict[str, Columns] = {"history.csv": [with_sources(history, scenario)]}
         for file, name in _RECORDS.items():
             always = not name.startswith("roller") and name in raw.records
             if always or (name in raw.records and raw.records[name].any()):
-                tables[file] = [sourced_table(self.result, self._records(name))]
+                tables[file] = [with_sources(self._records(name), scenario)]
         surface = self.surface(Sampling())
         if surface is not None:
             tables["worn_cam.csv"] = [surface.columns]
