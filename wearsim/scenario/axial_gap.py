@@ -100,9 +100,9 @@ class AxialGap:
             root = np.sqrt(2.0 * (self.crown_radius or 0.0))
             return np.asarray((0.75 * np.asarray(area) / root) ** (2.0 / 3.0))
         places, drops, areas = self._table
-        found = np.interp(area, areas, drops)
+        depth = np.interp(area, areas, drops)
         beyond = np.maximum(np.asarray(area) - areas[-1], 0.0) / (2.0 * places[-1])
-        return np.asarray(found + beyond)
+        return np.asarray(depth + beyond)
 
     @property
     def greatest_half_width(self) -> float:

@@ -85,13 +85,13 @@ def read_roller_profiles(
     mistakes: Mistakes, files: InputFile | tuple[InputFile, ...] | None
 ) -> tuple[Profile, ...]:
     """Return the start profiles of rollers; of files with mistakes, which are added, none."""
-    found = []
+    profiles = []
     for file in () if files is None else files if isinstance(files, tuple) else (files,):
         try:
-            found.append(read_profile(file.text, file.path))
+            profiles.append(read_profile(file.text, file.path))
         except ScenarioError as error:
             mistakes.add_file(error, "roller", "profile")
-    return tuple(found)
+    return tuple(profiles)
 
 
 def read_start_surface(mistakes: Mistakes, file: InputFile | None) -> StartSurface | None:
