@@ -211,13 +211,13 @@ def _test_rows(data: Data) -> TableRows:
 
 def _pitting_rows(data: Data) -> TableRows:
     """Return rows on pitting without wear; none of a scenario without fatigue."""
-    found = data.get("pitting_without_wear")
-    if found is None:
+    pitting = data.get("pitting_without_wear")
+    if pitting is None:
         return []
     rollers = None if data["cam"] is None else data["test"]["rollers"]
     names = {"cylinder": "cylinder" if data["cam"] is None else "cam", "roller": "rollers"}
-    sources = [(f"fatigue of the {names[body]}", text) for body, text in found["sources"].items()]
-    return [("pitting without wear", unworn_text(found, rollers)), *sources]
+    sources = [(f"fatigue of the {names[body]}", text) for body, text in pitting["sources"].items()]
+    return [("pitting without wear", unworn_text(pitting, rollers)), *sources]
 
 
 def _rounded(value: float) -> str:

@@ -68,7 +68,7 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     turn = study.turn
     fine = _fine(turn)
     lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
-    found, angle, point = fine.kinematics, fine.angle, study.point
+    kinematics, angle, point = fine.kinematics, fine.angle, study.point
     shaded = " (skids shaded)" if study.skids else ""
     gapped = between_flanks(angle, fine)
 
@@ -79,9 +79,9 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     right: dict[str, Any] = {"dash": "--", "right": True, "colour": ORANGE}
 
     motion = [
-        Line(angle, found.lift, label=f"{lift} [{unit}]"),
-        Line(angle, found.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
-        Line(angle, found.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
+        Line(angle, kinematics.lift, label=f"{lift} [{unit}]"),
+        Line(angle, kinematics.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
+        Line(angle, kinematics.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
     ]
     pressures = peak_pressures(turn.scenario, fine)
     load: list[Mark] = [
@@ -109,9 +109,13 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
             "Pressure angle, and curvature of the cam",
             inner,
             Axis("pressure angle", "deg"),
-            [Line(angle, found.pressure_angle), over_angle(found.curvature, **right), *edges],
+            [
+                Line(angle, kinematics.pressure_angle),
+                over_angle(kinematics.curvature, **right),
+                *edges,
+            ],
             "Pressure angle of the follower, and curvature of the surface of the cam.",
-            right=_right("curvature", "1/mm", found.curvature, 1.0 / PER_SI["mm"]),
+            right=_right("curvature", "1/mm", kinematics.curvature, 1.0 / PER_SI["mm"]),
         ),
         "load": Panel(
             f"Normal force, and peak pressure{shaded}",
@@ -126,13 +130,13 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
             ANGLE,
             Axis("rolling speed", "m/s"),
             [
-                over_angle(turn.speed * found.travel),
-                over_angle(found.spin, **right),
+                over_angle(turn.speed * kinematics.travel),
+                over_angle(kinematics.spin, **right),
                 *edges,
                 *skids,
             ],
             "Speed at which the contact rolls, and speed of the roller over that of the cam.",
-            right=_right("roller/cam speed", "1", found.spin, 1.0),
+            right=_right("roller/cam speed", "1", kinematics.spin, 1.0),
         ),
     }
     rows = [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]]
@@ -305,9 +309,9 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     worn = stations.values_between(deepest, places)
     point = turn.at_stations(fine)
     factor = factor_for(turn, float(deepest.max()))
-    follower, found = turn.cam.follower, point.kinematics
-    fresh = surface_points(follower, found, point.angle)[1]
-    cut = surface_points(follower, found, point.angle, factor * worn)[1]
+    follower, kinematics = turn.cam.follower, point.kinematics
+    fresh = surface_points(follower, kinematics, point.angle)[1]
+    cut = surface_points(follower, kinematics, point.angle, factor * worn)[1]
     marks: list[Mark] = [] if turn.cam.groove else [Patch(*cut, alpha=0.12)]
     label = f"worn, depth x {factor:g}"
     marks += [

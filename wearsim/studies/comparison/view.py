@@ -100,14 +100,14 @@ class ComparisonView(View):
 
     def overview(self) -> Overview:
         """Return the comparison, and the limits of each of the results."""
-        own = super().overview()
+        compared = super().overview()
         labels = [row.label for row in self.comparison.rows]
-        groups, excluded = dict(own.groups), list[str]()
+        groups, excluded = dict(compared.groups), list[str]()
         for label, view in zip(labels, self._views, strict=True):
-            found = view.overview()
-            groups[f"Limits of {label}"] = found.groups.get("Limits", [])
-            excluded += [text for text in found.excluded if text not in excluded]
-        return Overview(own.picture, groups, excluded, alone=True)
+            overview = view.overview()
+            groups[f"Limits of {label}"] = overview.groups.get("Limits", [])
+            excluded += [text for text in overview.excluded if text not in excluded]
+        return Overview(compared.picture, groups, excluded, alone=True)
 
     def data(self) -> dict[str, Any]:
         """Return the comparison in SI units; all results are compared with the first."""

@@ -104,11 +104,11 @@ def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) 
         if not 0.0 < low < high < math.inf:
             continue
         passes = np.geomspace(low, high, _POINTS)
-        found = np.array([risks.at(life) for life in passes.tolist()])
+        levels = np.array([risks.at(life) for life in passes.tolist()])
         curves = {
-            "wear first": (found[:, 2], "-", BLUE),
-            "pitting first": (found[:, 1], "--", ORANGE),
-            "both": (1.0 - found[:, 0], ":", BLACK),
+            "wear first": (levels[:, 2], "-", BLUE),
+            "pitting first": (levels[:, 1], "--", ORANGE),
+            "both": (1.0 - levels[:, 0], ":", BLACK),
         }
         for words, (share, dash, of_curve) in curves.items():
             name, drawn = (f"{label}: {words}", colour) if label else (words, of_curve)

@@ -71,8 +71,8 @@ def sources(scenario: Scenario | None) -> dict[str, str]:
 
 def fatigue_data(result: StudyResult[Any]) -> dict[str, dict[str, str]]:
     """Return the sources of the constants of fatigue of a result for JSON; nothing without it."""
-    found = sources(fatigue_scenario(result))
-    return {"fatigue_sources": found} if found else {}
+    by_body = sources(fatigue_scenario(result))
+    return {"fatigue_sources": by_body} if by_body else {}
 
 
 def source_text(scenario: Scenario | None) -> str:

@@ -380,7 +380,7 @@ def _movers(result: LifeResult, no_effects: str) -> Rows:
     for item in effects[:3]:
         text = f"{shown(item.first.value, '%', 2)} of the scatter"
         if item.name in changes:
-            low, high = (one.value - 1.0 for one in changes[item.name].factors)
+            low, high = (factor.value - 1.0 for factor in changes[item.name].factors)
             text += f"; life {100.0 * low:+.0f} %, {100.0 * high:+.0f} %"
         rows.append(Row(item.name, text))
     return rows or [Row("inputs", "none significantly")]

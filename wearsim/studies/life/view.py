@@ -147,24 +147,24 @@ class LifeView(RealisationsView[LifeResult]):
 
     def _plug_in(self, share: float) -> str:
         """Return the life with median and scatter of K/H taken as known; empty if they are."""
-        found = self.result.uncertain_life(share)
-        if found is None:
+        life = self.result.uncertain_life(share)
+        if life is None:
             return ""
-        plug_in = rounded_lives(found.low, found.plug_in, found.high)[1]
+        plug_in = rounded_lives(life.low, life.plug_in, life.high)[1]
         return f" given {_tests_of(self.result)}; plug-in {plug_in}"
 
     def _levels(self) -> Table:
         """Return predictive and plug-in lives, and what would reduce their uncertainty."""
         result, lines = self.result, []
         for share in result.settings.shares:
-            found = result.uncertain_life(share)
-            assert found is not None
-            known = math.isfinite(found.low) and math.isfinite(found.high)
+            life = result.uncertain_life(share)
+            assert life is not None
+            known = math.isfinite(life.low) and math.isfinite(life.high)
             low, predictive, plug_in, high = rounded_lives(
-                found.low, found.predictive, found.plug_in, found.high
+                life.low, life.predictive, life.plug_in, life.high
             )
-            total = found.by_tests + found.by_realisations
-            parts = (found.by_tests, found.by_realisations)
+            total = life.by_tests + life.by_realisations
+            parts = (life.by_tests, life.by_realisations)
             of_total = [shown(part / total, "%", 2) if total else NOTHING for part in parts]
             deviation = f"{math.sqrt(total):.2g}" if known else NOTHING
             cells = (predictive, plug_in, f"{low}..{high}", deviation)
@@ -284,8 +284,8 @@ class LifeView(RealisationsView[LifeResult]):
 
     def _uncertain(self, share: float) -> dict[str, Any]:
         """Return predictive and plug-in life and their uncertainty; nothing without a posterior."""
-        found = self.result.uncertain_life(share)
-        return {} if found is None else {"given_tests": asdict(found)}
+        life = self.result.uncertain_life(share)
+        return {} if life is None else {"given_tests": asdict(life)}
 
     def _rare(self) -> dict[str, Any] | None:
         if self.result.rare is None:
@@ -320,14 +320,14 @@ class LifeView(RealisationsView[LifeResult]):
 
 def _three_digits(result: LifeResult, share: float) -> str:
     """Return a life and its interval with three digits, or why it is not stated."""
-    found = result.b(share)
-    if not math.isfinite(found.value):
+    life = result.b(share)
+    if not math.isfinite(life.value):
         return life_text(result, share)
     value, low, high = (
         count(float(f"{end:.3g}")) if math.isfinite(end) else NOTHING
-        for end in (found.value, found.low, found.high)
+        for end in (life.value, life.low, life.high)
     )
-    if found.low == found.high:
+    if life.low == life.high:
         return f"{value} {result.unit}"
     return f"{value} {result.unit}, 95 %: {low} to {high}"
 

@@ -287,16 +287,16 @@ class RunView(StudyView[Result]):
         if result.is_cam:
             from wearsim.studies.cam.view import CAM_EXCLUDED, loads  # noqa: PLC0415
 
-            found, main = loads(result.scenario), sheet.panels["shape"]
+            load_rows, main = loads(result.scenario), sheet.panels["shape"]
             excluded += CAM_EXCLUDED
         else:
             named = {row.label: row for row in self.rows()}
-            found = [named[name] for name in ("normal force", "peak pressure")]
+            load_rows = [named[name] for name in ("normal force", "peak pressure")]
             main = sheet.first
         limits = limit_rows(result, brief=True)
         limits = limits or [Row("limits", "none in the scenario, table [limit]")]
         shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
-        groups = {"Loads": found, "Limits": limits, "Wear": shown_rows}
+        groups = {"Loads": load_rows, "Limits": limits, "Wear": shown_rows}
         return Overview(main, groups, excluded)
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
@@ -334,8 +334,8 @@ class RunView(StudyView[Result]):
         degrees = [f"{angle:.6g} deg" for angle in np.degrees(self.result.values("station_angle"))]
         following = [*degrees[1:], ""]
         return [
-            f"before {one}" if one == other else f"at {one}"
-            for one, other in zip(degrees, following, strict=True)
+            f"before {this_angle}" if this_angle == next_angle else f"at {this_angle}"
+            for this_angle, next_angle in zip(degrees, following, strict=True)
         ]
 
     def _along_angle(self) -> Iterator[Column]:
