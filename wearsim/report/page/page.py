@@ -67,7 +67,7 @@ class First:
 
 
 def first_of(views: Sequence[View]) -> First:
-    """Return the first screen of views: of each group that of the first view that has it."""
+    """Return the first screen of views: each group from the first view that has it."""
     from wearsim.report.figures import png_of_panel  # noqa: PLC0415  (imports matplotlib)
 
     overviews = [views[0].overview()]

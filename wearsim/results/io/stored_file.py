@@ -176,7 +176,7 @@ class StoredFile:
 
 
 def _check_link(folder: Any, last: bytes, name: str) -> None:
-    """Raise an error unless a name in a folder is that of an object in the file itself."""
+    """Raise an error unless a name in a folder leads to an object in the file itself."""
     from h5py import h5l  # noqa: PLC0415  (takes 0.2 s to import)
 
     if not folder.links.exists(last):
@@ -206,7 +206,7 @@ def _check_zeros(
 
 
 def _is_plain(kind: Any) -> bool:
-    """Return whether a type of HDF5 is that of numbers or of texts of fixed length."""
+    """Return whether a type of HDF5 holds numbers or texts of fixed length."""
     from h5py import h5t  # noqa: PLC0415  (takes 0.2 s to import)
 
     of_text = kind.get_class() == h5t.STRING and not kind.is_variable_str()

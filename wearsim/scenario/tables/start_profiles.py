@@ -40,11 +40,11 @@ class StartSurface:
 
     @property
     def varies(self) -> bool:
-        """Whether the heights are those of several angles."""
+        """Whether there are heights at several angles."""
         return len(self.angle) > 1
 
     def at(self, angle: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the heights at angles and positions, linear between those of the surface.
+        """Return the heights at angles and positions, by linear interpolation of the surface.
 
         Parameters
         ----------

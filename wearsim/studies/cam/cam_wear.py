@@ -66,7 +66,7 @@ class CamView:
         return cls(angles, at_angles, stations.values_at_angles(eye, CURVE_ANGLES))
 
     def grooves(self, depth: FloatArray) -> dict[str, FloatArray]:
-        """Return the worn profile of each surface from those at all stations [m].
+        """Return the worn profile of each surface from the profiles at all stations [m].
 
         Parameters
         ----------

@@ -51,7 +51,7 @@ def cam_observables(
     problem : WearProblem
     state : WearState
     row : mapping of str to ndarray
-        Observables of the run, with those of `cam_history`.
+        Observables of the run, `cam_history` among them.
     """
     cam = problem.kinematics.cam
     if cam is None:
@@ -70,7 +70,7 @@ def lift_curves(
 ) -> list[FloatArray]:
     """Return the lift error of each realisation at `CURVE_ANGLES` [m].
 
-    Of several rollers it is that of the one whose lift error varies most.
+    Of several rollers it is the curve of the roller whose lift error varies most.
 
     Parameters
     ----------

@@ -162,7 +162,7 @@ def _right(
     per_si: float,
     margin: tuple[float, float] = (0.0, 0.0),
 ) -> Axis:
-    """Return the axis at the right; that of a constant reaches around it."""
+    """Return the axis at the right, which reaches around a constant."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     limits: tuple[float | None, float | None] = (None, None)
     if high - low <= 1e-6 * abs(high):  # constant but for rounding

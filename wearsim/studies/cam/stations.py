@@ -95,7 +95,7 @@ def _relocated(turn: CamTurn, change: FloatArray) -> CamStations:
 
 
 def joined(stations: CamStations) -> CamStations:
-    """Return the stations with equal ones joined: those of a dwell, or of a rise and its return."""
+    """Return the stations, equal ones joined: of a dwell, or of a rise and its return."""
     columns = [getattr(stations, name).ravel() for name in _COMPARED]
     columns.append(np.abs(stations.pressure_angle.ravel()))
     scales = [max(float(np.nanmax(np.abs(column), initial=0.0)), 1e-300) for column in columns]

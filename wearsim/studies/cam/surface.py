@@ -127,7 +127,7 @@ def _points(
 def _distinct(points: FloatArray) -> BoolArray:
     """Return which points, the last axis, differ from the following one in any curve.
 
-    Of two equal points that at the start of a segment is kept, and not that at 360 deg.
+    Of two equal points the one at the start of a segment is kept, not the one at 360 deg.
     """
     return np.asarray((np.abs(np.roll(points, -1, axis=1) - points) > _DOUBLED).any(axis=0))
 

@@ -28,7 +28,7 @@ from wearsim.studies.cam.point import Point
 from wearsim.types import BoolArray, FloatArray
 
 STEEP = {"translating": math.radians(30.0), "swinging": math.radians(45.0)}
-SHARP = 2.0  # radius of the pitch curve over that of the roller, below which the contact is warned
+SHARP = 2.0  # radius of the pitch curve over the roller's, below which the contact is warned
 PART_OF_TOLERANCE = 0.25  # for the stations
 LEAST_LOAD = 1e-4  # of the greatest, where the flank of a groove changes
 _FINE = 1e-10  # tolerance of integrals over a turn
@@ -147,7 +147,7 @@ class CamTurn:
         return float(np.abs(self.effort(self.cam.motion.lift(theta), theta)).max())
 
     def at_angles(self, theta: FloatArray) -> Point:
-        """Return the state at any angles [rad]; between segments that of the following one."""
+        """Return the state at any angles [rad]; between two segments in the following one."""
         theta = np.asarray(theta, dtype=np.float64)
         return self.point(self.cam.motion.lift(theta), theta)
 
@@ -241,7 +241,7 @@ class CamTurn:
         return tuple(parts)
 
     def slip(self, theta: FloatArray, within: FloatArray | None = None) -> FloatArray:
-        """Return the slip of the roller, its lack of speed over that of the cam.
+        """Return the slip of the roller, its lack of speed relative to the cam's speed.
 
         Parameters
         ----------
@@ -278,7 +278,7 @@ class CamTurn:
 
     @cached_property
     def greatest_demand(self) -> float:
-        """Greatest traction of a rolling free roller, over that of friction; at most 1."""
+        """Greatest traction of a rolling free roller, over the limit of friction; at most 1."""
 
         def demand(panel: Panel, theta: FloatArray) -> FloatArray:
             torque = np.abs(self.torque(self.at(panel, theta)))

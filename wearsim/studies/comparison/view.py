@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +55,7 @@ class ComparisonView(View):
         Scenario key in which the results differ, of a sweep.
     """
 
+    sheet = "wearsim.studies.comparison.panels:comparison_sheet"
     basis = (
         "Intervals of ensembles are those of their means; those of runs contain the error of the"
         " steps only."
@@ -131,8 +133,6 @@ class ComparisonView(View):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels, with the worn profiles for a page."""
-        from wearsim.studies.comparison.panels import comparison_sheet  # noqa: PLC0415  (only of figures)
-
         titles = {result.title for result in self.results}
         shared = titles.pop() if len(titles) == 1 else ""
         suffix = f"for values of {self.key}" if self.key else ""
@@ -142,7 +142,8 @@ class ComparisonView(View):
             label: result.worn_profile()
             for label, result in zip(labels, self.results, strict=False)
         }
-        return comparison_sheet(self.comparison, heading, profiles)
+        drawn: Sheet = resolve_name(self.sheet)(self.comparison, heading, profiles)
+        return drawn
 
 
 def comparison_view(

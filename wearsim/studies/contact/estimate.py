@@ -24,7 +24,7 @@ INDICATORS = (
     "ln of the line load's curvature over a half-length, plus 0.001",
 )
 _BEYOND = 0.1  # allowed beyond the range of an indicator, over that range
-#: Times of one contact up to this one, over that of the cheapest model, do not count: well below a
+#: Times of one contact up to this multiple of the cheapest model's do not count: well below a
 #: millisecond.
 CHEAP = 10.0
 #: indicators whose errors do not increase beyond their greatest and their least value: contacts

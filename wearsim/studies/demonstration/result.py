@@ -217,7 +217,7 @@ class Demonstration(Viewed):
 
     @property
     def meets(self) -> float:
-        """Probability that the survival of the simulated design is that to show, or greater."""
+        """Probability that the simulated design has the survival to show, or a greater one."""
         return float((self._scale >= 0.0).mean()) if np.isfinite(self._scale).all() else math.nan
 
     def acceleration(self, design: int) -> Interval:
@@ -258,7 +258,7 @@ class Demonstration(Viewed):
         failures : int
             That are allowed.
         design : int
-            Number of the conditions of the test, 0 for those of service.
+            Number of the conditions of the test, 0 for service.
 
         Returns
         -------

@@ -86,7 +86,7 @@ def with_source_lines(title: str, result: StudyResult[Any]) -> str:
 
 
 def with_sources(columns: Iterable[Column], scenario: Scenario | None) -> list[Column]:
-    """Return columns of a CSV file, those of fatigue with the source of its constants."""
+    """Return columns of a CSV file, with the source of the constants of fatigue."""
     text = source_text(scenario)
     return [
         column._replace(source=text) if re.search("damage|pitting", column.name) else column

@@ -42,8 +42,8 @@ def returns_sheet(result: FieldReturns, measured: Sequence[Measured] = ()) -> Sh
     Returns
     -------
     Sheet
-        Survival before and after, with that of the units; failures in bands of lives; remaining
-        life of running units against their age.
+        Survival before and after, and of the units; failures in bands of lives; remaining life of
+        running units against their age.
     """
     panels = {
         "survival": _survival(result),

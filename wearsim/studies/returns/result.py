@@ -280,7 +280,7 @@ def field_returns(
         Geometric standard deviation, from 1 on, of the prior of a factor by which all lives in the
         field differ from the computed ones; its median is 1.
     labels : sequence of str
-        Names of several designs in the column ``design``; by default those of their files.
+        Names of several designs in the column ``design``; by default the names of their files.
 
     Returns
     -------

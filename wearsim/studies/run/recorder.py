@@ -439,7 +439,7 @@ class Recorder:
         return columns
 
     def _error_of_turn(self, columns: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the relative error of sums over the stations of a cam, that of its volume."""
+        """Return the relative error of sums over the stations of a cam, taken from its volume."""
         error = columns.get("volume_error_by_stations")
         if error is None:
             return np.zeros(len(self._history))

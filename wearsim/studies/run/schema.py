@@ -261,7 +261,7 @@ FATIGUE_VARIABLES: Mapping[str, Variable] = by_name(
         )
     )
 )
-#: those of the run of a cam
+#: axes and variables of the run of a cam
 CAM_FATIGUE_VARIABLES: Mapping[str, Variable] = by_name(
     (
         Variable(

@@ -189,7 +189,7 @@ def _likely(
 ) -> tuple[NoiseModels, FloatArray, FloatArray]:
     """Return a grid of noise models, the variance of each, and the logarithm of its weight.
 
-    One axis is the logarithm of the correlation length, the other that of the variance of the white
+    The axes are logarithms: of the correlation length, and of the variance of the white
     noise over that of a step of the process from point to point. Short distances show both parts of
     this ratio, whereas the white share is hardly independent of a correlation length that is long.
     """

@@ -45,7 +45,7 @@ class Hierarchy:
     t : ndarray, shape (t,)
         Grid of the scatter of ln K.
     tests : int, optional
-        Number of tests, by default that of the kernels.
+        Number of tests, by default one for each kernel.
     """
 
     def __init__(
@@ -185,12 +185,12 @@ class Posterior:
         )
 
     def bayes_factor(self, scale: float | None = None) -> float:
-        """Return the evidence of t = 0 over that of a half-normal t, with a flat m.
+        """Return the ratio of evidence, t = 0 over a half-normal t, with a flat m.
 
         Parameters
         ----------
         scale : float, optional
-            Scale of the prior of t; by default that of the posterior.
+            Scale of the prior of t; by default the scale of the posterior.
         """
         prior = half_normal(self.t, scale or self.scale) * trapezoid_weights(self.t)
         evidence = self.evidence()
@@ -210,7 +210,7 @@ class Posterior:
         ----------
         probability : sequence of float
         scale : float, optional
-            Scale of the prior of t; by default that of the posterior.
+            Scale of the prior of t; by default the scale of the posterior.
         """
         below = _cumulative(self.evidence() * half_normal(self.t, scale or self.scale), self.t)
         return [float(np.interp(p, below, self.t)) for p in probability]

@@ -75,7 +75,7 @@ class Design:
     kernels : sequence of LikelihoodMixture
         Likelihood of each test; of more tests they are repeated in this order.
     tests : int, optional
-        Number of tests, by default that of the kernels.
+        Number of tests, by default one for each kernel.
     negligible : float
         Scatter of ln K below which it is negligible.
     seed : int
@@ -122,7 +122,7 @@ class Design:
 
 
 def word(random: bool, upper: float, negligible: float) -> Word:
-    """Return the verdict of tests: first that of a test of equivalence, then that of t = 0.
+    """Return the verdict of tests: by a test of equivalence first, then by a test of t = 0.
 
     Parameters
     ----------

@@ -203,7 +203,7 @@ def _common_grid(designs: tuple[LifeDistribution, ...], most: float) -> FloatArr
 
 
 def _with_start(failed: FloatArray) -> FloatArray:
-    """Return probabilities of failure with those at life 0, where nothing has failed."""
+    """Return probabilities of failure from life 0 on, where nothing has failed."""
     return np.concatenate([np.zeros((len(failed), 1)), failed], axis=1)
 
 

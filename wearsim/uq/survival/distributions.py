@@ -184,7 +184,7 @@ class FactorMixture(LifeDistribution):
 
     @cached_property
     def middle(self) -> float:
-        """A life within the distribution: that of the median wear factor."""
+        """A life within the distribution, at the median wear factor."""
         finite = self.kappa[self.is_finite]
         return (
             float(np.median(finite) / math.exp(self.score.log_quantile(0.0)))

@@ -288,7 +288,7 @@ class IntegratedFit(FittedLives):
     degrees : float
         Its degrees of freedom.
     difference : float
-        Greatest difference of its probabilities from those of the lives.
+        Greatest difference of its probabilities from the shares of the lives.
     """
 
     sampling: FloatArray

@@ -144,7 +144,7 @@ def design_point(scores: FloatArray, response: FloatArray) -> FloatArray:
 
 
 def next_shift(scores: FloatArray, response: FloatArray, log_weight: FloatArray) -> FloatArray:
-    """Return the mean of the next density: that of the events, by their weights.
+    """Return the mean of the next density: the weighted mean of the events.
 
     Parameters
     ----------

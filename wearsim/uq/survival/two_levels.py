@@ -106,7 +106,7 @@ class UncertainLives:
     def _quantiles(self, share: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return ln life of a share with m = 0 for each scatter, and the ends of its interval.
 
-        The interval is that of `LifeDistribution.quantile`.
+        The interval is computed as in `LifeDistribution.quantile`.
         """
         value = self._crossings(np.full(len(self.scatters), share))
         if self.mixture.exact:
