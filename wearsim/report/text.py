@@ -189,6 +189,21 @@ OBSERVABLES: Mapping[str, Named] = {
 }
 
 
+#: units of limits of wear by their names; the others are lengths in um
+_LIMIT_UNITS = {
+    "volume": "mm^3",
+    "width": "mm",
+    "peak_pressure": "MPa",
+    "damage": "1",
+    "pitting": "1",
+}
+
+
+def limit_unit(name: str) -> str:
+    """Return the unit in which a limit of wear is shown, a key of `PER_SI`."""
+    return _LIMIT_UNITS.get(name, "um")
+
+
 def si_unit(name: str) -> str:
     """Return the SI unit of an observable, "m3" for a volume."""
     unit = OBSERVABLES[name].unit

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wearsim.report.text import lapse
+from wearsim.report.text import PER_SI, lapse, limit_unit
 from wearsim.studies.dry_run import Data
 from wearsim.studies.fatigue.unworn import unworn_text
 from wearsim.units import in_engineers_unit
@@ -14,13 +14,6 @@ from wearsim.units import in_engineers_unit
 TableRows = list[tuple[str, str]]
 _RADII = ("radius_m", "crown_radius_m", "width_m", "edge_radius_m", "chamfer_m")
 _UNITS = {"_m": ("mm", 1e-3), "_Pa": ("GPa", 1e9), "_rad": ("mrad", 1e-3)}  # by ends of keys
-_LIMIT_UNITS = {
-    "volume": ("mm^3", 1e-9),
-    "peak_pressure": ("MPa", 1e6),
-    "width": ("mm", 1e-3),
-    "damage": ("1", 1.0),
-    "pitting": ("1", 1.0),
-}
 
 
 def plan(data: Data) -> TableRows:
@@ -254,7 +247,8 @@ def _limit_rows(data: Data) -> TableRows:
     """Return a row for each limit of [limit], as forecast."""
     rows, test = [], data["test"]
     for item in data["forecast"]["limits"]:
-        unit, size = _LIMIT_UNITS.get(item["quantity"], ("um", 1e-6))
+        unit = limit_unit(item["quantity"])
+        size = 1.0 / PER_SI[unit]
         name = f"limit of {item['quantity'].replace('_', ' ')}"
         ratio = f"{_rounded(item['at_end'] / size)} of {item['limit'] / size:.4g}"
         ratio += "" if unit == "1" else f" {unit}"

@@ -30,7 +30,6 @@ from wearsim.studies.comparison.compare import (
     Compared,
     Comparison,
     compare,
-    observables_of,
 )
 from wearsim.studies.ensemble.view import INTERVAL
 from wearsim.uq.estimation.intervals import Interval
@@ -154,20 +153,13 @@ def comparison_view(
     Raises
     ------
     ResultsFileError
-        If an ensemble has no completed realisation.
-    ResultsFileError
-        Also if one lacks the observable; the message has the known ones.
+        If one has no completed realisation, or lacks the observable; the message lists what it has.
     """
-    name = observable or "depth"
-    for label, result in zip(labels, results, strict=True):
-        if getattr(result, "count", 1) == 0:
-            raise ResultsFileError(
-                f"{result.path}: has no completed realisation; nothing to compare"
-            )
-        known = observables_of(result)
-        if name not in known:
-            raise ResultsFileError(f"{label} has no '{name}', expected one of {', '.join(known)}")
-    return ComparisonView(compare(results, labels, name), key)
+    try:
+        compared = compare(results, labels, observable or "depth")
+    except ValueError as error:
+        raise ResultsFileError(str(error)) from error
+    return ComparisonView(compared, key)
 
 
 def _warnings(comparison: Comparison) -> list[str]:

@@ -15,6 +15,7 @@ from wearsim.report.text import (
     NOTHING,
     count,
     lapse,
+    limit_unit,
     part_with_interval,
     rounded_lives,
     shown,
@@ -39,11 +40,6 @@ ERROR = (
     " error of the model."
 )
 
-_LIMIT_UNITS = {
-    "volume": "mm^3",
-    "peak_pressure": "MPa",
-    **dict.fromkeys(("damage", "pitting"), "1"),
-}
 _UNKNOWN = (NOTHING, NOTHING)
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
@@ -353,7 +349,7 @@ def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
 
 def limit_texts(limits: Mapping[str, float]) -> list[str]:
     """Return limits of a life by name in SI units as texts, "depth 50.00 um"."""
-    units = ((name, _LIMIT_UNITS.get(name, "um"), value) for name, value in limits.items())
+    units = ((name, limit_unit(name), value) for name, value in limits.items())
     return [f"{name.replace('_', ' ')} {shown(value, unit)}" for name, unit, value in units]
 
 
@@ -415,7 +411,7 @@ def rare_command(result: LifeResult) -> str:
 
 def _limits_in_si(limits: Mapping[str, float]) -> list[str]:
     """Return limits of a life as arguments of --limit, "depth=5e-05 m"."""
-    units = ((name, kind_of(_LIMIT_UNITS.get(name, "um")).unit) for name in limits)
+    units = ((name, kind_of(limit_unit(name)).unit) for name in limits)
     texts = ((name, "" if unit == "1" else f" {unit}") for name, unit in units)
     return [f"{name}={limits[name]:.12g}{unit}" for name, unit in texts]
 

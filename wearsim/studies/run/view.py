@@ -18,6 +18,7 @@ from wearsim.report.text import (
     footer,
     in_unit,
     lapse,
+    limit_unit,
     percent,
     shown,
     simulated,
@@ -57,13 +58,6 @@ _RECORDS = {
     "dissipation.csv": "dissipation",
     "cylinder_damage_profiles.csv": "cylinder_damage_profile",
     "roller_damage_profiles.csv": "roller_damage_profile",
-}
-#: the others in um
-_UNITS = {
-    "volume": "mm^3",
-    "peak_pressure": "MPa",
-    "width": "mm",
-    **dict.fromkeys(("damage", "pitting"), "1"),
 }
 
 
@@ -435,7 +429,7 @@ def limit_rows(result: Result, *, brief: bool = False) -> Rows:
     """
     rows = list[Row]()
     for item in result.limits:
-        unit, name = _UNITS.get(item["quantity"], "um"), item["quantity"].replace("_", " ")
+        unit, name = limit_unit(item["quantity"]), item["quantity"].replace("_", " ")
         side = "above" if item["excess"] >= 0.0 else "below"
         by = "" if brief else f", {abs(100.0 * item['excess']):.3g} % {side}"
         end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)} at the end{by}"
