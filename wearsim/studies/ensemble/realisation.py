@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -278,6 +278,15 @@ class RealisationRunner:
             In the same order.
         """
         outcomes: dict[int, Outcome] = {}
+        for group in batch_groups(self.prepared(numbers, outcomes)):
+            for run, observations in zip(group, observe(group), strict=True):
+                outcomes[run.number] = self.outcome(run, observations)
+        return [outcomes[number] for number in numbers]
+
+    def prepared(
+        self, numbers: Iterable[int], outcomes: dict[int, Outcome]
+    ) -> list[RealisationRun]:
+        """Return the runs of realisations, and add the outcomes of those with an error."""
         runs = []
         for number in numbers:
             drawn: dict[str, float | FloatArray] = {}
@@ -285,10 +294,7 @@ class RealisationRunner:
                 runs.append(self.prepare(number, drawn))
             except Exception as error:  # an error fails this realisation only
                 outcomes[number] = Outcome(number=number, values=drawn, error=failure_text(error))
-        for group in batch_groups(runs):
-            for run, observations in zip(group, observe(group), strict=True):
-                outcomes[run.number] = self.outcome(run, observations)
-        return [outcomes[number] for number in numbers]
+        return runs
 
     def prepare(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
         """Return the run of a realisation, and add the values of its random inputs to `drawn`."""

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.errors import failure_text
 from wearsim.evolution.limits import Limit
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
@@ -22,7 +21,7 @@ from wearsim.studies.life.factor import NEGLIGIBLE, RARE, ExactFactor, exact_fac
 from wearsim.studies.life.rare.draws import changes_of, log_weight
 from wearsim.studies.life.stored_settings import LifeSettings
 from wearsim.studies.run.draws import Drawer
-from wearsim.types import FloatArray, Grid
+from wearsim.types import Grid
 
 if TYPE_CHECKING:
     from wearsim.studies.life.result import LifeResult
@@ -209,16 +208,9 @@ class LifeRunner(RealisationRunner):
         self, level: int, stage: int, numbers: list[int], outcomes: dict[int, Outcome]
     ) -> list[int]:
         """Run realisations of one length and stage; return those that need a longer test."""
-        runner, runs, left = self._level(level, stage), [], []
-        limits = limits_of(self.scenario)
-        for number in numbers:
-            drawn: dict[str, float | FloatArray] = {}
-            try:
-                runs.append(runner.prepare(number, drawn))
-            except Exception as error:  # an error fails this realisation only
-                outcomes[number] = Outcome(number=number, values=drawn, error=failure_text(error))
+        runner, limits, left = self._level(level, stage), limits_of(self.scenario), list[int]()
         last = runner.scenario.total_passes >= self.longest
-        for group in batch_groups(runs):
+        for group in batch_groups(runner.prepared(numbers, outcomes)):
             for run, outcome in zip(group, observe_lives(group, limits), strict=True):
                 ended = (
                     isinstance(outcome, Exception) or outcome.reached or outcome.failure is not None
