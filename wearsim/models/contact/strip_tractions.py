@@ -122,8 +122,8 @@ def _excess_torque(
     def excess(creepage: FloatArray) -> FloatArray:
         trial = replace(batch, longitudinal=creepage)
         force = strip_tractions(line_load, half_length, trial, grid, pair)[1][0]
-        found = -force * radius - torque
-        return np.where(rolls, found, creepage - batch.longitudinal)
+        excess = -force * radius - torque
+        return np.where(rolls, excess, creepage - batch.longitudinal)
 
     return excess
 

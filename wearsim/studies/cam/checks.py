@@ -1,4 +1,4 @@
-"""Skids of a cam's roller, and warnings of what is valid but hardly meant."""
+"""Skids of a cam's roller, and warnings of valid but implausible cams."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ class Calibration:
         return ""
 
     def _limited(self, indicators: FloatArray) -> FloatArray:
-        """Return indicators within their range, where nothing changes for the worse beyond it."""
+        """Return indicators cut to their range on the sides beyond which errors do not increase."""
         limited = indicators.copy()
         limited[_UNLIMITED_ABOVE] = np.minimum(limited, self.greatest)[_UNLIMITED_ABOVE]
         limited[_UNLIMITED_BELOW] = np.maximum(limited, self.least)[_UNLIMITED_BELOW]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -36,22 +36,22 @@ def demonstration_sheet(result: Demonstration, measured: Sequence[Measured] = ()
         (f"no failure, {label}", 0, number, result.acceleration(number).value)
         for number, label in enumerate(result.labels[1:], 1)
     ]
-    plans = {
-        name: [result.plan(need.life * ratio / factor, failures, design) for ratio in _DURATIONS]
-        for name, failures, design, factor in tests
-    }
-    colours = dict(zip(plans, several_colours(len(plans)), strict=True))
+    names, *_ = zip(*tests, strict=True)
+    plans = [
+        [result.plan(need.life * ratio / factor, failures, design) for ratio in _DURATIONS]
+        for _, failures, design, factor in tests
+    ]
 
     def panel(
-        title: str, y: Axis, caption: str, curves: Mapping[str, FloatArray], banded: Collection[str]
+        title: str, y: Axis, caption: str, curves: Sequence[FloatArray], banded: Collection[str]
     ) -> Panel:
         """Return values with their ends against the duration; some curves have a band."""
-        marks = list[Mark]()
-        for name, (value, low, high) in curves.items():
-            time = np.array([plan.duration for plan in plans[name]])
-            marks.append(Line(time, value, colour=colours[name], label=name))
+        marks, colours = list[Mark](), several_colours(len(plans))
+        for name, row, colour, ends in zip(names, plans, colours, curves, strict=True):
+            time, (value, low, high) = np.array([plan.duration for plan in row]), ends
+            marks.append(Line(time, value, colour=colour, label=name))
             if name in banded and np.any(low < high):
-                marks.append(Band(time, low, high, colour=colours[name], alpha=0.15))
+                marks.append(Band(time, low, high, colour=colour, alpha=0.15))
         marks.append(Span(need.life, dash=":", colour="0.4", label="life to show"))
         return Panel(title, Axis("duration", need.unit, 1.0, log=True), y, marks, caption)
 
@@ -60,17 +60,17 @@ def demonstration_sheet(result: Demonstration, measured: Sequence[Measured] = ()
             "Specimens",
             Axis("specimens", log=True),
             "Specimens that show the life, against the duration of their test.",
-            {
-                name: np.array([(plan.specimens, plan.low, plan.high) for plan in row], float).T
-                for name, row in plans.items()
-            },
-            plans,
+            [
+                np.array([(plan.specimens, plan.low, plan.high) for plan in row], float).T
+                for row in plans
+            ],
+            names,
         ),
         "passing": panel(
             "Probability that the design passes",
             Axis("passes", "%", limits=(0.0, 1.02)),
             "Probability that the simulated design passes the test, with a 95 % band.",
-            {name: arrays_of(plan.passing for plan in row) for name, row in plans.items()},
+            [arrays_of(plan.passing for plan in row) for row in plans],
             ["no failure"],
         ),
     }
