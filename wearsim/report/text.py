@@ -40,6 +40,7 @@ _SI = {"um": "m", "mm": "m", "mm^3": "m3", "MPa": "Pa", "deg": "rad", "J": "J", 
 TOO_FEW = "too few"
 TOO_FEW_REALISATIONS = "too few realisations"
 NINETY_PERCENT = (0.05, 0.95)
+QUANTILES = (0.05, 0.5, 0.95)  # that tables show
 _HALF_WIDTH_DIGITS = 2  # significant digits of the half-width, which set the decimals
 _MIN_DIGITS, _MAX_DIGITS = 3, 8  # significant digits of an estimate
 _WITHOUT_EXPONENT = (1e-4, 1e7)

@@ -15,6 +15,7 @@ from wearsim.report.text import (
     NINETY_PERCENT,
     NOTHING,
     OBSERVABLES,
+    QUANTILES,
     TOO_FEW_REALISATIONS,
     cells,
     count,
@@ -50,7 +51,6 @@ from wearsim.studies.fatigue.view import (
 )
 from wearsim.uq.estimation.estimates import Estimate, Target
 
-QUANTILES = (0.05, 0.5, 0.95)
 INTERVAL = "  95 % interval"
 _HEADS = ("at the end", "mean", "std", "5 %", "median", "95 %")
 _SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")

@@ -13,6 +13,7 @@ import numpy as np
 
 from wearsim.report.text import (
     NOTHING,
+    TOO_FEW_REALISATIONS,
     count,
     lapse,
     limit_unit,
@@ -202,7 +203,7 @@ class LifeView(RealisationsView[LifeResult]):
         if result.settings.alone:
             return result.settings.factor
         if result.count == 1:
-            return "too few realisations"
+            return TOO_FEW_REALISATIONS
         if result.are_equal:
             return "nothing, no two lives differ"
         if result.effects_obstacle:

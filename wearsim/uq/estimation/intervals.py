@@ -12,6 +12,8 @@ from wearsim.types import FloatArray
 
 CONFIDENCE = 0.95
 """Confidence of all intervals."""
+ENDS = np.array([0.025, 0.975])
+"""Probabilities of the ends of such an interval."""
 
 
 @dataclass(frozen=True)

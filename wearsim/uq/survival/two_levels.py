@@ -14,11 +14,10 @@ import numpy as np
 
 from wearsim.types import FloatArray
 from wearsim.uq.distributions.two_levels import TwoLevels, weighted_quantiles
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+from wearsim.uq.estimation.intervals import ENDS, UNKNOWN, Interval
 from wearsim.uq.survival.distributions import FactorMixture, logit_interval
 from wearsim.uq.survival.scores import ScoreFunction
 
-ENDS = np.array([0.025, 0.975])
 _WIDE = 700.0  # greatest magnitude of a logarithm
 _NODES = 121  # of ln life at which probabilities are tabulated for each scatter
 _REACH = 8.0  # of these nodes beyond the realisations, in scatters
