@@ -7,7 +7,17 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from wearsim.levelling import Measured
-from wearsim.report.panels import Axis, Band, Line, Mark, Panel, Sheet, Span, several_colours
+from wearsim.report.panels import (
+    Axis,
+    Band,
+    Line,
+    Mark,
+    Panel,
+    Sheet,
+    Span,
+    several_colours,
+    share_axis,
+)
 from wearsim.report.text import count_of
 from wearsim.studies.demonstration.result import Demonstration
 from wearsim.types import FloatArray
@@ -68,7 +78,7 @@ def demonstration_sheet(result: Demonstration, measured: Sequence[Measured] = ()
         ),
         "passing": panel(
             "Probability that the design passes",
-            Axis("passes", "%", limits=(0.0, 1.02)),
+            share_axis("passes"),
             "Probability that the simulated design passes the test, with a 95 % band.",
             [arrays_of(plan.passing for plan in row) for row in plans],
             ["no failure"],

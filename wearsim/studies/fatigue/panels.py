@@ -19,6 +19,7 @@ from wearsim.report.panels import (
     Records,
     message,
     pass_axis,
+    share_axis,
     worn_limits,
 )
 from wearsim.report.text import shown
@@ -119,5 +120,5 @@ def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) 
         text += f" {shown(level.pitting, '%', 3)} by pitting."
     if not marks:
         return message(title, "no life ended by wear or by pitting")
-    x, y = Axis(axis.name, axis.unit, axis.per_si, log=True), Axis("ended", "%", limits=(0.0, 1.02))
+    x, y = Axis(axis.name, axis.unit, axis.per_si, log=True), share_axis("ended")
     return Panel(title, x, y, marks, text.strip(), legend="upper left")

@@ -20,6 +20,7 @@ from wearsim.report.panels import (
     dots,
     message,
     several_colours,
+    share_axis,
 )
 from wearsim.report.text import count
 from wearsim.studies.returns.result import SHARES, FieldReturns
@@ -82,9 +83,7 @@ def _survival(result: FieldReturns) -> Panel:
     if target is not None:
         marks.append(Span(target, dash=":", colour="0.4", label=f"target {count(target)}"))
     text = "Share of the machines that outlast a life, before and after the returns."
-    return Panel(
-        "Survival, with 95 % bands", axis, Axis("survival", "%", limits=(0, 1.02)), marks, text
-    )
+    return Panel("Survival, with 95 % bands", axis, share_axis("survival"), marks, text)
 
 
 def _failures(result: FieldReturns) -> Panel:
