@@ -279,13 +279,12 @@ class WearProblem:
         filled: dict[str, Any] = {
             n: own_array(np.broadcast_to(c, self.shape)).ravel() for n, c in columns.items()
         }
-        shape, free = (*self.shape, self.grid.strips), self.free
+        shape = (*self.shape, self.grid.strips)
         return ContactBatch(
             gap=np.broadcast_to(self.nominal_gap, shape).reshape(-1, shape[-1]),
             normal_force=np.zeros(math.prod(self.shape)),
             **filled,
             shape=self.shape,
-            mean_radius=free and self.kinematics.cam is not None,
         )
 
     @cached_property
