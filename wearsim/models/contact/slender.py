@@ -131,9 +131,9 @@ class Slender(StripModel):
                 lambda trial: strip_tractions(*solved, trial, *tangential)[2],
             )
         dissipation, sums, _ = strip_tractions(*solved, batch, *tangential)
-        finite = np.isfinite(sums)
-        if np.count_nonzero(finite) < finite.size:
-            number = int(np.argmin(finite.all(axis=0)))
+        unknown = (~np.isfinite(sums)).nonzero()[1]
+        if unknown.size:
+            number = int(unknown.min())
             error = power_not_finite(batch.point(number), line_load=line_load[number])
             raise naming_contact(error, number, batch)
         return ContactBatchSolution.of_columns(

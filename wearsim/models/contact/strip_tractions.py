@@ -38,7 +38,7 @@ def strip_tractions(
     torque : ndarray, shape (contacts,)
         Of the longitudinal tractions on the rollers [N m]; zero without their rolling radii.
     """
-    contacts, variation, radius = len(line_load), batch.variation, batch.rolling_radius
+    contacts, variation, radius = line_load.shape[0], batch.variation, batch.rolling_radius
     dissipation, none = np.empty(line_load.shape), np.empty((contacts, 0))
     sums, torque = np.empty((len(SUMS), contacts)), np.empty(contacts)
     strip_contacts(
