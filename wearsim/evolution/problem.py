@@ -250,10 +250,8 @@ class WearProblem:
         It is not where strips reach the ends of a roller, a rounding or a chamfer, on measured
         profiles, and with other forms along the axis than circular crowns.
         """
-        if not self.crowned:
-            return False
         bend = np.diff(self.nominal_gap, 2, axis=-1)
-        if bend.size == 0:  # fewer than three strips
+        if not self.crowned or bend.size == 0:  # of fewer than three strips
             return False
         return bool(((bend > 0.0) & (bend < UNEVEN * np.median(bend, -1, keepdims=True))).all())
 
@@ -320,9 +318,8 @@ class WearProblem:
     @cached_property
     def pauses(self) -> list[FloatArray]:
         """Start and end of the pauses of each realisation, shape (pauses, 2) [passes]."""
-        pauses = [load.pauses for load in self.loads]
-        rate = self.kinematics.pass_rate
-        return [times * rate for times in pauses] if any(map(len, pauses)) else []
+        pauses = [load.pauses * self.kinematics.pass_rate for load in self.loads]
+        return pauses if any(map(len, pauses)) else []
 
     @cached_property
     def greatest_load(self) -> FloatArray:
@@ -495,8 +492,7 @@ class WearProblem:
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
         physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
-        total: FloatArray = self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0]
-        return total
+        return np.asarray(self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0])
 
     def mean_over_turn(self, values: FloatArray) -> FloatArray:
         """Return the mean over the stations weighted by their time, first axis of length one."""
