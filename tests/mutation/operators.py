@@ -57,6 +57,8 @@ class Mutant:
         First and last line of the changed expression or statement.
     before, after : str
         Source of it.
+    line : str
+        First line of the source of it.
     number : int
         Place among the changes of the module.
     """
@@ -67,6 +69,7 @@ class Mutant:
     lines: tuple[int, int]
     before: str
     after: str
+    line: str
     number: int
 
     def __str__(self) -> str:
@@ -148,13 +151,15 @@ def functions_of(tree: ast.Module) -> Iterator[tuple[str, Function]]:
 
 def mutants_of(root: Path, path: Path) -> list[Mutant]:
     """Return all mutants of a module."""
-    found = []
-    for name, function in functions_of(ast.parse(path.read_text(encoding="utf-8"))):
+    found, text = [], path.read_text(encoding="utf-8")
+    sources = text.splitlines()
+    for name, function in functions_of(ast.parse(text)):
         for kind, node, field, value in changes_of(function):
             lines = node.lineno, node.end_lineno or node.lineno  # type: ignore[attr-defined]
             before, after = _texts(node, field, value)
-            place = path.relative_to(root).as_posix(), name, kind, lines, before, after
-            found.append(Mutant(*place, len(found)))
+            place = path.relative_to(root).as_posix(), name, kind, lines
+            line = sources[lines[0] - 1].strip()
+            found.append(Mutant(*place, before, after, line, len(found)))
     return found
 
 

@@ -168,3 +168,10 @@ def test_error_of_a_great_volume_is_one_of_depth_and_profile() -> None:
     deepest = step.depths.max(axis=(0, 2))
     np.testing.assert_allclose(estimates[0], OF_VOLUME[0] * relative * deepest, rtol=1e-12)
     np.testing.assert_allclose(estimates[2], OF_VOLUME[1] * relative, rtol=1e-12)
+
+
+def test_fresh_bodies_have_no_relative_errors() -> None:
+    step = Step()
+    step.displaced[:], step.depths[:] = 0.0, 0.0
+    estimates = step.assess()[3]
+    np.testing.assert_array_equal(estimates[2], step.irreducible[2])
