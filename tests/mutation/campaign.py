@@ -45,17 +45,21 @@ ROOT = Path(__file__).parents[2]
 PARTS = ("wearsim/mechanics", "wearsim/evolution/steppers", "wearsim/uq")
 KERNELS = "wearsim/mechanics/"
 # tests by kind of mutants: of interpreted kernels, and of other functions
-TESTS = {"interpreted": ["tests/mechanics"], "compiled": ["tests/evolution", "tests/uq"]}
+TESTS = {
+    "interpreted": ["tests/mechanics"],
+    "compiled": ["tests/evolution", "tests/uq", "tests/scenario/test_mixtures.py"],
+}
 LIMIT = 1.2  # processor time of a test with its fixtures [s]
 CASES = 4  # of a parametrized test, from its first to its last one
 MOST = 6.0  # processor time of the tests of a mutant, the quickest ones first [s]
 OFTEN = 5.0  # ratio of the time limit of a test on a mutant to its duration
+LOADING = 3.0  # processor time for kernels that a test loads in addition [s]
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 Calls = dict[str, list[str]]  # names of the functions called, by module
 SURVIVED, KILLED, UNTESTED = "survived", "killed", "not called"
 
 
-@dataclass
+@dataclass(eq=False)  # plugins are hashable
 class Failures:
     """Plugin of pytest that notes whether a test failed or was skipped."""
 
@@ -68,7 +72,7 @@ class Failures:
         self.passed = self.passed or (report.passed and report.when == "call")
 
 
-@dataclass
+@dataclass(eq=False)  # plugins are hashable
 class Campaign:
     """Plugin of pytest that tries mutants on the collected tests, instead of running them."""
 
@@ -88,6 +92,8 @@ class Campaign:
         gc.freeze()
         called = self._called(session, modules)
         items = {item.nodeid: item for item in session.items}
+        if "NUMBA_DISABLE_JIT" not in os.environ:
+            load_kernels(items[name] for name in called)
         for mutant in self.mutants:
             chosen = [
                 (seconds, items[name])
@@ -151,7 +157,7 @@ class Campaign:
                 function.__code__ = code
             total = 0.0
             for seconds, item in chosen:
-                signal.setitimer(signal.ITIMER_PROF, 1.0 + OFTEN * seconds)
+                signal.setitimer(signal.ITIMER_PROF, LOADING + OFTEN * seconds)
                 total += seconds
                 if fails(item):
                     return True
@@ -172,6 +178,13 @@ def fails(item: pytest.Item) -> bool:
     finally:
         item.config.pluginmanager.unregister(noted)
     return noted.failed or not noted.passed
+
+
+def load_kernels(items: Iterable[pytest.Item]) -> None:
+    """Run one test of each file of whole tests, so that forked processes have compiled kernels."""
+    files = {item.path: item for item in items if "evolution" in item.path.parts}
+    for item in files.values():
+        fails(item)
 
 
 def some_cases(items: Iterable[pytest.Item]) -> list[pytest.Item]:
