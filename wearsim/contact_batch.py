@@ -45,9 +45,6 @@ class ContactBatch:
     shape : tuple of int, optional
         Numbers of stations, contacts and realisations that the contacts run through, the last
         fastest; error messages then name a contact by these indices.
-    mean_radius : bool
-        Whether the lever arm of a free roller may be its mean, weighted by the line load, as on a
-        cam; all creepages are then found together.
     """
 
     gap: FloatArray
@@ -63,7 +60,6 @@ class ContactBatch:
     rolling_radius: FloatArray | None = None
     friction_carried: bool = False
     shape: tuple[int, ...] | None = None
-    mean_radius: bool = False
 
     def __post_init__(self) -> None:
         count, values = len(self.gap), self.__dict__
@@ -195,9 +191,7 @@ def _rows(values: Sequence[float | FloatArray | None]) -> FloatArray | None:
 
 
 _INPUTS = tuple(
-    item.name
-    for item in fields(ContactBatch)
-    if item.name not in {"friction_carried", "shape", "mean_radius"}
+    item.name for item in fields(ContactBatch) if item.name not in {"friction_carried", "shape"}
 )
 
 

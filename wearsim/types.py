@@ -70,7 +70,7 @@ class Grid:
     @property
     def strips(self) -> int:
         """Number of strips."""
-        return len(self.y)
+        return self.y.size
 
     @property
     def edges(self) -> tuple[float, float]:

@@ -125,6 +125,7 @@ SOFT = '{youngs_modulus="200 GPa", poisson_ratio=0.3, yield_stress="100 MPa"}'
             "friction.coefficient: 1.17 exceeds 1",
         ),
         ("roller.crown_radius='1e9 mm'", "and nothing ends it; set roller.width"),
+        ("roller.crown_radius='10 mm'", "0.5767 x 0.5375 mm along and across rolling, is longer"),
     ],
 )
 def test_check_warns_of_implausible_inputs(

@@ -104,6 +104,27 @@ def test_error_by_steps_is_covered(case: str) -> None:
     assert abs(result.worn_volume[-1] - true.worn_volume[-1]) <= result.volume_error[-1]
 
 
+@pytest.mark.slow
+def test_error_by_steps_is_within_the_tolerance_where_half_of_a_groove_adheres() -> None:
+    changes = {
+        **PLAIN,
+        "operation.rollers": 1,
+        "operation.duration": "11000 min",
+        "roller.radius": "10 mm",
+        "roller.crown_radius": "195 mm",
+        "cylinder.radius": "8 mm",
+        "load.normal_force": "14 N",
+        "friction.coefficient": 0.076,
+        "creepage": {"longitudinal": 5e-5, "tilt": "0.6 mrad"},
+        "wear.cylinder.k_over_h": "3e-10 1/Pa",
+        "wear.roller.k_over_h": "4e-10 1/Pa",
+    }
+    result, true = (run({**changes, "evolution.tolerance": one}) for one in (1e-3, 1e-4))
+    assert 0.3 < result.values("adhesion_fraction")[-1].max() < 0.5
+    assert result.worn_volume[-1] == pytest.approx(true.worn_volume[-1], rel=1e-3)
+    assert result.depth[-1] == pytest.approx(true.depth[-1], rel=1e-3)
+
+
 def test_separate_rollers_wear_like_identical_ones() -> None:
     wear: dict[str, object] = {"wear.roller.k_over_h": "1e-11 1/Pa"}
     one = run({**SHORT, **wear})

@@ -102,7 +102,8 @@ def test_courses_on_exact_parabolas_differ_by_the_sampling_of_the_depth_alone() 
     depth, volume, profile = strip_errors(other, passes, sizes, end)[:, -1]
     assert 1.0 - deepest <= depth <= 2.0 * (1.0 - deepest)
     assert volume <= 1e-3
-    assert profile <= 2e-3  # where the cubic polynomials cross the ends of the groove
+    # where the cubic polynomials cross the ends of the groove, and the ends lie within strips
+    assert profile <= 4e-3
 
 
 def test_greatest_depths_of_coarse_strips_are_those_between_them() -> None:

@@ -116,5 +116,5 @@ def test_fields_support_friction_per_point():
     assert np.all(np.hypot(fields.traction_x, fields.traction_y)[:-1] <= bound + 1e-3)
     with pytest.raises(CapabilityError, match="no stationary field inside"):
         model.fields(solution, gap, RIG[0], replace(local, friction_carried=True))
-    with pytest.raises(CapabilityError, match="without a bearing torque"):
-        model.solve_one(gap, RIG[0], replace(local, bearing_torque=0.1, rolling_radius=np.ones(50)))
+    driven = replace(local, bearing_torque=0.2, rolling_radius=np.full(50, 0.02))
+    assert -0.02 * model.solve_one(gap, RIG[0], driven).force_x == pytest.approx(0.2, rel=1e-9)

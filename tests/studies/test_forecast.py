@@ -95,6 +95,17 @@ def test_forecast_of_damage_agrees_with_the_run(file, changes, factor) -> None:
     assert 1.0 / factor < found["reached_at_passes"] / passes < factor
 
 
+def test_rollers_of_different_yaw_on_a_cam_take_longer_than_equal_ones() -> None:
+    different = {"operation.rollers": 3, "creepage.yaw": ["1 mrad", "-2 mrad", "3 mrad"]}
+    seconds = [
+        dry_run(wearsim.load_scenario(SCENARIOS / "cam-cycloidal.toml", changes))["forecast"][
+            "wall_time_s"
+        ]
+        for changes in ({"operation.rollers": 3}, different)
+    ]
+    assert seconds[1] > 4.0 * seconds[0]  # 10 to 17 times when measured
+
+
 def test_spring_that_unloads_has_a_forecast_up_to_its_travel() -> None:
     stiff = {"load.kind": "spring", "load.stiffness": "20000 N/mm"}
     scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", stiff)

@@ -223,16 +223,17 @@ class Evolution:
 
         resting = self._resting()
         done, failed = bisect_failures(attempt, (~resting).nonzero()[0])
-        failures = self._rejected(failed, lengths)
+        places = resting.nonzero()[0]
+        failures = self._rejected(failed, lengths) if failed else {}
         accepted: list[tuple[IntArray, list[WearState]]] = []
-        if np.count_nonzero(resting):
-            places = resting.nonzero()[0]
+        if places.size:
             some = problem.at(places), state.at(places), lengths[places]
             accepted.append((places, list(self.stepper.rest(*some, self.stop))))
         for places, tried in done:
-            columns = self.numbers[places], tried.excess, lengths[places], tried.ratio
-            each = enumerate(zip(*(column.tolist() for column in columns), strict=True))
-            taken = [k for k, (n, *values) in each if self._trials[n].accepts(*values)]
+            numbers, ratios = self.numbers[places].tolist(), tried.ratio.tolist()
+            errors = tried.excess.tolist(), lengths[places].tolist(), ratios
+            each = enumerate(zip(numbers, *errors, strict=True))
+            taken = [k for k, (n, *error) in each if self._trials[n].accepts(*error)]
             if taken:
                 chosen = np.array(taken)
                 accepted.append((places[chosen], [item.at(chosen) for item in tried.path]))
@@ -259,11 +260,12 @@ class Evolution:
             for number, length in zip(numbers, proposed, strict=True):
                 self._trials.setdefault(number, self.stepper.trial(length))
         failures: dict[int, Exception] = {}
-        stops = np.full(len(numbers), self.stop)
+        stops = [self.stop] * len(numbers)
         if self.problem.pauses and not self.stepper.pass_by_pass:
-            stops = np.minimum(stops, next_boundaries(self.problem, self.state.passes))
+            boundaries = next_boundaries(self.problem, self.state.passes)
+            stops = np.minimum(self.stop, boundaries).tolist()
         resting = self._resting().tolist()
-        done = self.state.passes.tolist(), self.state.steps.tolist(), stops.tolist(), resting
+        done = self.state.passes.tolist(), self.state.steps.tolist(), stops, resting
         for place, (number, passes, steps, stop, rests) in enumerate(
             zip(numbers, *done, strict=True)
         ):
@@ -281,7 +283,7 @@ class Evolution:
         """Return which tests are in a pause; a pass-by-pass stepper passes over it itself."""
         if self.problem.pauses and not self.stepper.pass_by_pass:
             return at_rest(self.problem, self.state.passes)
-        return np.zeros(len(self.numbers), dtype=np.bool_)
+        return np.zeros(self.numbers.size, dtype=np.bool_)
 
     def _length(self, trial: Trial, passes: float, steps: int, stop: float) -> float:
         """Return the length of the next trial step of a test, up to `stop` [passes]."""
@@ -335,10 +337,11 @@ class Evolution:
 def _finite(tried: Attempt) -> Attempt:
     """Return a step; raise StepError if it leads to a value that is not finite."""
     end = tried.path[-1]
-    # counted, since all() takes twice as long on short arrays
-    checked = end.cylinder_depth, end.energy
-    if any(np.count_nonzero(np.isfinite(values)) < values.size for values in checked):
-        raise StepError(f"a value is not finite after pass {end.passes[0]:.0f}", end.to_arrays())
+    for values in (end.cylinder_depth, end.energy):
+        # counted, since all() takes twice as long on short arrays
+        if np.count_nonzero(np.isfinite(values)) < values.size:
+            message = f"a value is not finite after pass {end.passes[0]:.0f}"
+            raise StepError(message, end.to_arrays())
     return tried
 
 

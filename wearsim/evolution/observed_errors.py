@@ -93,7 +93,7 @@ def observed_errors(
     differences, widths = [], []
     for name, values in observed.items():
         own = values.reshape(len(passes), -1)
-        other = np.array([np.ravel(item[name]) for item in coarse.observed])
+        other = np.array([item[name].ravel() for item in coarse.observed])
         fine = _interpolated(at_there, at_passes, own)
         difference = np.abs(_interpolated(at_there, at_steps, other) - fine)
         if name.endswith("angle"):

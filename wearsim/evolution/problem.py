@@ -137,7 +137,7 @@ class WearProblem:
         """Number of contacts of a realisation."""
         return self.shape[0] * self.shape[1]
 
-    @property
+    @cached_property
     def has_nodes(self) -> bool:
         """Whether several quadrature nodes represent the passes of a roller."""
         return len(self.roller) > self.rollers
@@ -279,13 +279,12 @@ class WearProblem:
         filled: dict[str, Any] = {
             n: own_array(np.broadcast_to(c, self.shape)).ravel() for n, c in columns.items()
         }
-        shape, free = (*self.shape, self.grid.strips), self.free
+        shape = (*self.shape, self.grid.strips)
         return ContactBatch(
             gap=np.broadcast_to(self.nominal_gap, shape).reshape(-1, shape[-1]),
             normal_force=np.zeros(math.prod(self.shape)),
             **filled,
             shape=self.shape,
-            mean_radius=free and self.kinematics.cam is not None,
         )
 
     @cached_property
@@ -304,8 +303,8 @@ class WearProblem:
     @cached_property
     def constant_load(self) -> FloatArray | None:
         """Load before feedback, if it is constant in all realisations; as `force`."""
-        times = np.zeros(len(self.loads))
-        return self.force(times) if all(load.constant for load in self.loads) else None
+        constant = all(load.constant for load in self.loads)
+        return self._force(np.zeros(len(self.loads))) if constant else None
 
     @cached_property
     def has_spring(self) -> bool:
@@ -336,6 +335,9 @@ class WearProblem:
 
     def force(self, time: FloatArray) -> FloatArray:
         """Return the load before feedback at a time [s], (N,), or (S, 1, N) on a cam [N]."""
+        return self._force(time) if self.constant_load is None else self.constant_load
+
+    def _force(self, time: FloatArray) -> FloatArray:
         each = zip(self.loads, time[:, None], strict=True)
         return self.at_stations(np.array([load.force(own)[0] for load, own in each]))
 
@@ -396,10 +398,11 @@ class WearProblem:
         ndarray, shape (2, stations, contacts, realisations, strips)
             Wear of the cylinder and of the rollers.
         """
-        each = np.asarray(passes)[..., None]
+        each = passes if isinstance(passes, float) else passes[..., None]
         if self.linear_wear:
-            power = self.values_of(contacts, "dissipation")
-            return np.asarray(self._wear_coefficients * each * power)
+            power = contacts.dissipation.reshape(self.shape + contacts.dissipation.shape[1:])
+            parts: FloatArray = self._wear_coefficients * each * power
+            return parts
         shares = self.wear_shares
         return self.depths_worn(contacts, {body: shares[body] * each for body in BODIES})
 
@@ -492,7 +495,8 @@ class WearProblem:
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
         physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
-        return np.asarray(self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0])
+        total: FloatArray = self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0]
+        return total
 
     def mean_over_turn(self, values: FloatArray) -> FloatArray:
         """Return the mean over the stations weighted by their time, first axis of length one."""

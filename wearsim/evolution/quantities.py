@@ -391,7 +391,7 @@ def oscillation(line_load: FloatArray) -> float:
 
 def is_every(places: IntArray, count: int) -> bool:
     """Return whether places are those of all `count` realisations in their order."""
-    return len(places) == count and (count == 1 or bool((places == np.arange(count)).all()))
+    return places.size == count and (count == 1 or bool((places == np.arange(count)).all()))
 
 
 def values_between(

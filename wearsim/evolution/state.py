@@ -218,14 +218,12 @@ class WearState:
     def replaced(self, **others: Any) -> WearState:
         """Return the state with some fields replaced, in a tenth of the time of `replace`."""
         state = object.__new__(WearState)
-        values = state.__dict__
-        values.update(self.__dict__)
-        values.update(others)
+        state.__dict__.update(self.__dict__ | others)
         return state
 
     def with_stacked(self, depths: FloatArray, **others: Any) -> WearState:
         """Return the state with depths given as `stacked` [m], and with other fields replaced."""
-        cylinder, roller = separated(depths, len(self.cylinder_depth))
+        cylinder, roller = separated(depths, self.cylinder_depth.shape[0])
         state = self.replaced(cylinder_depth=cylinder, roller_depth=roller, **others)
         state.__dict__[stacked_depths.__name__] = (cylinder, roller), depths
         return state
@@ -242,7 +240,7 @@ class WearState:
 
     def at(self, realisations: IntArray) -> WearState:
         """Return the state of some realisations, by number and in that order."""
-        if is_every(realisations, len(self.passes)):
+        if is_every(realisations, self.passes.size):
             return self
         arrays = ((name, getattr(self, name)) for name in _AXES)
         return self.replaced(
@@ -253,16 +251,17 @@ class WearState:
 
     def with_others(self, places: IntArray, others: WearState) -> WearState:
         """Return the state with that of some realisations, by increasing place, replaced."""
-        order = np.arange(len(self.passes))
-        if len(places) == len(order):
+        realisations = self.passes.size
+        if places.size == realisations:
             return others
-        order[places] = len(order) + np.arange(len(places))
+        order = np.arange(realisations)
+        order[places] = realisations + np.arange(places.size)
         return joined_states([self, others]).at(order)
 
     @property
     def irreducible(self) -> FloatArray:
         """Errors of depth [m] and volume [m^3] not due to step size, shape (2, realisations)."""
-        if not np.count_nonzero(self.scatter):
+        if not self.scatter.nonzero()[0].size:
             return self.quadrature
         return np.asarray(self.quadrature + SIGMAS * np.sqrt(self.scatter))
 

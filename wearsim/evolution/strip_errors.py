@@ -5,7 +5,9 @@ accumulates in it as in the test, which contacts solved on coarse strips at a fe
 The error estimate is the difference of the two tests times a safety factor. Profiles are compared
 at the middles of the coarse strips, and greatest depths of the test with the deepest points between
 coarse strips: averages over strips, and the deepest strips, differ by their width alone. The
-depth between the deepest strips of the test, by a parabola, is part of the error of its depth.
+depth between the deepest strips of the test, by a parabola, is part of the error of its depth. The
+difference of the means over strips from the depths in their middles is part of the error of the
+profile, most of it at the edges of a groove.
 
 A difference is three times the error of the test where that is proportional to the square of the
 width of the strips, as in a groove at full slip. Where slip is partial it is equal to the error:
@@ -42,6 +44,9 @@ COVER, PARTIAL_COVER, FRESH_COVER = (
     np.array(factors)[:, None] for factors in ((0.3, 0.5, 0.9), (0.8, 1.1, 1.3), (1.6, 1.8, 1.8))
 )
 OF_PROFILE = 0.1  # estimates of depth and volume over that of the profile, all relative, at least
+# difference of the mean over a strip from the depth in its middle, over that of a parabola, at the
+# edge of a groove within a strip: from 1 to 4 by the angle at which the depth begins
+IN_MIDDLE = 2.0
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
 COARSE_TOLERANCE = 1e-5  # of the iterations of a step
 
@@ -103,6 +108,15 @@ def _means_below_points(depths: FloatArray) -> float:
     second = 2.0 * depths[:, 1:-1] - depths[:, :-2] - depths[:, 2:]
     at_deepest = np.where(depths[:, 1:-1] == depths.max(), second, 0.0)
     return float(at_deepest.max(initial=0.0)) / 24.0
+
+
+def _means_and_middles(depths: FloatArray) -> float:
+    """Return how far means over strips are from the depths in their middles, over the depths.
+
+    Both are Euclidean norms, see `IN_MIDDLE`.
+    """
+    second = float(np.linalg.norm(np.diff(depths, 2, axis=-1)))
+    return IN_MIDDLE * second / 24.0 / float(np.linalg.norm(depths))
 
 
 def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:
@@ -252,6 +266,7 @@ def strip_errors(
     if end.profiles is not None and end.profiles.any():
         top = greatest_between(end.profiles).max() + _means_below_points(end.profiles)
         found[0] += deepest * (top / end.profiles.max() - 1.0)
+        found[2] = np.hypot(found[2], _means_and_middles(end.profiles))
     return np.asarray(found)
 
 

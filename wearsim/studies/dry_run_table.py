@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wearsim.report.text import lapse
 from wearsim.studies.dry_run import Data
 from wearsim.studies.fatigue.unworn import unworn_text
 from wearsim.units import in_engineers_unit
@@ -220,28 +221,27 @@ def _pitting_rows(data: Data) -> TableRows:
     return [("pitting without wear", unworn_text(found, rollers)), *sources]
 
 
-def _rounded(value: float) -> str:
-    """Return a number to two digits, without an exponent."""
-    return f"{float(f'{value:.2g}'):,.12g}"
+def _rounded(value: float, digits: int = 2) -> str:
+    """Return a number to some digits, without an exponent."""
+    return f"{float(f'{value:.{digits}g}'):,.12g}"
 
 
 def _forecast_rows(forecast: Data) -> TableRows:
     """Return rows on the wear at the end of a run, and what it takes."""
-    depths = f"{forecast['depth_m'] * 1e6:.3g} um"
+    depths = f"{_rounded(forecast['depth_m'] * 1e6, 3)} um"
     if forecast["roller_depth_m"]:
-        depths += f", roller {forecast['roller_depth_m'] * 1e6:.3g} um"
+        depths += f", roller {_rounded(forecast['roller_depth_m'] * 1e6, 3)} um"
     wear = (
         f"depth {depths}, groove {forecast['width_m'] * 1e3:.3g} mm wide, peak pressure"
         f" {forecast['peak_pressure_Pa'] / 1e6:.3g} MPa, energy"
         f" {forecast['dissipated_energy_J']:.4g} J"
     )
     if forecast["lift_error_m"] is not None:
-        wear += f", lift error {forecast['lift_error_m'] * 1e6:.3g} um"
+        wear += f", lift error {_rounded(forecast['lift_error_m'] * 1e6, 3)} um"
     if "damage" in forecast:
         wear += f", damage {forecast['damage']:.3g}, probability of pitting"
         wear += f" {forecast['pitting']:.3g}"
-    seconds = forecast["wall_time_s"]
-    time = f"{seconds:.2g} s" if seconds < 100.0 else f"{seconds / 60.0:.2g} min"
+    time = lapse(float(f"{forecast['wall_time_s']:.2g}"))
     effort = (
         f"{_rounded(forecast['steps'])} steps, {time},"
         f" {_rounded(forecast['memory_bytes'] / 1e6)} MB of memory, file of"

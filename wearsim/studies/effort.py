@@ -17,6 +17,7 @@ from wearsim.errors import ContactError
 from wearsim.evolution.limits import OF_FATIGUE, Limit
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import FALLEN, SMALL, preload_of
+from wearsim.report.text import lapse
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
@@ -29,9 +30,12 @@ FEWEST_LOADED = 5  # strips in contact, with which the error is about 2 %
 LONG = 600.0  # s, a time of which it warns
 _STEPS, _STEPS_POWER = 20.0, 0.42  # at the default tolerance, of 1 + depth over elastic rise
 _TOLERANCE_POWER = -0.33
-_STAGES = 12.0  # solves of a stabilised step
+_STEPS_OF_STABILISED = 0.67  # over those of implicit steps
+_STEPS_OF_SPRING = 1.5  # over those at a constant load
+_STAGES, _SOLVES_OF_SPRING = 9.0, 4.0  # of a stabilised step, and solves of each with a spring
 _STAGE = 0.35  # time of such a solve, over a solve of a groove
 _STEP = 1.3  # time of an implicit step
+_COUPLED = 5e-11  # of the strips of all contacts of a station, cubed, where several are coupled [s]
 _EXPLICIT = 0.7  # time of an explicit step
 _WHOLE = 0.95  # of the width of a roller
 _CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
@@ -191,7 +195,8 @@ def _warnings(
         less = f"a higher evolution.tolerance than {scenario.evolution.tolerance:g}"
         if scenario.contact.model != "slender":
             less += " or contact.model = 'slender'"
-        yield f"forecast of the time: about {effort.seconds / 60.0:.2g} min; {less} takes less"
+        time = lapse(float(f"{effort.seconds:.2g}"))
+        yield f"forecast of the time: about {time}; {less} takes less"
 
 
 def restarts_of(problem: WearProblem, depth: float) -> float:
@@ -229,7 +234,9 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     schedule = RecordSchedule.of(scenario, passes)
     records = (passes / schedule.interval if schedule.interval else schedule.count) + 1.0
     if stepper == "stabilised":
-        steps /= 3.0
+        steps *= _STEPS_OF_STABILISED
+    if problem.has_spring:
+        steps *= _STEPS_OF_SPRING
     if stepper == "explicit":
         steps = forecast.stable_steps(passes, _STABLE)
     if scenario.evolution.step is not None:
@@ -240,7 +247,10 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     steps = max(min(steps + _STEPS_OF_RESTART * restarts, passes), 1.0)
     groove, solve = forecast.seconds_of_groove, forecast.seconds
     stages = _STAGES if stepper == "stabilised" else 1.0
+    stations, contacts, _ = problem.shape
+    strips, rollers = problem.grid.strips, problem.rollers
     if stepper == "stabilised":
+        stages *= _SOLVES_OF_SPRING if problem.has_spring else 1.0
         per_step = stages * max(_STAGE * groove, solve)
     elif stepper == "explicit":
         per_step = _EXPLICIT * groove + solve
@@ -250,8 +260,8 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     else:
         per_step = _STEP * groove
         per_step += (_OF_REFERENCE if scenario.contact.spec.reference else 2.0) * solve
-    stations, contacts, _ = problem.shape
-    strips, rollers = problem.grid.strips, problem.rollers
+        if contacts > 1:
+            per_step += _COUPLED * stations * float(contacts * strips) ** 3
     record = (3.0 * stations * rollers + stations + rollers) * strips
     row = _ROW + 25.0 * stations * contacts * (stations > 1)
     rows = row * (records if stepper == "per-pass" else steps)

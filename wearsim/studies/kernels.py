@@ -10,13 +10,18 @@ from wearsim.mechanics.numerics.jit import compilation_reported, ready_kernels
 from wearsim.scenario import Scenario
 
 #: Kernels of the built-in contact models and tangential theories, with the kernels that they call.
-_MODELS = {
+_MODELS: dict[str, set[str]] = {
     "slender": {"solve_slender", "factor_in_place", "solve_factored"},
     "hertz": {"hertz_on_profile"},
-    "hertz-fastsim": {"hertz_on_profile"},
+    "hertz-fastsim": {
+        "solve_contacts",
+        "find_patches",
+        "hertz_on_profile",
+        "fit_within",
+        "prescribed_ellipse",
+    },
     "semi-hertzian": {"solve_semi_hertzian"},
 }
-_BATCH = {"solve_contacts", "find_patches", "fit_within", "prescribed_ellipse"}
 _THEORIES: dict[str, set[str]] = {
     "strip": set(),
     "fastsim": {"closed_form"},
@@ -52,13 +57,11 @@ def kernels_of(
     names = set(_MODELS.get(model, ()))
     theory = getattr(contact.options, "tangential", "strip")
     if model == "hertz-fastsim":
-        march = getattr(contact.options, "closed_form", "") == "never"
-        names |= _BATCH if study != "contact" else {"march" if march else "closed_form"}
         names |= {"march_fields"} if fields else set()
     elif model in _MODELS:
         names |= _THEORIES[theory] | (_FIELDS[theory] if fields else set())
         if theory == "strip":
-            batched = model == "slender" and scenario.creepage.drive != "free"
+            batched = model == "slender"
             names |= {"strip_contacts"} if batched else set()
             names |= {"solve_strips"} if fields or not batched else set()
     if steps and model == "slender" and theory == "strip" and name == "per-pass":

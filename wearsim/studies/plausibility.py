@@ -65,6 +65,7 @@ def plausibility_warnings(scenario: Scenario) -> list[str]:
         *(fatigue_warnings(scenario, load) if scenario.fatigue is not None else ()),
         *_of_slip(scenario),
         *_of_width(scenario, load),
+        *_of_shape(scenario, load),
         *_of_log(scenario, load),
         *_of_cam(scenario),
         *_of_model(scenario),
@@ -177,6 +178,19 @@ def _of_width(scenario: Scenario, load: Load) -> Iterator[str]:
         yield (
             f"roller.{key}: a crown{form} makes a"
             f" contact {2e3 * half_width:.4g} mm wide, and nothing ends it; set roller.width"
+        )
+
+
+def _of_shape(scenario: Scenario, load: Load) -> Iterator[str]:
+    force = greatest_load(scenario, load)
+    if scenario.contact.model != "slender" or force <= 0.0:
+        return
+    patch = widest_patch(scenario, force)
+    if patch.a > patch.b:
+        yield (
+            f"contact.model: the unworn contact, {2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm along"
+            " and across rolling, is longer than wide, and 'slender' assumes the opposite;"
+            " 'semi-hertzian' or 'halfspace' does not"
         )
 
 

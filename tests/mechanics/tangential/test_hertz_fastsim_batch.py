@@ -131,17 +131,18 @@ def theory(closed_form=NEVER, kalker=TABLE, element_sum=False, points=24, single
     )  # fmt: skip
 
 
-def operating_points(chosen=slice(None)):
+def operating_points(chosen=slice(None), radius=None):
     random = np.random.default_rng(5)
     numbers = random.normal(size=(3, CONTACTS)) * [[4e-4], [5e-4], [0.1]]
     friction = random.uniform(0.05, 0.15, (CONTACTS, 1, 1))
     columns = [LOADS, 1e-3 + numbers[0], numbers[1], numbers[2], friction]
     speed, none = np.full(CONTACTS, 2.6)[chosen], np.zeros((0, len(Y)))
-    return ContactInputs(*(column[chosen] for column in columns), False, none, speed)
+    arms = none if radius is None else np.broadcast_to(radius, (CONTACTS, len(Y)))[chosen].copy()
+    return ContactInputs(*(column[chosen] for column in columns), False, none, speed, arms)
 
 
 def solve(options, inputs, row=ROW, gaps=GAPS, **given):
-    found = ContactResults(*np.zeros((3, len(row), len(Y))), *np.zeros((5, len(row))))
+    found = ContactResults(*np.zeros((3, len(row), len(Y))), *np.zeros((6, len(row))))
     patches = patches_of(len(row))
     failed = solve_contacts(bodies(len(row), **given), options, gaps, row, inputs, patches, found)
     return failed, found, patches
@@ -179,6 +180,15 @@ def test_power_is_the_work_of_forces_and_moment(closed_form):
     assert found.power == pytest.approx(expected, rel=1e-12)
     assert found.dissipation.sum(axis=1) * GRID.spacing == pytest.approx(found.power, rel=1e-12)
     assert found.line_load.sum(axis=1) * GRID.spacing == pytest.approx(LOADS, rel=1e-12)
+
+
+def test_torque_is_the_force_times_its_lever_arm():
+    _, found, _ = solve(theory(EXACT), operating_points(radius=0.02))
+    assert found.torque == pytest.approx(-0.02 * found.force_x, rel=1e-12)
+    _, tilted, _ = solve(theory(EXACT), operating_points(radius=0.02 + 0.1 * Y))
+    arm = tilted.torque / -found.force_x - 0.02
+    assert np.abs(arm).max() < 0.1 * np.abs(Y).max()
+    assert np.all(arm != 0.0)
 
 
 def test_first_failed_contact_is_returned():

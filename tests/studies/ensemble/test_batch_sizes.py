@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 
-from wearsim.studies.ensemble.batch_sizes import SECONDS, BatchSizes
+from wearsim.studies.ensemble.batch_sizes import LEAST_IN_BATCH, SECONDS, BatchSizes
 
 START, EACH = 3.0, 0.05  # s: start of a worker, and a realisation
 
 
-def batch_sizes(total: int, batches: int) -> list[int]:
-    """Return the sizes of the first batches of an ensemble that one worker runs."""
+def batch_sizes(total: int, batches: int, workers: int = 1) -> list[int]:
+    """Return the sizes of the first batches of an ensemble, which run one after the other."""
     now = 0.0
     policy = BatchSizes(lambda: now)
     sizes: list[int] = []
     for number in range(batches):
-        sizes.append(policy.next(total - sum(sizes), workers=1))
+        sizes.append(policy.next(total - sum(sizes), workers))
         now += sizes[-1] * EACH + (START if number == 0 else 0.0)
         policy.finished(sizes[-1])
     return sizes
@@ -25,8 +25,12 @@ def test_batches_grow_to_their_duration_despite_a_slow_start():
     assert batch_sizes(10_000, 6) == [1, 1, 4, 16, 64, round(SECONDS / EACH)]
 
 
-def test_last_batches_are_small_so_that_all_workers_end_together():
-    assert batch_sizes(12, 6) == [1, 1, 4, 3, 2, 1]
+def test_one_worker_takes_all_that_is_left():
+    assert batch_sizes(12, 4) == [1, 1, 4, 6]
+
+
+def test_several_workers_end_together_without_very_small_batches():
+    assert batch_sizes(100, 8, workers=2) == [1, 1, 4, 16, 20, LEAST_IN_BATCH, LEAST_IN_BATCH, 13]
 
 
 def test_time_left_does_not_include_the_start_of_a_worker():

@@ -56,6 +56,6 @@ def exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> Floa
     if force.ndim > 1:  # of a cam
         force = problem.mean_over_turn(force)[0, 0]
     own = at_least(problem, force + here.inputs.mean_offset)
-    if any(item.name == "friction" for item in problem.varying):
+    if problem.varying and any(item.name == "friction" for item in problem.varying):
         own = own * here.inputs.friction.mean(axis=0)
     return np.asarray(own)

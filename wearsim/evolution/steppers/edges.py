@@ -34,13 +34,14 @@ from wearsim.mechanics.numerics.edge_strips import SETTLED
 from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER
 from wearsim.mechanics.numerics.step_errors import EDGE_ORDER
-from wearsim.types import BoolArray, IntArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 
 LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
-# part of a contact that adheres up to which edges are resolved: where most of it adheres, wear is
-# greatest at the edge, and the line load is not uniform up to the layer in which it falls
-MOST_ADHESION = 0.5
+# part of a contact that adheres up to which edges are resolved, and from which they are not any
+# more: where much of it adheres, wear is greatest at the edge, the line load is not uniform up to
+# the layer in which it falls, and errors of the power add up
+MOST_ADHESION, CEASING_ADHESION = 0.4, 0.5
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
 
@@ -85,7 +86,8 @@ def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
 def unresolved(state: WearState) -> BoolArray:
     """Return which tests do not resolve edges, of a state with `FIELDS`."""
     assert state.part is not None
-    return np.asarray(np.isnan(state.part[0, 0, :, 0]))
+    found: BoolArray = np.isnan(state.part[0, 0, :, 0])
+    return found
 
 
 def most(state: WearState) -> IntArray:
@@ -101,8 +103,10 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
     """Return a state in which tests have begun or ceased to resolve edges.
 
     They resolve them from the step on at whose start the bodies have worn to a groove: wear, not
-    elasticity, then gives the contact its shape. Where strips now reach the end of a roller, edges
-    are never resolved any more. Tests that cease take a step of first order.
+    elasticity, then gives the contact its shape. They cease where a spring has lost its load, or
+    where the contact adheres: it may have slipped for a moment, after strips have been joined.
+    Where strips now reach the end of a roller, edges are never resolved any more. Tests that cease
+    take a step of first order.
     """
     if state.separation is None:
         return state
@@ -111,12 +115,16 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
     if not problem.has_crowned_gap:
         fields, sums = dict.fromkeys(FIELDS), kernel_input(state.past_sums[:, -1:])
         return state.replaced(**fields, past_sums=sums, order=np.ones_like(state.order))
-    whole, low = unresolved(state), _unloaded(problem, state)
-    if low is not None and (low & ~whole).any():
-        ended = {n: np.where(low[:, None], np.nan, getattr(state, n)) for n in FIELDS}
-        state = state.replaced(**ended, order=np.where(low & ~whole, 1, state.order))
-    begins = whole if low is None else whole & ~low
-    return _with_new_edges(problem, state, begins) if np.count_nonzero(begins) else state
+    whole, ceases = unresolved(state), _adhesion(problem, state) > CEASING_ADHESION
+    low = _unloaded(problem, state)
+    if low is not None:
+        ceases |= low
+    ended = ceases & ~whole
+    if ended.nonzero()[0].size:
+        fields = {n: np.where(ended[:, None], np.nan, getattr(state, n)) for n in FIELDS}
+        state = state.replaced(**fields, order=np.where(ended, 1, state.order))
+    begins = whole & ~ceases
+    return _with_new_edges(problem, state, begins) if begins.nonzero()[0].size else state
 
 
 def _unloaded(problem: WearProblem, state: WearState) -> BoolArray | None:
@@ -135,9 +143,13 @@ def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
         least - problem.nominal_least_gap,
         problem.values_of(state.contacts, "approach") - least,
     )
-    adhering = problem.values_of(state.contacts, "adhesion_fraction").max(axis=(0, 1))
     deep = sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
-    return np.asarray(deep & (adhering <= MOST_ADHESION))
+    return np.asarray(deep & (_adhesion(problem, state) <= MOST_ADHESION))
+
+
+def _adhesion(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest part of a contact of each test that adheres, shape (realisations,)."""
+    return np.asarray(problem.values_of(state.contacts, "adhesion_fraction").max(axis=(0, 1)))
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:

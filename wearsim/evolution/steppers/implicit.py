@@ -41,6 +41,9 @@ from wearsim.mechanics.numerics.step_errors import COVER, KEEP, SHARE, assess_st
 from wearsim.types import FloatArray, IntArray
 
 DOUBLED_SHARE = 0.9  # part of the tolerance that a step may add to the profiles, by step doubling
+# least relative error of the energy that a step aims at: no step is short enough for a smaller one,
+# as iterations are not more accurate, and by step doubling where the power changes by jumps
+LEAST_OF_ENERGY, LEAST_OF_JUMPS = 1e-5, 1e-4
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 # factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
 # of the volume, which do not add up
@@ -142,9 +145,8 @@ class ImplicitStepper(StepDoublingStepper):
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
-        of_energy, their_order = next_steps_of_energy(
-            state, end, self.tolerance, KEEP, edges.most(end)
-        )
+        least = max(self.tolerance, LEAST_OF_ENERGY)
+        of_energy, their_order = next_steps_of_energy(state, end, least, KEEP, edges.most(end))
         order = np.where(of_energy[1] < ratio, their_order, order)
         # the error so far shortens the next step
         over, ratio = np.maximum(over * left, of_energy[0]), np.minimum(ratio, of_energy[1])
@@ -189,6 +191,11 @@ class ImplicitStepper(StepDoublingStepper):
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
         over = np.where(unknown, over, over * left)
+        if self.by_doubling and not _varies(problem):
+            least = max(self.tolerance, LEAST_OF_JUMPS)
+            of_energy, their_order = next_steps_of_energy(half, end, least, KEEP, most)
+            order = np.where(of_energy[1] < ratio, their_order, order)
+            over, ratio = np.maximum(over, of_energy[0]), np.minimum(ratio, of_energy[1])
         if self.forced_step is not None:  # fixed steps may be too long for higher orders
             order = np.minimum(order, MAX_ORDER - 2)
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
@@ -217,7 +224,8 @@ class ImplicitStepper(StepDoublingStepper):
         of_profile = (state.profile_error - fixed[2]) / cover[1] * grown**DEPTH_EXPONENT
         worst = np.maximum(of_volume, np.where(volumes > 0.0, of_profile, 0.0))
         low, high = ADDED_UP
-        return np.asarray(np.clip((high - worst / self.tolerance) / (high - low), LEAST_AIM, 1.0))
+        left: FloatArray = (high - worst / self.tolerance) / (high - low)
+        return np.minimum(np.maximum(left, LEAST_AIM), 1.0)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
@@ -276,7 +284,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     if state.past_spans is None:
         state = with_rates(problem, state)
     state = edges.at_start_of_step(problem, state)
-    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+    here = problem
+    if problem.varying:
+        here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = conditions_of(here, problem, state, passes)
     order = np.asarray(state.order)
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
@@ -293,7 +303,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         start = state if whole else edges.without_edges(here, state)
         return step_by_formula(here, start, passes, conditions, np.ones_like(order))[0]
     # strips that leave the contact: their depth can decrease from the third order on
-    for lower in (2, 1) if np.count_nonzero(decreased) else ():
+    for lower in (2, 1) if decreased.nonzero()[0].size else ():
         again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
         if again.size:
             columns = (column[..., again] for column in vars(conditions).values())

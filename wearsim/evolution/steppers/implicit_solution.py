@@ -107,11 +107,11 @@ class Past(NamedTuple):
     def of(cls, state: WearState) -> Past:
         """Return those of a state of the implicit stepper."""
         wear, sums, feedback, spans, order, *edges = _PAST(state)
-        realisations, contacts = len(order), len(state.contacts.power)
+        realisations, contacts = order.size, state.contacts.power.size
         if feedback is None:
             feedback = np.empty((ROWS, 0, realisations))
         if edges[1] is None:
-            edges = [np.empty((contacts, 0))] * len(edges)
+            edges = [np.empty((contacts, 0))] * 3
         separation, part, whole_steps = edges
         return cls(
             wear,
@@ -157,21 +157,23 @@ def step_by_formula(
     """
     past, contacts, depths = Past.of(state), state.contacts, state.stacked
     bodies, gap = problem.body_rows, problem.contact_gap
-    share = np.array(problem.cylinder_wear_share[: len(passes), 0])  # at the first station
+    share = np.array(problem.cylinder_wear_share[: passes.size, 0])  # at the first station
     shape, strips = contacts.line_load.shape, problem.grid.strips
 
     def wear_of(contacts: ContactBatchSolution) -> FloatArray:
         return problem.wear_parts(contacts, 1.0).reshape(2, *shape)
 
-    in_groove = np.zeros(len(passes), dtype=np.bool_)
+    in_groove = np.zeros(passes.size, dtype=np.bool_)
     if past.part.size and not past.separation.size:  # strips in contact as wholes are counted
         in_groove = have_groove(problem, state)
     # line loads and wear about which the wear is linearised
     line_load, wear = contacts.line_load, wear_of(contacts)
-    realisations = len(passes)
-    resolved, of_tests = np.empty(realisations, dtype=np.bool_), np.empty((7, realisations))
+    realisations = passes.size
+    resolved, decreased = np.empty((2, realisations), dtype=np.bool_)
+    of_tests = np.empty((7, realisations))
     sums, feedback = np.empty(past.sums.shape[1:]), np.empty(past.feedback.shape[1:])
-    of_bodies, of_contacts = np.empty((6, *depths.shape)), np.empty((3, *shape))
+    work, of_contacts = np.empty((7, *depths.shape)), np.empty((3, *shape))
+    of_bodies, worn = work[:6], work[6]
     begin_step(
         past.spans,
         order,
@@ -202,11 +204,10 @@ def step_by_formula(
         *(bodies, resolved, gap, depths, past.part, of_bodies, of_contacts),
     )
     base, guess = of_bodies[3], of_bodies[4]
-    worn = np.empty(depths.shape)
     exponents = np.array(state.wear_exponents).reshape(shape)
     loads = LoadsOfStep(problem, state, conditions.force, passes, feedback)
-    stations, active = problem.shape[0], np.ones(len(passes), dtype=np.bool_)
-    iterations = np.zeros(len(passes), dtype=np.int64)
+    stations, active = problem.shape[0], np.ones(realisations, dtype=np.bool_)
+    iterations = np.zeros(realisations, dtype=np.int64)
     most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
     for iteration in range(1, MAX_FIXED_POINT + 1):
         about, compliance = np.empty((5, *shape)), np.empty((realisations, len(bodies), 2, strips))
@@ -230,11 +231,11 @@ def step_by_formula(
             moved = np.abs(guess - used).max(axis=(0, 2))
             change = np.maximum(change, opening * (moved / depth))
         converged = problem.iteration_tolerance * relaxation
-        adhering = problem.values_of(solved, "adhesion_fraction").max(axis=(0, 1)) > ADHERING
+        adhering = solved.adhesion_fraction.reshape(problem.shape).max(axis=(0, 1)) > ADHERING
         wear_of_step = np.where(adhering, OF_STEP * opening, np.inf)
         active &= ~(change <= converged * np.minimum(CONVERGED * depth, wear_of_step))
         contacts = solved
-        if not np.count_nonzero(active):
+        if not active.nonzero()[0].size:
             break
         # with a relaxed tolerance a step without wear might pass where strips are cut
         if iteration == MAX_FIXED_POINT or (
@@ -253,7 +254,7 @@ def step_by_formula(
     energy, ends = energy_per_pass(problem, contacts), np.empty(depths.shape)
     fields = np.empty((3, *past.part.shape) if past.part.size else (0, 0, 0))
     past_wear, past_sums = np.empty(past.wear.shape), np.empty(past.sums.shape)
-    past_feedback, decreased = np.empty(past.feedback.shape), np.empty_like(resolved)
+    past_feedback = np.empty(past.feedback.shape)
     ended: list[Any] = [past.separation, past.whole_steps, share, contacts.line_load, new, worn]
     ended += of_tests, sums, loads.feedback, energy, past.wear, past.sums, past.feedback
     ended += ends, fields, past_wear, past_sums, past_feedback, decreased
@@ -427,14 +428,13 @@ def solve_compliant(
     ContactBatchSolution
         In the problem's order; those of inactive realisations are taken from `warm`.
     """
-    model, realisations = problem.model, len(active)
-    coupled = len(batch) // realisations
-    if np.count_nonzero(active) == realisations and coupled == 1:
+    model, realisations = problem.model, active.size
+    coupled, numbers = problem.contacts_each, active.nonzero()[0]
+    if numbers.size == realisations and coupled == 1:
         return model.solve(batch, compliance.sum(axis=2).reshape(batch.gap.shape), None, warm)
-    if np.count_nonzero(active) == realisations == 1:
+    if numbers.size == realisations == 1:
         return model.solve(batch, None, SharedWear(problem.bodies, compliance), warm)
     # the contacts of one realisation next to each other, which the problem has `realisations` apart
-    numbers = np.flatnonzero(active)
     order = np.arange(len(batch)).reshape(coupled, realisations)[:, numbers].T.ravel()
     some, near, part = batch.at(order), warm.at(order), compliance[numbers]
     if coupled == 1:

@@ -305,10 +305,12 @@ def wear_per_pass(
 
 def energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
     """Return the energy that all contacts dissipate in a roller pass, shape (N,) [J]."""
-    power = problem.total_power(problem.values_of(contacts, "power"))
-    return np.asarray(power / problem.kinematics.pass_rate)
+    power = problem.total_power(contacts.power.reshape(problem.shape))
+    per_pass: FloatArray = power / problem.kinematics.pass_rate
+    return per_pass
 
 
 def volumes_of(problem: WearProblem, depths: FloatArray) -> FloatArray:
     """Return the volume of depths of all bodies, as `WearState.stacked`, (realisations,) [m^3]."""
-    return np.asarray((problem.volume_weights[1][:, None] * depths.sum(axis=-1)).sum(axis=0))
+    volumes: FloatArray = (problem.volume_weights[1][:, None] * depths.sum(axis=-1)).sum(axis=0)
+    return volumes

@@ -355,30 +355,3 @@ def march_fields(
         out,
     )
     return out
-
-
-def element_sum(
-    fields: FloatArray, longitudinal: float, lateral: float, rolling_speed: float
-) -> FloatArray:
-    """Return the dissipation as a sum over elements of their new traction times their slip.
-
-    The error is of first order in dx and negative; used for comparison with the work of the rigid
-    slip.
-
-    Parameters
-    ----------
-    fields : ndarray, shape (4, points + 1, strips)
-        From `march_fields`.
-    longitudinal, lateral : float
-        Flexibilities L1 and L2 [m/Pa].
-    rolling_speed : float
-        V [m/s].
-
-    Returns
-    -------
-    ndarray, shape (strips,)
-        P_l [W/m].
-    """
-    traction_x, traction_y, excess_x, excess_y = fields
-    work = longitudinal * traction_x * excess_x + lateral * traction_y * excess_y
-    return np.asarray(rolling_speed * work.sum(axis=0))

@@ -63,7 +63,8 @@ class ContactInputs(NamedTuple):
     Loads [N], creepages, spins [1/m] and V [m/s], all (contacts,); friction (contacts, points,
     strips), with one point if constant along a strip, and one strip if equal for all; whether
     friction moves with the material; variation of the creepage (contacts, strips), or (0, strips)
-    for none.
+    for none; lever arm of the longitudinal traction (contacts, strips) [m], or (0, strips) where
+    the torque on the roller is not needed.
     """
 
     normal_force: FloatArray
@@ -74,12 +75,14 @@ class ContactInputs(NamedTuple):
     carried: bool
     variation: FloatArray
     rolling_speed: FloatArray
+    rolling_radius: FloatArray
 
 
 class ContactResults(NamedTuple):
     """Solution: a(y) [m], q(y) [N/m] and P_l [W/m] (contacts, strips), the others (contacts,).
 
-    Forces [N] and spin moment [N m] on body 1, adhering fraction of the area and power [W].
+    Forces [N] and spin moment [N m] on body 1, adhering fraction of the area, power [W] and torque
+    on the roller [N m].
     """
 
     half_length: FloatArray
@@ -90,6 +93,7 @@ class ContactResults(NamedTuple):
     spin_moment: FloatArray
     adhesion_fraction: FloatArray
     power: FloatArray
+    torque: FloatArray
 
 
 class Workspace(NamedTuple):
@@ -367,7 +371,7 @@ def _fill_results(
     eta, phi, speed = inputs.lateral[k], inputs.spin[k], inputs.rolling_speed[k]
     centre = _load_weighted_mean(bodies.y, results.line_load[k])
     force_x, force_y, moment, power, sticking, length = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    positive = 0.0
+    positive, torque = 0.0, 0.0
     for j in range(len(bodies.y)):
         part = work.coverage[j]
         tx, ty, turning = total[FORCE_X, j], total[FORCE_Y, j], total[MOMENT, j]
@@ -377,6 +381,8 @@ def _fill_results(
         power += dissipation
         positive += max(dissipation, 0.0)
         force_x += part * tx
+        if len(inputs.rolling_radius) > 0:
+            torque -= part * tx * inputs.rolling_radius[k, j]
         force_y += part * ty
         moment += part * turning - (bodies.y[j] - centre) * (part * tx)
         sticking += total[ADHESION, j]
@@ -388,3 +394,4 @@ def _fill_results(
     results.force_x[k], results.force_y[k] = force_x * bodies.spacing, force_y * bodies.spacing
     results.spin_moment[k], results.power[k] = moment * bodies.spacing, power * bodies.spacing
     results.adhesion_fraction[k] = sticking / (2.0 * length)
+    results.torque[k] = torque * bodies.spacing

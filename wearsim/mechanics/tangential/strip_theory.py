@@ -202,8 +202,10 @@ def strip_contacts(
     spin: FloatArray,
     variation: FloatArray,
     friction: FloatArray,
+    rolling_radius: FloatArray,
     dissipation: FloatArray,
     sums: FloatArray,
+    torque: FloatArray,
 ) -> None:
     """Compute the tractions of several contacts of slender strips, and their sums.
 
@@ -222,11 +224,15 @@ def strip_contacts(
         Variation of the longitudinal creepage, whose load-weighted mean is subtracted here.
     friction : ndarray, shape (contacts, strips or 1)
         Friction coefficient.
+    rolling_radius : ndarray, shape (contacts, strips), or (contacts, 0) where it is not needed
+        Lever arm of the longitudinal traction [m].
     dissipation : ndarray, shape (contacts, strips)
         Filled: P_l [W/m].
     sums : ndarray, shape (6, contacts)
         Filled, in the order of `SUMS`: forces on body 1 [N], their moment about the centre of the
         load [N m], power [W], greatest pressure [Pa], and adhering fraction of the area.
+    torque : ndarray, shape (contacts,)
+        Filled: torque of the longitudinal traction on the roller [N m], zero without the lever arm.
     """
     contacts, n = line_load.shape
     slip_x, local_friction, tractions = np.empty(n), np.empty(n), new_tractions(n)
@@ -268,6 +274,9 @@ def strip_contacts(
         sums[0, k], sums[1, k] = sum_x * spacing, sum_y * spacing
         sums[2, k], sums[3, k] = moment * spacing, power * spacing
         sums[4, k], sums[5, k] = peak, 0.5 * adhering / length
+        torque[k] = 0.0
+        for i in range(rolling_radius.shape[1]):
+            torque[k] -= tractions.force_x[i] * rolling_radius[k, i] * spacing
 
 
 def compile_strip_contacts() -> None:
@@ -276,9 +285,8 @@ def compile_strip_contacts() -> None:
     elasticity = StripElasticity(1e11, 4e10, np.ones((2, 2)))
     slips = (contact, contact, contact, contact)  # rolling speed, both creepages, and spin
     sums = np.empty((len(SUMS), 1))
-    strip_contacts(
-        strip, strip, contact, 1.0, elasticity, *slips, strip, strip, np.empty((1, 1)), sums
-    )
+    filled = np.empty((1, 1)), sums, np.empty(1)
+    strip_contacts(strip, strip, contact, 1.0, elasticity, *slips, strip, strip, strip, *filled)
 
 
 compile_alongside("solve_slender", compile_strip_contacts)

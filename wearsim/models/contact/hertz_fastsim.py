@@ -28,6 +28,7 @@ from wearsim.models.tangential.fastsim import (
     Flexibility,
     Kalker,
 )
+from wearsim.models.tangential.torque_balance import with_balanced_creepage
 from wearsim.plugins import (
     Capabilities,
     ContactModelSpec,
@@ -108,24 +109,23 @@ class HertzFastsim(HertzModel):
         theory = FastsimTheory(
             bound=options.bound,
             mx=options.mx,
-            dissipation=options.dissipation,
             kalker=options.kalker,
             coefficients=None
             if given is None
             else CreepageCoefficients(given.c11, given.c22, given.c23, math.nan),
-            closed_form=options.closed_form,
             flexibility=options.flexibility,
         )
         super().__init__(theory, grid, materials, options.patch)
-        self._compiled = theory.compiled(self._pair)
+        self._integrals = options.dissipation, options.closed_form
+        self._compiled = theory.compiled(self._pair, *self._integrals)
 
     def with_creep_factor(self, factor: float) -> Self:
         """Return the model with Kalker's flexibilities divided by a factor."""
         model = super().with_creep_factor(factor)
-        model._compiled = model.theory.compiled(model._tangential)
+        model._compiled = model.theory.compiled(model._tangential, *model._integrals)
         return model
 
-    def solve_one(
+    def solve_contact(
         self,
         gap: FloatArray,
         longitudinal_curvature: float,
@@ -133,14 +133,8 @@ class HertzFastsim(HertzModel):
         wear_compliance: FloatArray | None = None,
         warm: ContactSolution | None = None,
     ) -> ContactSolution:
-        """Solve one contact; equal to a batch of one up to round-off.
-
-        As with a bearing torque, friction that does not vary along rolling is left to
-        `HertzModel.solve_contact`.
-        """
-        if np.ndim(point.friction) > 1 or wear_compliance is not None:
-            return super().solve_one(gap, longitudinal_curvature, point, wear_compliance, warm)
-        return self.solve_contact(gap, longitudinal_curvature, point)
+        """Solve one contact as a batch of one."""
+        return self.solve_one(gap, longitudinal_curvature, point, wear_compliance, warm)
 
     def solve(
         self,
@@ -149,26 +143,40 @@ class HertzFastsim(HertzModel):
         coupling: SharedWear | None = None,
         warm: ContactBatchSolution | None = None,
     ) -> ContactBatchSolution:
-        """Solve the contacts in one call of compiled code, those with a bearing torque in Python.
+        """Solve the contacts in one call of compiled code; `warm` guesses creepages.
 
         Raises
         ------
         ContactError
-            As `HertzModel.solve_contact`, with the place of the first contact that fails.
+            As `HertzModel.solve_contact`, with the place of the first contact that fails; or if
+            friction cannot transmit the torque of a free roller.
         CapabilityError
-            If a wear compliance is given, or a bearing torque with friction that varies from point
-            to point.
+            If a wear compliance is given.
         """
         refuse_unclaimed(self, batch, wear_compliance, coupling)
-        if batch.bearing_torque is not None:
-            return super().solve(batch)
         self._check_shapes(batch)
+        if batch.bearing_torque is not None:
+            batch = self._with_balanced_creepage(batch, warm)
+        patches, results = self._solved(batch)
+        columns = results._asdict()
+        del columns["torque"]
+        return ContactBatchSolution(
+            y=_column(self._grid.y),
+            **columns,
+            approach=patches.approach,
+            peak_pressure=patches.peak_pressure,
+            longitudinal_creepage=np.array(batch.longitudinal, dtype=np.float64),
+            iterations=patches.iterations,
+        )
+
+    def _solved(self, batch: ContactBatch) -> tuple[Patches, ContactResults]:
+        """Return patches and tractions of the contacts, and the torques on free rollers."""
         strips = self._grid.strips
         gaps, row = _distinct_gaps(batch.gap)
-        patches = _new_patches(len(row))
-        results = ContactResults(*np.zeros((3, len(row), strips)), *np.zeros((5, len(row))))
+        patches, contacts = _new_patches(len(row)), len(row)
+        results = ContactResults(*np.zeros((3, contacts, strips)), *np.zeros((6, contacts)))
         # axes without variation have the length 1
-        contacts, rank = len(row), batch.friction.ndim
+        rank, radius = batch.friction.ndim, batch.rolling_radius
         shape = {1: (contacts, 1, 1), 2: (contacts, 1, strips)}.get(rank, batch.friction.shape)
         inputs = ContactInputs(
             _usable_loads(batch),
@@ -179,18 +187,29 @@ class HertzFastsim(HertzModel):
             batch.friction_carried,
             np.zeros((0, strips)) if batch.variation is None else _column(batch.variation),
             _column(batch.rolling_speed),
+            np.zeros((0, strips)) if radius is None else _column(radius),
         )
         bodies = self._bodies(batch)
         first_failed = solve_contacts(bodies, self._compiled, gaps, row, inputs, patches, results)
-        if first_failed < len(row):
+        if first_failed < contacts:
             raise self._error_of(first_failed, batch)
-        return ContactBatchSolution(
-            y=bodies.y,
-            **results._asdict(),
-            approach=patches.approach,
-            peak_pressure=patches.peak_pressure,
-            longitudinal_creepage=np.array(batch.longitudinal, dtype=np.float64),
-            iterations=patches.iterations,
+        return patches, results
+
+    def _with_balanced_creepage(
+        self, batch: ContactBatch, warm: ContactBatchSolution | None
+    ) -> ContactBatch:
+        """Return the contacts with the creepages at which the tractions balance the torques."""
+        if batch.bearing_torque is None or batch.rolling_radius is None:
+            raise ValueError("a bearing torque needs the rolling radius of each strip")
+        _, unloaded = self._solved(batch)
+        return with_balanced_creepage(
+            batch,
+            unloaded.line_load,
+            unloaded.half_length,
+            self._grid,
+            self._tangential,
+            warm,
+            lambda trial: self._solved(trial)[1].torque,
         )
 
     def friction_points(self, batch: ContactBatch) -> tuple[FloatArray, FloatArray]:

@@ -86,7 +86,7 @@ class NormalContacts(NamedTuple):
         cls, batch: ContactBatch, size: int, start: ContactBatchSolution | None
     ) -> NormalContacts:
         """Return the normal problems of sets of `size` contacts, with an initial guess if any."""
-        shape = len(batch.gap) // size, size
+        shape = batch.gap.shape[0] // size, size
         wide = *shape, batch.gap.shape[1]
         line_load, half_length, separation = np.zeros((3, *wide))
         approach = np.zeros(shape)
@@ -159,7 +159,7 @@ class NormalContacts(NamedTuple):
 
         Contacts chosen from sets have arrays of another layout, for which numba would compile.
         """
-        status, iterations = np.zeros((2, len(self.gap)), np.int64)
+        status, iterations = np.zeros((2, self.gap.shape[0]), np.int64)
         failed = kernels.solve_slender(
             self.gap,
             kernel_input(own),

@@ -21,12 +21,10 @@ from wearsim.models.contact.strip_model import (
     grid_about_hertz,
     normal_failure,
 )
-from wearsim.models.contact.strip_tractions import (
-    strip_tractions,
-    with_balanced_creepage,
-)
+from wearsim.models.contact.strip_tractions import strip_tractions
 from wearsim.models.tangential.base import TangentialTheory, power_not_finite
 from wearsim.models.tangential.strip_theory import StripTheory, TangentialOptions, tangential_theory
+from wearsim.models.tangential.torque_balance import with_balanced_creepage
 from wearsim.plugins import (
     Capabilities,
     ContactModelSpec,
@@ -99,8 +97,8 @@ class Slender(StripModel):
     ) -> ContactBatchSolution:
         """Solve the contacts in one call if strip theory supports them.
 
-        Contacts with a bearing torque, except those of a cam, or with another theory have their
-        normal problems solved in one call and their tangential problems one after another.
+        Contacts with another theory have their normal problems solved in one call and their
+        tangential problems one after another.
         """
         refuse_unclaimed(self, batch, wear_compliance, coupling)
         normal = self._solve_normal(batch, wear_compliance, coupling, warm)
@@ -108,8 +106,7 @@ class Slender(StripModel):
         line_load, half_length = normal.line_load.reshape(shape), normal.half_length.reshape(shape)
         separation, approach = normal.separation.reshape(shape), normal.approach.reshape(shape[0])
         iterations = normal.iterations.ravel()
-        free = batch.bearing_torque is not None
-        if not isinstance(self.theory, StripTheory) or (free and not batch.mean_radius):
+        if not isinstance(self.theory, StripTheory):
             one_by_one = solved_one_by_one(
                 batch,
                 lambda k: self._complete(
@@ -122,16 +119,21 @@ class Slender(StripModel):
                 ),
             )
             return replace(one_by_one, separation=separation)
-        if free:
+        solved, tangential = (line_load, half_length), (self._grid, self._tangential)
+        if batch.bearing_torque is not None:
             batch = with_balanced_creepage(
-                batch, line_load, half_length, self._grid, self._tangential, warm
+                batch,
+                line_load,
+                half_length,
+                self._grid,
+                self._tangential,
+                warm,
+                lambda trial: strip_tractions(*solved, trial, *tangential)[2],
             )
-        dissipation, sums = strip_tractions(
-            line_load, half_length, batch, self._grid, self._tangential
-        )
-        finite = np.isfinite(sums)
-        if np.count_nonzero(finite) < finite.size:
-            number = int(np.argmin(finite.all(axis=0)))
+        dissipation, sums, _ = strip_tractions(*solved, batch, *tangential)
+        unknown = (~np.isfinite(sums)).nonzero()[1]
+        if unknown.size:
+            number = int(unknown.min())
             error = power_not_finite(batch.point(number), line_load=line_load[number])
             raise naming_contact(error, number, batch)
         return ContactBatchSolution.of_columns(

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.hertz.ellipse import HertzContact
 from wearsim.mechanics.tangential.kalker_coefficients import Flexibilities, one_flexibility
+from wearsim.models.tangential.torque_balance import balanced_creepage
 from wearsim.types import ContactFields, ContactSolution, FloatArray, OperatingPoint
 
 # below this coverage the load of a strip is round-off and the square of its half-length zero
@@ -148,7 +148,7 @@ def friction_per_strip(strips: Strips, point: OperatingPoint) -> FloatArray:
     if np.ndim(point.friction) > 1:
         raise CapabilityError(
             "this contact model takes one friction coefficient per strip, not one per point;"
-            " use contact.model = 'hertz-fastsim', without a bearing torque"
+            " use contact.model = 'hertz-fastsim'"
         )
     friction = np.empty_like(strips.y)
     friction[:] = point.friction
@@ -157,60 +157,34 @@ def friction_per_strip(strips: Strips, point: OperatingPoint) -> FloatArray:
     return friction
 
 
-def _balanced_creepage(
+def _free_creepage(
     theory: TangentialTheory, strips: Strips, pair: ElasticPair, point: OperatingPoint
 ) -> float:
     """Return the mean creepage at which the tractions balance the bearing torque."""
-    from scipy.optimize import brentq  # noqa: PLC0415  (slow to import, and rarely needed)
-
     radius, torque = point.rolling_radius, point.bearing_torque
     if radius is None or torque is None:
         raise ValueError("a bearing torque needs the rolling radius of each strip")
     friction = friction_per_strip(strips, point)
 
-    def excess(longitudinal: float) -> float:
-        slip = local_slip(strips, point, longitudinal)
+    def torque_of(creepage: FloatArray) -> FloatArray:
+        slip = local_slip(strips, point, float(creepage[0]))
         tractions = theory.tractions(strips, pair, slip, friction, point.rolling_speed)
-        return -float(np.dot(tractions.force_x, radius)) * strips.spacing - torque
+        return np.array([-float(np.dot(tractions.force_x, radius)) * strips.spacing])
 
-    # a creepage of gross sliding: above the variation and many times that of saturation
     variation = local_slip(strips, point, 0.0).longitudinal
-    saturation = float(friction.max() * strips.half_length.max()) * strips.longitudinal_curvature
-    saturation /= pair.creep_factor
-    reach = float(np.abs(variation).max()) + 100.0 * (saturation + abs(point.creepage.lateral))
-    low, high = excess(-reach), excess(reach)
-    if low >= 0.0 or high <= 0.0:
-        carried = torque + (high if torque > 0.0 else low)
-        raise skidding(
-            torque,
-            abs(carried),
-            point.normal_force,
-            {"line_load": strips.line_load, "half_length": strips.half_length},
-        )
-    return float(brentq(excess, -reach, reach, xtol=1e-16, rtol=1e-14))
-
-
-def skidding(
-    torque: float, carried: float, normal_force: float, state: Mapping[str, Any]
-) -> ContactError:
-    """Return the error of a free roller whose torque friction cannot transmit.
-
-    Parameters
-    ----------
-    torque, carried : float
-        The torque and the greatest that friction transmits [N m].
-    normal_force : float
-        Load [N].
-    state : mapping
-        State of the error.
-    """
-    return ContactError(
-        f"the roller skids: its torque of {1e3 * torque:.4g} N mm exceeds the"
-        f" {1e3 * carried:.4g} N mm that friction can transmit at a load of {normal_force:.4g} N",
-        {"torque": torque, "carried": carried, "normal_force": normal_force, **state},
-        remedy="lower creepage.bearing_torque, or raise friction.coefficient or the load",
-        cause="skid",
+    full_slip = float(friction.max() * strips.half_length.max()) * strips.longitudinal_curvature
+    others = float(np.abs(variation).max()) + 100.0 * abs(point.creepage.lateral)
+    state = {"line_load": strips.line_load, "half_length": strips.half_length}
+    creepage = balanced_creepage(
+        torque_of,
+        np.array([torque]),
+        np.zeros(1),
+        np.zeros(1),
+        np.array([full_slip / pair.creep_factor]),
+        np.array([others]),
+        lambda _: {"normal_force": point.normal_force, **state},
     )
+    return float(creepage[0])
 
 
 def spread_work(work: FloatArray) -> FloatArray:
@@ -249,7 +223,7 @@ def complete(
     """Solve the tangential problem of `strips` and return the complete contact solution."""
     longitudinal = point.creepage.longitudinal
     if point.bearing_torque is not None and not math.isnan(point.bearing_torque):
-        longitudinal = _balanced_creepage(theory, strips, pair, point)
+        longitudinal = _free_creepage(theory, strips, pair, point)
     slip = local_slip(strips, point, longitudinal)
     friction = friction_per_strip(strips, point)
     tractions = theory.tractions(strips, pair, slip, friction, point.rolling_speed)

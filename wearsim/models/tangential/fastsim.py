@@ -10,7 +10,7 @@ from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.tangential import hertz_fastsim_batch as batches
 from wearsim.mechanics.tangential.fastrip import fastrip, fastrip_fields
-from wearsim.mechanics.tangential.fastsim import closed_form, element_sum, march, march_fields
+from wearsim.mechanics.tangential.fastsim import closed_form, march, march_fields
 from wearsim.mechanics.tangential.kalker_coefficients import (
     CreepageCoefficients,
     Flexibilities,
@@ -59,19 +59,10 @@ class FastsimTheory(TangentialTheory):
         integral of either is the line load of the strip.
     mx : int
         Points along each strip.
-    dissipation : {"rigid-slip", "element-sum"}
-        Work of the rigid slip, second order in 1/mx, or the textbook's sum over elements, first
-        order and too low.
     kalker : {"table", "line-limit"}
         Kalker's table, or its limits for a contact that is long across rolling.
     coefficients : CreepageCoefficients, optional
         Coefficients that replace either.
-    closed_form : {"exact", "always", "never"}
-        Use of the closed-form integral instead of the march, if the dissipation is the work of the
-        rigid slip: without spin, where it is exact; also with spin, whose lateral slip phi x is
-        then neglected; or never. Over the inputs of the paper the neglect changes the mean and the
-        standard deviation of the power by less than 1e-4 of them, and a single power by 0.2 % rms,
-        at most 2.5 %.
     flexibility : {"three", "one"}
         Kalker's three flexibilities, or their mean weighted with the magnitudes of the creepages,
         ``L = (|xi| L1 + |eta| L2 + |phi| c L3)/sqrt(xi^2 + eta^2 + phi^2 c^2)``, c = sqrt(ab). With
@@ -97,18 +88,14 @@ class FastsimTheory(TangentialTheory):
         self,
         bound: Bound = "parabolic",
         mx: int = 50,
-        dissipation: Dissipation = "rigid-slip",
         kalker: Kalker = "table",
         coefficients: CreepageCoefficients | None = None,
-        closed_form: ClosedForm = "exact",
         flexibility: Flexibility = "three",
     ) -> None:
         self.elliptic = bound == "elliptic"
         self.mx = mx
-        self.element_sum = dissipation == "element-sum"
         self.kalker = kalker
         self.coefficients = coefficients
-        self.closed_form = closed_form
         self.single = flexibility == "one"
 
     def flexibilities(self, strips: Strips, pair: ElasticPair) -> Flexibilities:
@@ -153,26 +140,13 @@ class FastsimTheory(TangentialTheory):
         part = touching(strips)
         flexibility = self.flexibilities_under(strips, pair, slip)
         problem = self._problem(strips, flexibility, slip, friction, part)
-        out = np.zeros((5, len(strips.y)))
-        allowed = self.closed_form == "always" or (self.closed_form == "exact" and slip.spin == 0.0)
-        if allowed and not self.element_sum:
-            out[:4, part] = closed_form(*problem[:5])
-            if slip.spin != 0.0:
-                out[2] = 0.0  # phi x is neglected, in the work as in the traction
-        else:
-            out[:4, part] = march(*problem, self.mx)
-        force_x, force_y, moment, adhesion, dissipation = out
-        if self.element_sum:
-            fields = march_fields(*problem, np.ones((self.mx, len(problem[0]))))
-            dissipation[part] = element_sum(
-                fields, flexibility.longitudinal, flexibility.lateral, rolling_speed
-            )
-        else:
-            work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
-            dissipation[:] = -rolling_speed * work
-        out[[0, 1, 2, 4]] *= covered_share(strips)
-        dissipation[:] = spread_work(dissipation)
-        return Tractions(force_x, force_y, moment, dissipation, adhesion)
+        out = np.zeros((4, len(strips.y)))
+        # without spin the closed form is exact
+        out[:, part] = march(*problem, self.mx) if slip.spin else closed_form(*problem[:5])
+        out[:3] *= covered_share(strips)
+        force_x, force_y, moment, adhesion = out
+        work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
+        return Tractions(force_x, force_y, moment, spread_work(-rolling_speed * work), adhesion)
 
     def fields(
         self,
@@ -222,16 +196,32 @@ class FastsimTheory(TangentialTheory):
             power_density=-rolling_speed * (traction_x * slip_x + traction_y * slip_y),
         )
 
-    def compiled(self, pair: ElasticPair) -> batches.Theory:
-        """Return the theory as an argument of the kernels for many contacts."""
+    def compiled(
+        self, pair: ElasticPair, dissipation: Dissipation, closed_form: ClosedForm
+    ) -> batches.Theory:
+        """Return the theory as an argument of the kernels for many contacts.
+
+        Parameters
+        ----------
+        pair : ElasticPair
+        dissipation : {"rigid-slip", "element-sum"}
+            Work of the rigid slip, second order in 1/mx, or the textbook's sum over elements, first
+            order and too low.
+        closed_form : {"exact", "always", "never"}
+            Use of the closed-form integral instead of the march, if the dissipation is the work of
+            the rigid slip: without spin, where it is exact; also with spin, whose lateral slip
+            phi x is then neglected; or never. Over the inputs of the paper the neglect changes the
+            mean and the standard deviation of the power by less than 1e-4 of them, and a single
+            power by 0.2 % rms, at most 2.5 %.
+        """
         given = self.coefficients
         chosen = batches.TABLE if self.kalker == "table" else batches.LINE_LIMIT
         return batches.Theory(
             shear_modulus=pair.shear_modulus,
             poisson_ratio=pair.poisson_ratio,
             elliptic=self.elliptic,
-            closed_form=_CLOSED_FORM[self.closed_form],
-            element_sum=self.element_sum,
+            closed_form=_CLOSED_FORM[closed_form],
+            element_sum=dissipation == "element-sum",
             points=self.mx,
             single=self.single,
             kalker=chosen if given is None else batches.GIVEN,

@@ -12,6 +12,7 @@ import numpy as np
 SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
 GROWTH = 4  # greatest ratio of the size of a batch to the greatest before it
 MOST_IN_BATCH = 256
+LEAST_IN_BATCH = 16  # of those left, if they take less; a batch costs as much as five tests more
 BATCHES = 3  # finished batches from which the time left is estimated,
 RECENT = 8  # and the greatest number of them
 
@@ -38,7 +39,7 @@ class BatchSizes:
         self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
 
     def next(self, left: int, workers: int) -> int:
-        """Return the batch size for `SECONDS`, limited so that all workers end together.
+        """Return the batch size for `SECONDS`, limited so that several workers end together.
 
         The last batches give the rate: before the first ones the workers load the kernels,
         and a realisation takes longer in a small batch.
@@ -49,7 +50,9 @@ class BatchSizes:
             Realisations that are not finished.
         workers : int
         """
-        most = max(min(-(-left // (2 * workers)), MOST_IN_BATCH, GROWTH * self._largest), 1)
+        each = math.ceil(left / workers)
+        together = each if workers == 1 else max(math.ceil(each / 2), min(each, LEAST_IN_BATCH))
+        most = max(min(together, MOST_IN_BATCH, GROWTH * self._largest), 1)
         rate = self.rate
         if len(self._recent) > 1:
             (start, before), (end, run) = self._recent[0], self._recent[-1]

@@ -1,0 +1,142 @@
+"""Creepages of free rollers, at which the tractions balance the torques of their bearings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.errors import ContactError
+from wearsim.mechanics.hertz.elasticity import ElasticPair
+from wearsim.mechanics.numerics.roots import bracketed_roots, secant_roots
+from wearsim.types import FloatArray, Grid
+
+_SLIDING = 100.0  # creepage of gross sliding, over that of full slip
+
+
+def balanced_creepage(
+    torque_of: Callable[[FloatArray], FloatArray],
+    bearing_torque: FloatArray,
+    given: FloatArray,
+    first: FloatArray,
+    full_slip: FloatArray,
+    others: FloatArray,
+    state_of: Callable[[int], Mapping[str, Any]],
+) -> FloatArray:
+    """Return the mean longitudinal creepages at which the tractions balance the bearing torques.
+
+    Parameters
+    ----------
+    torque_of : callable
+        Torques of the longitudinal tractions on the rollers at given creepages, both of shape
+        (contacts,) [N m]; increasing.
+    bearing_torque : ndarray, shape (contacts,)
+        Torques needed [N m]; not a number for a roller that skids at its given creepage.
+    given, first : ndarray, shape (contacts,)
+        Creepages of the rollers that skid, and first guesses of the others.
+    full_slip, others : ndarray, shape (contacts,)
+        Order of the creepage of full slip, and the magnitude of what adds to the creepage: its
+        variation, and the lateral creepage.
+    state_of : callable
+        Load and state of a contact by number, for the error: "normal_force" and further values.
+
+    Raises
+    ------
+    ContactError
+        If friction cannot transmit a torque.
+
+    Notes
+    -----
+    A secant method from the guess; where it does not converge, a bracket of gross sliding. Each
+    root is independent of the other contacts.
+    """
+    rolls = np.isfinite(bearing_torque)
+    needed = np.where(rolls, bearing_torque, 0.0)
+
+    def excess(creepage: FloatArray) -> FloatArray:
+        return np.where(rolls, torque_of(creepage) - needed, creepage - given)
+
+    creepage, converged = secant_roots(excess, first, full_slip)
+    if converged.all():
+        return creepage
+    reach = _SLIDING * full_slip + others + np.abs(given)
+    low, high = excess(-reach), excess(reach)
+    lost = np.flatnonzero(~converged & rolls & ((low >= 0.0) | (high <= 0.0)))
+    if len(lost):
+        k = int(lost[0])
+        torque, carried = bearing_torque[k], needed[k] + (high[k] if needed[k] > 0.0 else low[k])
+        raise _skidding(float(torque), abs(float(carried)), state_of(k))
+    return np.where(converged, creepage, bracketed_roots(excess, -reach, reach, first))
+
+
+def with_balanced_creepage(
+    batch: ContactBatch,
+    line_load: FloatArray,
+    half_length: FloatArray,
+    grid: Grid,
+    pair: ElasticPair,
+    guess: ContactBatchSolution | None,
+    torque_of: Callable[[ContactBatch], FloatArray],
+) -> ContactBatch:
+    """Return the contacts with the creepages at which the tractions balance the torques.
+
+    Parameters
+    ----------
+    batch : ContactBatch
+        With a bearing torque, not a number where a roller skids at the given creepage.
+    line_load, half_length : ndarray, shape (contacts, strips)
+        Solution of the normal problem [N/m], [m].
+    grid : Grid
+    pair : ElasticPair
+    guess : ContactBatchSolution, optional
+        Solution with the first guesses of the creepage.
+    torque_of : callable
+        Torques of the tractions of given contacts on their rollers, shape (contacts,) [N m].
+
+    Raises
+    ------
+    ContactError
+        If friction cannot transmit a torque.
+    """
+    if batch.bearing_torque is None or batch.rolling_radius is None:
+        raise ValueError("a bearing torque needs the rolling radius of each strip")
+    first = np.zeros(len(batch))
+    if guess is not None:
+        first = np.nan_to_num(guess.longitudinal_creepage)
+
+    friction = batch.friction.reshape(len(batch), -1).max(axis=1)
+    full_slip = friction * half_length.max(axis=1) * batch.longitudinal_curvature
+    others = 100.0 * np.abs(batch.lateral)
+    if batch.variation is not None:
+        others = others + np.abs(batch.variation).max(axis=1)
+    else:
+        others = others + np.abs(batch.spin) * np.abs(grid.y).max()
+    creepage = balanced_creepage(
+        lambda creepage: torque_of(batch.replaced(longitudinal=creepage)),
+        batch.bearing_torque,
+        batch.longitudinal,
+        first,
+        full_slip / pair.creep_factor,
+        others,
+        lambda k: {
+            "normal_force": float(batch.normal_force[k]),
+            "line_load": line_load[k],
+            "half_length": half_length[k],
+        },
+    )
+    return replace(batch, longitudinal=creepage)
+
+
+def _skidding(torque: float, carried: float, state: Mapping[str, Any]) -> ContactError:
+    """Return the error of a free roller whose torque friction cannot transmit."""
+    return ContactError(
+        f"the roller skids: its torque of {1e3 * torque:.4g} N mm exceeds the"
+        f" {1e3 * carried:.4g} N mm that friction can transmit at a load of"
+        f" {state['normal_force']:.4g} N",
+        {"torque": torque, "carried": carried, **state},
+        remedy="lower creepage.bearing_torque, or raise friction.coefficient or the load",
+        cause="skid",
+    )
