@@ -21,14 +21,13 @@ Wear tests
 
 Ensembles
     ensemble(scenario, n, output)       run a wear test for each of n realisations
-    resume_ensemble(file)               continue or extend an ensemble from its file
+    resume_ensemble(file)               continue or extend an ensemble or lives from their file
 
 Identification
     identify(scenario, profiles)        wear factor K/H of measured tests, and its scatter
 
 Lives
     life(scenario, n, output)           run n tests to the first limit that they reach
-    resume_life(file)                   continue or extend a study of lives from its file
     sweep_life(scenario, key, values)   lives for several values of one key
 
 Designs, of the extra ``wearsim[optimise]``
@@ -118,7 +117,7 @@ if TYPE_CHECKING:
     from wearsim.studies.ensemble.sweep import sweep
     from wearsim.studies.identify.api import identify
     from wearsim.studies.identify.result import IdentificationResult
-    from wearsim.studies.life.api import life, resume_life, sweep_life
+    from wearsim.studies.life.api import life, sweep_life
     from wearsim.studies.life.result import LifeResult
     from wearsim.studies.opening import (
         open_dissipation,
@@ -166,7 +165,7 @@ _NAMES = {
     "wearsim.studies.comparison.compare": ["compare"],
     "wearsim.studies.ensemble.sweep": ["sweep"],
     "wearsim.studies.identify.api": ["identify"],
-    "wearsim.studies.life.api": ["life", "resume_life", "sweep_life"],
+    "wearsim.studies.life.api": ["life", "sweep_life"],
     "wearsim.studies.run.run": ["resume", "run"],
     "wearsim.studies.start.export": ["export_running_in"],
     "wearsim.types": ["ContactSolution", "Profile"],
@@ -207,7 +206,6 @@ __all__ = [
     "open_results",
     "resume",
     "resume_ensemble",
-    "resume_life",
     "run",
     "save_report",
     "scenario_schema",

@@ -59,6 +59,21 @@ class _Column(NamedTuple):
     conversion: Conversion | None
 
 
+def refuse_mistakes(file: str, mistakes: Sequence[Mistake]) -> None:
+    """Raise the mistakes of a table, if there are any, and of many the first `MAX_MISTAKES`.
+
+    Raises
+    ------
+    ScenarioError
+        With the mistakes.
+    """
+    if not mistakes:
+        return
+    more = len(mistakes) - MAX_MISTAKES
+    rest = [Mistake("", "", f"and {more} more")] if more > 0 else []
+    raise ScenarioError(file, [*mistakes[:MAX_MISTAKES], *rest])
+
+
 def read_columns(
     text: str,
     file: str,
@@ -157,11 +172,7 @@ def read_columns(
         data[column.name] = in_order(cells, column.conversion)
         if column.name == rising:
             _check_order(numbers, data[column.name], rising, either_way, mistakes)
-    if len(mistakes) > MAX_MISTAKES:
-        rest = Mistake("", "", f"and {len(mistakes) - MAX_MISTAKES} more")
-        mistakes = [*mistakes[:MAX_MISTAKES], rest]
-    if mistakes:
-        raise ScenarioError(file, mistakes)
+    refuse_mistakes(file, mistakes)
     falls = rising is not None and data[rising][0] > data[rising][1]
     order = slice(None, None, -1 if falls else 1)
     return {column.name: data[column.name][order] * column.factor for column in chosen}

@@ -106,8 +106,11 @@ def test_labels_of_equal_file_names_include_the_folder(here: Command) -> None:
         (["a.h5", "d.h5"], "holds realisations of one contact"),
         (["a.h5", "d.h5"], "only runs and ensembles can be compared"),
         (["a.h5", "none.h5"], "there is no such file"),
-        (["a.h5", "b.h5", "--observable", "dept"], "a has no 'dept', expected one of depth"),
-        (["a.h5", "r.h5", "--observable", "mean_power"], "r has no 'mean_power'"),
+        (
+            ["a.h5", "b.h5", "--observable", "dept"],
+            "'dept' is not an observable of a (did you mean 'depth'?); known: depth",
+        ),
+        (["a.h5", "r.h5", "--observable", "mean_power"], "'mean_power' is not an observable of r"),
         (["a.h5", "b.h5", "-o", "a.gif"], "has no known figure format"),
     ],
 )

@@ -144,7 +144,7 @@ def test_failed_realisations_are_not_repeated_while_extending(command: Command, 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--until", "5 min"], "only wear tests can be extended"),
+        (["--until", "5 min"], "has no meaning for a file that holds an ensemble"),
         (["--scheduler", "cloud"], "no scheduler 'cloud'"),
     ],
 )
@@ -165,7 +165,7 @@ def test_resume_refuses_options_of_ensembles_for_a_run(
 ) -> None:
     result = command("resume", finished, *arguments)
     assert result.exit_code == 2
-    assert f"for {arguments[0]}: is an option for ensembles only" in result.stderr
+    assert f"for {arguments[0]}: has no meaning for a file that holds a wear test" in result.stderr
 
 
 def test_resume_of_a_run_names_resume_ensemble(done: Path) -> None:

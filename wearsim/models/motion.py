@@ -217,8 +217,8 @@ class EndOptions(Options):
             If a unit does not fit.
         """
         return tuple(  # type: ignore[return-value]
-            [_derivative(value, order, unit) for order, value in enumerate(each, start=1)]
-            for each in (self.start, self.end)
+            [_derivative(value, order, unit) for order, value in enumerate(texts, start=1)]
+            for texts in (self.start, self.end)
         )
 
 
@@ -228,9 +228,9 @@ def _derivative(value: str | float, order: int, unit: str) -> float:
         if value == 0.0:
             return 0.0
         value = str(value)
-    number, _, own = value.strip().partition(" ")
+    number, _, unit_given = value.strip().partition(" ")
     expected = f'a derivative such as "5 {"mm" if unit == "m" else "deg"}{target[len(unit) :]}"'
-    factor = conversion(own, target, as_written(value), expected)
+    factor = conversion(unit_given, target, as_written(value), expected)
     return float(number) * float(factor)
 
 
@@ -251,15 +251,15 @@ class Table(MotionLaw):
     """Quintic spline through a table, with slope and acceleration zero at both ends."""
 
     def __init__(self, options: TableOptions, angle: float, rise: float, unit: str) -> None:
-        own, lift = read_lift(options.file.text, options.file.path, unit)
-        if abs(own[0]) > 1e-9 or abs(own[-1] - angle) > 1e-9:
-            got = f"{math.degrees(own[0]):.6g} to {math.degrees(own[-1]):.6g} deg"
+        angles, lift = read_lift(options.file.text, options.file.path, unit)
+        if abs(angles[0]) > 1e-9 or abs(angles[-1] - angle) > 1e-9:
+            got = f"{math.degrees(angles[0]):.6g} to {math.degrees(angles[-1]):.6g} deg"
             expected = f"0 to {math.degrees(angle):.6g} deg, the segment's angle"
             what = "the angles do not span the segment"
             raise ScenarioError(options.file.path, [Mistake("", "", what, got, expected)])
-        own[-1] = angle
-        refuse_kinks(options.file.path, own, lift)
-        self._spline = LiftSpline(own, lift - lift[0])
+        angles[-1] = angle
+        refuse_kinks(options.file.path, angles, lift)
+        self._spline = LiftSpline(angles, lift - lift[0])
 
     def lift(self, angle: FloatArray) -> FloatArray:
         """Return lift and derivatives by the angle, shape (3, points)."""
@@ -318,8 +318,8 @@ def _isolated(values: FloatArray, size: FloatArray) -> IntArray:
     for place in range(reach, len(values) - reach):
         sides = values[place - reach : place - reach + 2], values[place + reach - 1 :][:2]
         around[place] = max(side.max() for side in sides)
-    found = np.flatnonzero((values > 5.0 * around) & (values > size))
-    return found[np.diff(found, prepend=-9) > 1]  # one of two neighbours
+    places = np.flatnonzero((values > 5.0 * around) & (values > size))
+    return places[np.diff(places, prepend=-9) > 1]  # one of two neighbours
 
 
 def kinks(angle: FloatArray, lift: FloatArray, noise: float = 0.0) -> tuple[FloatArray, FloatArray]:
@@ -372,7 +372,7 @@ def refuse_kinks(
                 break
             count *= 2
         whole = len(angle) // count * count
-        angle, lift = (each[:whole].reshape(-1, count).mean(axis=1) for each in (angle, lift))
+        angle, lift = (values[:whole].reshape(-1, count).mean(axis=1) for values in (angle, lift))
         noise /= math.sqrt(count)
     corners, _ = kinks(angle, lift, noise)
     if len(corners):

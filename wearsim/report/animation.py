@@ -84,7 +84,7 @@ def save_animation(animation: Animation, path: Path) -> None:
             for number in range(animation.count):
                 axes.clear()
                 draw(axes, animation.frame(number))
-                if number == 0:  # the layout of the first frame is that of all
+                if number == 0:  # all frames have the layout of the first
                     figure.draw_without_rendering()
                     figure.set_layout_engine("none")
                 writer.grab_frame()

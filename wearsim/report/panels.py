@@ -401,6 +401,11 @@ def depth_axes(
     return passes >= 0.0, pass_axis(float(passes[-1])), Axis(name, "um")
 
 
+def share_axis(name: str) -> Axis:
+    """Return an axis of shares from 0 to 100 %."""
+    return Axis(name, "%", limits=(0.0, 1.02))
+
+
 def pass_axis(greatest: float) -> Axis:
     """Return an axis of roller passes up to a number."""
     size, name = pass_unit(greatest)

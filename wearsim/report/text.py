@@ -40,6 +40,7 @@ _SI = {"um": "m", "mm": "m", "mm^3": "m3", "MPa": "Pa", "deg": "rad", "J": "J", 
 TOO_FEW = "too few"
 TOO_FEW_REALISATIONS = "too few realisations"
 NINETY_PERCENT = (0.05, 0.95)
+QUANTILES = (0.05, 0.5, 0.95)  # that tables show
 _HALF_WIDTH_DIGITS = 2  # significant digits of the half-width, which set the decimals
 _MIN_DIGITS, _MAX_DIGITS = 3, 8  # significant digits of an estimate
 _WITHOUT_EXPONENT = (1e-4, 1e7)
@@ -85,9 +86,16 @@ def count(value: float) -> str:
     return f"{value:,.0f}"
 
 
+def count_of(number: int, noun: str, none: str = "") -> str:
+    """Return a number of things, "1 unit" or "1,000 units"; of zero another text if it is given."""
+    if not number and none:
+        return none
+    return f"{count(number)} {noun}{'' if number == 1 else 's'}"
+
+
 def number_of_realisations(number: int) -> str:
     """Return "1 realisation" or "1,000 realisations"."""
-    return f"{count(number)} realisation{'' if number == 1 else 's'}"
+    return count_of(number, "realisation")
 
 
 def pass_unit(greatest: float) -> tuple[float, str]:
@@ -180,6 +188,21 @@ OBSERVABLES: Mapping[str, Named] = {
     "cylinder_damage": Named("damage of the cylinder", "1"),
     "roller_damage": Named("damage of the rollers", "1"),
 }
+
+
+#: units of limits of wear by their names; the others are lengths in um
+_LIMIT_UNITS = {
+    "volume": "mm^3",
+    "width": "mm",
+    "peak_pressure": "MPa",
+    "damage": "1",
+    "pitting": "1",
+}
+
+
+def limit_unit(name: str) -> str:
+    """Return the unit in which a limit of wear is shown, a key of `PER_SI`."""
+    return _LIMIT_UNITS.get(name, "um")
 
 
 def si_unit(name: str) -> str:

@@ -52,6 +52,11 @@ class Row(NamedTuple):
     error: float | None = None
     answers: Mapping[str, tuple[float | None, str]] = {}
 
+    @classmethod
+    def answer(cls, label: str, name: str, value: float, unit: str) -> Row:
+        """Return the row of one number [SI] that other studies ask for by a name."""
+        return cls(label, value, unit, answers={name: (value, unit)})
+
     @property
     def text(self) -> str:
         """The quantity with its unit and error."""
@@ -94,7 +99,7 @@ def answers_of(rows: Rows) -> dict[str, Answer]:
 
 
 def width_row(width: Any, threshold: float) -> Row:
-    """Return widths of the groove, or the depth that it has not reached, in SI."""
+    """Return the row of the widths [m], or of the depth that a groove has not reached [m]."""
     answers = {"width": (float(np.max(width)), "mm")}
     if not np.any(width):
         return Row("width", f"0 mm, not deeper than {shown(threshold, 'um')}", answers=answers)

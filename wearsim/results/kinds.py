@@ -68,7 +68,7 @@ def _about(file: StoredFile) -> dict[str, Any]:
 
 
 def as_plugin(name: str) -> dict[str, str]:
-    """Return a kind of study as the plugins that a file lists, so that the file names its plugin.
+    """Return the entry of a kind of study in the list of plugins that a file holds.
 
     Parameters
     ----------

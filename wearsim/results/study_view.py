@@ -4,13 +4,26 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from wearsim.errors import PluginError, ResultsFileError
 from wearsim.report.text import count
-from wearsim.report.view import ORIGIN, STUDY, Repetition, Row, Rows, Table, View
+from wearsim.report.view import (
+    ORIGIN,
+    STUDY,
+    Column,
+    Columns,
+    Frame,
+    Overview,
+    Repetition,
+    Row,
+    Rows,
+    Table,
+    View,
+)
 from wearsim.results.content import StudyResult
 from wearsim.types import FloatArray
 from wearsim.units import in_engineers_unit
@@ -118,6 +131,49 @@ class StudyView(View, Generic[Shown]):
         scenario = Path(self.result.raw.scenario_file).name
         command = shlex.join(["wearsim", self.verb, scenario, *self.options()])
         return Repetition(command, files, SAME_NUMBERS)
+
+
+class DesignsView(View):
+    """View of returns from the field or of demonstration tests: one table, and its files.
+
+    Attributes
+    ----------
+    file : str
+        Name of the CSV file.
+    group : str
+        Title of the answers that a page shows first.
+    """
+
+    file: str
+    group: str
+
+    @abstractmethod
+    def table(self) -> list[Column]:
+        """Return the columns of the table."""
+
+    def columns(self) -> Mapping[str, Columns]:
+        """Return the table by the name of its file."""
+        return {self.file: [self.table()]}
+
+    def frame(self) -> Frame:
+        """Return the table for pandas, with rows from 1 on."""
+        columns = [(column.name, column.unit, column.values) for column in self.table()]
+        return Frame(columns, "number", range(1, len(columns[0][2]) + 1))
+
+    def stored_files(self) -> list[tuple[str, str]]:
+        """Return the scenario of the first design and its input files."""
+        view: View = self.result.designs[0].view
+        return view.stored_files()
+
+    def overview(self) -> Overview:
+        """Return the main panel and the answers."""
+        return Overview(self.panels().first, {self.group: self.rows()[1:]})
+
+
+def columns_of(name: str, ends: Iterable[FloatArray], unit: str = "1") -> list[Column]:
+    """Return values and lower and upper ends of their intervals as columns of a CSV file."""
+    names = (name, f"{name} low", f"{name} high")
+    return [Column(title, values, unit) for title, values in zip(names, ends, strict=True)]
 
 
 def drawn_rows(result: StudyResult[Any]) -> Rows:

@@ -81,11 +81,11 @@ class AxialGap:
         return np.asarray(offset * (radius / crown))
 
     def drop(self, s: FloatArray) -> FloatArray:
-        """Return the gap of rollers whose apex is above that of the cylinder [m]."""
+        """Return the gap of rollers whose apex is above the apex of the cylinder [m]."""
         return self._roller.drop(s) + self.cylinder_drop(s)
 
     def half_width(self, depth: FloatArray | float) -> FloatArray:
-        """Return the half-width of a conformal groove of a depth, at most that of the roller [m].
+        """Return the half-width of a conformal groove of a depth, at most half the roller [m].
 
         Of circular crowns it is (2 R d)^(1/2), also beyond the ends of the roller.
         """
@@ -100,13 +100,13 @@ class AxialGap:
             root = np.sqrt(2.0 * (self.crown_radius or 0.0))
             return np.asarray((0.75 * np.asarray(area) / root) ** (2.0 / 3.0))
         places, drops, areas = self._table
-        found = np.interp(area, areas, drops)
+        depth = np.interp(area, areas, drops)
         beyond = np.maximum(np.asarray(area) - areas[-1], 0.0) / (2.0 * places[-1])
-        return np.asarray(found + beyond)
+        return np.asarray(depth + beyond)
 
     @property
     def greatest_half_width(self) -> float:
-        """Greatest half-width of a contact, that of the roller or of a great drop [m]."""
+        """Greatest half-width of a contact: of the roller, or where the drop is great [m]."""
         return float(self._table[0][-1])
 
     def radius_at(self, half_width: float) -> float:

@@ -83,7 +83,7 @@ def _with_forms(
     mistakes: Mistakes, scenario: Scenario, numbers: dict[str, dict[str, Any]]
 ) -> dict[str, Any]:
     """Return the bodies with drawn numbers in their axial profiles, taken out of `numbers`."""
-    found: dict[str, Any] = {}
+    bodies: dict[str, Any] = {}
     for table in ("roller", "cylinder", "cam"):
         drawn = numbers.get(table, {}).pop("axial_profile", None)
         if drawn is None:
@@ -97,8 +97,8 @@ def _with_forms(
         mistakes.raise_any()
         changed = {"axial_profile": replace(choice, options=options)}
         isolated = isinstance(body, BaseModel)
-        found[name] = body.model_copy(update=changed) if isolated else replace(body, **changed)
-    return found
+        bodies[name] = body.model_copy(update=changed) if isolated else replace(body, **changed)
+    return bodies
 
 
 def _replaced(mistakes: Mistakes, section: Any, numbers: dict[str, Any], table: str) -> Any:

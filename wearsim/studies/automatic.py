@@ -215,7 +215,7 @@ def _not_calibrated(table: Calibration, states: list[_State]) -> str:
 
 
 def _looked_at(scenario: Scenario, test: bool) -> tuple[list[_State], str]:
-    """Return the states whose contacts are looked at, and their description."""
+    """Return the states in which errors are estimated, and their description."""
     scout = replace(scenario, contact=_choice(scenario, "slender", {}), random=())
     if not test:
         return [_single(scout)], "in this contact"

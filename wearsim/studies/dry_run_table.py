@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wearsim.report.text import lapse
+from wearsim.report.text import PER_SI, lapse, limit_unit
 from wearsim.studies.dry_run import Data
 from wearsim.studies.fatigue.unworn import unworn_text
 from wearsim.units import in_engineers_unit
@@ -14,13 +14,6 @@ from wearsim.units import in_engineers_unit
 TableRows = list[tuple[str, str]]
 _RADII = ("radius_m", "crown_radius_m", "width_m", "edge_radius_m", "chamfer_m")
 _UNITS = {"_m": ("mm", 1e-3), "_Pa": ("GPa", 1e9), "_rad": ("mrad", 1e-3)}  # by ends of keys
-_LIMIT_UNITS = {
-    "volume": ("mm^3", 1e-9),
-    "peak_pressure": ("MPa", 1e6),
-    "width": ("mm", 1e-3),
-    "damage": ("1", 1.0),
-    "pitting": ("1", 1.0),
-}
 
 
 def plan(data: Data) -> TableRows:
@@ -212,13 +205,13 @@ def _test_rows(data: Data) -> TableRows:
 
 def _pitting_rows(data: Data) -> TableRows:
     """Return rows on pitting without wear; none of a scenario without fatigue."""
-    found = data.get("pitting_without_wear")
-    if found is None:
+    pitting = data.get("pitting_without_wear")
+    if pitting is None:
         return []
     rollers = None if data["cam"] is None else data["test"]["rollers"]
     names = {"cylinder": "cylinder" if data["cam"] is None else "cam", "roller": "rollers"}
-    sources = [(f"fatigue of the {names[body]}", text) for body, text in found["sources"].items()]
-    return [("pitting without wear", unworn_text(found, rollers)), *sources]
+    sources = [(f"fatigue of the {names[body]}", text) for body, text in pitting["sources"].items()]
+    return [("pitting without wear", unworn_text(pitting, rollers)), *sources]
 
 
 def _rounded(value: float, digits: int = 2) -> str:
@@ -254,7 +247,8 @@ def _limit_rows(data: Data) -> TableRows:
     """Return a row for each limit of [limit], as forecast."""
     rows, test = [], data["test"]
     for item in data["forecast"]["limits"]:
-        unit, size = _LIMIT_UNITS.get(item["quantity"], ("um", 1e-6))
+        unit = limit_unit(item["quantity"])
+        size = 1.0 / PER_SI[unit]
         name = f"limit of {item['quantity'].replace('_', ' ')}"
         ratio = f"{_rounded(item['at_end'] / size)} of {item['limit'] / size:.4g}"
         ratio += "" if unit == "1" else f" {unit}"

@@ -39,7 +39,7 @@ from wearsim.types import FloatArray, Grid
 
 STRIPS = 61  # over the width in contact of one groove
 MOST_STRIPS = 301  # where contacts lie apart
-_MARGIN = 1.25  # width of the strips over that in contact
+_MARGIN = 1.25  # width of the strips over the width in contact
 _RATIO = 2.5  # of the depths of two grooves
 MOST_GROOVES = 50
 SLOW = 3.0  # s, for a contact by exact theory that is not solved again

@@ -72,7 +72,7 @@ def wearsim_study_kinds() -> Iterable[StudyKind]:
         read="wearsim.studies.ensemble.file.parts:read_ensemble",
         marked_by="life",
         holds="lives, from `wearsim life`",
-        resume="wearsim.studies.life.api:resume_life",
+        resume="wearsim.studies.ensemble.api:resume_ensemble",
         compare="wearsim.studies.life.comparison_view:lives_view",
         protocol=2,
     )

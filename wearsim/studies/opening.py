@@ -27,9 +27,9 @@ def open_results(path: str | Path) -> Any:
 
     Returns
     -------
-    Result, DissipationResult, EnsembleResult, LifeResult or IdentificationResult
-        Of a wear test, of a dissipation study, of an ensemble, of lives, of an identification; or
-        the result of a kind of study that a plugin adds.
+    Result, DissipationResult, EnsembleResult, IdentificationResult or another
+        Of a wear test, of a dissipation study, of an ensemble (of lives, a class derived from it),
+        of an identification; or the result of a kind of study that a plugin adds.
 
     Raises
     ------

@@ -170,7 +170,7 @@ def states_at(
         )
         states.append(state.at(places[-1]))
     problem, state = advance.problem.at(np.concatenate(places)), joined_states(states)
-    return problem, state_at(stepper, problem, state, np.array([one[2] for one in due]))
+    return problem, state_at(stepper, problem, state, np.array([record[2] for record in due]))
 
 
 def state_at(

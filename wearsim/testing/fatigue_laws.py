@@ -48,7 +48,7 @@ def damage_is_elementwise(fixture: FatigueLawFixture) -> None:
     pressures = _PRESSURES[1:].reshape(3, 100)
     damage = fixture.damage(pressures)
     require_values("the damage", damage, pressures.shape)
-    singly = np.concatenate([fixture.damage(one) for one in pressures.reshape(-1, 1)])
+    singly = np.concatenate([fixture.damage(pressure) for pressure in pressures.reshape(-1, 1)])
     require(np.array_equal(singly, damage.ravel()), "the damage depends on other pressures")
 
 

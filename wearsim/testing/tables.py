@@ -49,10 +49,12 @@ def mistake_names_table_and_key(fixture: TableFixture) -> None:
 @TABLE.specified_in(_SPEC)
 def other_studies_are_unchanged(fixture: TableFixture) -> None:
     """All other fields of the scenario are those of a scenario without the table."""
-    own: dict[str, Any] = {"text": "", "tables": {}}
-    found = replace(fixture.scenario(), **own)
-    plain = replace(shipped_scenario("rig-450min"), **own)
-    differ = [one.name for one in fields(plain) if _as_text(found, one) != _as_text(plain, one)]
+    without_table: dict[str, Any] = {"text": "", "tables": {}}
+    with_plugin = replace(fixture.scenario(), **without_table)
+    plain = replace(shipped_scenario("rig-450min"), **without_table)
+    differ = [
+        item.name for item in fields(plain) if _as_text(with_plugin, item) != _as_text(plain, item)
+    ]
     require(not differ, f"{', '.join(differ)} of the scenario are others")
 
 

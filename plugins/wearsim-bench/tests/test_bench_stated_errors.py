@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import wearsim
-from wearsim.errors import ResultsFileError
+from wearsim.errors import ResultsFileError, SolverError
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.plugins import BODIES
@@ -168,6 +168,18 @@ def test_reference_is_kept_in_the_folder(tmp_path, monkeypatch):
         reference_of(changed, tmp_path / "references")
     with pytest.raises(ZeroDivisionError):
         reference_of(TEST, None)
+
+
+def test_failure_of_a_reference_is_kept_too(tmp_path, monkeypatch):
+    def fails(test):
+        raise SolverError("it takes longer")
+
+    monkeypatch.setattr(references, "computed_reference", fails)
+    with pytest.raises(SolverError, match=r"it takes longer$"):
+        reference_of(TEST, tmp_path)
+    monkeypatch.undo()
+    with pytest.raises(SolverError, match=r"it takes longer \(kept in small-"):
+        reference_of(TEST, tmp_path)
 
 
 def test_unreadable_reference_is_an_error(tmp_path):

@@ -16,8 +16,9 @@ from tests.studies.life.test_life_kills import Killed, counted
 from tests.studies.life.test_rare_lives import MEDIAN, target_of, use_closed_form
 from wearsim.cli.render import show_view
 from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.ensemble.file.parts import read_ensemble
-from wearsim.studies.life.api import life, resume_life
+from wearsim.studies.life.api import life
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.rare.estimates import IMPORTANCE, SUBSET
 from wearsim.studies.life.result import LifeResult
@@ -137,7 +138,7 @@ def test_killed_study_of_an_integrated_factor_continues_bit_for_bit(
     with pytest.raises(Killed):
         study(path, rare=200, storage=counted(done, int(part * len(stages))))
     assert not read_ensemble(path).finished
-    result = resume_life(path, scheduler="serial")
+    result = resume_ensemble(path, scheduler="serial")
     assert differences(result, whole) == []
     assert result.rare_estimates == whole.rare_estimates
     assert result.settings == whole.settings

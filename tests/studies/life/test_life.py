@@ -16,7 +16,7 @@ from wearsim.errors import Interrupted, ResultsFileError, ScenarioError
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.ensemble.file.parts import read_ensemble
-from wearsim.studies.life.api import life, resume_life, sweep_life
+from wearsim.studies.life.api import life, sweep_life
 from wearsim.studies.life.comparison import swept_variable as against
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.realisation import LifeRunner
@@ -244,7 +244,7 @@ def test_stopped_study_continues_bit_for_bit(tmp_path: Path, exact: LifeResult) 
     with pytest.raises(Interrupted):
         lives(path, target=4000, stop_requested=stop)
     assert not read_ensemble(path).finished
-    result = resume_life(path, scheduler="serial")
+    result = resume_ensemble(path, scheduler="serial")
     assert differences(result, exact) == []
 
 
@@ -256,10 +256,10 @@ def test_lives_do_not_depend_on_workers(tmp_path: Path, exact: LifeResult) -> No
 def test_extended_study_has_the_same_first_lives(tmp_path: Path, exact: LifeResult) -> None:
     path = tmp_path / "extended.h5"
     lives(path, count=6)
-    result = resume_life(path, realisations=12, scheduler="serial")
+    result = resume_ensemble(path, realisations=12, scheduler="serial")
     assert np.array_equal(result.lives, exact.lives)
     with pytest.raises(ResultsFileError, match="has 12 realisations"):
-        resume_life(path, realisations=12, scheduler="serial")
+        resume_ensemble(path, realisations=12, scheduler="serial")
 
 
 def test_longer_attempts_reproduce_the_life(exact: LifeResult) -> None:
@@ -281,8 +281,7 @@ def test_study_of_lives_is_opened_as_such(exact: LifeResult) -> None:
     again = open_results(exact.path)
     assert isinstance(again, LifeResult)
     assert again.b(10) == exact.b(10)
-    with pytest.raises(ResultsFileError, match="resume_life"):
-        resume_ensemble(exact.path)
+    assert resume_ensemble(exact.path).raw.life == exact.raw.life  # nothing is left to be run
 
 
 def test_designs_are_compared_with_common_draws(exact: LifeResult, tmp_path: Path) -> None:
@@ -397,7 +396,7 @@ def test_stopped_rare_events_continue_bit_for_bit(tmp_path: Path) -> None:
     with pytest.raises(Interrupted):
         lives(path, scenario, 20, target=250, rare=200, stop_requested=stop)
     assert not read_ensemble(path).finished
-    result = resume_life(path, scheduler="serial")
+    result = resume_ensemble(path, scheduler="serial")
     assert differences(result, whole) == []
     assert result.rare == whole.rare
 

@@ -10,8 +10,9 @@ import pytest
 from tests.faulty_storage import WatchedStorage
 from tests.studies.ensemble_cases import LOGNORMAL, differences
 from tests.studies.life.test_life import design
+from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.life import settings
-from wearsim.studies.life.api import life, resume_life
+from wearsim.studies.life.api import life
 from wearsim.studies.life.result import LifeResult
 
 COUNT = 4
@@ -65,7 +66,9 @@ def test_killed_study_continues_bit_for_bit(
     path, done = tmp_path / "killed.h5", list[str]()
     with pytest.raises(Killed):
         study(path, counted(done, int(part * stages)))
-    result = resume_life(path, scheduler="serial") if path.exists() else study(path, counted([]))
+    result = (
+        resume_ensemble(path, scheduler="serial") if path.exists() else study(path, counted([]))
+    )
     assert differences(result, whole) == []
     assert result.rare == whole.rare
     assert result.b(50) == whole.b(50)

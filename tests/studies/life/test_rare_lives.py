@@ -17,11 +17,12 @@ from tests.studies.life.test_life import FRICTION, LOAD, design, lives
 from tests.studies.life.test_life_kills import Killed, counted
 from wearsim.cli.render import show_view
 from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.ensemble.batch import RealisationRun
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.file.schema import OBSERVABLES
 from wearsim.studies.life import realisation
-from wearsim.studies.life.api import life, resume_life
+from wearsim.studies.life.api import life
 from wearsim.studies.life.batch import LifeRun
 from wearsim.studies.life.rare.estimates import IMPORTANCE, SUBSET
 from wearsim.studies.life.realisation import LevelRunner
@@ -252,7 +253,7 @@ def test_killed_subset_simulation_continues_bit_for_bit(tmp_path: Path, part: fl
     with pytest.raises(Killed):
         subset_study(path, storage=counted(done, int(part * len(stages))))
     assert not read_ensemble(path).finished
-    result = resume_life(path, scheduler="serial")
+    result = resume_ensemble(path, scheduler="serial")
     assert differences(result, whole) == []
     assert result.rare_estimates == whole.rare_estimates
     assert result.settings == whole.settings

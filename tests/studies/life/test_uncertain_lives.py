@@ -65,7 +65,7 @@ def test_life_states_predictive_and_plug_in_lives(folder: Path):
 def test_lives_with_other_inputs_name_what_would_help(folder: Path):
     path = folder / "continued.h5"
     wearsim.life(scenario(folder, friction__coefficient=FRICTION), 10, path, scheduler="serial")
-    lives = wearsim.resume_life(path, realisations=16, scheduler="serial")
+    lives = wearsim.resume_ensemble(path, realisations=16, scheduler="serial")
     unbroken = wearsim.life(
         scenario(folder, friction__coefficient=FRICTION), 16, scheduler="serial"
     )

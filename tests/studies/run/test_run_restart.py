@@ -126,6 +126,24 @@ def test_first_checkpoints_come_soon(path: Path, monkeypatch: pytest.MonkeyPatch
     assert len(result.passes) > len(_checkpoints(events)) > 2
 
 
+def test_checkpoint_before_the_test_on_coarse_strips_continues(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = studies.run(short(), tmp_path / "whole.h5")
+    monkeypatch.setattr(in_progress, "FIRST_CHECKPOINT", 0.0)
+
+    def stop_at_the_end(event: Event) -> None:
+        if isinstance(event, Checkpointed) and event.passes == whole.passes[-1]:
+            raise SystemExit
+
+    with pytest.raises(SystemExit):
+        studies.run(short(outputs__checkpoint_every="1e9 s"), path, on_event=stop_at_the_end)
+    assert not open_results(path).finished
+    resumed = studies.resume(path)
+    assert resumed.finished
+    assert run_differences(whole, resumed) == ["sha256", "scenario_text"]
+
+
 def test_slow_disk_limits_the_checkpoints(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = short(outputs__checkpoint_every="1e-9 s")
     for part in (math.inf, 1e-9):

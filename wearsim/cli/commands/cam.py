@@ -96,11 +96,11 @@ def _angles(text: str) -> list[float]:
     """
     from wearsim.quantities import NUMBER, quantity
 
-    found: list[float] = []
+    angles: list[float] = []
     for part in text.split(","):
         ends = [end.strip() for end in part.split(":")]
         if len(ends) == 1:
-            found.append(quantity(ends[0], "rad"))
+            angles.append(quantity(ends[0], "rad"))
             continue
         number = NUMBER.match(ends[-1])
         if len(ends) != 3 or number is None:
@@ -114,5 +114,5 @@ def _angles(text: str) -> list[float]:
         if not 0.0 <= count <= _MOST_ANGLES:
             what = f"'{part.strip()}' is no range of 1 to {_MOST_ANGLES:,} angles"
             raise ValueError(f"{what}, expected one such as 0:359:1 deg")
-        found += [first + step * place for place in range(int(count + 1e-9) + 1)]
-    return found
+        angles += [first + step * place for place in range(int(count + 1e-9) + 1)]
+    return angles

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LifeUse:
-    """Use of lives: returns from the field or a demonstration test; and further files.
+    """Options of `wearsim life` that use lives: returns, demonstration tests, page and table.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class LifeUse:
 
     @property
     def is_special(self) -> bool:
-        """Whether something else than the lives is shown."""
+        """Whether returns or demonstration tests are shown instead of the lives."""
         return self.returns is not None or self.demonstrate is not None
 
     def check(self, force: bool) -> None:
@@ -89,7 +89,7 @@ class LifeUse:
         read_returns(self.returns, units)
 
     def view_of(self, results: Sequence[LifeResult], labels: Sequence[str]) -> View:
-        """Return the view of the use of lives."""
+        """Return the view of lives after returns, or of demonstration tests."""
         view: View
         if self.demonstrate is not None:
             with checking("--demonstrate"):

@@ -270,9 +270,9 @@ def export(
             return
     if surface is not None and sampling is not None:
         refuse_inputs(surface, [file], "the surface", option="--surface")
-        found = wearsim.open_results(file).view.surface(sampling)
-        refuse(found is None, f"requires the run of a cam, not {file}", "--surface")
-        write_surface(found, surface, spline=spline)
+        cam_surface = wearsim.open_results(file).view.surface(sampling)
+        refuse(cam_surface is None, f"requires the run of a cam, not {file}", "--surface")
+        write_surface(cam_surface, surface, spline=spline)
         if output is None:
             return
     sign: Literal[".", ","] = "," if decimal == "," else "."

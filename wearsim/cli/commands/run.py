@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -32,6 +33,7 @@ from wearsim.cli.shared import (
 from wearsim.errors import ResultsFileError, SolverError, WearsimError
 
 if TYPE_CHECKING:
+    from wearsim.cli.progress import Display
     from wearsim.studies.ensemble.result import EnsembleResult
 
 
@@ -105,56 +107,45 @@ def resume(
     quiet: Quiet = False,
 ) -> None:
     """Continue a run or an ensemble from its results file."""
-    from wearsim.cli.progress import (
-        BATCHES,
-        CHECKPOINT,
-        PARTS,
-        EnsembleWatcher,
-        PartWatcher,
-        RunWatcher,
-        watching,
-    )
+    from wearsim.cli import progress
     from wearsim.results.kinds import kind_of, open_study
 
     kind = kind_of(file)
     if not kind.resume:
         raise ResultsFileError(f"{file}: holds {kind.holds}, which cannot be continued")
-    if kind.name == "run":
-        given: dict[str, object] = {"--failed": failed, "--realisations": realisations}
-        given |= {"--workers": workers, "--scheduler": scheduler}
-        refuse_options(given, "is an option for ensembles only")
-        check_limit(until)
-        with watching(RunWatcher, open_study(file, kind), quiet, CHECKPOINT) as shown:
-            resumed = wearsim.resume(file, until, allow_deep=allow_deep, **shown.callbacks)
-        show_view(resumed.view, json=json, files={"results file": resumed.path})
-        return
-    chosen = checked_scheduler(scheduler, workers)
-    if kind.name not in {"ensemble", "life"}:
-        given = {"--until": until, "--allow-deep": allow_deep}
-        given |= {"--failed": failed, "--realisations": realisations}
-        refuse_options(given, f"has no meaning for a file that holds {kind.holds}")
-        with watching(PartWatcher, open_study(file, kind), quiet, PARTS) as parts:
-            hands = {"workers": workers, "scheduler": chosen}
-            result = kind.load("resume")(file, **hands, **parts.callbacks)
-        show_view(result.view, json=json, files={"results file": result.path})
-        return
-    refuse(until is not None, "only wear tests can be extended", "--until")
-    refuse(allow_deep, "is an option for wear tests only", "--allow-deep")
+    options: dict[str, Any] = {
+        "until": until,
+        "allow_deep": allow_deep,
+        "failed": failed,
+        "realisations": realisations,
+        "workers": workers,
+        "scheduler": scheduler,
+    }
+    of_tests = ("failed", "realisations", "workers", "scheduler")
+    tests = (of_tests, progress.EnsembleWatcher, progress.BATCHES)
+    kinds: dict[str, tuple[Sequence[str], type[Display], str]] = {
+        "run": (("until", "allow_deep"), progress.RunWatcher, progress.CHECKPOINT),
+        **dict.fromkeys(("ensemble", "life"), tests),
+    }
+    of_plugins = (("workers", "scheduler"), progress.PartWatcher, progress.PARTS)
+    names, watcher, stopping = kinds.get(kind.name, of_plugins)
+    without = {
+        f"--{name.replace('_', '-')}": options[name] for name in options if name not in names
+    }
+    refuse_options(without, f"has no meaning for a file that holds {kind.holds}")
     refuse(failed and realisations is not None, "extend the ensemble first", "--failed")
+    check_limit(until)
+    options["scheduler"] = checked_scheduler(scheduler, workers)
     before = open_study(file, kind)
-    nothing = _nothing_to_do(before, kind.name, failed)
-    if nothing and realisations is None:
-        note(f"note: nothing to do: {nothing}")
-    with watching(EnsembleWatcher, before, quiet, BATCHES) as watch:
-        result = kind.load("resume")(
-            file,
-            failed=failed,
-            realisations=realisations,
-            workers=workers,
-            scheduler=chosen,
-            **watch.callbacks,
-        )
-    show_ensemble(result, json, None, watch.workers)
+    if names == of_tests and realisations is None and (text := _nothing_to_do(before, failed)):
+        note(f"note: nothing to do: {text}")
+    with progress.watching(watcher, before, quiet, stopping) as watch:
+        given = {name: options[name] for name in names}
+        result = kind.load("resume")(file, **given, **watch.callbacks)
+    if isinstance(watch, progress.EnsembleWatcher):
+        show_ensemble(result, json, None, watch.workers)
+    else:
+        show_view(result.view, json=json, files={"results file": result.path})
 
 
 def check_limit(until: str | None) -> None:
@@ -172,10 +163,10 @@ def check_limit(until: str | None) -> None:
             Limit.parse(until)
 
 
-def _nothing_to_do(before: EnsembleResult, kind: str, failed: bool) -> str:
+def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
     """Return why there is nothing to do, or an empty text."""
     if not failed:
-        what = "study of lives" if kind == "life" else kind
+        what = "study of lives" if before.raw.life else "ensemble"
         return f"the {what} is finished" if before.finished else ""
     if before.failed:
         return ""

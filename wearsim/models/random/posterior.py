@@ -57,8 +57,8 @@ def read_levels(file: InputFile, unit: str, over: float) -> TwoLevels:
             mistakes.append(Mistake("", "", f"column '{name}' must be above 0", got))
     if mistakes:
         raise ScenarioError(file.path, mistakes)
-    found = (_REMARK.fullmatch(line.strip()) for line in file.text.splitlines())
-    remarks = {match["name"].strip(): match["value"].strip() for match in found if match}
+    matches = (_REMARK.fullmatch(line.strip()) for line in file.text.splitlines())
+    remarks = {match["name"].strip(): match["value"].strip() for match in matches if match}
     count = remarks.get(SPECIMENS, "0")
     contained = [key.strip() for key in remarks.get(CONTAINED, "").split(",") if key.strip()]
     return TwoLevels(

@@ -67,7 +67,7 @@ class First:
 
 
 def first_of(views: Sequence[View]) -> First:
-    """Return the first screen of views: of each group that of the first view that has it."""
+    """Return the first screen of views: each group from the first view that has it."""
     from wearsim.report.figures import png_of_panel  # noqa: PLC0415  (imports matplotlib)
 
     overviews = [views[0].overview()]
@@ -77,9 +77,9 @@ def first_of(views: Sequence[View]) -> First:
     for overview in overviews:
         groups = {**overview.groups, **groups}
     # what one of the results contains is included
-    lists = [one.excluded for one in overviews if one.excluded]
-    excluded = [text for text in lists[0] if all(text in one for one in lists)] if lists else []
-    panel = next((one.picture for one in overviews if one.picture is not None), None)
+    lists = [overview.excluded for overview in overviews if overview.excluded]
+    excluded = [text for text in lists[0] if all(text in texts for texts in lists)] if lists else []
+    panel = next((item.picture for item in overviews if item.picture is not None), None)
     if panel is None:
         return First(groups, excluded, "", "")
     picture = png_of_panel(panel, 130, 5.4 if panel.equal else 3.8)

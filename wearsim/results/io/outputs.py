@@ -68,7 +68,7 @@ def _continuing(path: str | Path) -> str:
     from wearsim.results.io.files import read_file  # noqa: PLC0415
 
     # by a variable that only files of this kind have
-    verbs = {"step": "resume", "life": "resume_life", "realisation": "resume_ensemble"}
+    verbs = {"step": "resume", "realisation": "resume_ensemble"}
 
     def take(file: StoredFile) -> tuple[bool, str]:
         finished = bool(file.attribute("finished"))

@@ -131,10 +131,10 @@ class StoredFile:
         # a chunk is read as a whole
         least = math.prod(dataset.chunks) if dataset.chunks and numbers else 0
         self._claim(name, max(numbers, least) * dataset.dtype.itemsize, SPARE)
-        found = np.asarray(dataset[chosen])
+        values = np.asarray(dataset[chosen])
         if dataset.chunks and numbers and ZEROS not in dataset.attrs:
-            _check_zeros(name, dataset, chosen, found)
-        return found
+            _check_zeros(name, dataset, chosen, values)
+        return values
 
     def text(self, name: str) -> str:
         """Read a text written by `hdf5_write.put_text`.
@@ -176,7 +176,7 @@ class StoredFile:
 
 
 def _check_link(folder: Any, last: bytes, name: str) -> None:
-    """Raise an error unless a name in a folder is that of an object in the file itself."""
+    """Raise an error unless a name in a folder leads to an object in the file itself."""
     from h5py import h5l  # noqa: PLC0415  (takes 0.2 s to import)
 
     if not folder.links.exists(last):
@@ -185,7 +185,9 @@ def _check_link(folder: Any, last: bytes, name: str) -> None:
         raise ValueError(f"{name} is a link to another place")
 
 
-def _check_zeros(name: str, dataset: h5py.Dataset, chosen: tuple[slice, ...], found: Array) -> None:
+def _check_zeros(
+    name: str, dataset: h5py.Dataset, chosen: tuple[slice, ...], values: Array
+) -> None:
     """Raise a ValueError if a stored chunk of an array that should have none has zeros only."""
     shape, lengths = dataset.shape, dataset.chunks
     region = [slice(*part.indices(length)) for part, length in zip(chosen, shape, strict=False)]
@@ -193,7 +195,7 @@ def _check_zeros(name: str, dataset: h5py.Dataset, chosen: tuple[slice, ...], fo
     starts = [part.start for part in region]
     for block in dataset.iter_chunks(tuple(region)):
         part = tuple(slice(b.start - s, b.stop - s) for b, s in zip(block, starts, strict=True))
-        if not only_zeros(found[part]):
+        if not only_zeros(values[part]):
             continue
         corner = tuple(b.start // length * length for b, length in zip(block, lengths, strict=True))
         if dataset.id.get_chunk_info_by_coord(corner).byte_offset is None:
@@ -204,7 +206,7 @@ def _check_zeros(name: str, dataset: h5py.Dataset, chosen: tuple[slice, ...], fo
 
 
 def _is_plain(kind: Any) -> bool:
-    """Return whether a type of HDF5 is that of numbers or of texts of fixed length."""
+    """Return whether a type of HDF5 holds numbers or texts of fixed length."""
     from h5py import h5t  # noqa: PLC0415  (takes 0.2 s to import)
 
     of_text = kind.get_class() == h5t.STRING and not kind.is_variable_str()

@@ -259,8 +259,8 @@ def _read_marginal(
     if not isinstance(raw, dict):
         return None
     place = f"{name}.marginal"
-    found: Distribution | None = _read_scalar(mistakes, raw, place, name, "marginal", quantity)
-    return found
+    marginal: Distribution | None = _read_scalar(mistakes, raw, place, name, "marginal", quantity)
+    return marginal
 
 
 def _read_scalar(

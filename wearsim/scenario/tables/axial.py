@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from wearsim.scenario.tables.bodies import Cylinder, Roller
 
 _WIDER = 1.0 + 1e-9
-FILE_FORM = "table"  # that of a key with the name of a file
+FILE_FORM = "table"  # form of a key with the name of a file
 AxialKey: TypeAlias = dict[str, object] | str
 
 DESCRIPTION = (

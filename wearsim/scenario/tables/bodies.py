@@ -280,10 +280,10 @@ def read_roller(mistakes: Mistakes, raw: Mapping[str, object]) -> Roller | None:
     form = crown(_radius(table.crown_radius, table.crown_diameter))
     profiles = read_roller_profiles(mistakes, table.profile)
     if table.axial_profile is not None:
-        found = read_axial(mistakes, table.axial_profile, "roller")
-        if found is None:
+        axial = read_axial(mistakes, table.axial_profile, "roller")
+        if axial is None:
             return None
-        form = found
+        form = axial
     return Roller.model_construct(
         radius=radius,
         axial_profile=form,

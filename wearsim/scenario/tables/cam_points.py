@@ -109,7 +109,7 @@ def motion_of(
 
 @dataclass(frozen=True)
 class _Turned:
-    """Lift of a closed curve above that at an angle."""
+    """Lift of a closed curve, less its lift at an angle."""
 
     curve: Callable[[FloatArray], FloatArray]
     start: float

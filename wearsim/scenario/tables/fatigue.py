@@ -109,8 +109,8 @@ def read_fatigue(mistakes: Mistakes, raw: Mapping[str, object]) -> FatigueChoice
     """Return the fatigue of the bodies, or None after adding the mistakes of [fatigue]."""
     table = validate(mistakes, FatigueTable, raw, "fatigue")
     bodies = {body: raw[body] for body in BODIES if isinstance(raw.get(body), dict)}
-    found = {body: _read_body(mistakes, f"fatigue.{body}", keys) for body, keys in bodies.items()}
-    laws = {body: law for body, law in found.items() if law is not None}
+    by_body = {body: _read_body(mistakes, f"fatigue.{body}", keys) for body, keys in bodies.items()}
+    laws = {body: law for body, law in by_body.items() if law is not None}
     if table is None:
         return None
     if not bodies:

@@ -40,11 +40,11 @@ class StartSurface:
 
     @property
     def varies(self) -> bool:
-        """Whether the heights are those of several angles."""
+        """Whether there are heights at several angles."""
         return len(self.angle) > 1
 
     def at(self, angle: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the heights at angles and positions, linear between those of the surface.
+        """Return the heights at angles and positions, by linear interpolation of the surface.
 
         Parameters
         ----------
@@ -85,13 +85,13 @@ def read_roller_profiles(
     mistakes: Mistakes, files: InputFile | tuple[InputFile, ...] | None
 ) -> tuple[Profile, ...]:
     """Return the start profiles of rollers; of files with mistakes, which are added, none."""
-    found = []
+    profiles = []
     for file in () if files is None else files if isinstance(files, tuple) else (files,):
         try:
-            found.append(read_profile(file.text, file.path))
+            profiles.append(read_profile(file.text, file.path))
         except ScenarioError as error:
             mistakes.add_file(error, "roller", "profile")
-    return tuple(found)
+    return tuple(profiles)
 
 
 def read_start_surface(mistakes: Mistakes, file: InputFile | None) -> StartSurface | None:

@@ -61,19 +61,19 @@ class CamView:
         stations = turn_of(scenario).stations
         eye = np.eye(stations.count)
         turned = np.mod(list(angles.values()), 2.0 * np.pi)
-        rows = [stations.values_at_angles(eye, np.array([one]))[0] for one in turned]
+        rows = [stations.values_at_angles(eye, np.array([angle]))[0] for angle in turned]
         at_angles = np.array(rows).reshape(len(rows), stations.count)
         return cls(angles, at_angles, stations.values_at_angles(eye, CURVE_ANGLES))
 
     def grooves(self, depth: FloatArray) -> dict[str, FloatArray]:
-        """Return the worn profile of each surface from those at all stations [m].
+        """Return the worn profile of each surface from the profiles at all stations [m].
 
         Parameters
         ----------
         depth : ndarray, shape (stations, strips)
         """
-        found = np.maximum(self.at_angles @ depth, 0.0)
-        return dict(zip(self.angles, found, strict=True))
+        depths = np.maximum(self.at_angles @ depth, 0.0)
+        return dict(zip(self.angles, depths, strict=True))
 
 
 def falls_of_lift(problem: WearProblem, state: WearState) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Skids of a cam's roller, and warnings of what is valid but hardly meant."""
+"""Skids of a cam's roller, and warnings of valid but implausible cams."""
 
 from __future__ import annotations
 
@@ -61,48 +61,48 @@ def skids_of(turn: CamTurn) -> tuple[Skid, ...]:
     within = middles[stations.panel]
     slip = np.nan_to_num(np.abs(turn.slip(point.angle, within)))
     power = scenario.friction.coefficient * point.normal_force * scenario.roller.radius * slip
-    found: list[Skid] = []
+    skids: list[Skid] = []
     for arc in turn.arcs:
         start, stop = float(arc.theta[0]), float(arc.theta[-1])
         inside = (within > start) & (within < stop)
         energy = float((stations.weight * power)[inside].sum())
-        if found and abs(found[-1].stop - start) < 1e-12:
-            energy, start = energy + found[-1].energy, found.pop().start
-        found.append(Skid(start, stop, energy))
-    return tuple(found)
+        if skids and abs(skids[-1].stop - start) < 1e-12:
+            energy, start = energy + skids[-1].energy, skids.pop().start
+        skids.append(Skid(start, stop, energy))
+    return tuple(skids)
 
 
 def cam_warnings(
     turn: CamTurn, skids: tuple[Skid, ...] = (), sweeps: float | None = None
 ) -> list[str]:
     """Return warnings of a steep pressure angle, a sharp cam, skids and uneven roller wear."""
-    follower, panels, found = turn.cam.follower, turn.panels, []
+    follower, panels, warnings = turn.cam.follower, turn.panels, []
     limit = STEEP[follower.kind]
     angle, theta = extreme(panels, lambda p, x: np.abs(turn.at(p, x).kinematics.pressure_angle))
     if angle > limit:
-        found.append(
+        warnings.append(
             f"cam: the pressure angle reaches {math.degrees(angle):.4g} deg at"
             f" {turn.place(theta)}, more than {math.degrees(limit):g} deg"
         )
     radius = turn.scenario.roller.radius
     sharp, theta = extreme(panels, lambda p, x: turn.at(p, x).kinematics.pitch_curvature)
     if sharp * SHARP * radius > 1.0:
-        found.append(
+        warnings.append(
             f"cam: the radius of the pitch curve falls to {1e3 / sharp:.4g} mm at"
             f" {turn.place(theta)}, less than twice the roller's {1e3 * radius:.6g} mm"
         )
-    found += noise_warnings(turn)
-    found += [
+    warnings += noise_warnings(turn)
+    warnings += [
         f"roller: it skids from {math.degrees(skid.start):.4g} to {math.degrees(skid.stop):.4g} deg"
         f" and dissipates {skid.energy:.4g} J per turn"
         for skid in skids
     ]
     if sweeps is not None and sweeps < FEWEST_SWEEPS:
-        found.append(
+        warnings.append(
             f"roller: the contact moves around it only {sweeps:.3g} times in a life; it may wear"
             " unevenly, while even wear is assumed"
         )
-    return found
+    return warnings
 
 
 def _two_digits(value: float) -> str:
@@ -128,10 +128,10 @@ def noise_warnings(turn: CamTurn) -> list[str]:
         f" still changes that of the spline by {effect(measured.error)} (root mean squares; the"
         f" greatest acceleration is {1e3 * measured.peak:.3g} {unit}/rad^2)"
     )
-    found, stated = [text], measured.tolerance
+    warnings, stated = [text], measured.tolerance
     if stated is not None and not _NEAR**-1 < measured.noise / stated < _NEAR:
-        found.append(
+        warnings.append(
             f"cam: lift_tolerance is {1e6 * stated:.2g} u{measured.unit}, and the points of"
             f" {measured.file} scatter by {noise}: is one of them in other units?"
         )
-    return found
+    return warnings

@@ -135,7 +135,7 @@ def turning(result: Result) -> Animation:
         turned = np.exp(-1j * theta[number])
         marks: list[Mark] = []
         for unworn, worn in outlines:
-            fresh, cut = (np.append(one, one[0]) * turned for one in (unworn, worn))
+            fresh, cut = (np.append(outline, outline[0]) * turned for outline in (unworn, worn))
             if not turn.cam.groove:
                 marks.append(Patch(cut.real, cut.imag, alpha=0.12))
             marks.append(Line(fresh.real, fresh.imag, width=0.9, colour=GREY, label="unworn"))

@@ -24,7 +24,7 @@ def grooves_at(result: Result, angle: float | None = None) -> tuple[FloatArray, 
     result : Result
         Of a cam.
     angle : float, optional
-        Angle of the cam [rad]; by default that at which it is worn deepest.
+        Angle of the cam [rad]; by default where it is worn deepest.
     """
     depth = np.asarray(result.raw.records["cylinder_depth_profile"])[:, :, 0]
     if angle is None:

@@ -25,19 +25,19 @@ def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]
     cam = problem.kinematics.cam
     if cam is None:
         return {}
-    found = extremes(problem, state)
-    least, greatest = found["least_wear"], found["greatest_wear"]
+    at_extremes = extremes(problem, state)
+    least, greatest = at_extremes["least_wear"], at_extremes["greatest_wear"]
     return {
         "turns": state.passes / problem.kinematics.physical_rollers,
         "station_depth": at_every_station(problem, state.cylinder_depth[:, 0].max(axis=-1)),
-        "peak_pressure": found["peak_pressure"].value,
+        "peak_pressure": at_extremes["peak_pressure"].value,
         "lift_error": least.value + greatest.value,
-        **{f"{name}_angle": extreme.angle for name, extreme in found.items()},
-        "depth_error_by_stations": found["depth"].error,
+        **{f"{name}_angle": extreme.angle for name, extreme in at_extremes.items()},
+        "depth_error_by_stations": at_extremes["depth"].error,
         "volume_error_by_stations": volume_error_by_stations(problem, state),
-        "peak_pressure_error_by_stations": found["peak_pressure"].error,
+        "peak_pressure_error_by_stations": at_extremes["peak_pressure"].error,
         "lift_error_error_by_stations": least.error + greatest.error,
-        **{f"{n}_angle_error_by_stations": item.angle_error for n, item in found.items()},
+        **{f"{n}_angle_error_by_stations": item.angle_error for n, item in at_extremes.items()},
     }
 
 
@@ -51,7 +51,7 @@ def cam_observables(
     problem : WearProblem
     state : WearState
     row : mapping of str to ndarray
-        Observables of the run, with those of `cam_history`.
+        Observables of the run, `cam_history` among them.
     """
     cam = problem.kinematics.cam
     if cam is None:
@@ -70,7 +70,7 @@ def lift_curves(
 ) -> list[FloatArray]:
     """Return the lift error of each realisation at `CURVE_ANGLES` [m].
 
-    Of several rollers it is that of the one whose lift error varies most.
+    Of several rollers it is the curve of the roller whose lift error varies most.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ def lift_curves(
     roller = peak_to_peak(cam, errors).argmax(axis=0)
     curves = cam.at_unworn(errors)
     return [
-        each.values_at_angles(curves[:, roller[place], place], CURVE_ANGLES)
-        for place, each in enumerate(stations)
+        stations_of_test.values_at_angles(curves[:, roller[place], place], CURVE_ANGLES)
+        for place, stations_of_test in enumerate(stations)
     ]
 
 
@@ -104,8 +104,8 @@ def at_every_station(problem: WearProblem, values: FloatArray) -> FloatArray:
     cam = problem.kinematics.cam
     if cam is None:
         return values
-    found = cam.at_unworn(values)
-    return found if cam.recorded is None else np.maximum(found, 0.0)
+    at_stations = cam.at_unworn(values)
+    return at_stations if cam.recorded is None else np.maximum(at_stations, 0.0)
 
 
 def station_columns(problem: WearProblem) -> dict[str, FloatArray]:

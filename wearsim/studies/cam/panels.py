@@ -29,7 +29,7 @@ from wearsim.report.panels import (
     measured_marks,
     worn_limits,
 )
-from wearsim.report.text import PER_SI, shown, with_error
+from wearsim.report.text import OBSERVABLES, PER_SI, shown, with_error
 from wearsim.scenario.tables.cam_points import MeasuredPoints
 from wearsim.studies.cam.drawing import (
     axis_mark,
@@ -43,7 +43,7 @@ from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.fatigue.panels import pitting_panel
-from wearsim.studies.fatigue.view import has_fatigue, source_line
+from wearsim.studies.fatigue.view import with_source_lines
 from wearsim.studies.run.panels import (
     HEIGHT,
     Y,
@@ -68,7 +68,7 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     turn = study.turn
     fine = _fine(turn)
     lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
-    found, angle, point = fine.kinematics, fine.angle, study.point
+    kinematics, angle, point = fine.kinematics, fine.angle, study.point
     shaded = " (skids shaded)" if study.skids else ""
     gapped = between_flanks(angle, fine)
 
@@ -79,9 +79,9 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
     right: dict[str, Any] = {"dash": "--", "right": True, "colour": ORANGE}
 
     motion = [
-        Line(angle, found.lift, label=f"{lift} [{unit}]"),
-        Line(angle, found.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
-        Line(angle, found.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
+        Line(angle, kinematics.lift, label=f"{lift} [{unit}]"),
+        Line(angle, kinematics.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
+        Line(angle, kinematics.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
     ]
     pressures = peak_pressures(turn.scenario, fine)
     load: list[Mark] = [
@@ -109,9 +109,13 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
             "Pressure angle, and curvature of the cam",
             inner,
             Axis("pressure angle", "deg"),
-            [Line(angle, found.pressure_angle), over_angle(found.curvature, **right), *edges],
+            [
+                Line(angle, kinematics.pressure_angle),
+                over_angle(kinematics.curvature, **right),
+                *edges,
+            ],
             "Pressure angle of the follower, and curvature of the surface of the cam.",
-            right=_right("curvature", "1/mm", found.curvature, 1.0 / PER_SI["mm"]),
+            right=_right("curvature", "1/mm", kinematics.curvature, 1.0 / PER_SI["mm"]),
         ),
         "load": Panel(
             f"Normal force, and peak pressure{shaded}",
@@ -126,13 +130,13 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
             ANGLE,
             Axis("rolling speed", "m/s"),
             [
-                over_angle(turn.speed * found.travel),
-                over_angle(found.spin, **right),
+                over_angle(turn.speed * kinematics.travel),
+                over_angle(kinematics.spin, **right),
                 *edges,
                 *skids,
             ],
             "Speed at which the contact rolls, and speed of the roller over that of the cam.",
-            right=_right("roller/cam speed", "1", found.spin, 1.0),
+            right=_right("roller/cam speed", "1", kinematics.spin, 1.0),
         ),
     }
     rows = [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]]
@@ -158,7 +162,7 @@ def _right(
     per_si: float,
     margin: tuple[float, float] = (0.0, 0.0),
 ) -> Axis:
-    """Return the axis at the right; that of a constant reaches around it."""
+    """Return the axis at the right, which reaches around a constant."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     limits: tuple[float | None, float | None] = (None, None)
     if high - low <= 1e-6 * abs(high):  # constant but for rounding
@@ -214,7 +218,15 @@ def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     stations = turn.stations
     worn = np.asarray(result.raw.records["cylinder_depth_profile"])[:, :, 0]
     panels = {
-        "map": _depth_map(turn, stations, worn[-1], result),
+        "map": _map(
+            turn,
+            stations,
+            result,
+            "depth",
+            result.depth,
+            "Worn depth of the cam",
+            "the cam is deepest",
+        ),
         "shape": _worn_shape(turn, stations, worn[-1]),
         "lift": _lift_error(turn, stations, result),
         "groove": _groove(result, measured),
@@ -224,12 +236,15 @@ def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     }
     rows = [["map", "map", "shape"], ["lift", "lift", "shape"], ["depth", "groove", "roller"]]
     heights = [1.2, 0.9, 1.1]
-    if has_fatigue(result):
-        panels |= {"damage": _damage_map(turn, stations, result), "pitting": pitting_panel(result)}
+    if result.raw.fatigue:
+        title, where = "Damage of the cam by fatigue", "the damage of the cam is greatest"
+        damage = result.values("cylinder_damage")
+        panels["damage"] = _map(turn, stations, result, "damage", damage, title, where)
+        panels["pitting"] = pitting_panel(result)
         rows.insert(2, ["damage", "damage", "pitting"])
         heights.insert(2, 1.2)
     return Sheet(
-        f"{result.title}\n{_caption(result)}{source_line(result)}",
+        with_source_lines(f"{result.title}\n{_caption(result)}", result),
         panels,
         rows,
         (12.5, 3.0 * sum(heights)),
@@ -250,40 +265,41 @@ def _caption(result: Result) -> str:
     )
 
 
-def _depth_map(turn: CamTurn, stations: Stations, depth: FloatArray, result: Result) -> Panel:
-    place = float(np.max(result.final["depth_angle_rad"])) * DEG
-    deepest = shown(float(np.max(result.depth[-1])), "um")
-    text = f"At the end the cam is deepest at {place:.4g} deg: {deepest}."
-    named = "Worn depth of the cam", text
-    return _map(turn, stations, depth, result, Axis("depth", "um"), named)
-
-
-def _damage_map(turn: CamTurn, stations: Stations, result: Result) -> Panel:
-    damage = np.asarray(result.raw.records["cylinder_damage_profile"])[-1, :, 0]
-    place = float(np.max(result.final["damage_angle_rad"])) * DEG
-    greatest = shown(float(np.max(result.final["cylinder_damage"])), "1")
-    text = f"At the end the damage of the cam is greatest at {place:.4g} deg: {greatest}."
-    named = "Damage of the cam by fatigue", text
-    return _map(turn, stations, damage, result, Axis("damage", "1"), named)
-
-
 def _map(
     turn: CamTurn,
     stations: Stations,
-    profiles: FloatArray,
     result: Result,
-    scale: Axis,
-    named: tuple[str, str],
+    quantity: str,
+    course: FloatArray,
+    title: str,
+    where: str,
 ) -> Panel:
-    """Return profiles at the stations as a map over angle and width, with title and caption."""
+    """Return depth or damage of a cam at the end as a map over angle and width.
+
+    Parameters
+    ----------
+    turn : CamTurn
+    stations : Stations
+    result : Result
+    quantity : {"depth", "damage"}
+    course : ndarray
+        Its greatest value on the cam at every step.
+    title, where : str
+        Title of the panel, and what is at the angle of the greatest value.
+    """
+    axis = Axis(quantity, OBSERVABLES[quantity].unit)
+    profiles = np.asarray(result.raw.records[f"cylinder_{quantity}_profile"])[-1, :, 0]
     angle, values = stations.values_at(profiles, _SAMPLES)
     greatest = values.max(axis=0)
     extent = result.y[greatest > 1e-3 * greatest.max()] if greatest.max() > 0.0 else result.y
     # interpolation overshoots next to an edge
-    image = Image(angle, result.y, np.maximum(values, 0.0).T, scale, "magma_r")
+    image = Image(angle, result.y, np.maximum(values, 0.0).T, axis, "magma_r")
     limits = (1.25 * extent[0], 1.05 * extent[-1])  # the names of the segments lie below
     y = Axis("y across the track", "mm", limits=limits)
-    return Panel(named[0], ANGLE, y, [image, *segment_marks(turn.cam.motion)], named[1])
+    place = float(np.max(result.final[f"{quantity}_angle_rad"])) * DEG
+    text = f"At the end {where} at {place:.4g} deg: "
+    text += f"{shown(float(np.max(course[-1])), axis.unit)}."
+    return Panel(title, ANGLE, y, [image, *segment_marks(turn.cam.motion)], text)
 
 
 def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
@@ -293,9 +309,9 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     worn = stations.values_between(deepest, places)
     point = turn.at_stations(fine)
     factor = factor_for(turn, float(deepest.max()))
-    follower, found = turn.cam.follower, point.kinematics
-    fresh = surface_points(follower, found, point.angle)[1]
-    cut = surface_points(follower, found, point.angle, factor * worn)[1]
+    follower, kinematics = turn.cam.follower, point.kinematics
+    fresh = surface_points(follower, kinematics, point.angle)[1]
+    cut = surface_points(follower, kinematics, point.angle, factor * worn)[1]
     marks: list[Mark] = [] if turn.cam.groove else [Patch(*cut, alpha=0.12)]
     label = f"worn, depth x {factor:g}"
     marks += [

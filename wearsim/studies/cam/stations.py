@@ -46,18 +46,18 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
     numbers = np.array([float(panel.segment) for panel in stations.panels])
     segments = numbers[stations.panel]
     within = middles[stations.panel]
-    found = replace(
+    stations_of_cam = replace(
         _values(turn, point, stations.weight, segments, within),
         panels=stations,
         skids=_skids(turn),
     )
     if turn.is_worn:
-        return found
-    if moves(turn, found):
-        found = _movable(found, turn)
+        return stations_of_cam
+    if moves(turn, stations_of_cam):
+        stations_of_cam = _movable(stations_of_cam, turn)
     start = turn.scenario.cylinder.start_surface
     differ = start is not None and start.varies
-    return found if found.inertia.size or differ else joined(found)
+    return stations_of_cam if stations_of_cam.inertia.size or differ else joined(stations_of_cam)
 
 
 def moves(turn: CamTurn, stations: CamStations) -> bool:
@@ -88,14 +88,14 @@ def _movable(stations: CamStations, turn: CamTurn) -> CamStations:
 
 def _relocated(turn: CamTurn, change: FloatArray) -> CamStations:
     """Return the stations for changes of the normal force; see `CamStations.relocated`."""
-    found = cam_stations(turn.worn(change))
-    assert found.panels is not None
-    matrix, _, _ = moved_stations(found.panels, turn.stations)
-    return replace(_movable(found, turn), recorded=matrix)
+    moved = cam_stations(turn.worn(change))
+    assert moved.panels is not None
+    matrix, _, _ = moved_stations(moved.panels, turn.stations)
+    return replace(_movable(moved, turn), recorded=matrix)
 
 
 def joined(stations: CamStations) -> CamStations:
-    """Return the stations with equal ones joined: those of a dwell, or of a rise and its return."""
+    """Return the stations, equal ones joined: of a dwell, or of a rise and its return."""
     columns = [getattr(stations, name).ravel() for name in _COMPARED]
     columns.append(np.abs(stations.pressure_angle.ravel()))
     scales = [max(float(np.nanmax(np.abs(column), initial=0.0)), 1e-300) for column in columns]
@@ -122,31 +122,31 @@ def _values(
     within: FloatArray | None,
 ) -> CamStations:
     """Return the values at points with weights [rad]; `within` as in `CamTurn.slip`."""
-    found, count, roller = point.kinematics, len(point.angle), turn.scenario.roller
+    kinematics, count, roller = point.kinematics, len(point.angle), turn.scenario.roller
     factor, rest = np.ones(count), np.zeros(count)
     if turn.load is not None:
-        lever = turn.cam.follower.lever * np.cos(found.pressure_angle)
+        lever = turn.cam.follower.lever * np.cos(kinematics.pressure_angle)
         factor = np.where(point.inner, -1.0, 1.0) / lever
         rest = point.normal_force - factor * turn.load.preload
     feedback = turn.load is not None and turn.load.feedback != "none"
-    side = np.sign(found.spin)
+    side = np.sign(kinematics.spin)
     bearing = turn.scenario.creepage.bearing_torque or 0.0
     most = GRIP * turn.scenario.friction.coefficient * turn.carried(point) * roller.radius
     torque = np.clip(side * turn.torque(point), -most, most) if turn.free else np.zeros(count)
     columns = {
         "angle": point.angle,
         "segment": segments + 1.0,
-        "rolling_speed": turn.speed * found.travel,
-        "longitudinal_curvature": found.relative_curvature,
-        "surface_curvature": np.where(point.inner, -1.0, 1.0) * found.curvature,
-        "length": weight * found.travel,
+        "rolling_speed": turn.speed * kinematics.travel,
+        "longitudinal_curvature": kinematics.relative_curvature,
+        "surface_curvature": np.where(point.inner, -1.0, 1.0) * kinematics.curvature,
+        "length": weight * kinematics.travel,
         "time_share": weight / math.tau,
         "load_factor": factor,
         "load_rest": rest,
         "stiffness": point.stiffness if feedback else np.zeros(count),
         "inertia_torque": torque - bearing,
-        "pressure_angle": found.pressure_angle,
-        "skid": side * roller.radius * turn.slip(point.angle, within) / found.travel,
+        "pressure_angle": kinematics.pressure_angle,
+        "skid": side * roller.radius * turn.slip(point.angle, within) / kinematics.travel,
     }
     arrays: dict[str, Any] = {name: np.array(a)[:, None, None] for name, a in columns.items()}
     inertia = np.zeros((0, 0))

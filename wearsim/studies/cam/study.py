@@ -71,7 +71,7 @@ class CamStudy(Viewed):
     jump_speed : float, optional
         Speed at which the follower jumps [rad/s].
     winding_number : float
-        Length of the cam's surface over that of the roller.
+        Length of the cam's surface over the roller's circumference.
     winding_ratio : tuple of int
         Nearest ratio of small numbers.
     sweeps : float, optional

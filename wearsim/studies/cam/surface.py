@@ -39,7 +39,7 @@ def worn_surface(result: Result, sampling: Sampling) -> Surface:
     if sampling.position is not None:
         profiles = np.asarray(result.raw.records["cylinder_depth_profile"])[-1, :, 0]
         depth = np.array(
-            [np.interp(sampling.position, result.y, one, 0.0, 0.0) for one in profiles]
+            [np.interp(sampling.position, result.y, profile, 0.0, 0.0) for profile in profiles]
         )
     return _Outlines(turn, turn.stations, depth).surface(sampling)
 
@@ -94,13 +94,16 @@ class _Outlines:
 
             def points(theta: FloatArray, panel=panel, values=values) -> FloatArray:  # type: ignore[no-untyped-def]
                 lift = turn.cam.motion.lift_in(panel.segment, theta)
-                found = turn.cam.follower.kinematics(lift, np.full(len(theta), inner))
+                kinematics = turn.cam.follower.kinematics(lift, np.full(len(theta), inner))
                 depths: list[FloatArray | float] = [0.0]
                 if values is not None:
                     place = np.clip((theta - panel.start) / (panel.stop - panel.start), 0.0, 1.0)
                     depths.append(np.maximum(interpolation(len(values), place) @ values, 0.0))
-                each = [surface_points(turn.cam.follower, found, theta, one)[1] for one in depths]
-                return np.array([x + 1j * y for x, y in each])
+                curves = [
+                    surface_points(turn.cam.follower, kinematics, theta, depth)[1]
+                    for depth in depths
+                ]
+                return np.array([x + 1j * y for x, y in curves])
 
             yield points, panel.start, panel.stop
 
@@ -115,8 +118,8 @@ def _points(
     parts: list[tuple[Points, float, float]], angles: list[FloatArray]
 ) -> tuple[FloatArray, FloatArray]:
     """Return angles and points, shape (curves, points), none of them twice."""
-    each = [part[0](angle) for part, angle in zip(parts, angles, strict=True)]
-    angle, points = np.concatenate(angles), np.concatenate(each, axis=1)
+    curves = [part[0](angle) for part, angle in zip(parts, angles, strict=True)]
+    angle, points = np.concatenate(angles), np.concatenate(curves, axis=1)
     kept = _distinct(points)
     return angle[kept], points[:, kept]
 
@@ -124,7 +127,7 @@ def _points(
 def _distinct(points: FloatArray) -> BoolArray:
     """Return which points, the last axis, differ from the following one in any curve.
 
-    Of two equal points that at the start of a segment is kept, and not that at 360 deg.
+    Of two equal points the one at the start of a segment is kept, not the one at 360 deg.
     """
     return np.asarray((np.abs(np.roll(points, -1, axis=1) - points) > _DOUBLED).any(axis=0))
 

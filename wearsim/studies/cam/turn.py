@@ -28,7 +28,7 @@ from wearsim.studies.cam.point import Point
 from wearsim.types import BoolArray, FloatArray
 
 STEEP = {"translating": math.radians(30.0), "swinging": math.radians(45.0)}
-SHARP = 2.0  # radius of the pitch curve over that of the roller, below which the contact is warned
+SHARP = 2.0  # radius of the pitch curve over the roller's, below which the contact is warned
 PART_OF_TOLERANCE = 0.25  # for the stations
 LEAST_LOAD = 1e-4  # of the greatest, where the flank of a groove changes
 _FINE = 1e-10  # tolerance of integrals over a turn
@@ -104,18 +104,25 @@ class CamTurn:
             inner = self.effort(lift, theta) < 0.0 if grooved else np.zeros(len(theta), dtype=bool)
         return self._loaded(self.cam.follower.kinematics(lift, inner), theta, inner)
 
-    def _loaded(self, found: RollerKinematics, theta: FloatArray, inner: BoolArray) -> Point:
+    def _loaded(self, kinematics: RollerKinematics, theta: FloatArray, inner: BoolArray) -> Point:
         """Return the state for a motion of the roller on the flanks `inner`."""
-        follower, lever = self.cam.follower, self.cam.follower.lever * np.cos(found.pressure_angle)
+        follower, lever = (
+            self.cam.follower,
+            self.cam.follower.lever * np.cos(kinematics.pressure_angle),
+        )
         if self.load is None:
             force = np.full(len(theta), self._constant)
-            effort, spring = force * follower.lever * np.cos(found.pressure_angle), 0.0
+            effort, spring = force * follower.lever * np.cos(kinematics.pressure_angle), 0.0
         else:
-            effort = self.effort((found.lift, found.lift_per_rad, found.lift_per_rad2), theta)
+            effort = self.effort(
+                (kinematics.lift, kinematics.lift_per_rad, kinematics.lift_per_rad2), theta
+            )
             force, spring = np.where(inner, -effort, effort) / lever, self.load.spring
             if self.cam.groove:  # it vanishes where the flank changes
                 force = np.maximum(force, LEAST_LOAD * self._greatest_effort / follower.lever)
-        return Point(theta, found, inner, force, effort * found.lift_per_rad, spring / lever**2)
+        return Point(
+            theta, kinematics, inner, force, effort * kinematics.lift_per_rad, spring / lever**2
+        )
 
     def at(self, panel: Panel, theta: FloatArray) -> Point:
         """Return the state at angles within a panel [rad]."""
@@ -140,7 +147,7 @@ class CamTurn:
         return float(np.abs(self.effort(self.cam.motion.lift(theta), theta)).max())
 
     def at_angles(self, theta: FloatArray) -> Point:
-        """Return the state at any angles [rad]; between segments that of the following one."""
+        """Return the state at any angles [rad]; between two segments in the following one."""
         theta = np.asarray(theta, dtype=np.float64)
         return self.point(self.cam.motion.lift(theta), theta)
 
@@ -199,8 +206,8 @@ class CamTurn:
 
         def rolling(panel: Panel, theta: FloatArray) -> Rolling:
             point, most = self.at(panel, theta), self._greatest_torque(panel, theta)
-            found, drag = point.kinematics, self.drag(point) / scale
-            return Rolling(found.spin, found.spin_per_rad, drag, most / scale)
+            kinematics, drag = point.kinematics, self.drag(point) / scale
+            return Rolling(kinematics.spin, kinematics.spin_per_rad, drag, most / scale)
 
         try:
             return skid_arcs(self.panels, rolling)
@@ -217,7 +224,7 @@ class CamTurn:
     @cached_property
     def parts(self) -> tuple[Panel, ...]:
         """Panels, split where a skid begins or ends."""
-        found = []
+        parts = []
         for number, panel in enumerate(self.panels):
             ends = [
                 float(edge)
@@ -230,11 +237,11 @@ class CamTurn:
                 if high - low > 1e-9:
                     rolls = np.isnan(self.slip(np.array([0.5 * (low + high)]))[0])
                     dwell = panel.dwell and bool(rolls)
-                    found.append(panel._replace(start=low, stop=high, dwell=dwell))
-        return tuple(found)
+                    parts.append(panel._replace(start=low, stop=high, dwell=dwell))
+        return tuple(parts)
 
     def slip(self, theta: FloatArray, within: FloatArray | None = None) -> FloatArray:
-        """Return the slip of the roller, its lack of speed over that of the cam.
+        """Return the slip of the roller, its lack of speed relative to the cam's speed.
 
         Parameters
         ----------
@@ -248,12 +255,12 @@ class CamTurn:
         ndarray, shape (points,)
             Not a number where the roller rolls.
         """
-        found = np.full(len(theta), np.nan)
+        slips = np.full(len(theta), np.nan)
         within = np.mod(theta, math.tau) if within is None else within
         for arc in self.arcs:
             inside = (within >= arc.theta[0]) & (within <= arc.theta[-1])
-            found[inside] = arc.slip_at(np.mod(theta[inside], math.tau))
-        return found
+            slips[inside] = arc.slip_at(np.mod(theta[inside], math.tau))
+        return slips
 
     @cached_property
     def normal_range(self) -> tuple[float, float]:
@@ -271,7 +278,7 @@ class CamTurn:
 
     @cached_property
     def greatest_demand(self) -> float:
-        """Greatest traction of a rolling free roller, over that of friction; at most 1."""
+        """Greatest traction of a rolling free roller, over the limit of friction; at most 1."""
 
         def demand(panel: Panel, theta: FloatArray) -> FloatArray:
             torque = np.abs(self.torque(self.at(panel, theta)))
@@ -342,9 +349,9 @@ class CamTurn:
             return np.asarray(factor * point.kinematics.travel)
 
         fine = choose_stations(self.panels, lambda p, x: values(p, x)[None], _FINE)
-        each = zip(fine.panels, fine.numbers, fine.first, strict=True)
+        parts = zip(fine.panels, fine.numbers, fine.first, strict=True)
         return float(
-            sum(fine.weight[i : i + n] @ values(p, fine.angle[i : i + n]) for p, n, i in each)
+            sum(fine.weight[i : i + n] @ values(p, fine.angle[i : i + n]) for p, n, i in parts)
         )
 
     def at_stations(self, stations: Stations) -> Point:
@@ -405,15 +412,15 @@ class CamTurn:
         ``least_normal_force`` [N], of a cam without a groove. ``pivot_margin``: distance of the
         pivot of an arm from the cam [m].
         """
-        radius, found = self.scenario.roller.radius, {}
+        radius, margins = self.scenario.roller.radius, {}
         sharpest, _ = extreme(self.panels, self._undercut)
-        found["undercut_margin"] = radius / sharpest - radius if sharpest > 0.0 else math.inf
+        margins["undercut_margin"] = radius / sharpest - radius if sharpest > 0.0 else math.inf
         if not self.cam.groove:
-            found["least_normal_force"] = self.normal_range[0]
+            margins["least_normal_force"] = self.normal_range[0]
         if self.cam.follower.swings and not self.cam.groove:
             greatest, _ = extreme(self.panels, self.radius)
-            found["pivot_margin"] = self.cam.follower.centre_distance - greatest
-        return found
+            margins["pivot_margin"] = self.cam.follower.centre_distance - greatest
+        return margins
 
     def _reach_mistakes(self) -> list[Mistake]:
         """Return a mistake if the cam of a swinging arm reaches its pivot."""
@@ -462,13 +469,13 @@ class _Path:
     def at(self, segment: int, theta: FloatArray, inner: bool) -> RollerKinematics:
         """Return the motion at angles within a segment [rad], on the inner flank of a groove."""
         key = segment, inner, theta.tobytes()
-        found = self._known.get(key)
-        if found is None:
+        kinematics = self._known.get(key)
+        if kinematics is None:
             lift = self._cam.motion.lift_in(segment, theta)
-            found = self._cam.follower.kinematics(lift, inner)
+            kinematics = self._cam.follower.kinematics(lift, inner)
             if len(self._known) < MOST_KNOWN:
-                self._known[key] = found
-        return found
+                self._known[key] = kinematics
+        return kinematics
 
 
 _path_of = lru_cache(maxsize=4)(_Path)

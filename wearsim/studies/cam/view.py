@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.mechanics.cam import surface_points
+from wearsim.mechanics.cam import extreme, surface_points
 from wearsim.report.text import NOTHING, PER_SI, in_unit, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
+from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import harmonic_depth
-from wearsim.studies.cam.study import CamStudy
+from wearsim.studies.cam.study import CamStudy, peak_pressures
+from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.fatigue.unworn import lives_at, stresses_below
 from wearsim.studies.fatigue.view import source_rows, with_sources
 from wearsim.types import FloatArray
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from wearsim.report.surfaces import Sampling, Surface
 
 
+#: what wear tests of cams do not contain, beside what tests of cylinders do not
+CAM_EXCLUDED = ("vibration of the follower", "uneven wear around the roller")
 # titles of the columns of the motion table, names of their values, and units
 _MOTION = (
     ("angle", "angle_rad", "deg"),
@@ -133,13 +137,13 @@ class CamView(View):
     def tables(self) -> list[Table]:
         """Return motion, loads and contact at the stations, in engineering units."""
         study, point, turn = self.result, self.result.point, self.result.turn
-        found, lift = point.kinematics, "deg" if turn.cam.follower.swings else "mm"
+        kinematics, lift = point.kinematics, "deg" if turn.cam.follower.swings else "mm"
         columns = [
             ("angle [deg]", point.angle, "deg"),
-            (f"lift [{lift}]", found.lift, lift),
-            ("pressure angle [deg]", found.pressure_angle, "deg"),
-            ("V [m/s]", turn.speed * found.travel, "m/s"),
-            ("roller/cam", found.spin, "1"),
+            (f"lift [{lift}]", kinematics.lift, lift),
+            ("pressure angle [deg]", kinematics.pressure_angle, "deg"),
+            ("V [m/s]", turn.speed * kinematics.travel, "m/s"),
+            ("roller/cam", kinematics.spin, "1"),
             ("N [N]", point.normal_force, "N"),
             ("p0 [MPa]", study.peak_pressure, "MPa"),
             ("creepage", study.contacts.longitudinal_creepage, "1"),
@@ -179,32 +183,32 @@ class CamView(View):
     def _columns(self) -> dict[str, tuple[str, Any]]:
         """Return the values at the stations by their keys: unit and numbers in SI."""
         study, point, turn = self.result, self.result.point, self.result.turn
-        found, unit = point.kinematics, turn.cam.lift_unit
-        x, y = surface_points(turn.cam.follower, found, point.angle)[1]
+        kinematics, unit = point.kinematics, turn.cam.lift_unit
+        x, y = surface_points(turn.cam.follower, kinematics, point.angle)[1]
         jerk = turn.cam.motion.jerk(point.angle)
         # of the roller's centre along its path
         travel = turn.cam.follower.lever * np.stack(
-            [found.lift, found.lift_per_rad, found.lift_per_rad2, jerk]
+            [kinematics.lift, kinematics.lift_per_rad, kinematics.lift_per_rad2, jerk]
         )
         with np.errstate(divide="ignore"):
-            radius = 1.0 / found.curvature
+            radius = 1.0 / kinematics.curvature
         columns: dict[str, tuple[str, Any]] = {
             "angle_rad": ("rad", point.angle),
-            f"lift_{unit}": (unit, found.lift),
-            f"lift_per_rad_{unit}": (unit, found.lift_per_rad),
-            f"lift_per_rad2_{unit}": (unit, found.lift_per_rad2),
+            f"lift_{unit}": (unit, kinematics.lift),
+            f"lift_per_rad_{unit}": (unit, kinematics.lift_per_rad),
+            f"lift_per_rad2_{unit}": (unit, kinematics.lift_per_rad2),
             f"lift_per_rad3_{unit}": (unit, jerk),
             "roller_lift_m": ("m", travel[0]),
             "velocity_m_per_s": ("m/s", turn.speed * travel[1]),
             "acceleration_m_per_s2": ("m/s^2", turn.speed**2 * travel[2]),
             "jerk_m_per_s3": ("m/s^3", turn.speed**3 * travel[3]),
-            "pressure_angle_rad": ("rad", found.pressure_angle),
-            "curvature_per_m": ("1/m", found.curvature),
+            "pressure_angle_rad": ("rad", kinematics.pressure_angle),
+            "curvature_per_m": ("1/m", kinematics.curvature),
             "radius_of_curvature_m": ("m", radius),
             "x_m": ("m", x),
             "y_m": ("m", y),
-            "rolling_speed_m_per_s": ("m/s", turn.speed * found.travel),
-            "roller_speed_ratio": ("1", found.spin),
+            "rolling_speed_m_per_s": ("m/s", turn.speed * kinematics.travel),
+            "roller_speed_ratio": ("1", kinematics.spin),
             "normal_force_N": ("N", point.normal_force),
             "peak_pressure_Pa": ("Pa", study.peak_pressure),
             "drive_torque_N_m": ("N m", point.drive_torque),
@@ -276,7 +280,7 @@ class CamView(View):
 
     def columns(self) -> Mapping[str, Columns]:
         """Return the motion table, one row for each station."""
-        values = {name: found for name, (_, found) in self._columns().items()}
+        values = {name: numbers for name, (_, numbers) in self._columns().items()}
         swings, film = self.result.turn.cam.follower.swings, "film_thickness_m" in values
         chosen = [
             *_MOTION[:1],
@@ -308,3 +312,17 @@ def _without_rounding(values: FloatArray) -> list[float]:
     """Return values, with 0 for those that are zero to the rounding of the greatest."""
     size = np.abs(values)
     return [float(value) for value in np.where(size > 1e-11 * size.max(), values, 0.0)]
+
+
+def loads(scenario: Scenario) -> Rows:
+    """Return speed, force, torque and pressure of a cam before wear."""
+    turn = CamTurn(scenario)
+    least, greatest = turn.normal_range
+    pressure, theta = extreme(turn.panels, lambda p, x: peak_pressures(scenario, turn.at(p, x)))
+    torque, _ = extreme(turn.panels, lambda p, x: np.abs(turn.at(p, x).drive_torque))
+    return [
+        Row("speed", turn.speed, "rpm"),
+        Row("normal force", f"{shown(least, 'N', 3)} to {shown(greatest, 'N', 3)}"),
+        Row("peak pressure, new", f"{shown(pressure, 'MPa', 3)} at {turn.place(theta)}"),
+        Row("drive torque", f"up to {shown(torque, 'N m', 3)}, without losses"),
+    ]

@@ -10,6 +10,7 @@ from typing import TypeAlias, TypeGuard
 import numpy as np
 
 from wearsim.errors import unknown_name
+from wearsim.report.text import QUANTILES
 from wearsim.results.viewed import Viewed
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.opening import open_results
@@ -20,7 +21,6 @@ from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.mann_whitney import Paired, paired, superiority
 from wearsim.uq.sampling.sampler import REPLICATES
 
-QUANTILES = (0.05, 0.5, 0.95)
 _ROUND_OFF = 1e-9  # relative difference of the ends of tests of equal length
 
 Comparable: TypeAlias = Result | EnsembleResult

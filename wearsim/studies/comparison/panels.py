@@ -26,7 +26,7 @@ from wearsim.report.panels import (
 )
 from wearsim.report.text import OBSERVABLES, Named, sufficient_for
 from wearsim.studies.comparison.compare import Compared, Comparison
-from wearsim.studies.comparison.rows import against, realisations
+from wearsim.studies.comparison.view import against, realisations
 from wearsim.studies.run.panels import HEIGHT, Y
 
 MOST_POINTS = 2000  # of a distribution function

@@ -1,31 +1,45 @@
-"""View of a comparison of runs and ensembles: differences, estimates, and profiles."""
+"""View of a comparison of runs and ensembles: differences in words, estimates, and profiles."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.errors import ResultsFileError
 from wearsim.levelling import Measured
-from wearsim.report.text import NOTHING, OBSERVABLES, cells, count, si_key, si_unit, with_interval
+from wearsim.report.text import (
+    NOTHING,
+    OBSERVABLES,
+    cells,
+    count,
+    part_with_interval,
+    shown,
+    si_key,
+    si_unit,
+    simulated,
+    with_interval,
+)
 from wearsim.report.view import STUDY, Frame, Overview, Row, Rows, Table, View
 from wearsim.studies.comparison.compare import (
     Comparable,
     Compared,
     Comparison,
     compare,
-    observables_of,
 )
-from wearsim.studies.comparison.rows import against, kind, length
 from wearsim.studies.ensemble.view import INTERVAL
+from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.estimation.mann_whitney import FEWEST, Paired
 
 if TYPE_CHECKING:
     from wearsim.report.panels import Sheet
 
 _ENDS = ("value", "low", "high")
+EQUAL = "equal in all tests"
 
 
 class ComparisonView(View):
@@ -40,6 +54,7 @@ class ComparisonView(View):
         Scenario key in which the results differ, of a sweep.
     """
 
+    sheet = "wearsim.studies.comparison.panels:comparison_sheet"
     basis = (
         "Intervals of ensembles are those of their means; those of runs contain the error of the"
         " steps only."
@@ -86,14 +101,14 @@ class ComparisonView(View):
 
     def overview(self) -> Overview:
         """Return the comparison, and the limits of each of the results."""
-        own = super().overview()
+        compared = super().overview()
         labels = [row.label for row in self.comparison.rows]
-        groups, excluded = dict(own.groups), list[str]()
+        groups, excluded = dict(compared.groups), list[str]()
         for label, view in zip(labels, self._views, strict=True):
-            found = view.overview()
-            groups[f"Limits of {label}"] = found.groups.get("Limits", [])
-            excluded += [text for text in found.excluded if text not in excluded]
-        return Overview(own.picture, groups, excluded, alone=True)
+            overview = view.overview()
+            groups[f"Limits of {label}"] = overview.groups.get("Limits", [])
+            excluded += [text for text in overview.excluded if text not in excluded]
+        return Overview(compared.picture, groups, excluded, alone=True)
 
     def data(self) -> dict[str, Any]:
         """Return the comparison in SI units; all results are compared with the first."""
@@ -117,8 +132,6 @@ class ComparisonView(View):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels, with the worn profiles for a page."""
-        from wearsim.studies.comparison.panels import comparison_sheet  # noqa: PLC0415  (only of figures)
-
         titles = {result.title for result in self.results}
         shared = titles.pop() if len(titles) == 1 else ""
         suffix = f"for values of {self.key}" if self.key else ""
@@ -128,7 +141,8 @@ class ComparisonView(View):
             label: result.worn_profile()
             for label, result in zip(labels, self.results, strict=False)
         }
-        return comparison_sheet(self.comparison, heading, profiles)
+        drawn: Sheet = resolve_name(self.sheet)(self.comparison, heading, profiles)
+        return drawn
 
 
 def comparison_view(
@@ -139,20 +153,13 @@ def comparison_view(
     Raises
     ------
     ResultsFileError
-        If an ensemble has no completed realisation.
-    ResultsFileError
-        Also if one lacks the observable; the message has the known ones.
+        If one has no completed realisation, or lacks the observable; the message lists what it has.
     """
-    name = observable or "depth"
-    for label, result in zip(labels, results, strict=True):
-        if getattr(result, "count", 1) == 0:
-            raise ResultsFileError(
-                f"{result.path}: has no completed realisation; nothing to compare"
-            )
-        known = observables_of(result)
-        if name not in known:
-            raise ResultsFileError(f"{label} has no '{name}', expected one of {', '.join(known)}")
-    return ComparisonView(compare(results, labels, name), key)
+    try:
+        compared = compare(results, labels, observable or "depth")
+    except ValueError as error:
+        raise ResultsFileError(str(error)) from error
+    return ComparisonView(compared, key)
 
 
 def _warnings(comparison: Comparison) -> list[str]:
@@ -208,3 +215,88 @@ def _data(row: Compared, file: str) -> dict[str, Any]:
         "paired_with_first": paired,
         "difference_from_first": asdict(row.difference) if row.difference else None,
     }
+
+
+def realisations(row: Compared) -> str:
+    """Return the number of realisations of an ensemble: "7 of 10, 3 failed"."""
+    text = count(row.done)
+    if row.done < row.requested:
+        text += f" of {count(row.requested)}"
+        # an ensemble that reached its target, without failures
+        text += " at most" if row.finished and row.done + row.failed < row.requested else ""
+    text += f", {count(row.failed)} failed" if row.failed else ""
+    text += f", {count(row.count)} of them independent" if row.count < row.done else ""
+    return text if row.finished else f"{text}, unfinished"
+
+
+def kind(row: Compared) -> str:
+    """Return the kind of a result, "ensemble of 40" or "run"."""
+    if row.kind == "run":
+        return "run" if row.finished else "run, unfinished"
+    return f"ensemble of {realisations(row)}"
+
+
+def length(row: Compared) -> str:
+    """Return the length of the tests, "3,000 passes, 1.000 min"."""
+    return f"{count(row.passes)} passes, {simulated(row.time)}"
+
+
+def against(comparison: Comparison, row: Compared) -> list[tuple[str, str]]:
+    """Return the comparison of a result with the first one, as table rows.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    row : Compared
+        One of its rows except the first.
+    """
+    first = comparison.rows[0]
+    unit = OBSERVABLES[comparison.observable].unit
+    more, less = ("deeper", "shallower") if comparison.observable == "depth" else ("more", "less")
+    if row.difference is not None:
+        errors = (first.value.half_width, row.value.half_width)
+        text = _of_runs(row.difference, errors, unit, more, less)
+        return [(f"{row.label} against {first.label}", text)]
+    rows = []
+    if row.deeper is not None:
+        rows.append((f"{row.label} {more} than {first.label}", _of_tests(first, row, row.deeper)))
+    if row.paired is not None:
+        rows.append(("  with the same draws", _of_pairs(row.paired, unit, more, less)))
+    return rows
+
+
+def _of_runs(
+    difference: Interval, errors: tuple[float, float], unit: str, more: str, less: str
+) -> str:
+    """Return the difference of two runs, with their estimated errors."""
+    texts = " and ".join(shown(error, unit, 2) for error in errors)
+    stated = f"estimated errors {texts}" if any(errors) else "no error estimate"
+    by = difference.value
+    if by == 0.0:
+        return f"equal ({stated})"
+    if difference.low <= 0.0 <= difference.high:
+        return f"not significant: difference {shown(abs(by), unit, 3)}, within the {stated}"
+    return f"{more if by > 0.0 else less} by {shown(abs(by), unit)} ({stated})"
+
+
+def _of_tests(first: Compared, row: Compared, deeper: Interval) -> str:
+    """Return the probability that a test of one ensemble exceeds a test of the other."""
+    low = min(first.values[0], row.values[0])
+    high = max(first.values[-1], row.values[-1])
+    if low == high and row.count + first.count > 2:
+        return EQUAL
+    if not math.isfinite(deeper.value):
+        return f"too few realisations, {FEWEST} of each are sufficient"
+    pairs = "pairs of tests" if row.kind == first.kind else "the tests of the ensemble"
+    return f"in {part_with_interval(deeper)} of {pairs}"
+
+
+def _of_pairs(pairs: Paired, unit: str, more: str, less: str) -> str:
+    """Return the difference between tests with the same draws."""
+    by = pairs.difference
+    if pairs.count == 1:
+        amount = f"{more if by.value > 0.0 else less} by {shown(abs(by.value), unit)}"
+        return f"{amount if by.value else 'equal'} in the only pair of tests"
+    if by.low == by.value == by.high == 0.0:
+        return EQUAL
+    return f"in {part_with_interval(pairs.share)}, by {with_interval(by, unit)} on average"

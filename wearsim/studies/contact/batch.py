@@ -272,16 +272,16 @@ class Realisations:
         parts = []
         for number in range(count):
             values = {key: float(column[number]) for key, column in forms.items()}
-            own = realise(self._once, values)
-            parts.append(surfaces(own, [0], offsets[:, number : number + 1], self.grid))
+            realised = realise(self._once, values)
+            parts.append(surfaces(realised, [0], offsets[:, number : number + 1], self.grid))
         rolling, slip = parts[0].roller_drop, parts[0].slip_profile
         if rolling is not None:
-            rolling = np.concatenate([np.asarray(one.roller_drop) for one in parts], axis=1)
+            rolling = np.concatenate([np.asarray(part.roller_drop) for part in parts], axis=1)
         if slip is not None:
-            slip = np.concatenate([np.asarray(one.slip_profile) for one in parts], axis=2)
+            slip = np.concatenate([np.asarray(part.slip_profile) for part in parts], axis=2)
         return replace(
             problem,
-            flat_gap=np.concatenate([one.gap for one in parts], axis=2),
+            flat_gap=np.concatenate([part.gap for part in parts], axis=2),
             roller_drop=rolling,
             slip_profile=slip,
         )

@@ -28,7 +28,7 @@ _SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
 
 @dataclass(frozen=True)
 class ContactErrors:
-    """Differences of a contact from a reference; signed except those of P_l(y).
+    """Differences of a contact from a reference; signed, except of P_l(y).
 
     Parameters
     ----------

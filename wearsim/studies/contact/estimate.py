@@ -24,7 +24,7 @@ INDICATORS = (
     "ln of the line load's curvature over a half-length, plus 0.001",
 )
 _BEYOND = 0.1  # allowed beyond the range of an indicator, over that range
-#: Times of one contact up to this one, over that of the cheapest model, do not count: well below a
+#: Times of one contact up to this multiple of the cheapest model's do not count: well below a
 #: millisecond.
 CHEAP = 10.0
 #: indicators whose errors do not increase beyond their greatest and their least value: contacts
@@ -93,7 +93,7 @@ class Calibration:
         return ""
 
     def _limited(self, indicators: FloatArray) -> FloatArray:
-        """Return indicators within their range, where nothing changes for the worse beyond it."""
+        """Return indicators cut to their range on the sides beyond which errors do not increase."""
         limited = indicators.copy()
         limited[_UNLIMITED_ABOVE] = np.minimum(limited, self.greatest)[_UNLIMITED_ABOVE]
         limited[_UNLIMITED_BELOW] = np.maximum(limited, self.least)[_UNLIMITED_BELOW]

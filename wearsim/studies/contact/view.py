@@ -50,10 +50,7 @@ class ContactView(View):
         moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
         spin = f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"
         width = shown(self._width, "mm") if self.edges else NOTHING
-
-        def stated(label: str, name: str, value: float, unit: str) -> Row:
-            return Row(label, value, unit, answers={name: (value, unit)})
-
+        length = 2.0 * float(solution.half_length.max())
         return [
             *(Row(*pair) for pair in self.start.items()),
             Row("contact model", study.described_model),
@@ -64,16 +61,14 @@ class ContactView(View):
             Row("longitudinal creepage", solution.longitudinal_creepage),
             Row("lateral creepage", point.creepage.lateral),
             Row("spin", spin),
-            stated(
-                "patch length 2a", "patch_length", 2.0 * float(solution.half_length.max()), "mm"
-            ),
+            Row.answer("patch length 2a", "patch_length", length, "mm"),
             Row("patch width", width, answers={"patch_width": (self._width, "mm")}),
-            stated("peak pressure", "peak_pressure", solution.peak_pressure, "MPa"),
-            stated("approach", "approach", solution.approach, "um"),
-            stated("longitudinal force", "force_x", solution.force_x, "N"),
-            stated("lateral force", "force_y", solution.force_y, "N"),
-            stated("spin moment", "spin_moment", moment, "N mm"),
-            stated("dissipated power", "power", solution.power, "W"),
+            Row.answer("peak pressure", "peak_pressure", solution.peak_pressure, "MPa"),
+            Row.answer("approach", "approach", solution.approach, "um"),
+            Row.answer("longitudinal force", "force_x", solution.force_x, "N"),
+            Row.answer("lateral force", "force_y", solution.force_y, "N"),
+            Row.answer("spin moment", "spin_moment", moment, "N mm"),
+            Row.answer("dissipated power", "power", solution.power, "W"),
             Row("adhesion fraction", round(solution.adhesion_fraction, _DIGITS), "%"),
         ]
 

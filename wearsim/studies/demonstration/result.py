@@ -17,7 +17,7 @@ from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.settings import parse_life
 from wearsim.studies.opening import labels_of
 from wearsim.types import FloatArray
-from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.estimation.intervals import ENDS, Interval
 from wearsim.uq.survival.demonstration import (
     DrawnLives,
     drawn_lives,
@@ -35,7 +35,6 @@ _TEXT = re.compile(
     re.IGNORECASE,
 )
 _EXPECTED = 'expected a survival, a confidence and a life, as in "R=0.9 C=0.95 at 500 h"'
-_ENDS = np.array([0.025, 0.975])
 
 
 class Requirement(NamedTuple):
@@ -200,7 +199,7 @@ class Demonstration(Viewed):
         """Return the mean of draws with the 95 % interval."""
         if not np.isfinite(values).all():
             return Interval(math.nan, -math.inf, math.inf)
-        low, high = np.quantile(values, _ENDS).tolist()
+        low, high = np.quantile(values, ENDS).tolist()
         return Interval(float(values.mean()), low, high)
 
     @property
@@ -217,7 +216,7 @@ class Demonstration(Viewed):
 
     @property
     def meets(self) -> float:
-        """Probability that the survival of the simulated design is that to show, or greater."""
+        """Probability that the simulated design has the survival to show, or a greater one."""
         return float((self._scale >= 0.0).mean()) if np.isfinite(self._scale).all() else math.nan
 
     def acceleration(self, design: int) -> Interval:
@@ -258,7 +257,7 @@ class Demonstration(Viewed):
         failures : int
             That are allowed.
         design : int
-            Number of the conditions of the test, 0 for those of service.
+            Number of the conditions of the test, 0 for service.
 
         Returns
         -------
@@ -279,7 +278,7 @@ class Demonstration(Viewed):
         if count is None:
             unknown = Interval(math.nan, -math.inf, math.inf)
             return Plan(duration, failures, None, None, None, unknown)
-        ends = np.quantile(survived, _ENDS)
+        ends = np.quantile(survived, ENDS)
         low, high = (specimens(need.confidence, ends[k : k + 1], failures) for k in (0, 1))
         passing = self._interval(pass_probability(count, failures, drawn.failed(log)))
         return Plan(duration, failures, count, low, high, passing)
@@ -333,7 +332,7 @@ def demonstration(
     >>> wearsim.demonstration(lives, "R=0.9 C=0.95 at 5e5")
     <Demonstration 'a wear test': R = 0.9, C = 0.95 at 500000 passes, 29 specimens>
     """
-    designs = [lives] if isinstance(lives, LifeResult) else list(lives)
+    designs = list(lives) if isinstance(lives, Sequence) else [lives]
     need = Requirement.parse(requirement, designs[0].unit)
     share = 1.0 - need.survival
     for design in designs:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from wearsim.report.text import NOTHING, count, part_with_interval, shown
-from wearsim.report.view import STUDY, Column, Columns, Frame, Overview, Row, Rows, Table, View
+from wearsim.report.text import NOTHING, count, count_of, part_with_interval, shown
+from wearsim.report.view import STUDY, Column, Row, Rows, Table
+from wearsim.results.study_view import DesignsView, columns_of
 from wearsim.studies.demonstration.result import Demonstration, Plan
 from wearsim.studies.life.view import limit_texts
-from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.estimation.intervals import Interval, arrays_of
 
 _BASIS = (
     "The simulation gives the shape of the distribution of lives and the acceleration; the scale is"
@@ -26,13 +26,14 @@ _NO_SHAPE = (
 )
 
 
-class DemonstrationView(View):
+class DemonstrationView(DesignsView):
     """Specimens against duration, and the probability that the design passes.
 
     Panels: specimens, probability of passing. Files: the tests.
     """
 
     sheet = "wearsim.studies.demonstration.panels:demonstration_sheet"
+    file, group = "tests.csv", "Demonstration"
     basis = _BASIS
 
     def __init__(self, result: Demonstration) -> None:
@@ -75,7 +76,7 @@ class DemonstrationView(View):
         result, need = self.result, self.result.requirement
         numbers = result.by_binomial
         allowed = ", ".join(
-            f"{number} with {'no' if k == 0 else k} failure{'s' if k > 1 else ''}"
+            f"{number} with {count_of(k, 'failure', 'no failure')}"
             for k, number in enumerate(numbers)
         )
         plain = result.plan(need.life)
@@ -127,10 +128,10 @@ class DemonstrationView(View):
                 [self._number(some[0].duration), *map(_cell, some), self._passing(some[0])]
             )
         what = "test" if design == 0 else f"test at {result.labels[design]}"
-        heads = [f"duration of the {what} [{need.unit}]"]
-        heads += [
-            f"specimens, {'no failure' if k == 0 else f'{k} failure' + ('s' if k > 1 else '')}"
-            for k in range(need.failures + 1)
+        allowed = (count_of(k, "failure", "no failure") for k in range(need.failures + 1))
+        heads = [
+            f"duration of the {what} [{need.unit}]",
+            *(f"specimens, {text}" for text in allowed),
         ]
         return Table("", lines, [*heads, "passes without failure"])
 
@@ -163,49 +164,25 @@ class DemonstrationView(View):
             "warnings": list(self.warnings),
         }
 
-    def _columns(self) -> list[Column]:
+    def table(self) -> list[Column]:
         """Return the tests as columns."""
-        result, unit = self.result, self.result.requirement.unit
-        plans = [
-            (label, plan)
-            for label, some in zip(result.labels, result.plans, strict=True)
-            for plan in some
+        result = self.result
+        labels = [
+            label for label, plans in zip(result.labels, result.plans, strict=True) for _ in plans
         ]
-
-        def numbers(name: str) -> Any:
-            values = [getattr(plan, name) for _, plan in plans]
-            return np.array([math.nan if item is None else item for item in values])
-
-        passing = [plan.passing for _, plan in plans]
+        plans = [plan for some in result.plans for plan in some]
+        names = ("duration", "failures", "specimens", "low", "high")
+        given = [[getattr(plan, name) for plan in plans] for name in names]
+        duration, failures, *specimens = (
+            np.array([math.nan if item is None else item for item in numbers]) for numbers in given
+        )
         return [
-            Column("conditions", [label for label, _ in plans]),
-            Column("duration", numbers("duration"), unit),
-            Column("failures", numbers("failures")),
-            Column("specimens", numbers("specimens")),
-            Column("specimens low", numbers("low")),
-            Column("specimens high", numbers("high")),
-            Column("passes", np.array([item.value for item in passing])),
-            Column("passes low", np.array([item.low for item in passing])),
-            Column("passes high", np.array([item.high for item in passing])),
+            Column("conditions", labels),
+            Column("duration", duration, result.requirement.unit),
+            Column("failures", failures),
+            *columns_of("specimens", specimens),
+            *columns_of("passes", arrays_of(plan.passing for plan in plans)),
         ]
-
-    def columns(self) -> Mapping[str, Columns]:
-        """Return the tests."""
-        return {"tests.csv": [self._columns()]}
-
-    def frame(self) -> Frame:
-        """Return the tests as a table of pandas."""
-        columns = [(item.name, item.unit, item.values) for item in self._columns()]
-        return Frame(columns, "number", range(1, len(columns[0][2]) + 1))
-
-    def stored_files(self) -> list[tuple[str, str]]:
-        """Return the scenario of the design and its input files."""
-        files: list[tuple[str, str]] = self.result.designs[0].view.stored_files()
-        return files
-
-    def overview(self) -> Overview:
-        """Return the specimens and the first answers."""
-        return Overview(self.panels().first, {"Demonstration": self.rows()[1:]})
 
 
 def _cell(plan: Plan) -> str:

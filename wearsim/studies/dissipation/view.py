@@ -11,6 +11,7 @@ import numpy as np
 from wearsim.report.csv_files import drawn
 from wearsim.report.text import (
     NOTHING,
+    TOO_FEW_REALISATIONS,
     Named,
     count,
     footer,
@@ -43,7 +44,6 @@ QUANTITIES = {
 }
 _SI = {"W": "W", "N": "N", "N mm": "N_m", "MPa": "Pa"}
 _ROUNDING = 1e-12  # rounding errors of forces, relative to the normal force
-_TOO_FEW = "too few realisations"
 _HEADS = ("", "mean", "95 % interval", "std", "95 % interval", "skewness")
 
 
@@ -74,7 +74,9 @@ class DissipationView(StudyView[DissipationResult]):
             values = " to ".join(in_unit(end.value, "W") for end in ends)
             # with the digits of the quantile, so that rounding does not put it outside its interval
             pairs = [(in_unit(end.low, "W"), in_unit(end.high, "W")) for end in ends]
-            intervals = [_TOO_FEW if NOTHING in pair else "..".join(pair) for pair in pairs]
+            intervals = [
+                TOO_FEW_REALISATIONS if NOTHING in pair else "..".join(pair) for pair in pairs
+            ]
             confidence = " and ".join(dict.fromkeys(intervals))
             name = f"dissipated power, {100.0 * (high - low):g} %"
             rows.append(Row(name, f"{values} W (95 % confidence: {confidence})"))

@@ -1,4 +1,4 @@
-"""Ensembles of whole wear tests: start, stop and resume."""
+"""Ensembles of whole wear tests: start and stop; they and studies of lives are continued."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import CapabilityError, ResultsFileError, ScenarioError
 from wearsim.results.io.outputs import check_output
-from wearsim.scenario import Scenario, as_scenario, parse_scenario, require_run
+from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.observables import CURVE_ANGLES
 from wearsim.studies.ensemble.designs import (
@@ -27,7 +28,6 @@ from wearsim.studies.ensemble.designs import (
 )
 from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
 from wearsim.studies.ensemble.file.data import EnsembleData
-from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.file.schema import (
     ALL_OBSERVABLES,
     CAM_OBSERVABLES,
@@ -249,28 +249,29 @@ def resume_ensemble(
     on_notice: Callable[[str], None] | None = None,
     storage: Storage = DISK,
 ) -> EnsembleResult:
-    """Continue an ensemble from its file; the result equals an unbroken one bit for bit.
+    """Continue an ensemble or a study of lives from its file; the result equals an unbroken one.
 
     Parameters
     ----------
     file : path
-        Results file of an ensemble that was stopped, or finished.
+        Results file of an ensemble or of lives that was stopped, or finished.
     failed : bool
         Run the failed realisations again, and no others.
     realisations : int, optional
-        New maximum number of realisations, to extend the ensemble.
+        New maximum number of realisations, to extend the study.
     workers, scheduler, progress, on_progress, stop_requested, on_notice, storage
         As in `ensemble`.
 
     Returns
     -------
     EnsembleResult
+        Of lives, of the class that `life` returns.
 
     Raises
     ------
     ResultsFileError
-        If the file cannot be read, needs a plugin that is not installed, is being written, or
-        has as many realisations already.
+        If the file cannot be read, needs a plugin that is not installed, is being written, has as
+        many realisations already, or has tests for rare events after them.
     ScenarioError
         If the size of the plan is fixed, so that it cannot be extended.
     WorkerError, Interrupted
@@ -280,43 +281,49 @@ def resume_ensemble(
     --------
     >>> wearsim.resume_ensemble("rig-ensemble.h5", realisations=20, scheduler="serial").count
     20
+    >>> wearsim.resume_ensemble("rig-life.h5", realisations=20, scheduler="serial").count
+    20
     """
-    data, path = read_ensemble(file), Path(file)
-    if data.life:
-        raise ResultsFileError(f"{path}: holds a study of lives, which resume_life continues")
+    before, path = open_ensemble(file), Path(file)
+    data = before.raw
     check_plugins(path, data)
-    if data.finished and realisations is None and not (failed and len(data.failed)):
-        return open_ensemble(path)
-    scenario = parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__)
-    plan, total = parse_plan(data.plan), data.requested
     if realisations is not None:
-        checked_count(scenario, realisations)
-        check_plan(scenario, plan, "more realisations")
-        total = more_realisations(path, total, realisations, data.finished)
+        _check_growth(before, realisations, failed)
+    runner: RealisationRunner = resolve_name(before.runner).continuing(before, realisations)
+    repeated = failed and len(data.failed)
+    if data.finished and realisations is None and not (repeated or runner.further(before)):
+        return before
     target = Target.parse(data.until) if data.until else None
-    grid = Grid(data.variables["y"], data.strip_width)
-    runner = RealisationRunner(scenario, plan, total, grid)
     hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
-    finish = EnsembleWork.run_failed_again if failed else EnsembleWork.finish
-    continue_work(path, data, runner, target, hands, finish, storage)
+    with (
+        hands.open(runner.scenario, runner.total) as (watch, pool),
+        EnsembleFile.open(path, storage) as opened,
+    ):
+        runner.compile_kernels()
+        if runner.total > data.requested:
+            opened.grow(runner.total, **runner.state)
+        work = EnsembleWork(opened, runner, target, pool, watch, stop_requested)
+        work.warn(changed_origins(data, runner.scenario))
+        (work.run_failed_again if failed else work.finish)()
     return open_ensemble(path)
 
 
-def more_realisations(path: Path, held: int, realisations: int, finished: bool) -> int:
-    """Return a new number of realisations of a file that holds some.
-
-    Raises
-    ------
-    ResultsFileError
-        If it is not greater.
-    """
+def _check_growth(before: EnsembleResult, realisations: int, failed: bool) -> None:
+    """Check that a study can be extended to a number of realisations; raises as its caller."""
+    data, path = before.raw, before.path
+    checked_count(before.scenario, realisations)
+    check_plan(before.scenario, parse_plan(data.plan), "more realisations")
+    if data.life.get("rare"):
+        raise ResultsFileError(
+            f"{path}: has tests for rare events after its realisations, and cannot be extended"
+        )
+    held, finished = data.requested, data.finished and not failed
     if realisations < held or (finished and realisations == held):
         raise ResultsFileError(
             f"{path}: has {held} realisations",
             python="give a larger number of realisations to extend it",
             shell="give a larger number with -n to extend it",
         )
-    return realisations
 
 
 class Workers(NamedTuple):
@@ -345,45 +352,6 @@ class Workers(NamedTuple):
             ) as pool,
         ):
             yield watch, pool
-
-
-def continue_work(
-    path: Path,
-    data: EnsembleData,
-    runner: RealisationRunner,
-    target: Target | None,
-    hands: Workers,
-    finish: Callable[[EnsembleWork], None],
-    storage: Storage,
-    **grown: Any,
-) -> None:
-    """Continue an ensemble or lives in a file, which grows to the realisations of the runner.
-
-    Parameters
-    ----------
-    path, data
-        The file and its content.
-    runner : RealisationRunner
-        Runs realisations; it has their new number.
-    target : Target, optional
-        Target that ends the ensemble early.
-    hands : Workers
-    finish : callable
-        Runs the remaining or the failed realisations.
-    storage : Storage
-    **grown
-        Fields of the file that change with its size.
-    """
-    with (
-        hands.open(runner.scenario, runner.total) as (watch, pool),
-        EnsembleFile.open(path, storage) as opened,
-    ):
-        runner.compile_kernels()
-        if runner.total > data.requested:
-            opened.grow(runner.total, **grown)
-        work = EnsembleWork(opened, runner, target, pool, watch, hands.stop_requested)
-        work.warn(changed_origins(data, runner.scenario))
-        finish(work)
 
 
 def ensemble_content(

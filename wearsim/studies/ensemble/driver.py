@@ -176,17 +176,21 @@ class EnsembleWork:
         self.warnings = list(dict.fromkeys([*self.warnings, *texts]))
 
     def finish(self) -> None:
-        """Run all pending realisations, and finish the file.
+        """Run all pending realisations and those that follow from them, and finish the file.
 
         Raises
         ------
         Interrupted
             If the work was stopped before the end.
         """
-        self.run()
+        self._run()
+        while further := self.runner.further(self._result()):
+            self.file.grow(further.total, **self._state(), **further.state)
+            self.runner, self.total = further, further.total
+            self._run()
         self.file.finish(self._complete)
 
-    def run(self) -> None:
+    def _run(self) -> None:
         """Run all pending realisations; raises as `finish`."""
         self._analyse()
         while not (self._is_complete() or self._stopping):
@@ -194,20 +198,6 @@ class EnsembleWork:
         if not self._is_complete():
             self.file.put_state(**self._state())
             raise self._interrupted()
-
-    def extend(self, runner: RealisationRunner, total: int, **state: object) -> None:
-        """Add pending realisations that are run by another runner.
-
-        Parameters
-        ----------
-        runner : RealisationRunner
-        total : int
-            New number of realisations.
-        state
-            Fields of the results that change.
-        """
-        self.file.grow(total, **self._state(), **state)
-        self.runner, self.total = runner, total
 
     def run_failed_again(self) -> None:
         """Run the failed realisations again; raises as `finish`.
@@ -219,7 +209,8 @@ class EnsembleWork:
         finished = self.file.data.finished
         self.file.clear(numbers)  # from now on a kill leaves an ensemble to be resumed
         if finished:
-            self.finish()
+            self._run()
+            self.file.finish(self._complete)
             return
         self._sizes = []
         self._run_batches(numbers)
@@ -297,7 +288,7 @@ class EnsembleWork:
         while self.target and self._sizes and not self._reached:
             if (self.file.status[: self._limit] == PENDING).any():
                 return
-            if self.target.reached(self.result().estimate_for(self.target)):
+            if self.target.reached(self._result().estimate_for(self.target)):
                 self._reached = True
                 return
             self._sizes = self._sizes[1:]
@@ -308,7 +299,7 @@ class EnsembleWork:
     def _is_complete(self) -> bool:
         return self._reached or not (self.file.status == PENDING).any()
 
-    def result(self) -> Any:
+    def _result(self) -> Any:
         """Return the present content of the file."""
         return self.runner.result(
             replace(self.file.data, status=self.file.status.copy()), self.file.path
@@ -341,7 +332,7 @@ class EnsembleWork:
         status, target, now = self.file.status, self.target or default, time.monotonic()
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
         if done and (now > self._next_estimate or self._is_complete()):
-            self._estimate = target.interval(self.result().estimate_for(target))
+            self._estimate = target.interval(self._result().estimate_for(target))
             # at most 5 % of the time
             self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * (time.monotonic() - now))
         self.on_progress(

@@ -49,12 +49,12 @@ from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.ensemble.file.data import Effect
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.fatigue.panels import DAMAGE
-from wearsim.studies.fatigue.view import readable_scenario, source_text
+from wearsim.studies.fatigue.view import with_source_lines
 from wearsim.studies.run.panels import HEIGHT, Y
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.estimation.estimates import Target
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval, arrays_of
 
 LINES = 12  # realisations drawn as lines
 MOST_POINTS = 2000
@@ -67,8 +67,7 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
 
     Measured profiles are drawn over the worn profile.
     """
-    sources = source_text(readable_scenario(result)) if result.raw.fatigue else ""
-    title = "\n".join(filter(None, [result.title, _caption(result), sources]))
+    title = with_source_lines(f"{result.title}\n{_caption(result)}", result)
     if result.count == 0:
         nothing = message("", "no realisation is completed: nothing to draw")
         return Sheet(title, {"nothing": nothing}, [["nothing"]], (13.0, 7.5))
@@ -145,6 +144,17 @@ def _some(x: FloatArray, rows: FloatArray) -> Line:
     return Line(x, rows, width=0.6, alpha=0.6, colour=GREY, label=label)
 
 
+def _curves(x: FloatArray, curves: FloatArray, mean: FloatArray) -> list[Mark]:
+    """Return the curves of some realisations, and of all their 90 % range and mean."""
+    marks: list[Mark] = [_some(x, curves[:LINES])]
+    if len(curves) > 1:
+        if sufficient_for(len(curves), NINETY_PERCENT[0]):
+            low, high = np.quantile(curves, NINETY_PERCENT, axis=0)
+            marks.append(Band(x, low, high, label="5 % to 95 %"))
+        marks.append(Line(x, mean, colour=BLACK, label="mean"))
+    return marks
+
+
 def _density(result: EnsembleResult) -> Panel:
     title, depth = "Depth at the end", result.at_end("depth")
     if result.count == 1 or result.is_constant("depth"):
@@ -180,9 +190,7 @@ def _convergence(result: EnsembleResult) -> Panel:
     target = Target.parse(result.until or _DEFAULT)
     named = OBSERVABLES[target.observable]
     counts, intervals = result.convergence(target)
-    value, low, high = (
-        np.array([getattr(item, end) for item in intervals]) for end in ("value", "low", "high")
-    )
+    value, low, high = arrays_of(intervals)
     labels = {-target.width: "", target.width: f"target: ±{100 * target.width:g} %"}
     marks = [
         Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
@@ -220,18 +228,13 @@ def _damage(result: EnsembleResult) -> Panel:
     name = "damage_curve" if result.raw.cam else "cylinder_damage_profile"
     band = result.band(name)
     curves = result.kept_values(name)
-    marks: list[Mark] = [_some(band.y, curves[:LINES])]
-    if len(curves) > 1:
-        if sufficient_for(len(curves), NINETY_PERCENT[0]):
-            low, high = np.quantile(curves, NINETY_PERCENT, axis=0)
-            marks.append(Band(band.y, low, high, label="5 % to 95 %"))
-        marks.append(Line(band.y, band.mean, colour=BLACK, label="mean"))
     body = "cam" if result.raw.cam else "cylinder"
     mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
     text = (
         f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests."
     )
     x = ANGLE if result.raw.cam else Axis(Y, "mm", limits=worn_limits(band.y, curves.max(axis=0)))
+    marks = _curves(band.y, curves, band.mean)
     return Panel(f"Damage of the {body} at the end", x, DAMAGE, marks, text)
 
 
@@ -241,12 +244,7 @@ def _lift_error(result: EnsembleResult) -> Panel:
     # the last angle is the first one
     curves = curves - curves[:, :-1].mean(axis=1, keepdims=True)
     angle = np.asarray(result.raw.variables["angle"])
-    marks: list[Mark] = [_some(angle, curves[:LINES])]
-    if len(curves) > 1:
-        if sufficient_for(len(curves), NINETY_PERCENT[0]):
-            low, high = np.quantile(curves, NINETY_PERCENT, axis=0)
-            marks.append(Band(angle, low, high, label="5 % to 95 %"))
-        marks.append(Line(angle, curves.mean(axis=0), colour=BLACK, label="mean"))
+    marks = _curves(angle, curves, curves.mean(axis=0))
     mean = shown(result.estimate("lift_error", -1, ()).mean.value, "um")
     return Panel(
         "Lift error at the end",
@@ -310,10 +308,7 @@ def _label(item: Effect) -> str:
 
 def _intervals(places: FloatArray, intervals: list[Interval], colour: str) -> Whiskers:
     known = [np.isfinite(index.value) for index in intervals]
-    low, high = (
-        np.where(known, np.clip([getattr(index, end) for index in intervals], 0.0, 1.0), np.nan)
-        for end in ("low", "high")
-    )
+    low, high = (np.where(known, end, np.nan) for end in arrays_of(intervals)[1:].clip(0.0, 1.0))
     return Whiskers(places, low, high, horizontal=True, colour=colour)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -19,7 +19,7 @@ from wearsim.mechanics.numerics.jit import not_cached
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
-from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, sources
+from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, parse_plan, sources
 from wearsim.studies.ensemble.file.data import EnsembleData, Outcome
 from wearsim.studies.failures import explained
 from wearsim.studies.kernels import kernels_of
@@ -214,6 +214,30 @@ class RealisationRunner:
         self.plan, self.total, self.grid = plan, total, grid
         self._prepared: dict[object, ContactModel] = {}
 
+    @classmethod
+    def continuing(cls, result: EnsembleResult, total: int | None) -> RealisationRunner:
+        """Return the runner of the realisations in a file.
+
+        Parameters
+        ----------
+        result : EnsembleResult
+            Content of the file.
+        total : int, optional
+            New number of realisations; by default that of the file.
+        """
+        data = result.raw
+        grid = Grid(data.variables["y"], data.strip_width)
+        return cls(result.scenario, parse_plan(data.plan), total or data.requested, grid)
+
+    @property
+    def state(self) -> dict[str, object]:
+        """Fields of the file that depend on the number of realisations."""
+        return {}
+
+    def further(self, result: EnsembleResult) -> RealisationRunner | None:
+        """Return the runner of realisations that follow from earlier ones, None without any."""
+        return None
+
     def result(self, data: EnsembleData, path: Path | None) -> EnsembleResult:
         """Return the result of the realisations in a file."""
         from wearsim.studies.ensemble.result import EnsembleResult  # noqa: PLC0415  (not of workers)
@@ -254,6 +278,15 @@ class RealisationRunner:
             In the same order.
         """
         outcomes: dict[int, Outcome] = {}
+        for group in batch_groups(self.prepared(numbers, outcomes)):
+            for run, observations in zip(group, observe(group), strict=True):
+                outcomes[run.number] = self.outcome(run, observations)
+        return [outcomes[number] for number in numbers]
+
+    def prepared(
+        self, numbers: Iterable[int], outcomes: dict[int, Outcome]
+    ) -> list[RealisationRun]:
+        """Return the runs of realisations, and add the outcomes of those with an error."""
         runs = []
         for number in numbers:
             drawn: dict[str, float | FloatArray] = {}
@@ -261,10 +294,7 @@ class RealisationRunner:
                 runs.append(self.prepare(number, drawn))
             except Exception as error:  # an error fails this realisation only
                 outcomes[number] = Outcome(number=number, values=drawn, error=failure_text(error))
-        for group in batch_groups(runs):
-            for run, observations in zip(group, observe(group), strict=True):
-                outcomes[run.number] = self.outcome(run, observations)
-        return [outcomes[number] for number in numbers]
+        return runs
 
     def prepare(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
         """Return the run of a realisation, and add the values of its random inputs to `drawn`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -40,6 +40,9 @@ class EnsembleResult(EnsembleValues):
     >>> print(f"{depth.value * 1e6:.0f} um, 95 % interval from {depth.low * 1e6:.0f} um")
     48 um, 95 % interval from 46 um
     """
+
+    #: class that runs its realisations, "module:name"; imported to continue them only
+    runner: ClassVar[str] = "wearsim.studies.ensemble.realisation:RealisationRunner"
 
     def worn_profile(self) -> ComputedProfile:
         """Return the mean profile at the end of the tests with its band.

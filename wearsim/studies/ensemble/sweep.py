@@ -151,16 +151,23 @@ def sweep(
     >>> [f"{result.depth[-1] * 1e6:.1f} um" for result in results]
     ['42.6 um', '48.1 um']
     """
+    names, scenarios = scenarios_of(scenario, key, values)
+    if realisations is not None and output is None:
+        raise TypeError("ensembles are written to files: name one with output")
+    results = run_sweep(scenarios, names, realisations, output, on_value=on_value, **options)
+    return Sweep(results, key, names)
+
+
+def scenarios_of(
+    scenario: Scenario | str | Path, key: str, values: Sequence[object]
+) -> tuple[list[str], list[Scenario]]:
+    """Return the values of a sweep as texts, and the scenario of each; raises as `sweep`."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise TypeError(f"values must be a list, got {values!r}")
     base, names = as_scenario(scenario), [str(value) for value in values]
     if not names:
         raise ValueError("a sweep needs one or more values")
-    if realisations is not None and output is None:
-        raise TypeError("ensembles are written to files: name one with output")
-    scenarios = [base.changed({key: value}) for value in values]
-    results = run_sweep(scenarios, names, realisations, output, on_value=on_value, **options)
-    return Sweep(results, key, names)
+    return names, [base.changed({key: value}) for value in values]
 
 
 def run_sweep(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from wearsim.report.text import (
     NINETY_PERCENT,
     NOTHING,
     OBSERVABLES,
+    QUANTILES,
     TOO_FEW_REALISATIONS,
     cells,
     count,
@@ -43,21 +44,17 @@ from wearsim.studies.ensemble.file.data import Band, Effect, EnsembleData
 from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, LIFE, PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.fatigue.view import (
-    readable_scenario,
+    fatigue_data,
+    fatigue_scenario,
     source_rows,
-    sources,
     with_sources,
 )
 from wearsim.uq.estimation.estimates import Estimate, Target
 
-QUANTILES = (0.05, 0.5, 0.95)
 INTERVAL = "  95 % interval"
 _HEADS = ("at the end", "mean", "std", "5 %", "median", "95 %")
 _SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")
 _BLOCK = 16384  # realisations in memory at a time
-
-if TYPE_CHECKING:
-    from wearsim.scenario import Scenario
 
 Shown = TypeVar("Shown", bound=EnsembleResult)
 
@@ -79,11 +76,6 @@ class RealisationsView(StudyView[Shown]):
             " memory, a killed worker or an updated plugin repeat them with:"
             f" wearsim resume {result.path} --failed"
         )
-
-    @property
-    def _scenario(self) -> Scenario | None:
-        """Scenario of tests with fatigue, if its plugins are installed; None of others."""
-        return readable_scenario(self.result) if self.result.raw.fatigue else None
 
     def random_inputs(self) -> Rows:
         """Return the draws of the random inputs, and descriptions of those that vary in time."""
@@ -131,7 +123,7 @@ class RealisationsView(StudyView[Shown]):
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, courses, and profile and lift error at the end."""
         result = self.result
-        scenario = self._scenario
+        scenario = fatigue_scenario(result)
         blocks = _realisations(result.raw)
         tables: dict[str, Columns] = {
             "realisations.csv": (with_sources(block, scenario) for block in blocks)
@@ -213,7 +205,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
                 "length of a test",
                 f"{count(raw.total_passes)} passes, {shown(raw.total_time, 'min')}",
             ),
-            *source_rows(self._scenario),
+            *source_rows(fatigue_scenario(result)),
             Row("contact model", result.described_model),
             Row("stepper", f"{raw.stepper}, tolerance {raw.tolerance:g}"),
         ]
@@ -299,7 +291,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
             "inputs": drawn_data(result),
             "random": varying_inputs(result, result.inputs),
             "record_passes": result.record_passes,
-            **({"fatigue_sources": of_bodies} if (of_bodies := sources(self._scenario)) else {}),
+            **fatigue_data(result),
             "wall_seconds": raw.wall_seconds,
             **self.ending(),
         }

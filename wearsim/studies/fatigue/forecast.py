@@ -51,17 +51,17 @@ def rates_across(
     if is_groove:
         touching = np.where(pressure > 0.0, pressure, np.nan)
         pressure = np.minimum(pressure, np.nanmedian(touching, axis=-1, keepdims=True))
-    found = np.zeros((load.shape[0], 1 + problem.rollers, load.shape[-1]))
+    rates = np.zeros((load.shape[0], 1 + problem.rollers, load.shape[-1]))
     for body, law in fatigue_of(problem).laws.items():
         part = (problem.wear_shares[body] * law.damage_per_pass(pressure))[:, :, 0]
         if body == "cylinder":
-            found[:, 0] = part.sum(axis=1)
+            rates[:, 0] = part.sum(axis=1)
             continue
         for number in range(problem.rollers):
-            found[:, 1 + number] = part[:, problem.roller == number].sum(axis=1)
-    rows = found.reshape(-1, found.shape[-1])
+            rates[:, 1 + number] = part[:, problem.roller == number].sum(axis=1)
+    rows = rates.reshape(-1, rates.shape[-1])
     across = [np.interp(y, problem.grid.y, row, left=0.0, right=0.0) for row in rows]
-    return np.reshape(across, (*found.shape[:-1], len(y)))
+    return np.reshape(across, (*rates.shape[:-1], len(y)))
 
 
 def damage_after(

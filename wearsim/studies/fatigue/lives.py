@@ -95,14 +95,14 @@ def lives_of(result: LifeValues, share: float) -> dict[str, float] | None:
     if risks is None:
         return None
     scale = 1.0 / result.settings.per_unit
-    each = {
+    incidences = {
         "both": risks.either,
         "without_wear": risks.without_wear,
         "without_pitting": _without_pitting(risks),
         "pitting": lambda life: risks.at(life).pitting,
         "wear": lambda life: risks.at(life).wear,
     }
-    return {name: scale * risks.life(share, incidence) for name, incidence in each.items()}
+    return {name: scale * risks.life(share, incidence) for name, incidence in incidences.items()}
 
 
 def _without_pitting(risks: CompetingRisks) -> Callable[[float], float]:
@@ -134,7 +134,7 @@ def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | N
     if risks is None:
         return None
     shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
-    each = [lives_of(result, share / 100.0) for share in shares]
+    lives = [lives_of(result, share / 100.0) for share in shares]
     level = risks.at(math.inf)
     names = {
         "both": ("wear or pitting", 1.0 - level.survival),
@@ -146,7 +146,11 @@ def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | N
     cells = [
         [
             words,
-            *(_life(found[name]) for found in each if found is not None),
+            *(
+                _life(lives_of_share[name])
+                for lives_of_share in lives
+                if lives_of_share is not None
+            ),
             NOTHING if last is None else shown(last, "%", 3),
         ]
         for name, (words, last) in names.items()

@@ -22,7 +22,7 @@ def fatigue_history(problem: WearProblem, state: WearState) -> dict[str, FloatAr
     damage, error = state.damage[:2]
     effective = effective_damage(problem, damage)
     cylinder, rollers = greatest_damages(problem, damage)
-    found = {
+    history = {
         "damage": effective,
         "pitting": fatigue_of(problem).pitting(effective),
         "cylinder_damage": cylinder,
@@ -32,9 +32,9 @@ def fatigue_history(problem: WearProblem, state: WearState) -> dict[str, FloatAr
     cam = problem.kinematics.cam
     if cam is not None:
         rows = damage[: problem.shape[0]].max(axis=-1)
-        found["station_damage"] = at_every_station(problem, rows)
-        found["damage_angle"] = cam.greatest(rows).angle
-    return found
+        history["station_damage"] = at_every_station(problem, rows)
+        history["damage_angle"] = cam.greatest(rows).angle
+    return history
 
 
 def fatigue_record(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
@@ -82,8 +82,8 @@ def fatigue_curves(
     along = at_every_station(problem, rows)
     for v, angle in enumerate(cam.greatest(rows).angle.tolist()):
         across = np.maximum(cam.at_angle(cylinder[:, v], angle), 0.0)
-        found = stations[v].values_at_angles(along[:, v], CURVE_ANGLES)
-        curves[v] |= {"cylinder_damage_profile": across, "damage_curve": np.maximum(found, 0.0)}
+        at_angles = stations[v].values_at_angles(along[:, v], CURVE_ANGLES)
+        curves[v] |= {"cylinder_damage_profile": across, "damage_curve": np.maximum(at_angles, 0.0)}
     return curves
 
 
@@ -98,8 +98,8 @@ def final_fatigue(last: Mapping[str, Any]) -> dict[str, FloatArray]:
     if "damage" not in last:
         return {}
     names = "damage", "damage_error", "pitting", "cylinder_damage", "roller_damage"
-    found = {name: np.asarray(last[name]) for name in names}
-    found["roller_damage"] = found["roller_damage"].max(axis=0)
+    final = {name: np.asarray(last[name]) for name in names}
+    final["roller_damage"] = final["roller_damage"].max(axis=0)
     if "damage_angle" in last:
-        found["damage_angle_rad"] = np.asarray(last["damage_angle"])
-    return found
+        final["damage_angle_rad"] = np.asarray(last["damage_angle"])
+    return final

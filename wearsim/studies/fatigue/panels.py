@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,18 +18,38 @@ from wearsim.report.panels import (
     Panel,
     Records,
     message,
+    pass_axis,
+    share_axis,
     worn_limits,
 )
-from wearsim.report.text import pass_unit, shown
+from wearsim.report.text import shown
 from wearsim.studies.fatigue.lives import competing_risks
+from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
-    from wearsim.studies.life.result import LifeResult
+    from wearsim.studies.life.values import LifeValues
     from wearsim.studies.run.result import Result
 
 _POINTS = 81  # of an incidence
 _ENDS = 1e-3, 0.999  # share of the lives at the ends of the axis
 DAMAGE = Axis("damage", "1", limits=(0.0, None))
+
+
+def rollers_at_end(y: FloatArray, values: FloatArray) -> list[Mark]:
+    """Return values of the rollers across the track at the end, of those that are not zero.
+
+    Parameters
+    ----------
+    y : ndarray, shape (strips,)
+    values : ndarray, shape (rollers, strips)
+    """
+    names = ["roller"] if len(values) == 1 else [f"roller {k}" for k in range(1, len(values) + 1)]
+    style: dict[str, Any] = {"dash": "--", "width": 1.0, "colour": BLACK}
+    return [
+        Line(y, curve, label=f"{name}, at the end", **style)
+        for name, curve in zip(names, values, strict=True)
+        if curve.any()
+    ]
 
 
 def damage_panel(result: Result) -> Panel:
@@ -38,11 +58,7 @@ def damage_panel(result: Result) -> Panel:
     cylinder = np.asarray(records["cylinder_damage_profile"])[:, 0, 0]
     rollers = np.asarray(records["roller_damage_profile"])[-1, :, 0]
     marks: list[Mark] = [Records(result.y, cylinder, result.record_passes)]
-    for number, values in enumerate(rollers):
-        if values.any():
-            name = "roller" if len(rollers) == 1 else f"roller {number + 1}"
-            label = f"{name}, at the end"
-            marks.append(Line(result.y, values, dash="--", width=1.0, colour=BLACK, label=label))
+    marks += rollers_at_end(result.y, rollers)
     limits = worn_limits(result.y, cylinder.max(axis=0))
     text = f"At the end the cylinder has a damage of {shown(float(cylinder[-1].max()), '1')}."
     title = "Damage of the cylinder by fatigue"
@@ -52,7 +68,6 @@ def damage_panel(result: Result) -> Panel:
 
 def pitting_panel(result: Result) -> Panel:
     """Return the effective damage and the probability of pitting against the roller passes."""
-    size, name = pass_unit(float(result.passes[-1]))
     damage, chance = (
         np.asarray(result.values(name)).reshape(len(result.passes), -1).max(axis=1)
         for name in ("damage", "pitting")
@@ -65,16 +80,16 @@ def pitting_panel(result: Result) -> Panel:
         f"At the end the effective damage is {shown(float(damage[-1]), '1')} and the probability of"
         f" pitting {shown(float(chance[-1]), '%', 3)}."
     )
-    x = Axis(name, per_si=1.0 / size)
+    x = pass_axis(float(result.passes[-1]))
     return Panel("Effective damage, and pitting", x, DAMAGE, marks, text, legend="lower right")
 
 
-def incidence_panel(designs: Sequence[tuple[LifeResult, str, str]], axis: Axis) -> Panel:
+def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) -> Panel:
     """Return the probability of wear first, of pitting first and of either, against the life.
 
     Parameters
     ----------
-    designs : sequence of (LifeResult, str, str)
+    designs : sequence of (LifeValues, str, str)
         Lives with the label and the colour of each design; the label of one alone is empty.
     axis : Axis
         Of the life.
@@ -90,11 +105,11 @@ def incidence_panel(designs: Sequence[tuple[LifeResult, str, str]], axis: Axis) 
         if not 0.0 < low < high < math.inf:
             continue
         passes = np.geomspace(low, high, _POINTS)
-        found = np.array([risks.at(life) for life in passes.tolist()])
+        levels = np.array([risks.at(life) for life in passes.tolist()])
         curves = {
-            "wear first": (found[:, 2], "-", BLUE),
-            "pitting first": (found[:, 1], "--", ORANGE),
-            "both": (1.0 - found[:, 0], ":", BLACK),
+            "wear first": (levels[:, 2], "-", BLUE),
+            "pitting first": (levels[:, 1], "--", ORANGE),
+            "both": (1.0 - levels[:, 0], ":", BLACK),
         }
         for words, (share, dash, of_curve) in curves.items():
             name, drawn = (f"{label}: {words}", colour) if label else (words, of_curve)
@@ -105,5 +120,5 @@ def incidence_panel(designs: Sequence[tuple[LifeResult, str, str]], axis: Axis) 
         text += f" {shown(level.pitting, '%', 3)} by pitting."
     if not marks:
         return message(title, "no life ended by wear or by pitting")
-    x, y = Axis(axis.name, axis.unit, axis.per_si, log=True), Axis("ended", "%", limits=(0.0, 1.02))
+    x, y = Axis(axis.name, axis.unit, axis.per_si, log=True), share_axis("ended")
     return Panel(title, x, y, marks, text.strip(), legend="upper left")

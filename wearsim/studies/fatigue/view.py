@@ -20,14 +20,9 @@ if TYPE_CHECKING:
 EXCLUDED = "fatigue (pitting)"  # by a study without the table [fatigue]
 
 
-def has_fatigue(result: Result) -> bool:
-    """Return whether a run has the damage of its bodies."""
-    return "damage" in result.raw.history
-
-
 def fatigue_rows(result: Result) -> Rows:
     """Return rows on damage and pitting at the end of a run; none without fatigue."""
-    if not has_fatigue(result):
+    if not result.raw.fatigue:
         return []
     final = result.final
     damage, error = (np.asarray(final[name], dtype=float) for name in ("damage", "damage_error"))
@@ -40,7 +35,7 @@ def fatigue_rows(result: Result) -> Rows:
         Row("effective damage", with_error(damage, float(np.max(error)), "1")),
         Row("greatest damage", greatest),
         Row("probability of pitting", np.asarray(final["pitting"], dtype=float), "%"),
-        *source_rows(readable_scenario(result)),
+        *source_rows(fatigue_scenario(result)),
     ]
 
 
@@ -48,10 +43,10 @@ def _most(value: float | list[float]) -> float:
     return float(np.max(value))
 
 
-def readable_scenario(result: StudyResult[Any]) -> Scenario | None:
-    """Return the scenario of a result; None if a plugin of it is not installed."""
+def fatigue_scenario(result: StudyResult[Any]) -> Scenario | None:
+    """Return the scenario of a result; None without fatigue, or a plugin that is not installed."""
     try:
-        return result.scenario
+        return result.scenario if result.raw.fatigue else None
     except WearsimError:
         return None
 
@@ -74,9 +69,10 @@ def sources(scenario: Scenario | None) -> dict[str, str]:
     return {body: law.source for body, law in scenario.fatigue.laws.items()}
 
 
-def sources_of(result: Result) -> dict[str, str]:
-    """Return the sources of the constants of fatigue of a run by body."""
-    return sources(readable_scenario(result)) if has_fatigue(result) else {}
+def fatigue_data(result: StudyResult[Any]) -> dict[str, dict[str, str]]:
+    """Return the sources of the constants of fatigue of a result for JSON; nothing without it."""
+    by_body = sources(fatigue_scenario(result))
+    return {"fatigue_sources": by_body} if by_body else {}
 
 
 def source_text(scenario: Scenario | None) -> str:
@@ -84,21 +80,15 @@ def source_text(scenario: Scenario | None) -> str:
     return "\n".join(f"{row.label}: {row.text}" for row in source_rows(scenario))
 
 
-def source_line(result: Result) -> str:
-    """Return fatigue laws and sources of a run as further lines of a figure; else nothing."""
-    text = source_text(readable_scenario(result)) if has_fatigue(result) else ""
-    return f"\n{text}" if text else ""
+def with_source_lines(title: str, result: StudyResult[Any]) -> str:
+    """Return the title of a figure, with fatigue laws and sources of a result as further lines."""
+    return "\n".join(filter(None, [title, source_text(fatigue_scenario(result))]))
 
 
 def with_sources(columns: Iterable[Column], scenario: Scenario | None) -> list[Column]:
-    """Return columns of a CSV file, those of fatigue with the source of its constants."""
+    """Return columns of a CSV file, with the source of the constants of fatigue."""
     text = source_text(scenario)
     return [
         column._replace(source=text) if re.search("damage|pitting", column.name) else column
         for column in columns
     ]
-
-
-def sourced_table(result: Result, columns: Iterable[Column]) -> list[Column]:
-    """Return columns of a CSV file of a run, see `with_sources`."""
-    return with_sources(columns, readable_scenario(result) if has_fatigue(result) else None)

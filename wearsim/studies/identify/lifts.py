@@ -21,7 +21,7 @@ from wearsim.scenario.tables.cam_lift import one_turn, read_lift_table
 from wearsim.studies.cam.observables import CURVE_ANGLES
 from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.measurements import Measurement
-from wearsim.studies.identify.traces import Trace
+from wearsim.studies.identify.traces import Trace, block_means
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.hierarchy.noise import MOST_POINTS
 
@@ -59,9 +59,7 @@ def read_change(item: Measurement, follower: Follower) -> Trace:
     angle, change = angle[:-1], change[:-1]
     count = -(-len(angle) // MOST_POINTS)
     if count > 1:
-        starts = np.arange(0, len(angle), count)
-        sizes = np.diff(np.append(starts, len(angle)))
-        angle, change = (np.add.reduceat(values, starts) / sizes for values in (angle, change))
+        angle, change = block_means(count, angle, change)
     unworn_points = np.zeros(len(angle), dtype=np.bool_)
     words = "the lift before the test"
     return Trace(

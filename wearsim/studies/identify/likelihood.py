@@ -24,7 +24,7 @@ _ITERATIONS = 8
 # in standard deviations; the trapezoidal rule on a normal density errs by less than 1e-3
 _LATTICE = np.array([[1.2 * a, 1.6 * b] for a in range(-3, 4) for b in range(-2, 3)])
 _ROUNDS = 8  # of centring the lattice
-_FIRST = 4.0  # variance of the first lattice over that at the maximum, which has kinks beside it
+_FIRST = 4.0  # variance of the first lattice over the one at the maximum, which has kinks beside it
 _COARSE = 0.05  # part of its variance by which a lattice is wider than the moments on it
 _UNFIT, _OFF = 0.35, 0.3  # of ln variance and of the mean, in standard deviations
 _VALUES = 3_000_000  # of an array

@@ -28,6 +28,7 @@ from wearsim.report.panels import (
     Text,
     dots,
     evenly_spaced,
+    share_axis,
 )
 from wearsim.report.text import in_unit, shown
 from wearsim.studies.identify.planning import SCATTERS, PlannedDesign
@@ -189,7 +190,7 @@ def power_sheet(designs: Sequence[PlannedDesign], title: str = "") -> Sheet:
         panels[design.name] = Panel(
             fill(f"Inputs {design.name}", 56),
             Axis("number of tests", log=True),
-            Axis("" if number else "rate of the verdict", "%", limits=(0.0, 1.02)),
+            share_axis("" if number else "rate of the verdict"),
             marks,
             "Rates of the verdicts by the number of tests.",
             legend="" if number else "best",

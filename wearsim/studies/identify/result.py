@@ -246,7 +246,7 @@ class IdentificationResult(StudyResult[IdentificationData]):
 
     @cached_property
     def levels(self) -> TwoLevels:
-        """Distribution of K/H of the next specimen, with what is not known of its two numbers.
+        """Distribution of K/H of the next specimen, with what is not known of median and scatter.
 
         Weights over mean m and scatter t of ln K/H. Its `contained` are inputs that were neither
         drawn nor known in all tests: where they differed, t contains it.
@@ -263,7 +263,7 @@ class IdentificationResult(StudyResult[IdentificationData]):
         return TwoLevels.on_grid(*grid, len(self.raw.specimens), self.raw.contained)
 
     def posterior_csv(self) -> str:
-        """Return both levels of K/H as the CSV file of the distribution "posterior".
+        """Return medians, scatters and weights of K/H as the CSV of the distribution "posterior".
 
         Examples
         --------

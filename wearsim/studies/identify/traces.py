@@ -179,6 +179,13 @@ def _line_of_ends(y: FloatArray, height: FloatArray) -> tuple[float, float]:
     return slope, first - slope * start
 
 
+def block_means(length: int, *arrays: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the means of arrays over blocks of neighbouring points, the last may be shorter."""
+    starts = np.arange(0, len(arrays[0]), length)
+    sizes = np.diff(np.append(starts, len(arrays[0])))
+    return tuple(np.add.reduceat(values, starts) / sizes for values in arrays)
+
+
 def _thinned(profile: Profile, item: Measurement, crown_radius: float, averaged: bool) -> Trace:
     """Return a levelled trace of at most `MOST_POINTS` points.
 
@@ -188,9 +195,7 @@ def _thinned(profile: Profile, item: Measurement, crown_radius: float, averaged:
     y, height = profile.y, profile.height
     count = -(-len(y) // MOST_POINTS)
     if averaged:
-        starts = np.arange(0, len(y), count)
-        sizes = np.diff(np.append(starts, len(y)))
-        y, height = (np.add.reduceat(values, starts) / sizes for values in (y, height))
+        y, height = block_means(count, y, height)
     else:
         y, height = y[::count], height[::count]
     unworn = np.zeros(len(y), dtype=np.bool_)

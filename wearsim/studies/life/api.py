@@ -1,11 +1,10 @@
-"""Life of a design: start and resume."""
+"""Life of a design, and of several designs of a sweep."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, cast
@@ -13,32 +12,27 @@ from typing import Any, cast
 import numpy as np
 
 from wearsim.atomic_write import DISK, Storage
-from wearsim.errors import Interrupted, ResultsFileError
+from wearsim.errors import Interrupted
 from wearsim.results.io.outputs import check_output
-from wearsim.scenario import Scenario, as_scenario, parse_scenario, realise
+from wearsim.scenario import Scenario, as_scenario, realise
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.api import (
     Watcher,
     Workers,
     checked_request,
-    continue_work,
     ensemble_content,
-    more_realisations,
 )
 from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.file.data import EnsembleData
-from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import profile_axis
-from wearsim.studies.ensemble.sweep import path_of
-from wearsim.studies.life.rare.stages import next_stages
+from wearsim.studies.ensemble.sweep import path_of, scenarios_of
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.settings import SHARES, checked_study, design_variable
-from wearsim.studies.life.stored_settings import LifeSettings, life_target
+from wearsim.studies.life.stored_settings import LifeSettings
 from wearsim.studies.opening import open_ensemble
-from wearsim.studies.preparation import check_plugins
-from wearsim.types import FloatArray, Grid
+from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Target
 
 
@@ -110,7 +104,7 @@ def life(
     TypeError, ValueError
         If an argument is invalid.
     WorkerError, Interrupted
-        As in `ensemble`; `resume_life` continues from the file.
+        As in `ensemble`; `resume_ensemble` continues from the file.
 
     Examples
     --------
@@ -143,7 +137,7 @@ def life(
             EnsembleFile.create(path, *content, storage) as file,
         ):
             runner.compile_kernels()
-            _finish_stages(EnsembleWork(file, runner, aim, pool, watch, stop_requested), runner)
+            EnsembleWork(file, runner, aim, pool, watch, stop_requested).finish()
         return _opened(path, in_memory=output is None)
 
 
@@ -167,89 +161,6 @@ def _opened(path: Path, in_memory: bool) -> LifeResult:
         return result
     variables = {name: result.raw.variables[name] for name in result.raw.schema.variables}
     return replace(result, raw=replace(result.raw, variables=variables), path=None)
-
-
-def resume_life(
-    file: str | Path,
-    *,
-    failed: bool = False,
-    realisations: int | None = None,
-    workers: int | None = None,
-    scheduler: str = "processes",
-    progress: bool = False,
-    on_progress: Watcher | None = None,
-    stop_requested: Callable[[], bool] | None = None,
-    on_notice: Callable[[str], None] | None = None,
-    storage: Storage = DISK,
-) -> LifeResult:
-    """Continue a study of lives from its file; the result equals an unbroken one.
-
-    Parameters
-    ----------
-    file : path
-        Results file of `life`.
-    failed, realisations, workers, scheduler, progress, on_progress, stop_requested, on_notice
-        As in `resume_ensemble`.
-    storage : Storage
-        File operations.
-
-    Returns
-    -------
-    LifeResult
-
-    Raises
-    ------
-    ResultsFileError
-        If the file cannot be continued.
-    WorkerError, Interrupted
-        As in `life`.
-
-    Examples
-    --------
-    >>> wearsim.resume_life("rig-life.h5", realisations=20, scheduler="serial").count
-    20
-    """
-    data, path = read_ensemble(file), Path(file)
-    if not data.life:
-        raise ResultsFileError(f"{path}: holds no study of lives; resume_ensemble continues it")
-    check_plugins(path, data)
-    before = LifeResult(data, path)
-    settings = before.settings
-    is_over = data.finished and not next_stages(before)
-    if is_over and realisations is None and not (failed and len(data.failed)):
-        return before
-    scenario = parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__)
-    if realisations is not None and settings.rare:
-        raise ResultsFileError(
-            f"{path}: has tests for rare events after its realisations, and cannot be extended"
-        )
-    total = settings.plain
-    if realisations is not None:
-        total = more_realisations(path, total, realisations, data.finished and not failed)
-    settings = replace(settings, plain=total)
-    grid = Grid(data.variables["y"], data.strip_width)
-    runner = LifeRunner(scenario, total, grid, settings, data.life["base"])
-    aim = life_target(data.until) if data.until else None
-    hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
-    finish = EnsembleWork.run_failed_again if failed else partial(_finish_stages, runner=runner)
-    grown = {"life": {**data.life, "plain": total}}
-    continue_work(path, data, runner, aim, hands, finish, storage, **grown)
-    return cast("LifeResult", open_ensemble(path))
-
-
-def _finish_stages(work: EnsembleWork, runner: LifeRunner) -> None:
-    """Run all tests, also those for rare events stage by stage; raises as `EnsembleWork`."""
-    work.run()
-    while further := next_stages(work.result()):
-        stages, total = (
-            (*runner.settings.stages, *further),
-            further[-1]["first"] + further[-1]["count"],
-        )
-        settings = replace(runner.settings, stages=stages)
-        runner = LifeRunner(runner.scenario, total, runner.grid, settings, runner.base)
-        work.extend(runner, total, life={**asdict(settings), "base": runner.base})
-        work.run()
-    work.finish()
 
 
 def _prepared(
@@ -331,10 +242,7 @@ def sweep_life(
     >>> [f"{one.variable.text}: B10 {one.b(10).value:.3g}" for one in found]
     ['400 mm: B10 7.61e+05', '500 mm: B10 8.51e+05']
     """
-    if isinstance(values, str) or not isinstance(values, Iterable):
-        raise TypeError(f"values must be a list, got {values!r}")
-    base, names = as_scenario(scenario), [str(value) for value in values]
-    scenarios = [base.changed({key: value}) for value in values]
+    names, scenarios = scenarios_of(scenario, key, values)
     paths = [path_of(output, name) for name in names]
     if len(set(paths)) < len(paths):
         raise ValueError("two values have the same file; write them differently")

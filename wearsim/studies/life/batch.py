@@ -78,7 +78,7 @@ class _Test:
     """
 
     history: list[tuple[float, FloatArray]] = field(default_factory=list)
-    found: LifeRun | None = None
+    outcome: LifeRun | None = None
     limit: int = -1
     level: float = 1.0
     slope: float = 1.0
@@ -144,7 +144,7 @@ class _Group:
                 add_observed(courses, advance.numbers.tolist(), self._by_limit(relative))
             self._take(advance, relative)
         failures = self.evolution.failures
-        reached = {k: test.found for k, test in enumerate(self.tests) if test.found is not None}
+        reached = {k: test.outcome for k, test in enumerate(self.tests) if test.outcome is not None}
 
         def observe(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
             return self._by_limit(self._ratios(problem, state))
@@ -155,7 +155,7 @@ class _Group:
             observed["depth"] = errors[0] / max(cylinder, roller)
             observed["volume"] = errors[1] / volume
             self._widen(number, observed)
-        return [failures.get(k) or test.found or _missing() for k, test in enumerate(self.tests)]
+        return [failures.get(k) or test.outcome or _missing() for k, test in enumerate(self.tests)]
 
     def _by_limit(self, relative: FloatArray) -> dict[str, FloatArray]:
         """Return quantities over their limits, (limits, tests), by the name of the quantity."""
@@ -177,7 +177,7 @@ class _Group:
         if advance.problem.fatigue:
             damages = damage_of(advance.problem, advance.end).tolist()
             for place, number in enumerate(numbers):
-                if self.tests[number].found is None:
+                if self.tests[number].outcome is None:
                     known = self.tests[number].damage
                     known.append((float(advance.end.passes[place]), damages[place]))
         # the only state of a path may be known to be below all limits
@@ -186,7 +186,7 @@ class _Group:
             [
                 k
                 for k, number in enumerate(numbers)
-                if self.tests[number].found is None and reached[k]
+                if self.tests[number].outcome is None and reached[k]
             ],
             dtype=np.int64,
         )
@@ -206,7 +206,7 @@ class _Group:
         self.evolution.end(over)
         ended = np.flatnonzero(advance.end.passes >= self.stop)
         for place in ended.tolist():
-            if self.tests[numbers[place]].found is None and numbers[place] not in failed:
+            if self.tests[numbers[place]].outcome is None and numbers[place] not in failed:
                 chosen = np.array([place])
                 life = dict.fromkeys(("life", "life_low", "life_high"), math.inf)
                 some = advance.problem.at(chosen), advance.end.at(chosen)
@@ -217,7 +217,7 @@ class _Group:
         scenario = self.runs[0].draws.scenario
         deep = too_deep_tests(advance, scenario, _LIMITS)
         for place, number in enumerate(advance.numbers.tolist()):
-            if number in deep and self.tests[number].found is None:
+            if number in deep and self.tests[number].outcome is None:
                 chosen = np.array([place])
                 some = advance.problem.at(chosen), advance.end.at(chosen)
                 self._finish(number, *some, {}, deep[number])
@@ -272,9 +272,9 @@ class _Group:
     def _widen(self, number: int, errors: Mapping[str, FloatArray]) -> None:
         """Add errors of quantities over their limits, by quantity, to the bounds of a life."""
         test = self.tests[number]
-        if test.found is None or test.limit < 0:
+        if test.outcome is None or test.limit < 0:
             return
-        scalars = test.found.scalars
+        scalars = test.outcome.scalars
         error = float(errors[self.limits[test.limit].quantity])
         added = scalars["life"] * error / max(test.slope, FLAT)
         scalars["life_low"] = max(scalars["life_low"] - added, 0.0)
@@ -286,12 +286,12 @@ class _Group:
         A quantity that is nearly constant at its limit is followed to the limit plus its error.
         """
         test = self.tests[number]
-        if test.found is None:
+        if test.outcome is None:
             return False
-        if test.found.failure is not None:
+        if test.outcome.failure is not None:
             return True
         passes, relative = test.history[-1]
-        scalars = test.found.scalars
+        scalars = test.outcome.scalars
         if math.isinf(scalars["life_high"]) and float(relative[test.limit]) >= test.level:
             scalars["life_high"] = passes
         return math.isfinite(scalars["life_high"])
@@ -352,7 +352,7 @@ class _Group:
             scalars["course_end"] = float(state.passes[0])
             end = scalars["course_end"], float(damage_of(problem, state)[0])
             curves["damage_course"] = course_of(test.damage, end, self.first_damage[number])
-        test.found = LifeRun(rows, scalars, curves, problem.grid, failure)
+        test.outcome = LifeRun(rows, scalars, curves, problem.grid, failure)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:
         """Return the angle of a cam at which the limited quantity is greatest [rad]."""

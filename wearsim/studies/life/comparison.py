@@ -99,7 +99,7 @@ def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
 
 
 def compare_lives(first: LifeValues, second: LifeValues, share: float = 0.1) -> LifeComparison:
-    """Return the comparison of two designs; `share` is that of the lives in `b10_ratio`.
+    """Return the comparison of two designs, with `b10_ratio` for lives at a share of failures.
 
     Raises
     ------

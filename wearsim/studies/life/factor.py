@@ -161,6 +161,6 @@ def posterior_table(scenario: Scenario, file: str | Path) -> tuple[str, dict[str
     table: dict[str, object] = {"distribution": "posterior", "file": name}
     if any(item.name == SHARED for item in scenario.random) and scenario.wear is not None:
         options: Any = scenario.wear.options
-        own = options.cylinder.wear_factor
-        return SHARED, {**table, "over": f"{own!r} 1/Pa"}
+        reference = options.cylinder.wear_factor
+        return SHARED, {**table, "over": f"{reference!r} 1/Pa"}
     return CYLINDER, table

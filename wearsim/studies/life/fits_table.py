@@ -59,7 +59,7 @@ def _test_text(test: AndersonDarling | None) -> str:
 
 
 def fits_data(result: LifeResult) -> dict[str, Any]:
-    """Return the fits to the drawn lives, and to those with K/H integrated exactly."""
+    """Return the fits to the drawn lives, and with K/H integrated exactly."""
 
     def numbers(fit: FittedLives) -> dict[str, Any]:
         shares = result.settings.shares

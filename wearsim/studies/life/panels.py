@@ -25,11 +25,13 @@ from wearsim.report.panels import (
     evenly_spaced,
     message,
     several_colours,
+    share_axis,
 )
 from wearsim.report.text import count, shown
 from wearsim.report.view import Overview, Row, Rows
-from wearsim.studies.cam.overview import CAM_EXCLUDED, loads, picture
-from wearsim.studies.cam.panels import ANGLE
+from wearsim.studies.cam.panels import ANGLE, shape_panel
+from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.view import CAM_EXCLUDED, loads
 from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
 from wearsim.studies.fatigue.panels import incidence_panel
 from wearsim.studies.fatigue.view import EXCLUDED as NO_FATIGUE, source_text
@@ -45,7 +47,6 @@ _WIDTH = 14.0  # of a figure with three columns [in]
 _POINTS = 200  # of a curve
 _MOST_MARKS = 500
 _PERCENT = (0.1, 1.0, 5.0, 10.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0, 99.9)
-_SHARE = (0.0, 1.02)  # of an axis of shares
 _DARK, _PALE = "0.3", "0.85"
 
 
@@ -184,7 +185,7 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
             ]
             text += f" Dotted: the target of {count(target)} {axis.unit}."
     x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
-    y = Axis("survival", "%", limits=_SHARE)
+    y = share_axis("survival")
     return Panel("Survival, with 95 % band", x, y, marks, text)
 
 
@@ -303,7 +304,7 @@ def _incidence(designs: Sequence[_Design], axis: Axis) -> Panel:
         return message(title, "no limit was reached")
     x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
     text = "Share of the machines whose life has ended at each limit."
-    return Panel(title, x, Axis("ended", "%", limits=_SHARE), marks, text)
+    return Panel(title, x, share_axis("ended"), marks, text)
 
 
 def _limits(designs: Sequence[_Design]) -> Panel:
@@ -311,7 +312,7 @@ def _limits(designs: Sequence[_Design]) -> Panel:
     if any(design.result.angles for design in designs):
         marks = list[Mark]()
         edges: FloatArray = np.radians(5.0 * np.arange(73))
-        share_axis = Axis("share", "%", limits=(0.0, None))
+        y = Axis("share", "%", limits=(0.0, None))
         for design in designs:
             for number, (name, angles) in enumerate(design.result.angles.items()):
                 share = np.histogram(angles % (2.0 * np.pi), edges)[0] / design.result.count
@@ -319,7 +320,7 @@ def _limits(designs: Sequence[_Design]) -> Panel:
                 places = edges[:-1], edges[1:], share
                 marks.append(Bars(*places, colour=design.colour, alpha=alpha, label=label))
         caption = "Share of the machines by the angle at which the limit was reached."
-        return Panel("Angle at which the limit is reached", ANGLE, share_axis, marks, caption)
+        return Panel("Angle at which the limit is reached", ANGLE, y, marks, caption)
     if not any(design.result.observed.any() for design in designs):
         return message("Limit reached first", "no limit was reached")
     names = list(dict.fromkeys(name for design in designs for name in design.result.first_limits))
@@ -334,7 +335,7 @@ def _limits(designs: Sequence[_Design]) -> Panel:
     return Panel(
         "Limit reached first",
         Axis(ticks=range(len(names)), names=shown_names, limits=(-1.0, max(len(names), 1.0))),
-        Axis("share", "%", limits=_SHARE),
+        share_axis("share"),
         bars,
         "Share of the machines by the limit that they reached first.",
     )
@@ -356,7 +357,7 @@ def life_overview(result: LifeResult, lives: Mapping[str, Rows], no_effects: str
         excluded.remove(NO_FATIGUE)
     main = life_sheet(result).first if scenario.cam is None else None
     if scenario.cam is not None:
-        groups["Loads"], main = loads(scenario), picture(scenario)
+        groups["Loads"], main = loads(scenario), shape_panel(CamTurn(scenario))
         excluded += CAM_EXCLUDED
     if result.count:
         shares = (result.first_limits.get(name, 0.0) for name in scenario.limit.given)
@@ -379,7 +380,7 @@ def _movers(result: LifeResult, no_effects: str) -> Rows:
     for item in effects[:3]:
         text = f"{shown(item.first.value, '%', 2)} of the scatter"
         if item.name in changes:
-            low, high = (one.value - 1.0 for one in changes[item.name].factors)
+            low, high = (factor.value - 1.0 for factor in changes[item.name].factors)
             text += f"; life {100.0 * low:+.0f} %, {100.0 * high:+.0f} %"
         rows.append(Row(item.name, text))
     return rows or [Row("inputs", "none significantly")]

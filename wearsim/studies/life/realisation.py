@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.errors import failure_text
 from wearsim.evolution.limits import Limit
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
@@ -22,7 +21,7 @@ from wearsim.studies.life.factor import NEGLIGIBLE, RARE, ExactFactor, exact_fac
 from wearsim.studies.life.rare.draws import changes_of, log_weight
 from wearsim.studies.life.stored_settings import LifeSettings
 from wearsim.studies.run.draws import Drawer
-from wearsim.types import FloatArray, Grid
+from wearsim.types import Grid
 
 if TYPE_CHECKING:
     from wearsim.studies.life.result import LifeResult
@@ -127,6 +126,30 @@ class LifeRunner(RealisationRunner):
         self.settings, self.base = settings, base
         self._levels: dict[tuple[int, int], LevelRunner] = {}
 
+    @classmethod
+    def continuing(cls, result: LifeResult, total: int | None) -> LifeRunner:  # type: ignore[override]
+        """Return the runner of the tests in a file; parameters as of `RealisationRunner`."""
+        data, settings = result.raw, result.settings
+        plain = total or settings.plain
+        grid = Grid(data.variables["y"], data.strip_width)
+        changed = replace(settings, plain=plain)
+        return cls(result.scenario, plain, grid, changed, data.life["base"])
+
+    @property
+    def state(self) -> dict[str, object]:
+        """Fields of the file that depend on the number of tests."""
+        return {"life": {**asdict(self.settings), "base": self.base}}
+
+    def further(self, result: LifeResult) -> LifeRunner | None:  # type: ignore[override]
+        """Return the runner of the next tests for rare events, None after the last ones."""
+        from wearsim.studies.life.rare.stages import next_stages  # noqa: PLC0415  (not of workers)
+
+        if not (stages := next_stages(result)):
+            return None
+        settings = replace(self.settings, stages=(*self.settings.stages, *stages))
+        total = stages[-1]["first"] + stages[-1]["count"]
+        return LifeRunner(self.scenario, total, self.grid, settings, self.base)
+
     def result(self, data: EnsembleData, path: Path | None) -> LifeResult:
         """Return the result of the realisations in a file."""
         from wearsim.studies.life.result import LifeResult  # noqa: PLC0415  (not of workers)
@@ -185,16 +208,9 @@ class LifeRunner(RealisationRunner):
         self, level: int, stage: int, numbers: list[int], outcomes: dict[int, Outcome]
     ) -> list[int]:
         """Run realisations of one length and stage; return those that need a longer test."""
-        runner, runs, left = self._level(level, stage), [], []
-        limits = limits_of(self.scenario)
-        for number in numbers:
-            drawn: dict[str, float | FloatArray] = {}
-            try:
-                runs.append(runner.prepare(number, drawn))
-            except Exception as error:  # an error fails this realisation only
-                outcomes[number] = Outcome(number=number, values=drawn, error=failure_text(error))
+        runner, limits, left = self._level(level, stage), limits_of(self.scenario), list[int]()
         last = runner.scenario.total_passes >= self.longest
-        for group in batch_groups(runs):
+        for group in batch_groups(runner.prepared(numbers, outcomes)):
             for run, outcome in zip(group, observe_lives(group, limits), strict=True):
                 ended = (
                     isinstance(outcome, Exception) or outcome.reached or outcome.failure is not None

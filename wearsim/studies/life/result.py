@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -55,6 +55,8 @@ class LifeResult(LifeValues):
     >>> lives.limits, lives.is_exact
     (('depth',), True)
     """
+
+    runner: ClassVar[str] = "wearsim.studies.life.realisation:LifeRunner"
 
     def __repr__(self) -> str:
         b10 = self.b(10).value

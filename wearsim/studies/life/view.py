@@ -13,8 +13,10 @@ import numpy as np
 
 from wearsim.report.text import (
     NOTHING,
+    TOO_FEW_REALISATIONS,
     count,
     lapse,
+    limit_unit,
     part_with_interval,
     rounded_lives,
     shown,
@@ -39,11 +41,6 @@ ERROR = (
     " error of the model."
 )
 
-_LIMIT_UNITS = {
-    "volume": "mm^3",
-    "peak_pressure": "MPa",
-    **dict.fromkeys(("damage", "pitting"), "1"),
-}
 _UNKNOWN = (NOTHING, NOTHING)
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
@@ -147,24 +144,24 @@ class LifeView(RealisationsView[LifeResult]):
 
     def _plug_in(self, share: float) -> str:
         """Return the life with median and scatter of K/H taken as known; empty if they are."""
-        found = self.result.uncertain_life(share)
-        if found is None:
+        life = self.result.uncertain_life(share)
+        if life is None:
             return ""
-        plug_in = rounded_lives(found.low, found.plug_in, found.high)[1]
+        plug_in = rounded_lives(life.low, life.plug_in, life.high)[1]
         return f" given {_tests_of(self.result)}; plug-in {plug_in}"
 
     def _levels(self) -> Table:
         """Return predictive and plug-in lives, and what would reduce their uncertainty."""
         result, lines = self.result, []
         for share in result.settings.shares:
-            found = result.uncertain_life(share)
-            assert found is not None
-            known = math.isfinite(found.low) and math.isfinite(found.high)
+            life = result.uncertain_life(share)
+            assert life is not None
+            known = math.isfinite(life.low) and math.isfinite(life.high)
             low, predictive, plug_in, high = rounded_lives(
-                found.low, found.predictive, found.plug_in, found.high
+                life.low, life.predictive, life.plug_in, life.high
             )
-            total = found.by_tests + found.by_realisations
-            parts = (found.by_tests, found.by_realisations)
+            total = life.by_tests + life.by_realisations
+            parts = (life.by_tests, life.by_realisations)
             of_total = [shown(part / total, "%", 2) if total else NOTHING for part in parts]
             deviation = f"{math.sqrt(total):.2g}" if known else NOTHING
             cells = (predictive, plug_in, f"{low}..{high}", deviation)
@@ -206,7 +203,7 @@ class LifeView(RealisationsView[LifeResult]):
         if result.settings.alone:
             return result.settings.factor
         if result.count == 1:
-            return "too few realisations"
+            return TOO_FEW_REALISATIONS
         if result.are_equal:
             return "nothing, no two lives differ"
         if result.effects_obstacle:
@@ -284,8 +281,8 @@ class LifeView(RealisationsView[LifeResult]):
 
     def _uncertain(self, share: float) -> dict[str, Any]:
         """Return predictive and plug-in life and their uncertainty; nothing without a posterior."""
-        found = self.result.uncertain_life(share)
-        return {} if found is None else {"given_tests": asdict(found)}
+        life = self.result.uncertain_life(share)
+        return {} if life is None else {"given_tests": asdict(life)}
 
     def _rare(self) -> dict[str, Any] | None:
         if self.result.rare is None:
@@ -320,14 +317,14 @@ class LifeView(RealisationsView[LifeResult]):
 
 def _three_digits(result: LifeResult, share: float) -> str:
     """Return a life and its interval with three digits, or why it is not stated."""
-    found = result.b(share)
-    if not math.isfinite(found.value):
+    life = result.b(share)
+    if not math.isfinite(life.value):
         return life_text(result, share)
     value, low, high = (
         count(float(f"{end:.3g}")) if math.isfinite(end) else NOTHING
-        for end in (found.value, found.low, found.high)
+        for end in (life.value, life.low, life.high)
     )
-    if found.low == found.high:
+    if life.low == life.high:
         return f"{value} {result.unit}"
     return f"{value} {result.unit}, 95 %: {low} to {high}"
 
@@ -353,7 +350,7 @@ def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
 
 def limit_texts(limits: Mapping[str, float]) -> list[str]:
     """Return limits of a life by name in SI units as texts, "depth 50.00 um"."""
-    units = ((name, _LIMIT_UNITS.get(name, "um"), value) for name, value in limits.items())
+    units = ((name, limit_unit(name), value) for name, value in limits.items())
     return [f"{name.replace('_', ' ')} {shown(value, unit)}" for name, unit, value in units]
 
 
@@ -415,7 +412,7 @@ def rare_command(result: LifeResult) -> str:
 
 def _limits_in_si(limits: Mapping[str, float]) -> list[str]:
     """Return limits of a life as arguments of --limit, "depth=5e-05 m"."""
-    units = ((name, kind_of(_LIMIT_UNITS.get(name, "um")).unit) for name in limits)
+    units = ((name, kind_of(limit_unit(name)).unit) for name in limits)
     texts = ((name, "" if unit == "1" else f" {unit}") for name, unit in units)
     return [f"{name}={limits[name]:.12g}{unit}" for name, unit in texts]
 

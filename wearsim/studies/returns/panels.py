@@ -20,9 +20,11 @@ from wearsim.report.panels import (
     dots,
     message,
     several_colours,
+    share_axis,
 )
 from wearsim.report.text import count
 from wearsim.studies.returns.result import SHARES, FieldReturns
+from wearsim.uq.estimation.intervals import arrays_of
 from wearsim.uq.survival.lives import survival_curve
 
 _POINTS = 80
@@ -41,8 +43,8 @@ def returns_sheet(result: FieldReturns, measured: Sequence[Measured] = ()) -> Sh
     Returns
     -------
     Sheet
-        Survival before and after, with that of the units; failures in bands of lives; remaining
-        life of running units against their age.
+        Survival before and after, and of the units; failures in bands of lives; remaining life of
+        running units against their age.
     """
     panels = {
         "survival": _survival(result),
@@ -65,10 +67,7 @@ def _survival(result: FieldReturns) -> Panel:
             (after, colour, "after", 0.25),
         ):
             chances = [lives.probability_before(float(end)) for end in life]
-            low, value, high = (
-                1.0 - np.array([getattr(chance, end) for chance in chances])
-                for end in ("high", "value", "low")
-            )
+            value, high, low = 1.0 - arrays_of(chances)
             marks.append(Band(life, low, high, colour=shade, alpha=alpha))
             marks.append(Line(life, value, colour=shade, label=f"{name}{text}"))
         chosen = fleet.design == number
@@ -84,9 +83,7 @@ def _survival(result: FieldReturns) -> Panel:
     if target is not None:
         marks.append(Span(target, dash=":", colour="0.4", label=f"target {count(target)}"))
     text = "Share of the machines that outlast a life, before and after the returns."
-    return Panel(
-        "Survival, with 95 % bands", axis, Axis("survival", "%", limits=(0, 1.02)), marks, text
-    )
+    return Panel("Survival, with 95 % bands", axis, share_axis("survival"), marks, text)
 
 
 def _failures(result: FieldReturns) -> Panel:
@@ -120,10 +117,7 @@ def _remaining(result: FieldReturns) -> Panel:
     marks = list[Mark]()
     age = np.array([unit.age for unit in result.running])
     for place, (share, colour) in enumerate(zip(SHARES, several_colours(len(SHARES)), strict=True)):
-        lives = [unit.remaining.lives[place] for unit in result.running]
-        low, value, high = (
-            np.array([getattr(life, end) for life in lives]) for end in ("low", "value", "high")
-        )
+        value, low, high = arrays_of(unit.remaining.lives[place] for unit in result.running)
         high = np.where(np.isfinite(high), high, np.nan)
         marks.append(Whiskers(age, low, high, colour=colour))
         marks.append(dots(age, value, "o", colour=colour, label=f"B{share:g}"))

@@ -280,7 +280,7 @@ def field_returns(
         Geometric standard deviation, from 1 on, of the prior of a factor by which all lives in the
         field differ from the computed ones; its median is 1.
     labels : sequence of str
-        Names of several designs in the column ``design``; by default those of their files.
+        Names of several designs in the column ``design``; by default the names of their files.
 
     Returns
     -------
@@ -304,7 +304,7 @@ def field_returns(
     >>> len(field.running), int(field.check.observed[-1])
     (1, 1)
     """
-    designs = [lives] if isinstance(lives, LifeResult) else list(lives)
+    designs = list(lives) if isinstance(lives, Sequence) else [lives]
     if not 1.0 <= life_factor < math.inf:
         raise ValueError(f"the life factor must be from 1 on, got {life_factor:g}")
     for design in designs:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.csv_tables import MAX_MISTAKES, TextRow, read_texts
+from wearsim.csv_tables import TextRow, read_texts, refuse_mistakes
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.types import BoolArray
 from wearsim.units import QuantityError, conversion
@@ -194,11 +194,7 @@ def read_returns(file: str | Path, designs: Sequence[UnitsOf]) -> Returns:
         spans.append((first, last))
         numbers.append(number)
         running.append(state == "suspended" and not cause)
-    if mistakes := reader.mistakes:
-        if len(mistakes) > MAX_MISTAKES:
-            rest = Mistake("", "", f"and {len(mistakes) - MAX_MISTAKES} more")
-            mistakes = [*mistakes[:MAX_MISTAKES], rest]
-        raise ScenarioError(str(file), mistakes)
+    refuse_mistakes(str(file), reader.mistakes)
     low, high = np.array(spans).T
     return Returns(
         str(file), names, Fleet(low, high, np.array(numbers)), np.array(running, dtype=bool), others

@@ -3,35 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from wearsim.report.text import count, part_with_interval, rounded_lives
-from wearsim.report.view import STUDY, Column, Columns, Frame, Overview, Row, Rows, Table, View
+from wearsim.report.text import count, count_of, part_with_interval, rounded_lives
+from wearsim.report.view import STUDY, Column, Row, Rows, Table
+from wearsim.results.study_view import DesignsView, columns_of
 from wearsim.studies.life.view import limit_texts
 from wearsim.studies.returns.result import SHARES, FieldReturns, RunningUnit
-from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.estimation.intervals import Interval, arrays_of
 from wearsim.uq.survival.fleet import Predicted
-from wearsim.uq.survival.two_levels import UncertainLife
 
 _MOST = 12  # running units in a table
+_REACHED = Interval(1.0, 1.0, 1.0)  # probability of a unit that is older than the target
 _BASIS = (
     "Intervals hold the value with a probability of 95 %, given the wear tests, the prior of the"
     " life factor and the returns; units are independent given these."
 )
 
 
-class FieldReturnsView(View):
+class FieldReturnsView(DesignsView):
     """Lives before and after returns, predicted and observed failures, and remaining lives.
 
     Panels: survival, failures, remaining lives. Files: the running units.
     """
 
     sheet = "wearsim.studies.returns.panels:returns_sheet"
+    file, group = "units.csv", "Life"
     basis = _BASIS
 
     def __init__(self, result: FieldReturns) -> None:
@@ -48,12 +50,15 @@ class FieldReturnsView(View):
         """Return the lives before and after the returns, and how well they agree."""
         result, check, rows = self.result, self.result.check, list[Row]()
         given = f"given {self._tests()}"
-        units = _units(len(result.returns.fleet))
+        units = count_of(len(result.returns.fleet), "unit")
         for number, label in enumerate(result.labels):
             of = f" of {label}" if len(result.labels) > 1 else ""
-            before, after = (life(10.0, number) for life in (result.before, result.after))
-            rows.append(Row(f"B10 after{of}", f"{self._life(after)} {given} and {units}"))
-            rows.append(Row(f"B10 before{of}", f"{self._life(before)} {given}"))
+            before, after = (
+                _life(life(10.0, number).interval, f" {result.unit}")
+                for life in (result.before, result.after)
+            )
+            rows.append(Row(f"B10 after{of}", f"{after} {given} and {units}"))
+            rows.append(Row(f"B10 before{of}", f"{before} {given}"))
             target = result.designs[number].target
             if target is not None:
                 name = f"P(life < {count(target)} {result.unit}){of}"
@@ -63,7 +68,9 @@ class FieldReturnsView(View):
                 ]
                 rows.append(Row(name, f"{pair[1]}, before {pair[0]}"))
         failed = int(result.returns.fleet.failed.sum())
-        rows.append(Row("failures", f"{failed} observed, {_total(check.before)} predicted before"))
+        rows.append(
+            Row("failures", f"{failed} observed, {_numbers(check.before, -1)} predicted before")
+        )
         rows.append(Row("agreement before", _surprise(check.surprise)))
         rows.append(Row("goodness of fit after", _fit(check.fit)))
         return rows
@@ -74,7 +81,7 @@ class FieldReturnsView(View):
         fleet = result.returns.fleet
         failed = int(fleet.failed.sum())
         known = int((fleet.failed & (fleet.low < fleet.high)).sum())
-        units = f"{_units(len(fleet))}: {count(failed)} failed"
+        units = f"{count_of(len(fleet), 'unit')}: {count(failed)} failed"
         units += f", {count(known)} of them at an inspection" if known else ""
         units += f", {count(len(result.running))} running"
         factor = result.life_factor
@@ -92,11 +99,6 @@ class FieldReturnsView(View):
     def _tests(self) -> str:
         levels = self.result.posterior.before
         return f"{levels.specimens} specimens" if levels.specimens else "the specimens"
-
-    def _life(self, life: UncertainLife) -> str:
-        interval = life.interval
-        low, value, high = rounded_lives(interval.low, interval.value, interval.high)
-        return f"{value} {self.result.unit} [{low}..{high}]"
 
     def _lives(self) -> Table:
         """Return lives of shares before and after the returns."""
@@ -147,7 +149,7 @@ class FieldReturnsView(View):
         several, target = len(result.labels) > 1, result.designs[0].target
         lines = []
         for unit in ordered[:_MOST]:
-            lives = [_further(life) for life in unit.remaining.lives]
+            lives = [_life(life) for life in unit.remaining.lives]
             cells = [unit.name, *([result.labels[unit.design]] if several else [])]
             cells += [count(float(f"{unit.age:.4g}")), *lives]
             if target is not None:
@@ -231,7 +233,7 @@ class FieldReturnsView(View):
             "warnings": list(self.warnings),
         }
 
-    def _columns(self) -> list[Column]:
+    def table(self) -> list[Column]:
         """Return the running units as columns."""
         result = self.result
         columns = [
@@ -240,50 +242,21 @@ class FieldReturnsView(View):
             Column("age", np.array([unit.age for unit in result.running]), result.unit),
         ]
         for place, share in enumerate(SHARES):
-            for end in ("value", "low", "high"):
-                values = [getattr(unit.remaining.lives[place], end) for unit in result.running]
-                name = f"further life B{share:g}{'' if end == 'value' else f' {end}'}"
-                columns.append(Column(name, np.array(values), result.unit))
+            lives = arrays_of(unit.remaining.lives[place] for unit in result.running)
+            columns += columns_of(f"further life B{share:g}", lives, result.unit)
         if result.designs[0].target is not None:
-            for end in ("value", "low", "high"):
-                values = [
-                    getattr(unit.remaining.survival, end) if unit.remaining.survival else 1.0
-                    for unit in result.running
-                ]
-                name = f"reaches target{'' if end == 'value' else f' {end}'}"
-                columns.append(Column(name, np.array(values)))
+            survival = arrays_of(unit.remaining.survival or _REACHED for unit in result.running)
+            columns += columns_of("reaches target", survival)
         return columns
-
-    def columns(self) -> Mapping[str, Columns]:
-        """Return the running units."""
-        return {"units.csv": [self._columns()]}
-
-    def frame(self) -> Frame:
-        """Return the running units as a table of pandas."""
-        columns = [(item.name, item.unit, item.values) for item in self._columns()]
-        return Frame(columns, "number", range(1, len(self.result.running) + 1))
-
-    def stored_files(self) -> list[tuple[str, str]]:
-        """Return the scenario of the first design and its input files."""
-        files: list[tuple[str, str]] = self.result.designs[0].view.stored_files()
-        return files
-
-    def overview(self) -> Overview:
-        """Return the survival and the first answers."""
-        return Overview(self.panels().first, {"Life": self.rows()[1:]})
-
-
-def _units(number: int) -> str:
-    return f"{count(number)} {'unit' if number == 1 else 'units'}"
 
 
 def _range(interval: Interval) -> str:
     return f"{interval.value:.3g} [{interval.low:.3g}, {interval.high:.3g}]"
 
 
-def _further(life: Interval) -> str:
+def _life(life: Interval, unit: str = "") -> str:
     low, value, high = rounded_lives(life.low, life.value, life.high)
-    return f"{value} [{low}..{high}]"
+    return f"{value}{unit} [{low}..{high}]"
 
 
 def _reaches(unit: RunningUnit) -> str:
@@ -294,10 +267,6 @@ def _reaches(unit: RunningUnit) -> str:
 def _numbers(predicted: Predicted, place: int) -> str:
     ends = (predicted.low[place], predicted.high[place])
     return f"{predicted.mean[place]:.3g} [{ends[0]:.0f}, {ends[1]:.0f}]"
-
-
-def _total(predicted: Predicted) -> str:
-    return _numbers(predicted, -1)
 
 
 def _surprise(probability: float) -> str:

@@ -291,17 +291,19 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
     half the tolerance, as has the known part of its error, or `MAX_NODES` are reached.
     """
     evolution = draws.scenario.evolution
-    count, one = evolution.nodes or minimum_nodes(draws.passes), np.ones(1)
+    count, single_pass = evolution.nodes or minimum_nodes(draws.passes), np.ones(1)
     while True:
-        found = with_nodes(problem, draws.scenario, draws.passes, count)
+        refined = with_nodes(problem, draws.scenario, draws.passes, count)
         if evolution.nodes or 2 * count > MAX_NODES:
-            return found
-        fresh = fresh_state(found)
-        full = volume_of(problem, explicit_step(found, fresh, one).depths)
-        half = volume_of(problem, explicit_step(*half_quadrature(found, fresh), one).depths)
-        error = np.maximum(np.abs(full - half), found.quadrature_error * full)
+            return refined
+        fresh = fresh_state(refined)
+        full = volume_of(problem, explicit_step(refined, fresh, single_pass).depths)
+        half = volume_of(
+            problem, explicit_step(*half_quadrature(refined, fresh), single_pass).depths
+        )
+        error = np.maximum(np.abs(full - half), refined.quadrature_error * full)
         if (error <= 0.5 * evolution.tolerance * full).all():
-            return found
+            return refined
         count *= 2
 
 

@@ -94,7 +94,7 @@ def written_value(limit: Limit, value: float) -> str:
 
 
 def without_limit_rows(data: RunData, state: WearState) -> RunData:
-    """Return the data of a run without the rows after its checkpoint, those at a limit."""
+    """Return the data of a run without the rows after its checkpoint, written at a limit."""
     passes = float(state.passes[0])
     steps = data.history["passes"] <= passes
     records = data.records["record_passes"] <= passes

@@ -41,7 +41,7 @@ LEAST_CHOSEN = 2.5  # strips per half-width of a patch; with fewer chosen ones, 
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
 STRIPS_OF_FORM = 121  # of a run on the width of a roller that is not crowned, at least
-PART_OF_FORM = 0.5  # of the patch of such bodies, which is resolved as that of a crown
+PART_OF_FORM = 0.5  # of the patch of such bodies, which is resolved as the patch of a crown
 STRIPS_OF_CONTACT = 121
 STRIPS_OF_CONTACT_OF_FORM = 485  # where its ends are steep, for a peak pressure within 1 %
 DRAWN = {"scalar", "joint"}  # roles of random inputs with a range
@@ -188,7 +188,7 @@ def strips_over(width: float, half_width: float, tolerance: float, groove: float
     tolerance : float
         Relative error of the test.
     groove : float
-        Half-width of the final groove, where that of the start need not be resolved [m].
+        Half-width of the final groove, where the patch at the start need not be resolved [m].
     """
     per_half_width = strips_per_half_width(half_width, tolerance, groove)
     strips = int(np.ceil(width / half_width * per_half_width))
@@ -345,7 +345,7 @@ def start_of(draws: Draws, shared: Grid) -> Grid:
 
 
 def start_of_run(scenario: Scenario, draws: Draws) -> Grid:
-    """Return the strips with which the run of a scenario starts, those of its realisation."""
+    """Return the strips with which the run of a scenario starts, for its realisation."""
     if not scenario.random:
         return strips_of_run(draws)
     return start_of(draws, shared_strips(scenario))

@@ -138,6 +138,8 @@ class RunInProgress:
         )
         try:
             self._step_to_end()
+            if not self.reached:  # the test on coarse strips may take as long as the last steps
+                self._write_in_time(FIRST_CHECKPOINT)
             self._estimate_strip_errors()
             self._check_errors()
             self._write(finished=True)
@@ -296,17 +298,16 @@ class RunInProgress:
                 self._interrupt()
             self._write_in_time()
 
-    def _write_in_time(self) -> None:
-        """Write a checkpoint if the last one is long ago.
+    def _write_in_time(self, interval: float | None = None) -> None:
+        """Write a checkpoint if the last one is longer ago than an interval [s].
 
-        A short run has some too: until their interval is reached, as much time passes before a
-        checkpoint as had passed before the last one.
+        Without an interval it is that of the scenario. A short run has some too: until it is
+        reached, as much time passes before a checkpoint as had passed before the last one.
         """
-        every = min(
-            self.scenario.outputs.checkpoint_every,
-            max(FIRST_CHECKPOINT, self._written - self.started),
-        )
-        if time.monotonic() - self._written > max(every, self._last_write / WRITING):
+        if interval is None:
+            early = max(FIRST_CHECKPOINT, self._written - self.started)
+            interval = min(self.scenario.outputs.checkpoint_every, early)
+        if time.monotonic() - self._written > max(interval, self._last_write / WRITING):
             self._write()
 
     def _check_depth(self) -> None:

@@ -20,7 +20,7 @@ from wearsim.uq.sampling.sobol import Stream
 MAX_NODES = 128
 REFERENCE_POINTS = 2**15  # Sobol points of the exact means
 LEAST_WEIGHT = 0.1  # of an equal weight; a negative weight would add material
-_OTHERS = (0.7, 1.4, 2.0)  # saturations over that of the unworn bodies; grooves have greater ones
+_OTHERS = (0.7, 1.4, 2.0)  # saturations relative to the unworn bodies; grooves have greater ones
 _ACROSS, _SHARES = np.polynomial.legendre.leggauss(24)  # points across half of a Hertz contact
 _ROOT = np.sqrt(1.0 - (0.5 * _ACROSS + 0.5) ** 2)  # half-length of its strips over the greatest one
 _SHARES = 0.75 * _SHARES * _ROOT**2  # of its load

@@ -10,7 +10,6 @@ import numpy as np
 from wearsim.errors import WearsimError
 from wearsim.levelling import Measured
 from wearsim.report.panels import (
-    BLACK,
     COLOURS,
     DASHES,
     GREY,
@@ -28,8 +27,8 @@ from wearsim.report.panels import (
 )
 from wearsim.report.text import count, shown, simulated
 from wearsim.report.view import width_row
-from wearsim.studies.fatigue.panels import damage_panel, pitting_panel
-from wearsim.studies.fatigue.view import has_fatigue, source_line
+from wearsim.studies.fatigue.panels import damage_panel, pitting_panel, rollers_at_end
+from wearsim.studies.fatigue.view import with_source_lines
 from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray
 
@@ -49,11 +48,11 @@ def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
         "pressure": pressure_panel(result),
     }
     rows, height = [["profiles", "depth"], ["dissipation", "load"]], 7.6
-    if has_fatigue(result):
+    if result.raw.fatigue:
         panels |= {"damage": damage_panel(result), "pitting": pitting_panel(result)}
         rows, height = [*rows, ["damage", "pitting"]], 11.0
     return Sheet(
-        f"{result.title}\n{caption(result)}{source_line(result)}",
+        with_source_lines(f"{result.title}\n{caption(result)}", result),
         panels,
         rows,
         (11.0, height),
@@ -89,13 +88,8 @@ def caption(result: Result) -> str:
 def _profiles(result: Result, limits: tuple[float, float], measured: Sequence[Measured]) -> Panel:
     worn, passes = np.asarray(result.profiles), result.record_passes
     marks: list[Mark] = [Records(result.y, result.start_height - worn, passes)]
-    rollers = np.asarray(result.roller_profiles)
-    rollers = rollers if rollers.ndim == 3 else rollers[:, None]
-    for number in range(rollers.shape[1]):
-        if rollers[-1, number].max() > 0.0:
-            name = "roller" if rollers.shape[1] == 1 else f"roller {number + 1}"
-            curve, label = (result.y, -rollers[-1, number]), f"{name}, at the end"
-            marks.append(Line(*curve, dash="--", width=1.0, colour=BLACK, label=label))
+    rollers = np.asarray(result.roller_profiles).reshape(len(passes), -1, len(result.y))
+    marks += rollers_at_end(result.y, -rollers[-1])
     return Panel(
         "Worn profile of the cylinder (black: start of the run)",
         Axis(Y, "mm", limits=limits),
@@ -133,8 +127,7 @@ def depth_panel(result: Result) -> Panel:
 
 
 def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
-    power = np.asarray(result.dissipation)
-    power = power if power.ndim == 3 else power[:, None]  # (record, roller, strip)
+    power = np.asarray(result.dissipation).reshape(len(result.record_passes), -1, len(result.y))
     rollers = power.shape[1]
     marks = [
         Records(

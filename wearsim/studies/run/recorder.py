@@ -188,8 +188,8 @@ class History:
             problems, states, steps = zip(*waiting, strict=True)
             several = problems[0].at(np.zeros(len(waiting), dtype=np.int64))
             state, step = joined_states(states), np.concatenate(steps)
-            found = _rows_of(self._stepper, several, state, step, self._threshold)
-            self._rows[self._computed :] = found
+            rows = _rows_of(self._stepper, several, state, step, self._threshold)
+            self._rows[self._computed :] = rows
             self._computed = len(self._rows)
         return self._rows
 
@@ -231,13 +231,13 @@ def _each(row: Variables, realisations: int) -> list[Variables]:
     rows: list[Variables] = [{} for _ in range(realisations)]
     for name, values in row.items():
         dims = ALL_VARIABLES[name].dims
-        for place, one in enumerate(rows):
+        for place, single in enumerate(rows):
             if name in _WITHOUT_REALISATION:
-                one[name] = values[place]
+                single[name] = values[place]
             elif dims[-1] == "y":
-                one[name] = values[..., place : place + 1, :]
+                single[name] = values[..., place : place + 1, :]
             else:
-                one[name] = values[..., place : place + 1]
+                single[name] = values[..., place : place + 1]
     return rows
 
 
@@ -309,8 +309,8 @@ class Recorder:
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
         stepper, end = self.stepper, advance.end
-        for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
-            self._record(advance, one)
+        for due in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
+            self._record(advance, due)
         self._history.add(advance.problem, end, advance.path[0])
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end, advance.problem.grid
@@ -329,9 +329,9 @@ class Recorder:
             Passes at the end of the test without this stop.
         """
         stepper, start = self.stepper, advance.path[0]
-        for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
-            if one[2] < state.passes[0]:
-                self._record(advance, one)
+        for due in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
+            if due[2] < state.passes[0]:
+                self._record(advance, due)
         self._compute_records()
         self._records.append(self._row(advance.problem, advance.problem, state))
         self._history.add(advance.problem, state, start)
@@ -345,8 +345,8 @@ class Recorder:
         if waiting and (waiting[0][0] is not problem or _is_full(problem, len(waiting))):
             self._compute_records()
         if _carries_loads(self.stepper, problem, state):
-            own = state.replaced(coarse_step_solution=None, half_quadrature_solution=None)
-            self._records.append((problem, own, passes))
+            kept = state.replaced(coarse_step_solution=None, half_quadrature_solution=None)
+            self._records.append((problem, kept, passes))
         else:
             self._compute_records()
             there = states_at(self.stepper, advance, [due])
@@ -366,15 +366,18 @@ class Recorder:
         waiting = self._waiting
         if waiting:
             stepper, problem = self.stepper, waiting[0][0]
-            starts, passes = [one[1] for one in waiting], np.array([one[2] for one in waiting])
+            starts, passes = (
+                [record[1] for record in waiting],
+                np.array([record[2] for record in waiting]),
+            )
             several = problem.at(np.zeros(len(waiting), dtype=np.int64))
             try:
                 state = state_at(stepper, several, joined_states(starts), passes)
             except (StepError, ContactError):  # a step that fails is halved for a single test
-                each = zip(starts, passes[:, None], strict=True)
-                state = joined_states([state_at(stepper, problem, *one) for one in each])
-            found = _each(record_row(stepper, several, state), len(waiting))
-            rows = [(problem.grid, row) for row in found]
+                singles = zip(starts, passes[:, None], strict=True)
+                state = joined_states([state_at(stepper, problem, *record) for record in singles])
+            contents = _each(record_row(stepper, several, state), len(waiting))
+            rows = [(problem.grid, row) for row in contents]
             self._records[-len(waiting) :] = rows
         return self._records
 
@@ -436,7 +439,7 @@ class Recorder:
         return columns
 
     def _error_of_turn(self, columns: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the relative error of sums over the stations of a cam, that of its volume."""
+        """Return the relative error of sums over the stations of a cam, taken from its volume."""
         error = columns.get("volume_error_by_stations")
         if error is None:
             return np.zeros(len(self._history))

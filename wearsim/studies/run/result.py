@@ -22,7 +22,7 @@ from wearsim.results.content import (
 )
 from wearsim.results.io.files import read_study
 from wearsim.studies.fatigue.observables import final_fatigue
-from wearsim.studies.run.schema import ESTIMATED, RUN, run_schema
+from wearsim.studies.run.schema import ALL_VARIABLES, ESTIMATED, RUN, run_schema
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -87,6 +87,11 @@ class RunData(StudyData):
     def schema(self) -> Schema:
         """Schema of the results file."""
         return self.schema_of({}, {*self.static, *self.history})
+
+    @property
+    def fatigue(self) -> bool:
+        """Whether it has the damage of its bodies."""
+        return "damage" in self.history
 
     @classmethod
     def schema_of(cls, attributes: Mapping[str, Any], names: Container[str]) -> Schema:
@@ -234,7 +239,7 @@ class Result(StudyResult[RunData]):
         Parameters
         ----------
         angle : float, optional
-            Angle of a cam [rad]; by default that at which it is worn deepest.
+            Angle of a cam [rad]; by default where it is worn deepest.
 
         Examples
         --------
@@ -416,30 +421,23 @@ class Result(StudyResult[RunData]):
         last.update({name: last[name].max(axis=0) for name in per_roller})
         deepest = np.maximum(last["depth"], last["roller_depth"])
         rollers = self.raw.static["multiplicity"] @ self.raw.history["roller_worn_volume"][-1]
-        below_nominal = (
-            {"depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1]))}
-            if self.start_height.any()
-            else {}
-        )
+        below: dict[str, Number] = {}
+        if self.start_height.any():
+            below["depth_below_nominal_m"] = _number(np.asarray(self.depth_below_nominal[-1]))
+
+        def with_units(*names: str) -> dict[str, Number]:
+            return {_key(name): _number(last[name]) for name in names}
+
         return {
             "passes": _number(last["passes"]),
             **self._final_of_cam(last),
-            "time_s": _number(last["time"]),
-            "depth_m": _number(last["depth"]),
-            **below_nominal,
-            "width_m": _number(last["width"]),
-            "worn_volume_m3": _number(last["worn_volume"]),
-            "roller_depth_m": _number(last["roller_depth"]),
-            "roller_worn_volume_m3": _number(last["roller_worn_volume"]),
-            "dissipated_energy_J": _number(last["dissipated_energy"]),
-            "power_W": _number(last["power"]),
-            "normal_force_N": _number(last["normal_force"]),
-            "peak_pressure_Pa": _number(last["peak_pressure"]),
-            "descent_m": _number(last["descent"]),
-            "elastic_approach_m": _number(last["elastic_approach"]),
+            **with_units("time", "depth"),
+            **below,
+            **with_units("width", "worn_volume", "roller_depth", "roller_worn_volume"),
+            **with_units("dissipated_energy", "power", "normal_force", "peak_pressure"),
+            **with_units("descent", "elastic_approach"),
             **{name: _number(value) for name, value in final_fatigue(last).items()},
-            "depth_error_m": _number(last["depth_error"]),
-            "volume_error_m3": _number(last["volume_error"]),
+            **with_units("depth_error", "volume_error"),
             **self._final_errors(last),
             "relative_profile_error": _number(last["profile_error"]),
             "relative_depth_error": _number(_relative(last["depth_error"], deepest)),
@@ -450,14 +448,13 @@ class Result(StudyResult[RunData]):
 
     def _final_errors(self, last: Arrays) -> dict[str, Number]:
         """Return the estimated errors of the final state, the greatest one over the rollers."""
-        variables = self.raw.schema.variables
         errors: dict[str, Number] = {}
         for name in ESTIMATED:
             error = last.get(f"{name}_error")
-            if error is not None and variables[name].unit != "1":
-                over_rollers = "roller" in variables[name].dims
+            if error is not None and ALL_VARIABLES[name].unit != "1":
+                over_rollers = "roller" in ALL_VARIABLES[name].dims
                 greatest = error.max(axis=0) if over_rollers else error
-                errors[f"{name}_error_{variables[name].unit.replace('^', '')}"] = _number(greatest)
+                errors[_key(name, "_error")] = _number(greatest)
         return errors
 
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
@@ -486,6 +483,11 @@ class Result(StudyResult[RunData]):
             "station_lift_error_m": curve.tolist(),
             "station_lift_error_from_dwell_m": (curve - dwell).tolist(),
         }
+
+
+def _key(name: str, ending: str = "") -> str:
+    """Return the name of a variable with its SI unit, "worn_volume_m3"."""
+    return f"{name}{ending}_{ALL_VARIABLES[name].unit.replace('^', '')}"
 
 
 def _number(values: Array) -> Number:

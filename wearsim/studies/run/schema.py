@@ -261,7 +261,7 @@ FATIGUE_VARIABLES: Mapping[str, Variable] = by_name(
         )
     )
 )
-#: those of the run of a cam
+#: axes and variables of the run of a cam
 CAM_FATIGUE_VARIABLES: Mapping[str, Variable] = by_name(
     (
         Variable(
@@ -289,9 +289,11 @@ RUN = Schema("wearsim-run", 10, "a wear test, from `wearsim run`", AXES, VARIABL
 @cache
 def run_schema(*, cam: bool, fatigue: bool) -> Schema:
     """Return the schema of the run of a cylinder or a cam, with fatigue or without."""
-    found = {
+    variables = {
         **VARIABLES,
         **(CAM_VARIABLES if cam else {}),
         **(FATIGUE_VARIABLES if fatigue else {}),
     }
-    return replace(RUN, variables={**found, **(CAM_FATIGUE_VARIABLES if cam and fatigue else {})})
+    return replace(
+        RUN, variables={**variables, **(CAM_FATIGUE_VARIABLES if cam and fatigue else {})}
+    )

@@ -18,6 +18,7 @@ from wearsim.report.text import (
     footer,
     in_unit,
     lapse,
+    limit_unit,
     percent,
     shown,
     simulated,
@@ -28,10 +29,10 @@ from wearsim.report.view import Column, Columns, Frame, Overview, Row, Rows, wid
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
 from wearsim.studies.fatigue.view import (
     EXCLUDED as NO_FATIGUE,
+    fatigue_data,
     fatigue_rows,
-    has_fatigue,
-    sourced_table,
-    sources_of,
+    fatigue_scenario,
+    with_sources,
 )
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.schema import ALL_VARIABLES, AXES
@@ -57,13 +58,6 @@ _RECORDS = {
     "dissipation.csv": "dissipation",
     "cylinder_damage_profiles.csv": "cylinder_damage_profile",
     "roller_damage_profiles.csv": "roller_damage_profile",
-}
-#: the others in um
-_UNITS = {
-    "volume": "mm^3",
-    "peak_pressure": "MPa",
-    "width": "mm",
-    **dict.fromkeys(("damage", "pitting"), "1"),
 }
 
 
@@ -163,9 +157,6 @@ class RunView(StudyView[Result]):
             error = final[f"{name}_error_{key}"]
             return with_error(np.asarray(final[f"{name}_{key}"]), float(np.max(error)), unit)
 
-        def of(name: str, unit: str, key: str) -> dict[str, tuple[float | None, str]]:
-            return {name: (float(np.max(final[f"{name}_{key}"])), unit)}
-
         arm, greatest = self._arm_length(), float(np.max(final["lift_error_m"]))
         of_arm = f", {shown(greatest / arm, 'deg', 3)} of the arm" if arm else ""
         return [
@@ -175,7 +166,7 @@ class RunView(StudyView[Result]):
             Row(
                 "lift error, peak to peak",
                 stated("lift_error", "um", "m") + of_arm,
-                answers=of("lift_error", "um", "m"),
+                answers={"lift_error": (greatest, "um")},
             ),
             Row("least wear of the lift", f"at {stated('least_wear_angle', 'deg', 'rad')}"),
             Row("greatest wear of the lift", f"at {stated('greatest_wear_angle', 'deg', 'rad')}"),
@@ -236,7 +227,7 @@ class RunView(StudyView[Result]):
             "random": varying_inputs(result, result.raw.drawn),
             **self.ending(),
             "limits": result.limits,
-            **({"fatigue_sources": of_bodies} if (of_bodies := sources_of(result)) else {}),
+            **fatigue_data(result),
         }
 
     def _of_arm(self) -> dict[str, Any]:
@@ -284,22 +275,22 @@ class RunView(StudyView[Result]):
     def overview(self) -> Overview:
         """Return the worn body, its loads, and limits that are passed or not."""
         result, excluded = self.result, [*EXCLUDED, "scatter of the inputs"]
-        if has_fatigue(result):
+        if result.raw.fatigue:
             excluded.remove(NO_FATIGUE)
         sheet = self.panels()
         if result.is_cam:
-            from wearsim.studies.cam.overview import CAM_EXCLUDED, loads  # noqa: PLC0415
+            from wearsim.studies.cam.view import CAM_EXCLUDED, loads  # noqa: PLC0415
 
-            found, main = loads(result.scenario), sheet.panels["shape"]
+            load_rows, main = loads(result.scenario), sheet.panels["shape"]
             excluded += CAM_EXCLUDED
         else:
             named = {row.label: row for row in self.rows()}
-            found = [named[name] for name in ("normal force", "peak pressure")]
+            load_rows = [named[name] for name in ("normal force", "peak pressure")]
             main = sheet.first
         limits = limit_rows(result, brief=True)
         limits = limits or [Row("limits", "none in the scenario, table [limit]")]
         shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
-        groups = {"Loads": found, "Limits": limits, "Wear": shown_rows}
+        groups = {"Loads": load_rows, "Limits": limits, "Wear": shown_rows}
         return Overview(main, groups, excluded)
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
@@ -315,11 +306,12 @@ class RunView(StudyView[Result]):
             if variable.kind == "history"
             for column in _columns(name, raw.history[name], variable.dims, name, self._angles())
         ]
-        tables: dict[str, Columns] = {"history.csv": [sourced_table(self.result, history)]}
+        scenario = fatigue_scenario(self.result)
+        tables: dict[str, Columns] = {"history.csv": [with_sources(history, scenario)]}
         for file, name in _RECORDS.items():
             always = not name.startswith("roller") and name in raw.records
             if always or (name in raw.records and raw.records[name].any()):
-                tables[file] = [sourced_table(self.result, self._records(name))]
+                tables[file] = [with_sources(self._records(name), scenario)]
         surface = self.surface(Sampling())
         if surface is not None:
             tables["worn_cam.csv"] = [surface.columns]
@@ -336,8 +328,8 @@ class RunView(StudyView[Result]):
         degrees = [f"{angle:.6g} deg" for angle in np.degrees(self.result.values("station_angle"))]
         following = [*degrees[1:], ""]
         return [
-            f"before {one}" if one == other else f"at {one}"
-            for one, other in zip(degrees, following, strict=True)
+            f"before {this_angle}" if this_angle == next_angle else f"at {this_angle}"
+            for this_angle, next_angle in zip(degrees, following, strict=True)
         ]
 
     def _along_angle(self) -> Iterator[Column]:
@@ -437,7 +429,7 @@ def limit_rows(result: Result, *, brief: bool = False) -> Rows:
     """
     rows = list[Row]()
     for item in result.limits:
-        unit, name = _UNITS.get(item["quantity"], "um"), item["quantity"].replace("_", " ")
+        unit, name = limit_unit(item["quantity"]), item["quantity"].replace("_", " ")
         side = "above" if item["excess"] >= 0.0 else "below"
         by = "" if brief else f", {abs(100.0 * item['excess']):.3g} % {side}"
         end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)} at the end{by}"

@@ -117,13 +117,13 @@ def _pieces(contents: Mapping[str, str]) -> dict[str, list[str]]:
 
 def _keys_of_texts(text: str) -> dict[str, str]:
     """Return the dotted keys of the texts in a scenario, by text."""
-    found: dict[str, str] = {}
+    keys: dict[str, str] = {}
     for key, value in flat(parse_toml(text, "scenario")):
         texts = value if isinstance(value, list) else [value]
         for item in texts:
             inner = item.values() if isinstance(item, dict) else [item]
-            found |= {name: key for name in inner if isinstance(name, str)}
-    return found
+            keys |= {name: key for name in inner if isinstance(name, str)}
+    return keys
 
 
 def _grid(data: RunData) -> Grid:
@@ -155,14 +155,14 @@ def _rollers(scenario: Scenario, data: RunData) -> list[Profile]:
     offsets = contact_inputs(draws.scenario, range(count), drawn)["offset"]
     settings = [_settings(draws.scenario, number) for number in range(count)]
     y, worn = data.static["y"], data.records["roller_depth_profile"][-1, :, 0]
-    found = []
+    profiles = []
     for number in range(count):
         same = [k for k, first in enumerate(groups) if settings[first] == settings[number]]
         place = groups.index(number) if number in groups else same[0]
         s, earlier = y - offsets[number, 0], roller_profile(scenario, number)
         start = 0.0 if earlier is None else np.interp(s, earlier.y, earlier.height)
-        found.append(_joined(s, start - worn[place], earlier))
-    return found
+        profiles.append(_joined(s, start - worn[place], earlier))
+    return profiles
 
 
 def _settings(scenario: Scenario, number: int) -> tuple[object, ...]:

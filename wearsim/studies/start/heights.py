@@ -91,9 +91,9 @@ def roller_height(scenario: Scenario, rollers: Sequence[int], s: FloatArray) -> 
     """
     if not scenario.roller.profiles:
         return 0.0
-    found = np.empty_like(s)
+    height = np.empty_like(s)
     for place, number in enumerate(rollers):
         profile = roller_profile(scenario, number)
         assert profile is not None
-        found[place] = np.interp(s[place], profile.y, profile.height)
-    return found
+        height[place] = np.interp(s[place], profile.y, profile.height)
+    return height

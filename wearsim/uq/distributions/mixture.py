@@ -55,12 +55,12 @@ class Mixture(Distribution):
 
     @cached_property
     def mean(self) -> float:
-        """Exact mean, if those of the components are."""
+        """Mean, exact if the means of the components are exact."""
         return math.fsum(w * item.mean for w, item in self._pairs)
 
     @cached_property
     def std(self) -> float:
-        """Exact standard deviation, if those of the components are."""
+        """Standard deviation, exact if the components have exact ones."""
         squares = (w * (item.std**2 + (item.mean - self.mean) ** 2) for w, item in self._pairs)
         return math.sqrt(math.fsum(squares))
 

@@ -90,8 +90,8 @@ class TwoLevels(Distribution):
 
         probability = np.asarray(probability, dtype=float)
         scores, logs = self._table
-        found = np.exp(np.interp(ndtri(probability), scores, logs))
-        return np.where(probability <= 0.0, 0.0, np.where(probability >= 1.0, np.inf, found))
+        values = np.exp(np.interp(ndtri(probability), scores, logs))
+        return np.where(probability <= 0.0, 0.0, np.where(probability >= 1.0, np.inf, values))
 
     @cached_property
     def _table(self) -> tuple[FloatArray, FloatArray]:

@@ -77,11 +77,11 @@ class Estimate:
 
     def quantile(self, probability: float) -> Interval:
         """Return the quantile of one of the requested probabilities."""
-        found = dict(self.quantiles)
-        if probability not in found:
+        quantiles = dict(self.quantiles)
+        if probability not in quantiles:
             kind = "a probability of this estimate, see the argument probabilities"
-            raise unknown_name(f"{probability:g}", kind, (f"{known:g}" for known in found))
-        return found[probability]
+            raise unknown_name(f"{probability:g}", kind, (f"{known:g}" for known in quantiles))
+        return quantiles[probability]
 
 
 def estimate(

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.types import FloatArray
 
 CONFIDENCE = 0.95
 """Confidence of all intervals."""
+ENDS = np.array([0.025, 0.975])
+"""Probabilities of the ends of such an interval."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,12 @@ class Interval:
         return Interval(
             *(min(max(end, least), greatest) for end in (self.value, self.low, self.high))
         )
+
+
+def arrays_of(intervals: Iterable[Interval]) -> FloatArray:
+    """Return estimates and lower and upper ends of intervals, shape (3, intervals)."""
+    ends = [(interval.value, interval.low, interval.high) for interval in intervals]
+    return np.array(ends, dtype=np.float64).reshape(-1, 3).T
 
 
 UNKNOWN = Interval(math.nan, -math.inf, math.inf)

@@ -319,11 +319,11 @@ def _merge(
 ) -> tuple[int, FloatArray, FloatArray]:
     """Return count, mean and sum of squared deviations with `rows` added."""
     before, mean, square = so_far
-    own = rows.mean(axis=0)
-    own_square = ((rows - own) ** 2).sum(axis=0)
-    count, difference = before + len(rows), own - mean
+    mean_of_rows = rows.mean(axis=0)
+    square_of_rows = ((rows - mean_of_rows) ** 2).sum(axis=0)
+    count, difference = before + len(rows), mean_of_rows - mean
     return (
         count,
         mean + difference * (len(rows) / count),
-        square + own_square + difference**2 * (before * len(rows) / count),
+        square + square_of_rows + difference**2 * (before * len(rows) / count),
     )

@@ -120,14 +120,14 @@ class LikelihoodMixture:
         centre = self.mean - part.centre
         scale = np.sqrt(self.variance + scatter**2)
         nodes = np.linspace(-REACH, REACH, _NODES)
-        found = np.empty((len(scatter), _NODES))
+        log_density = np.empty((len(scatter), _NODES))
         for row, (t, unit) in enumerate(zip(scatter, scale, strict=True)):
             std = np.hypot(part.std, t)
             exponent = -0.5 * ((nodes[:, None] * unit - centre) / std) ** 2
             exponent += np.log(part.weight / std) - 0.5 * _LOG_2PI
             top = exponent.max(axis=1)
-            found[row] = top + np.log(np.exp(exponent - top[:, None]).sum(axis=1))
-        return scale, found
+            log_density[row] = top + np.log(np.exp(exponent - top[:, None]).sum(axis=1))
+        return scale, log_density
 
     def _reduced(self) -> LikelihoodMixture:
         """Return the mixture with neighbouring parts merged, mean and variance kept."""

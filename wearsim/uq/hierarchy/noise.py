@@ -78,14 +78,14 @@ class Noise:
         columns : ndarray, shape (points, columns)
             Heights [m], or anything that adds to them.
         """
-        found, mean = np.empty_like(columns), np.zeros(columns.shape[1])
+        white, mean = np.empty_like(columns), np.zeros(columns.shape[1])
         for j, (factor, gain, scale) in enumerate(zip(*self.filter(y), strict=True)):
             error = columns[j] - mean
-            np.multiply(error, scale, out=found[j])
+            np.multiply(error, scale, out=white[j])
             error *= gain * factor
             mean *= factor
             mean += error
-        return found
+        return white
 
     def sample(self, y: FloatArray, normal: FloatArray) -> FloatArray:
         """Return noise made from independent standard normal numbers.
@@ -100,13 +100,13 @@ class Noise:
         ndarray, shape (points, ...)
         """
         decay = np.exp(-np.diff(y, prepend=y[0]) / self.length)
-        found = np.empty_like(normal[0])
+        correlated = np.empty_like(normal[0])
         value = normal[0, 0]
         for j, factor in enumerate(decay):
             if j:
                 value = factor * value + np.sqrt(1.0 - factor * factor) * normal[0, j]
-            found[j] = value
-        return np.asarray(self.sigma * found + self.white * normal[1])
+            correlated[j] = value
+        return np.asarray(self.sigma * correlated + self.white * normal[1])
 
 
 @dataclass(frozen=True)
@@ -170,17 +170,17 @@ def noise_models(
     least : float
         Least standard deviation of the noise, known from elsewhere [m].
     """
-    found, variance, score = _likely(y, residual, forms)
+    models, variance, score = _likely(y, residual, forms)
     kept = score > score.max() - _NEGLIGIBLE
-    arrays = found.decay, found.gain, found.scale, found.lines
+    arrays = models.decay, models.gain, models.scale, models.lines
     decay, gain, scale, lines = (np.ascontiguousarray(values[..., kept]) for values in arrays)
     freedom = len(y) - forms.shape[1]
     # a variance that is greater by a factor divides the logarithm of the likelihood by it
     known = np.maximum(1.0, least**2 / variance[kept])
     exponent = 0.5 * freedom / known
-    log_weight = found.log_weight[kept]
+    log_weight = models.log_weight[kept]
     log_weight += (exponent - 0.5 * freedom) * np.log(freedom * variance[kept])
-    length, white = found.length[kept], found.white[kept]
+    length, white = models.length[kept], models.white[kept]
     return NoiseModels(length, white, decay, gain, scale, lines, log_weight, exponent)
 
 
@@ -189,7 +189,7 @@ def _likely(
 ) -> tuple[NoiseModels, FloatArray, FloatArray]:
     """Return a grid of noise models, the variance of each, and the logarithm of its weight.
 
-    One axis is the logarithm of the correlation length, the other that of the variance of the white
+    The axes are logarithms: of the correlation length, and of the variance of the white
     noise over that of a step of the process from point to point. Short distances show both parts of
     this ratio, whereas the white share is hardly independent of a correlation length that is long.
     """
@@ -246,15 +246,15 @@ def _whitened(
     columns: FloatArray, decay: FloatArray, gain: FloatArray, scale: FloatArray
 ) -> FloatArray:
     """Return columns whitened by several models, shape (points, models, columns)."""
-    found = np.empty((*decay.shape, columns.shape[1]))
-    mean = np.zeros(found.shape[1:])
+    white = np.empty((*decay.shape, columns.shape[1]))
+    mean = np.zeros(white.shape[1:])
     corrected = (decay * gain)[:, :, None]
     for j, column in enumerate(columns):
-        error = np.subtract(column, mean, out=found[j])
+        error = np.subtract(column, mean, out=white[j])
         mean *= decay[j][:, None]
         mean += corrected[j] * error
-    found *= scale[:, :, None]
-    return found
+    white *= scale[:, :, None]
+    return white
 
 
 def fit_noise(y: FloatArray, height: FloatArray) -> Noise:

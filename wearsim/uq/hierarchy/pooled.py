@@ -45,16 +45,16 @@ class Hierarchy:
     t : ndarray, shape (t,)
         Grid of the scatter of ln K.
     tests : int, optional
-        Number of tests, by default that of the kernels.
+        Number of tests, by default one for each kernel.
     """
 
     def __init__(
         self, kernels: Sequence[LikelihoodMixture], t: FloatArray, tests: int | None = None
     ) -> None:
         self.kernels, self.t = list(kernels), t
-        found = [kernel.table(t) for kernel in self.kernels]
-        self._scale = np.stack([scale for scale, _ in found])  # (kernels, t)
-        self._table = np.stack([table for _, table in found])
+        tables = [kernel.table(t) for kernel in self.kernels]
+        self._scale = np.stack([scale for scale, _ in tables])  # (kernels, t)
+        self._table = np.stack([table for _, table in tables])
         self.owner = np.arange(tests or len(self.kernels)) % len(self.kernels)
 
     def on_grid(self, centres: FloatArray, row: int, count: int) -> tuple[FloatArray, FloatArray]:
@@ -102,7 +102,7 @@ class Hierarchy:
         -------
         ndarray, shape (sets, t)
         """
-        found = np.empty((len(centres), len(self.t)))
+        log_likelihood = np.empty((len(centres), len(self.t)))
         block = max(_VALUES // _MEANS_OF_MANY, 1)
         for start in range(0, len(centres), block):
             some = centres[start : start + block]
@@ -110,8 +110,8 @@ class Hierarchy:
                 m, total = self.on_grid(some, row, _MEANS_OF_MANY)
                 top = total.max(axis=1)
                 sums = np.exp(total - top[:, None]).sum(axis=1) * (m[:, 1] - m[:, 0])
-                found[start : start + block, row] = top + np.log(sums)
-        return found
+                log_likelihood[start : start + block, row] = top + np.log(sums)
+        return log_likelihood
 
 
 def upper_limits(log_likelihood: FloatArray, t: FloatArray, probability: float) -> FloatArray:
@@ -185,23 +185,23 @@ class Posterior:
         )
 
     def bayes_factor(self, scale: float | None = None) -> float:
-        """Return the evidence of t = 0 over that of a half-normal t, with a flat m.
+        """Return the ratio of evidence, t = 0 over a half-normal t, with a flat m.
 
         Parameters
         ----------
         scale : float, optional
-            Scale of the prior of t; by default that of the posterior.
+            Scale of the prior of t; by default the scale of the posterior.
         """
         prior = half_normal(self.t, scale or self.scale) * trapezoid_weights(self.t)
-        found = self.evidence()
-        return float(found[0] * prior.sum() / (found @ prior))
+        evidence = self.evidence()
+        return float(evidence[0] * prior.sum() / (evidence @ prior))
 
     def density(self) -> FloatArray:
         """Return the density of m and t, shape (t, m)."""
-        found = np.exp(self.log_likelihood - self.log_likelihood.max())
-        found = found * half_normal(self.t, self.scale)[:, None]
-        inner = found.sum(axis=1) * (self.m[:, 1] - self.m[:, 0])
-        return np.asarray(found / (inner @ trapezoid_weights(self.t)))
+        density = np.exp(self.log_likelihood - self.log_likelihood.max())
+        density = density * half_normal(self.t, self.scale)[:, None]
+        inner = density.sum(axis=1) * (self.m[:, 1] - self.m[:, 0])
+        return np.asarray(density / (inner @ trapezoid_weights(self.t)))
 
     def scatter(self, probability: Sequence[float], scale: float | None = None) -> list[float]:
         """Return quantiles of t.
@@ -210,7 +210,7 @@ class Posterior:
         ----------
         probability : sequence of float
         scale : float, optional
-            Scale of the prior of t; by default that of the posterior.
+            Scale of the prior of t; by default the scale of the posterior.
         """
         below = _cumulative(self.evidence() * half_normal(self.t, scale or self.scale), self.t)
         return [float(np.interp(p, below, self.t)) for p in probability]

@@ -62,10 +62,10 @@ def sample_hierarchy(
     def log_probability(vectors: FloatArray) -> FloatArray:
         m, t, deviations = vectors[:, 0], vectors[:, 1], vectors[:, 2:]
         values = m[:, None] + t[:, None] * deviations
-        found = -0.5 * (t / scale) ** 2 - 0.5 * (deviations**2).sum(axis=1)
+        log_density = -0.5 * (t / scale) ** 2 - 0.5 * (deviations**2).sum(axis=1)
         for row, log in zip(values.T, logs, strict=True):
-            found += np.interp(row, ln_k, log)
-        return np.where((t >= 0.0) & (t < GREATEST), found, -np.inf)
+            log_density += np.interp(row, ln_k, log)
+        return np.where((t >= 0.0) & (t < GREATEST), log_density, -np.inf)
 
     random = np.random.default_rng(seed)
     walkers = max(LEAST_WALKERS, 2 * (specimens + 2))

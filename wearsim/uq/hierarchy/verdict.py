@@ -47,11 +47,11 @@ def simulated_centres(
     from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
 
     numbers = Stream(seed, name, "test").rows(0, sets, 3 * tests).reshape(sets, 3, tests)
-    found = t * ndtri(numbers[:, 0])
+    centres = t * ndtri(numbers[:, 0])
     for test in range(tests):
         kernel = kernels[test % len(kernels)]
-        found[:, test] += kernel.deviations(numbers[:, 1:, test].T)
-    return np.asarray(found)
+        centres[:, test] += kernel.deviations(numbers[:, 1:, test].T)
+    return np.asarray(centres)
 
 
 class Decision(NamedTuple):
@@ -75,7 +75,7 @@ class Design:
     kernels : sequence of LikelihoodMixture
         Likelihood of each test; of more tests they are repeated in this order.
     tests : int, optional
-        Number of tests, by default that of the kernels.
+        Number of tests, by default one for each kernel.
     negligible : float
         Scatter of ln K below which it is negligible.
     seed : int
@@ -110,19 +110,19 @@ class Design:
 
     def decide(self, centres: FloatArray) -> Decision:
         """Return the verdicts of sets of tests, shape (sets, tests)."""
-        found = self.hierarchy.integrated(centres)
-        upper = upper_limits(found, self.hierarchy.t, 1.0 - ALPHA)
+        log_likelihood = self.hierarchy.integrated(centres)
+        upper = upper_limits(log_likelihood, self.hierarchy.t, 1.0 - ALPHA)
         explained = upper < self.negligible
-        return Decision((ratios(found) > self.quantile) & ~explained, explained)
+        return Decision((ratios(log_likelihood) > self.quantile) & ~explained, explained)
 
     def rates(self, t: float) -> tuple[float, float]:
         """Return the rates of the verdicts "random" and "explained" where the scatter is t."""
-        found = self.decide(self.simulated(t, f"scatter {t:g}"))
-        return float(found.random.mean()), float(found.explained.mean())
+        decision = self.decide(self.simulated(t, f"scatter {t:g}"))
+        return float(decision.random.mean()), float(decision.explained.mean())
 
 
 def word(random: bool, upper: float, negligible: float) -> Word:
-    """Return the verdict of tests: first that of a test of equivalence, then that of t = 0.
+    """Return the verdict of tests: by a test of equivalence first, then by a test of t = 0.
 
     Parameters
     ----------
@@ -172,10 +172,10 @@ class Power:
         from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
 
         low, below, tests = 1, ALPHA, 2
-        while (found := self.rates(tests, t)[0]) < power:
+        while (rate := self.rates(tests, t)[0]) < power:
             if tests >= most:
                 return None
-            low, below, tests = tests, max(found, ALPHA), min(2 * tests, most)
-        ends = ndtri([below, power, min(found, 0.999)])
+            low, below, tests = tests, max(rate, ALPHA), min(2 * tests, most)
+        ends = ndtri([below, power, min(rate, 0.999)])
         part = (ends[1] - ends[0]) / (ends[2] - ends[0])
         return max(int(np.ceil(low * (tests / low) ** part)), 2)

@@ -122,8 +122,8 @@ def replicated_sobol(
     points = np.empty((count, dimension))
     for offset in range(min(replicates, count)):
         start, replicate = divmod(first + offset, replicates)
-        own = points[offset::replicates]
-        own[:] = sobol.scrambled(seed, name, dimension, start, len(own), replicate)
+        sequence = points[offset::replicates]
+        sequence[:] = sobol.scrambled(seed, name, dimension, start, len(sequence), replicate)
     return points
 
 

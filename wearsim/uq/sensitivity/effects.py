@@ -35,8 +35,8 @@ class SignedEffect:
     def factors(self) -> tuple[Interval, Interval]:
         """Factors of a value whose logarithm changes, at the 10 % and the 90 % quantile."""
         low, high = (
-            Interval(math.exp(one.value), math.exp(one.low), math.exp(one.high))
-            for one in (self.low, self.high)
+            Interval(math.exp(change.value), math.exp(change.low), math.exp(change.high))
+            for change in (self.low, self.high)
         )
         return low, high
 
@@ -74,15 +74,15 @@ def effects(values: FloatArray, scores: Mapping[str, FloatArray]) -> dict[str, S
         with standard errors that allow for unequal variances: HC3 of MacKinnon and White, J.
         Econometrics 29 (1985), DOI 10.1016/0304-4076(85)90158-7.
     """
-    designs = {name: np.column_stack([one, one**2]) for name, one in scores.items()}
+    designs = {name: np.column_stack([score, score**2]) for name, score in scores.items()}
     columns = sum(design.shape[1] for design in designs.values())
     if len(values) >= _PER_TERM * (1 + columns):
         return _fitted(values, designs)
-    found: dict[str, SignedEffect] = {}
+    by_input: dict[str, SignedEffect] = {}
     for name, design in designs.items():
         if len(values) >= _PER_TERM * (1 + design.shape[1]):
-            found |= _fitted(values, {name: design})
-    return found
+            by_input |= _fitted(values, {name: design})
+    return by_input
 
 
 def exact_effect(low: float, high: float) -> SignedEffect:
@@ -119,7 +119,7 @@ def _fitted(values: FloatArray, designs: Mapping[str, FloatArray]) -> dict[str, 
     slopes = inverse @ values
     leverage = np.einsum("ij,ji->i", terms, inverse)
     left_out = (values - terms @ slopes) / np.maximum(1.0 - leverage, 1e-9)
-    found, first = {}, 1
+    by_input, first = {}, 1
     for name, design in designs.items():
         many, changes = design.shape[1] // 2, []
         for score in (float(ndtri(TAIL)), -float(ndtri(TAIL))):
@@ -128,6 +128,6 @@ def _fitted(values: FloatArray, designs: Mapping[str, FloatArray]) -> dict[str, 
             error = math.sqrt(float(((at @ inverse * left_out) ** 2).sum()))
             change = float(at @ slopes)
             changes.append(t_interval(change, error, len(values) - terms.shape[1]))
-        found[name] = SignedEffect(*changes)
+        by_input[name] = SignedEffect(*changes)
         first += design.shape[1]
-    return found
+    return by_input

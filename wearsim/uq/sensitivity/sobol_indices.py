@@ -163,13 +163,17 @@ def saltelli_indices(
     return indices
 
 
-def _combined(one: FloatArray, other: FloatArray, square: FloatArray) -> FloatArray:
+def _combined(saltelli: FloatArray, jansen: FloatArray, square: FloatArray) -> FloatArray:
     """Return the combination of two numerators whose ratio to `square` has the least variance."""
-    influences = [part - part.mean() / square.mean() * square for part in (one, other)]
-    (own, both), (_, others) = np.cov(influences)
-    difference = own + others - 2.0 * both
-    weight = min(max((others - both) / difference, 0.0), 1.0) if difference > 0.0 else 1.0
-    return np.asarray(weight * one + (1.0 - weight) * other)
+    influences = [part - part.mean() / square.mean() * square for part in (saltelli, jansen)]
+    (variance, covariance), (_, variance_of_jansen) = np.cov(influences)
+    difference = variance + variance_of_jansen - 2.0 * covariance
+    weight = (
+        min(max((variance_of_jansen - covariance) / difference, 0.0), 1.0)
+        if difference > 0.0
+        else 1.0
+    )
+    return np.asarray(weight * saltelli + (1.0 - weight) * jansen)
 
 
 def _ratio(part: FloatArray, square: FloatArray) -> Interval:

@@ -80,26 +80,31 @@ def two_specimens(
         lives = [np.minimum(item.life, most) for item in (first, second)]
         shares = part_below(*lives), 1.0 - part_below(lives[1], lives[0])
         left = [float((item >= most).mean()) for item in lives]
-        own = (lives[0] > lives[1]) + 0.5 * (lives[0] == lives[1]) if paired else np.zeros(n)
+        same_draws = (lives[0] > lives[1]) + 0.5 * (lives[0] == lives[1]) if paired else np.zeros(n)
     else:
         grid = _common_grid((first, second), most)
         if len(grid) * max(n, m) > _LARGEST:
             return UNKNOWN
-        one, other = (_with_start(item.failed(grid)) for item in (first, second))
-        alive, fails = 1.0 - 0.5 * (one[:, 1:] + one[:, :-1]), np.diff(other, axis=1)
-        last = 1.0 - one[:, -1], 1.0 - other[:, -1]
+        first_failed, second_failed = (_with_start(item.failed(grid)) for item in (first, second))
+        alive, fails = (
+            1.0 - 0.5 * (first_failed[:, 1:] + first_failed[:, :-1]),
+            np.diff(second_failed, axis=1),
+        )
+        last = 1.0 - first_failed[:, -1], 1.0 - second_failed[:, -1]
         shares = (
             alive @ fails.mean(axis=0) + 0.5 * last[0] * last[1].mean(),
             fails @ alive.mean(axis=0) + 0.5 * last[1] * last[0].mean(),
         )
         left = [float(item.mean()) for item in last] if math.isfinite(most) else [0.0, 0.0]
-        own = (alive * fails).sum(axis=1) + 0.5 * last[0] * last[1] if paired else np.zeros(n)
+        same_draws = (
+            (alive * fails).sum(axis=1) + 0.5 * last[0] * last[1] if paired else np.zeros(n)
+        )
     undecided = 0.5 * left[0] * left[1]
     value = float(shares[0].mean())
     if both_exact:
         return Interval(value, value - undecided, value + undecided)
     if paired:
-        value = (n * value - float(own.mean())) / (n - 1)
+        value = (n * value - float(same_draws.mean())) / (n - 1)
         error = float((shares[0] + shares[1]).std(ddof=1)) / math.sqrt(n)
     else:
         error = math.sqrt(float(shares[0].var(ddof=1)) / n + float(shares[1].var(ddof=1)) / m)
@@ -167,9 +172,9 @@ def quantile_ratio(
         weights.append(
             weights[0] if paired else random.multinomial(m, np.full(m, 1.0 / m), size=size)
         )
-        found = [f(w.astype(float)) for f, w in zip(functions, weights, strict=True)]
+        quantiles = [f(w.astype(float)) for f, w in zip(functions, weights, strict=True)]
         with np.errstate(divide="ignore", invalid="ignore"):
-            logs[start : start + size] = np.log(found[0]) - np.log(found[1])
+            logs[start : start + size] = np.log(quantiles[0]) - np.log(quantiles[1])
     if not np.isfinite(logs).all():
         return Interval(value, 0.0, math.inf) if math.isfinite(value) else UNKNOWN
     tail = 0.5 * (1.0 - CONFIDENCE)
@@ -178,8 +183,8 @@ def quantile_ratio(
     return Interval(value, *(math.exp(middle + widening * (end - middle)) for end in (low, high)))
 
 
-def _ratio(one: float, other: float) -> float:
-    return float(one / other) if math.isfinite(one) and 0.0 < other < math.inf else math.nan
+def _ratio(life: float, other: float) -> float:
+    return float(life / other) if math.isfinite(life) and 0.0 < other < math.inf else math.nan
 
 
 def _common_grid(designs: tuple[LifeDistribution, ...], most: float) -> FloatArray:
@@ -198,7 +203,7 @@ def _common_grid(designs: tuple[LifeDistribution, ...], most: float) -> FloatArr
 
 
 def _with_start(failed: FloatArray) -> FloatArray:
-    """Return probabilities of failure with those at life 0, where nothing has failed."""
+    """Return probabilities of failure from life 0 on, where nothing has failed."""
     return np.concatenate([np.zeros((len(failed), 1)), failed], axis=1)
 
 
@@ -218,8 +223,8 @@ def _weighted_quantile(
             low = (below <= math.floor(rank)).sum(axis=1)
             high = (below <= math.floor(rank) + 1.0).sum(axis=1)
             part = rank - math.floor(rank)
-            one, other = lives[low], lives[np.minimum(high, len(lives) - 1)]
-            return np.asarray(one + part * (other - one) if part > 0.0 else one)
+            lower, upper = lives[low], lives[np.minimum(high, len(lives) - 1)]
+            return np.asarray(lower + part * (upper - lower) if part > 0.0 else lower)
 
         return counted
     failed, logs = design.failed(grid), np.log(grid)
@@ -228,9 +233,9 @@ def _weighted_quantile(
         mean = weights @ failed / weights.sum(axis=1, keepdims=True)
         after = np.clip((mean < probability).sum(axis=1), 1, len(grid) - 1)
         rows = np.arange(len(mean))
-        one, other = mean[rows, after - 1], mean[rows, after]
-        part = (probability - one) / np.maximum(other - one, 1e-300)
-        found = np.exp(logs[after - 1] + part * (logs[after] - logs[after - 1]))
-        return np.asarray(np.where(mean[:, -1] < probability, math.inf, found))
+        below, above = mean[rows, after - 1], mean[rows, after]
+        part = (probability - below) / np.maximum(above - below, 1e-300)
+        quantiles = np.exp(logs[after - 1] + part * (logs[after] - logs[after - 1]))
+        return np.asarray(np.where(mean[:, -1] < probability, math.inf, quantiles))
 
     return mixed

@@ -111,8 +111,8 @@ class CompetingRisks:
         late = self._no_pit(np.broadcast_to(self.end[:, None], high.shape), high)
         survival = border[:, 0] * (alive @ weight)
         wear = (1.0 - border[:, 0]) * (late @ weight)
-        found = float(survival.mean()), float(wear.mean())
-        return Incidence(found[0], 1.0 - found[0] - found[1], found[1])
+        means = float(survival.mean()), float(wear.mean())
+        return Incidence(means[0], 1.0 - means[0] - means[1], means[1])
 
     def either(self, life: float) -> float:
         """Return the probability of an end by wear or by pitting before a life."""
@@ -147,10 +147,10 @@ class CompetingRisks:
 
     def _counted(self, life: float) -> Incidence:
         """Return the probabilities at a life with the factor of each realisation."""
-        one = np.ones((len(self.end), 1))
+        factors = np.ones((len(self.end), 1))
         ended = self.worn.astype(np.bool_) & (self.end <= life)
         passes = np.minimum(life, self.end)[:, None]
-        alive = self._no_pit(passes, one)[:, 0]
+        alive = self._no_pit(passes, factors)[:, 0]
         survival, wear = float(np.mean(alive * ~ended)), float(np.mean(alive * ended))
         return Incidence(survival, 1.0 - survival - wear, wear)
 

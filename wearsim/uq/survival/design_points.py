@@ -58,17 +58,17 @@ def design_points(scores: FloatArray, response: FloatArray, needed: Needed) -> l
     dimension = scores.shape[1]
 
     def distance(points: FloatArray) -> FloatArray:
-        found = fit(points)
-        score = np.clip(needed(found), 0.0, _OPEN)
-        beyond = np.where(score < _OPEN, 0.0, found - response.min())  # leads towards the event
+        fitted = fit(points)
+        score = np.clip(needed(fitted), 0.0, _OPEN)
+        beyond = np.where(score < _OPEN, 0.0, fitted - response.min())  # leads towards the event
         return np.asarray((points**2).sum(axis=1) + score**2 + _OPEN**2 * np.maximum(beyond, 0.0))
 
     def improved(point: FloatArray) -> FloatArray:
         def at(z: Any) -> float:
             return float(distance(np.asarray(z)[None])[0])
 
-        found = np.asarray(minimize(at, point, method="Nelder-Mead").x)
-        return np.asarray(found * min(1.0, _FAR / max(float(np.linalg.norm(found)), _FAR)))
+        nearest = np.asarray(minimize(at, point, method="Nelder-Mead").x)
+        return np.asarray(nearest * min(1.0, _FAR / max(float(np.linalg.norm(nearest)), _FAR)))
 
     random = np.random.default_rng(0)
     directions = random.standard_normal((_CANDIDATES, dimension))
@@ -83,9 +83,13 @@ def design_points(scores: FloatArray, response: FloatArray, needed: Needed) -> l
     if not other.any() or values[other].min() > reach:
         return [first]
     second = improved(candidates[other][np.argmin(values[other])])
-    one, two = distance(np.stack([first, second]))
+    distance_of_first, distance_of_second = distance(np.stack([first, second]))
     opposite = float(first @ second) < 0.0 and float(np.linalg.norm(second)) > 0.5
-    return [first, second] if opposite and two - one < _UNLIKELY else [first]
+    return (
+        [first, second]
+        if opposite and distance_of_second - distance_of_first < _UNLIKELY
+        else [first]
+    )
 
 
 def _fit(
@@ -93,7 +97,7 @@ def _fit(
 ) -> tuple[Callable[[FloatArray], FloatArray], FloatArray]:
     """Return the fitted function, and the slopes of the linear fit."""
     count, dimension = scores.shape
-    found = []
+    fits = []
     total = float(((response - response.mean()) ** 2).sum()) + np.finfo(float).tiny
     for powers in ((1,), (1, 2)):
         if powers == (1, 2) and count < 2 * (1 + 2 * dimension):
@@ -102,9 +106,9 @@ def _fit(
         terms = np.linalg.lstsq(design, response, rcond=None)[0]
         left = float(((response - design @ terms) ** 2).sum()) / total
         criterion = count * math.log(max(left, 1e-20)) + design.shape[1] * math.log(count)
-        found.append((criterion, powers, terms))
-    _, powers, terms = min(found, key=lambda item: item[0])
-    return lambda z: np.asarray(_terms(z, powers) @ terms), np.asarray(found[0][2][1:])
+        fits.append((criterion, powers, terms))
+    _, powers, terms = min(fits, key=lambda item: item[0])
+    return lambda z: np.asarray(_terms(z, powers) @ terms), np.asarray(fits[0][2][1:])
 
 
 def _terms(scores: FloatArray, powers: Sequence[int]) -> FloatArray:
@@ -169,10 +173,10 @@ def improved_shifts(
     distances = np.array([((scores - point) ** 2).sum(axis=1) for point in points])
     nearest, shifts, parts = distances.argmin(axis=0), [], []
     for number, point in enumerate(points):
-        own = np.where(nearest == number, weight, 0.0)
-        total, square = float(own.sum()), float((own**2).sum())
+        near = np.where(nearest == number, weight, 0.0)
+        total, square = float(near.sum()), float((near**2).sum())
         enough = square > 0.0 and total**2 >= _FEW * square
-        shifts.append(np.asarray(own @ scores / total) if enough else point)
+        shifts.append(np.asarray(near @ scores / total) if enough else point)
         parts.append(total)
     whole = max(sum(parts), np.finfo(float).tiny)
     parts = [max(part / whole, _LEAST_SHARE) for part in parts]

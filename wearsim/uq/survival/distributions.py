@@ -58,24 +58,24 @@ class LifeDistribution(ABC):
         Interval
             Student's t on the logit scale; of zero width if nothing is sampled.
         """
-        each = self.failed(np.array([life]))[:, 0]
-        value = float(each.mean())
+        failed = self.failed(np.array([life]))[:, 0]
+        value = float(failed.mean())
         if self.exact:
             return Interval(value, value, value)
         if self.count < 2:
             return Interval(value, 0.0, 1.0)
-        return logit_interval(value, *self.error(life, each))
+        return logit_interval(value, *self.error(life, failed))
 
-    def error(self, life: float, each: FloatArray) -> tuple[float, float]:
+    def error(self, life: float, failed: FloatArray) -> tuple[float, float]:
         """Return the standard error of the mean probability, and its degrees of freedom.
 
         Parameters
         ----------
         life : float
-        each : ndarray, shape (count,)
+        failed : ndarray, shape (count,)
             Probabilities of failure before it.
         """
-        return float(each.std(ddof=1)) / math.sqrt(self.count), self.count - 1
+        return float(failed.std(ddof=1)) / math.sqrt(self.count), self.count - 1
 
     def quantile(self, probability: float) -> Interval:
         """Return the life that a share does not reach.
@@ -184,7 +184,7 @@ class FactorMixture(LifeDistribution):
 
     @cached_property
     def middle(self) -> float:
-        """A life within the distribution: that of the median wear factor."""
+        """A life within the distribution, at the median wear factor."""
         finite = self.kappa[self.is_finite]
         return (
             float(np.median(finite) / math.exp(self.score.log_quantile(0.0)))
@@ -206,15 +206,15 @@ class FactorMixture(LifeDistribution):
         shift = np.broadcast_to(np.asarray(self.shift), self.kappa.shape)[:, None]
         return np.asarray(ndtr((shift - self.score(factor)) / self.spread))
 
-    def error(self, life: float, each: FloatArray) -> tuple[float, float]:
+    def error(self, life: float, failed: FloatArray) -> tuple[float, float]:
         """Return the standard error of the mean probability, and its degrees of freedom.
 
         The error is at least the one predicted by fits of ln kappa, since a sample rarely contains
         the realisations that cause most of the scatter of a small probability, and with a spread
         that is the greater the smaller the probability, see `caution`.
         """
-        error, degrees = super().error(life, each)
-        mean = float(each.mean())
+        error, degrees = super().error(life, failed)
+        mean = float(failed.mean())
         predicted = self._predicted(life, caution(mean))
         if predicted == 0.0:  # a probability below the least number
             return math.inf, 1.0
@@ -231,8 +231,8 @@ class FactorMixture(LifeDistribution):
             return math.inf
         if self.count < 2:
             return 0.0
-        each = self.failed(np.array([life]))[:, 0]
-        number = effective_number(self.count, float(each.mean()), float(each.var(ddof=1)))
+        failed = self.failed(np.array([life]))[:, 0]
+        number = effective_number(self.count, float(failed.mean()), float(failed.var(ddof=1)))
         return min(number, self._predicted(life, 1.0))
 
     def _predicted(self, life: float, widened: float) -> float:

@@ -84,14 +84,14 @@ def fits_of(log: FloatArray) -> Fits:
     count = len(log)
     if count < 2:
         return Fits(float(log.mean()) if count else 0.0, [np.zeros_like(_SCORES)], 1.0)
-    centre, found = float(log.mean()), [log.std(ddof=1) * _SCORES]
+    centre, fits = float(log.mean()), [log.std(ddof=1) * _SCORES]
     if count >= _FEWEST:
         ordered, scores = np.sort(log) - centre, ndtri((np.arange(count) + 0.625) / (count + 0.25))
-        found.append(np.polyval(np.polyfit(scores, ordered, 2), _SCORES))
+        fits.append(np.polyval(np.polyfit(scores, ordered, 2), _SCORES))
     degrees = count - 1
     # of the chi-squared distribution of the variance
     lower = 2.0 * float(gammaincinv(0.5 * degrees, 1.0 - _CONFIDENCE)) / degrees
-    return Fits(centre, found, 1.0 / math.sqrt(lower))
+    return Fits(centre, fits, 1.0 / math.sqrt(lower))
 
 
 def caution(probability: float) -> float:
@@ -128,10 +128,10 @@ def predicted_number(
     sure, fitted = shares
     numbers = []
     for fit in fits:
-        each = probability(fit)
-        inner = float(_DENSITY @ each)
+        failed = probability(fit)
+        inner = float(_DENSITY @ failed)
         mean = sure + fitted * inner
-        terms = fitted * float(_DENSITY @ (each - mean) ** 2)
+        terms = fitted * float(_DENSITY @ (failed - mean) ** 2)
         variance = sure * (1.0 - mean) ** 2 + terms + (1.0 - sure - fitted) * mean**2
         numbers.append(effective_number(count, mean, variance))
     return min(numbers)

@@ -189,10 +189,10 @@ class _Sample:
 
     def maximum(self, w: float = 0.0) -> tuple[FloatArray, float]:
         """Return location and ln sigma of the greatest log-likelihood, and its value."""
-        found = self.logs[self.observed]
+        observed = self.logs[self.observed]
         weight = np.broadcast_to(np.asarray(self.weight), self.logs.shape)
         middle = float(np.average(self.logs, weights=weight))
-        start = np.array([middle, math.log(max(float(found.std()), 1e-12))])
+        start = np.array([middle, math.log(max(float(observed.std()), 1e-12))])
         return self._maximised(start, w, [0, 1])
 
     def _maximised(self, at: FloatArray, w: float, free: list[int]) -> tuple[FloatArray, float]:
@@ -209,12 +209,14 @@ class _Sample:
                 trial = at.copy()
                 trial[free] += step
                 with np.errstate(over="ignore", invalid="ignore"):
-                    found = self.derivatives(trial[0], trial[1], w)
-                if found[0] >= value or not np.any(np.abs(step) > 1e-14 * (1.0 + np.abs(at[free]))):
+                    derivatives = self.derivatives(trial[0], trial[1], w)
+                if derivatives[0] >= value or not np.any(
+                    np.abs(step) > 1e-14 * (1.0 + np.abs(at[free]))
+                ):
                     break
                 step = 0.5 * step
-            gain, at = found[0] - value, trial
-            value, gradient, curvature = found
+            gain, at = derivatives[0] - value, trial
+            value, gradient, curvature = derivatives
             if gain <= 1e-13 * (1.0 + abs(value)) and (np.abs(step) < 1e-9).all():
                 break
         return at, value
@@ -286,7 +288,7 @@ class IntegratedFit(FittedLives):
     degrees : float
         Its degrees of freedom.
     difference : float
-        Greatest difference of its probabilities from those of the lives.
+        Greatest difference of its probabilities from the shares of the lives.
     """
 
     sampling: FloatArray

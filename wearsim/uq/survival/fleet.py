@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.distributions.two_levels import TwoLevels, weighted_quantiles
-from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.estimation.intervals import ENDS, Interval
 from wearsim.uq.survival.distributions import FactorMixture
 from wearsim.uq.survival.returns import Fleet, LifeFunctions
 
@@ -23,7 +23,6 @@ _EDGES = 200  # lives among which the edges of bands are chosen
 _NODES = 81  # of the functions of a scatter
 _LEAST = 1e-4  # weight over the greatest up to which the posterior counts for remaining lives
 _FURTHER = np.geomspace(1e-4, 30.0, 73)  # further lives, over the median life
-_ENDS = np.array([0.025, 0.975])
 
 
 class Predicted(NamedTuple):
@@ -114,7 +113,7 @@ def check_fleet(
 def _predicted(numbers: IntArray, units: int) -> Predicted:
     """Return the prediction of drawn numbers of failures, shape (draws, bands)."""
     numbers = np.minimum(np.column_stack([numbers, numbers.sum(axis=1)]), units)
-    low, high = np.quantile(numbers, _ENDS, axis=0, method="inverted_cdf")
+    low, high = np.quantile(numbers, ENDS, axis=0, method="inverted_cdf")
     return Predicted(numbers.mean(axis=0), low, high)
 
 
@@ -234,13 +233,13 @@ def remaining_lives(
         stated = []
         for share in shares:
             crossed = _crossings(curves, 1.0 - share, further)
-            low, high = weighted_quantiles(crossed, weight, _ENDS).tolist()
+            low, high = weighted_quantiles(crossed, weight, ENDS).tolist()
             value = float(_crossings(mean[None, :], 1.0 - share, further)[0])
             stated.append(Interval(value, min(low, value), max(high, value)))
         survival = None
         if target is not None and target > ages[place]:
             reached = ratio[:, place, -1]
-            low, high = weighted_quantiles(reached, weight, _ENDS).tolist()
+            low, high = weighted_quantiles(reached, weight, ENDS).tolist()
             value = float(weight @ reached)
             survival = Interval(value, min(low, value), max(high, value))
         remaining.append(RemainingLife(tuple(stated), survival))

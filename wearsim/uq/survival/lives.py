@@ -71,18 +71,18 @@ def survival_curve(life: FloatArray, observed: BoolArray) -> SurvivalCurve:
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # undefined where the survival is 0 or 1
         band = function.confidence_interval(CONFIDENCE, method="log-log")
-    found = np.unique(life[observed])
+    ends = np.unique(life[observed])
     steps: list[Any] = [function, band.low, band.high]
-    survival, low, high = (np.array(item.evaluate(found)) for item in steps)
+    survival, low, high = (np.array(item.evaluate(ends)) for item in steps)
     low = np.where(np.isnan(low), 0.0, low)
     high = np.fmin.accumulate(np.where(np.isnan(high), 1.0, high))
     first_censored = life[~observed].min() if (~observed).any() else math.inf
-    for place, end in enumerate(found[:_FEW]):
+    for place, end in enumerate(ends[:_FEW]):
         failures = int((life[observed] <= end).sum())
         if end < first_censored and failures < _FEW:
             exact = proportion(failures, len(life))
             low[place], high[place] = 1.0 - exact.high, 1.0 - exact.low
-    return SurvivalCurve(found, survival, low, high)
+    return SurvivalCurve(ends, survival, low, high)
 
 
 def proportion(count: int, of: int, confidence: float = CONFIDENCE) -> Interval:
@@ -296,10 +296,10 @@ def cumulative_incidence(
     >>> cumulative_incidence(np.array([1.0, 2.0, 3.0]), np.array([0, 1, 0]), 2)[1][:, -1]
     array([0.66666667, 0.33333333])
     """
-    found = np.unique(life[cause >= 0])
-    at_risk = len(life) - np.searchsorted(np.sort(life), found)
+    ends = np.unique(life[cause >= 0])
+    at_risk = len(life) - np.searchsorted(np.sort(life), ends)
     failed = np.array(
-        [[((life == end) & (cause == k)).sum() for end in found] for k in range(causes)]
-    ).reshape(causes, len(found))
+        [[((life == end) & (cause == k)).sum() for end in ends] for k in range(causes)]
+    ).reshape(causes, len(ends))
     survival = np.concatenate([[1.0], np.cumprod(1.0 - failed.sum(axis=0) / at_risk)])
-    return found, np.cumsum(survival[:-1] * failed / at_risk, axis=1)
+    return ends, np.cumsum(survival[:-1] * failed / at_risk, axis=1)

@@ -144,7 +144,7 @@ def design_point(scores: FloatArray, response: FloatArray) -> FloatArray:
 
 
 def next_shift(scores: FloatArray, response: FloatArray, log_weight: FloatArray) -> FloatArray:
-    """Return the mean of the next density: that of the events, by their weights.
+    """Return the mean of the next density: the weighted mean of the events.
 
     Parameters
     ----------
@@ -244,8 +244,8 @@ def subset_simulation(
         try:
             stage = stages.send(response(trial))
         except StopIteration as end:
-            found: RareProbability = end.value
-            return found
+            probability: RareProbability = end.value
+            return probability
 
 
 def subset_stages(
@@ -313,7 +313,7 @@ def subset_stages(
         left = math.ceil(math.log(chance / probability) / math.log(_LEVEL) - _TOLERATED)
         left = max(left, math.ceil(_AHEAD * levels), 1)
         seeds, chains = np.flatnonzero(event)[:kept], kept
-        state, value, found = states[seeds], values[seeds], []
+        state, value, steps = states[seeds], values[seeds], []
         for _ in range(max((tests - done) // (left * kept), 2)):
             scale = min(scale, 1.0)
             trial = yield SubsetStage(kept, state, scale)
@@ -322,8 +322,8 @@ def subset_stages(
             value = np.where(accepted, trial, value)
             scale *= math.exp(float(accepted.mean()) - _ACCEPTANCE)
             done += kept
-            found.append((state, value))
-        states, values = (np.concatenate(items) for items in zip(*found, strict=True))
+            steps.append((state, value))
+        states, values = (np.concatenate(items) for items in zip(*steps, strict=True))
 
 
 def _correlation(event: BoolArray, share: float) -> float:

@@ -241,7 +241,7 @@ def _location_error(lives: FactorMixture) -> float:
 
 
 def _scatters_of(levels: TwoLevels) -> tuple[FloatArray, IntArray]:
-    """Return the scatters of a posterior, those that hardly differ as one, and that of each row."""
+    """Return the scatters of a posterior, nearly equal ones merged, and the scatter of each row."""
     scatters, owner = np.unique(levels.t, return_inverse=True)
     starts = [0]
     for place, t in enumerate(scatters):
@@ -284,7 +284,7 @@ def _covering(values: FloatArray, weight: FloatArray, count: int) -> FloatArray:
 
 
 def _scatter_grid(scatters: FloatArray, weight: FloatArray) -> FloatArray:
-    """Return scatters over the greatest part of the posterior, finer than those of the prior."""
+    """Return scatters over the greatest part of the posterior, finer than in the prior."""
     if len(scatters) <= _FEW:
         return scatters
     inside = np.flatnonzero(weight > _SHARE)

@@ -97,7 +97,8 @@ def score_function(distribution: Distribution) -> ScoreFunction:
         added.append((middle[rough], log[rough]))
         halves = (first, middle, below, log), (middle, last, log, above)
         ends = tuple(  # type: ignore[assignment]
-            np.concatenate([one[rough], other[rough]]) for one, other in zip(*halves, strict=True)
+            np.concatenate([lower_half[rough], upper_half[rough]])
+            for lower_half, upper_half in zip(*halves, strict=True)
         )
     scores, logs = (np.concatenate(items) for items in zip(*added, strict=True))
     order = np.argsort(scores, kind="stable")

@@ -14,11 +14,10 @@ import numpy as np
 
 from wearsim.types import FloatArray
 from wearsim.uq.distributions.two_levels import TwoLevels, weighted_quantiles
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+from wearsim.uq.estimation.intervals import ENDS, UNKNOWN, Interval
 from wearsim.uq.survival.distributions import FactorMixture, logit_interval
 from wearsim.uq.survival.scores import ScoreFunction
 
-ENDS = np.array([0.025, 0.975])
 _WIDE = 700.0  # greatest magnitude of a logarithm
 _NODES = 121  # of ln life at which probabilities are tabulated for each scatter
 _REACH = 8.0  # of these nodes beyond the realisations, in scatters
@@ -106,16 +105,18 @@ class UncertainLives:
     def _quantiles(self, share: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return ln life of a share with m = 0 for each scatter, and the ends of its interval.
 
-        The interval is that of `LifeDistribution.quantile`.
+        The interval is computed as in `LifeDistribution.quantile`.
         """
         value = self._crossings(np.full(len(self.scatters), share))
         if self.mixture.exact:
             return value, value, value
         ends = []
-        for log, t, each in zip(value, self.scatters, self._failed(value), strict=True):
-            error = self.given(0.0, float(t)).error(math.exp(min(log, _WIDE)), each)
+        for log, t, failed in zip(value, self.scatters, self._failed(value), strict=True):
+            error = self.given(0.0, float(t)).error(math.exp(min(log, _WIDE)), failed)
             ends.append(logit_interval(share, *error))
-        low, high = (np.array([getattr(one, end) for one in ends]) for end in ("low", "high"))
+        low, high = (
+            np.array([getattr(interval, end) for interval in ends]) for end in ("low", "high")
+        )
         return value, self._crossings(low), self._crossings(high)
 
     def _failed(self, log: FloatArray) -> FloatArray:
@@ -146,18 +147,18 @@ class UncertainLives:
 
     def probability_before(self, life: float) -> Interval:
         """Return the probability of a life below `life`, with its 95 % credible interval."""
-        found = self.mixture.probability_before(life)
-        if not 0.0 < found.value < 1.0:
-            return found
-        each = np.clip(self.probabilities(np.array([life]))[:, 0], _LEAST, 1.0 - 2.0**-53)
-        logits, weight = np.log(each / (1.0 - each)), self.levels.weight
-        if not 0.0 < found.low <= found.high < 1.0:
+        interval = self.mixture.probability_before(life)
+        if not 0.0 < interval.value < 1.0:
+            return interval
+        chances = np.clip(self.probabilities(np.array([life]))[:, 0], _LEAST, 1.0 - 2.0**-53)
+        logits, weight = np.log(chances / (1.0 - chances)), self.levels.weight
+        if not 0.0 < interval.low <= interval.high < 1.0:
             return UNKNOWN
-        sampled = [math.log(end / (1.0 - end)) for end in (found.low, found.high)]
+        sampled = [math.log(end / (1.0 - end)) for end in (interval.low, interval.high)]
         errors = np.full(len(logits), (sampled[1] - sampled[0]) / (2.0 * _NORMAL))
         ends = weighted_quantiles(*_with_errors(logits, errors, weight), ENDS)
         low, high = (1.0 / (1.0 + np.exp(-ends))).tolist()
-        return Interval(found.value, min(low, found.value), max(high, found.value))
+        return Interval(interval.value, min(low, interval.value), max(high, interval.value))
 
     def probabilities(self, life: FloatArray) -> FloatArray:
         """Return the probability of a life below each of `life` for all (m, t), shape (rows, m)."""
@@ -165,11 +166,11 @@ class UncertainLives:
 
         with np.errstate(divide="ignore"):
             log = self.levels.m[:, None] + np.log(life)
-        found = np.empty_like(log)
+        failed = np.empty_like(log)
         for place, (nodes, scores) in enumerate(zip(*self._table, strict=True)):
             rows = self._owner == place
-            found[rows] = ndtr(np.interp(log[rows], nodes, scores))
-        return found
+            failed[rows] = ndtr(np.interp(log[rows], nodes, scores))
+        return failed
 
     @cached_property
     def _table(self) -> tuple[FloatArray, FloatArray]:

@@ -243,6 +243,7 @@ def _lives(
         "on_progress": lambda progress: on_progress(progress.done),
     }
     others = [item for item in scenario.random if not item.name.startswith("wear.")]
+    result: wearsim.EnsembleResult
     if request.tests == 0:
         if len(others) == len(scenario.random):
             return Answer(tests=0)  # the wear factor does not scatter
@@ -251,9 +252,9 @@ def _lives(
             scenario = _with_means(request.design, others)
         result = wearsim.life(scenario, 1, **options)
     elif path.exists():
-        result = wearsim.resume_life(path, **options)  # the tests that were stopped
+        result = wearsim.resume_ensemble(path, **options)  # the tests that were stopped
         if result.count < request.tests:
-            result = wearsim.resume_life(path, realisations=request.tests, **options)
+            result = wearsim.resume_ensemble(path, realisations=request.tests, **options)
     else:
         result = wearsim.life(scenario, request.tests, path, **options)
     shown, _ = panels_of(result.view.panels())

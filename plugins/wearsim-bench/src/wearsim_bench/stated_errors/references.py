@@ -42,6 +42,7 @@ MOST_STRIPS = ((3, 601), (8, 321), (10_000, 161))
 PILOT_TOLERANCE, PILOT_STRIPS, WIDENED = 1e-2, 8.0, 1.6
 MOST_PILOTS = 14
 SECONDS = 300.0  # limit on the process time of a reference, which other work does not change
+_FAILURE = "failure"  # name of the reason for which there is no reference
 SETTINGS = hashlib.sha256(
     repr(
         (EACH_PASS, LOOSE_FROM, LONGEST_STEP, PER_PATCH, PER_GROOVE, LEAST_STRIPS, MOST_STRIPS)
@@ -280,18 +281,27 @@ def reference_of(test: RandomTest, folder: Path | None) -> Reference:
 
 
 def kept(path: Path | None, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Return the arrays of a file, or compute them and write it."""
+    """Return the arrays of a file, or compute them and write it; also a failure is kept."""
     if path is not None and path.exists():
         try:
             with np.load(path) as arrays:
-                return {name: arrays[name][()] for name in arrays}
+                found = {name: arrays[name][()] for name in arrays}
         except (OSError, ValueError, TypeError, EOFError, BadZipFile) as error:
             raise ResultsFileError(f"{path}: is not a reference solution; delete it") from error
-    computed = compute()
+        if _FAILURE in found:
+            raise SolverError(f"{found[_FAILURE]} (kept in {path.name})")
+        return found
+    failure: SolverError | None = None
+    try:
+        computed = compute()
+    except SolverError as error:
+        failure, computed = error, {_FAILURE: error.message}
     if path is not None:
         path.parent.mkdir(parents=True, exist_ok=True)
         with os_errors_converted(path), replacement(path) as file:
             np.savez(file, **computed)
+    if failure is not None:
+        raise failure
     return computed
 
 
