@@ -2,21 +2,25 @@
 # make test            lint, types, import contracts and the quick tests: 7 minutes on 2 cores
 # make test-slow       the other tests: kills of the writers, hard cases, installs, Dask, the site: 20 minutes
 # make test-coverage   how often stated intervals hold the truth, by hundreds of data sets: 10 minutes, before a release
+# make mutants         share of changed operators and constants that the quick tests notice: docs/measurements/mutants.json;
+#                      SAMPLE=300 and SEED=1 choose, SAMPLE=0 takes all 15,000, which takes hours
 # make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; ten minutes,
 #                      and an hour of one core for the references of stated errors, which are kept in out/references
 # make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
 # make bench-ensembles the same of persistence, ensembles and intervals of lives; a quarter of an hour
 # make validate        published tests compared: out/validation, docs/measurements/validation.json; less than two minutes
 # make docs            the site: docs/_build/html/index.html; three minutes, no network; make linkcheck looks at external links
-# make release         all distributions as sdist and wheel in dist/, checked, installed in empty environments; SBOM; ten minutes
+# make release         all distributions as sdist and wheel in dist/, checked, installed in empty environments; the conda
+#                      package, built and tested; SBOM; ten minutes
 # make clean           remove what these targets made, including the environment
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
+MEASURED := docs/measurements
 
-.PHONY: demo test test-slow test-coverage style lint bench bench-docs bench-ensembles validate docs linkcheck release clean
+.PHONY: demo test test-slow test-coverage mutants style lint bench bench-docs bench-ensembles validate docs linkcheck release clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -26,7 +30,7 @@ demo: $(VENV)/.installed
 
 # threads of BLAS in each of the test processes would wait for each other; bytecode of the tests is
 # kept for the processes that start later, also where PYTHONDONTWRITEBYTECODE is set
-test test-slow test-coverage: export OPENBLAS_NUM_THREADS = 1
+test test-slow test-coverage mutants: export OPENBLAS_NUM_THREADS = 1
 test test-slow test-coverage: export PYTHONDONTWRITEBYTECODE =
 
 # mypy, which takes one core for a minute, runs beside the tests
@@ -40,6 +44,11 @@ test-slow: $(VENV)/.installed-dev
 test-coverage: $(VENV)/.installed-dev
 	$(BIN)/pytest -n $(JOBS) --dist worksteal -m coverage
 
+SAMPLE ?= 300
+SEED ?= 1
+mutants: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.mutation.campaign --sample $(SAMPLE) --seed $(SEED) -o $(MEASURED)/mutants.json
+
 style: $(VENV)/.installed-dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -48,7 +57,6 @@ lint: style
 	$(BIN)/mypy
 
 # a topic that fails leaves the file of the last measurement; references do not depend on the stepper
-MEASURED := docs/measurements
 bench-docs: $(VENV)/.installed-dev
 	mkdir -p out
 	$(BIN)/wearsim bench stepping -o out/bench --force && cp out/bench/stepping.json $(MEASURED)
@@ -98,6 +106,7 @@ release: $(VENV)/.installed-dev
 	$(BIN)/twine check --strict dist/*
 	$(BIN)/check-wheel-contents --ignore W004 dist/*.whl
 	WEARSIM_DIST=dist $(BIN)/pytest -m slow tests/test_installs.py
+	$(BIN)/python release/conda.py
 	$(PYTHON) -m venv --without-pip $(SBOM)/venv
 	$(BIN)/python -m pip --python $(SBOM)/venv/bin/python install --quiet dist/wearsim-[0-9]*.whl
 	$(BIN)/cyclonedx-py environment --pyproject pyproject.toml --of JSON -o $(SBOM)/wearsim.cdx.json $(SBOM)/venv/bin/python

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -56,6 +57,50 @@ def test_no_module_prints():
 def test_every_module_has_a_docstring():
     bare = [str(path) for path in MODULES if not ast.get_docstring(tree(path))]
     assert not bare
+
+
+PATCHES = {"setattr", "delattr", "setitem", "delitem", "patch", "object"}
+MAY_PATCH = re.compile(r"(set|del)attr\(|patch\(|\._\w+(\.\w+)* = ")
+
+
+def patched_names(module: ast.Module) -> Iterator[str]:
+    """Yield the attributes that a module of tests replaces, except those of its own `self`."""
+    for node in ast.walk(module):
+        if isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            if called in PATCHES:
+                names = [name for name in node.args[:2] if isinstance(name, ast.Constant)]
+                yield from (str(name.value).rpartition(".")[2] for name in names)
+        elif isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
+            text = ast.unparse(node)
+            yield from [] if text.rpartition(".")[0] == "self" else text.split(".")
+
+
+def test_tests_patch_no_private_names():
+    texts = {path: path.read_text() for path in TESTS}
+    found = {
+        str(path.relative_to(ROOT)): name
+        for path, text in texts.items()
+        if MAY_PATCH.search(text)
+        for name in patched_names(tree(path))
+        if re.match("_(?!_)", name)
+    }
+    assert not found, "replace by an argument, a public name, or a test of the effect"
+
+
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [
+        ('monkeypatch.setattr("wearsim.run._clock", now)', {"_clock"}),
+        ("monkeypatch.delattr(run, '_clock')", {"_clock"}),
+        ("run._clock = now", {"run", "_clock"}),
+        ("run._state.clock = now", {"run", "_state", "clock"}),
+        ("self._clock = now", set()),
+        ("now = run._clock", set()),
+    ],
+)
+def test_patched_names_are_found(line: str, names: set[str]):
+    assert set(patched_names(ast.parse(line))) == names
 
 
 def test_no_file_is_longer_than_500_lines():

@@ -255,20 +255,16 @@ def test_cache_is_renewed_when_a_callee_elsewhere_changes(site: Path, tmp_path: 
 
 
 @pytest.fixture
-def cache_folder(
-    site: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[Callable[[Path | None], Path | None]]:
+def cache_folder(site: Path, tmp_path: Path) -> Iterator[Callable[[Path | None], Path | None]]:
     """Return a function that gives the folder of the kernels of `site` as in a new process."""
-    monkeypatch.setattr(jit, "__file__", str(site / "wearsim/mechanics/numerics/jit.py"))
 
     def folder(of_user: Path | None = None) -> Path | None:
-        monkeypatch.setenv("NUMBA_CACHE_DIR", str(of_user or ""))
-        jit._cache_folder.cache_clear()
-        return jit._cache_folder()
+        jit.cache_folder.cache_clear()
+        home = str(tmp_path / "home")
+        return jit.cache_folder(site / "wearsim" / "mechanics", str(of_user or ""), home)
 
     yield folder
-    monkeypatch.undo()
-    jit._cache_folder.cache_clear()
+    jit.cache_folder.cache_clear()
 
 
 def test_unwritable_folder_of_the_user_falls_back_to_the_next(site, tmp_path, cache_folder):

@@ -6,17 +6,16 @@ from pathlib import Path
 
 import pytest
 from cli_examples import SHORT, Command
-from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from typer.testing import CliRunner, Result
 
 from wearsim.cli.app import app
-from wearsim.report import figures
 
 
 @pytest.fixture(autouse=True)
 def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let texts of figures overlap, which halves the time; those of tests/report do not."""
-    monkeypatch.setattr(figures, "_Figure", lambda figsize, layout: Figure(figsize=figsize))
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda engine, figure: None)
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,10 @@ from typer.testing import CliRunner
 from wearsim.cli.app import app
 from wearsim.mechanics.cam.motion import Motion, Segment
 from wearsim.models.motion import LiftSpline
+from wearsim.report.animation import Animation
+from wearsim.report.panels import Panel
 from wearsim.scenario import load_scenario
+from wearsim.studies.cam import drawing
 
 CAM, ARM = (str(SCENARIOS / f"cam-{name}.toml") for name in ("cycloidal", "swinging"))
 
@@ -162,10 +166,11 @@ def test_animation_turns_once(
 ) -> None:
     from PIL import Image
 
-    from wearsim.studies.cam import drawing
+    def shortened(frame: Callable[[int], Panel], count: int, rate: int) -> Animation:
+        assert count == 72
+        return Animation(lambda number: frame(9 * number), 8, rate)
 
-    assert drawing._FRAMES == 72
-    monkeypatch.setattr(drawing, "_FRAMES", 8)
+    monkeypatch.setattr(drawing, "Animation", shortened)
     done = command("plot", run_of_arm, "--animate", "arm.gif")
     assert done.exit_code == 0, done.output
     with Image.open("arm.gif") as film:

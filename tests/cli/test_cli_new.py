@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import math
 import re
+import runpy
+import shutil
 import tomllib
 from pathlib import Path
 
@@ -245,12 +247,14 @@ def test_new_plugin_replaces_no_folder(command: Command) -> None:
     assert not list(Path("wearsim-sponge").iterdir())
 
 
-def test_template_is_found_installed_or_in_a_clone(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_template_is_found_installed_or_in_a_clone(tmp_path: Path) -> None:
     assert template.template_folder() == ROOT / "plugins" / "wearsim-template"
-    monkeypatch.setattr(template, "_FOLDERS", (tmp_path, ROOT))
-    assert template.template_folder() == tmp_path
+    installed = tmp_path / "wearsim"
+    (installed / "plugins").mkdir(parents=True)
+    module = shutil.copy(str(template.__file__), installed / "plugins")
+    (installed / "plugin_template").mkdir()
+    found = runpy.run_path(str(module))["template_folder"]()
+    assert found == installed / "plugin_template"
 
 
 def test_wheel_contains_the_files_of_new() -> None:

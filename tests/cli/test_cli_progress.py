@@ -1,11 +1,11 @@
 import io
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from wearsim.cli import progress
 from wearsim.cli.progress import RunWatcher
-from wearsim.mechanics.numerics import jit
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.report.text import plain
 from wearsim.studies.run.recorder import Event, Finished, Started, Stepped, Warned
@@ -59,9 +59,9 @@ def test_first_steps_show_no_time_left(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_compilation_is_shown_in_lines_without_control_characters(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(jit, "_cache_folder", lambda: None)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     time = Time()
 
     @kernel
@@ -83,9 +83,9 @@ def test_compilation_is_shown_in_lines_without_control_characters(
 
 
 def test_quiet_shows_no_compilation(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(jit, "_cache_folder", lambda: None)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
 
     @kernel
     def third(x: float) -> float:

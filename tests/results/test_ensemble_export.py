@@ -9,7 +9,6 @@ import pytest
 
 from tests.report.made_up_ensembles import made_up
 from wearsim.errors import ResultsFileError
-from wearsim.studies.ensemble import view as ensemble_view
 from wearsim.studies.opening import export_csv
 
 
@@ -20,14 +19,13 @@ def read(path):
     return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
 
 
-@pytest.mark.parametrize("block", [7, 10_000])
-def test_every_realisation_is_a_row_for_any_block_size(tmp_path, monkeypatch, block):
-    monkeypatch.setattr(ensemble_view, "_BLOCK", block)
-    result = made_up(30, failed=[4, 9], pending=3)
+@pytest.mark.parametrize("count", [30, 16_600])  # the second is written in two blocks
+def test_every_realisation_is_a_row(tmp_path, count):
+    result = made_up(count, failed=[4, 9], pending=3)
     export_csv(result, tmp_path)
     found = read(tmp_path / "realisations.csv")
-    np.testing.assert_array_equal(found["realisation"], np.arange(27))
-    failed = np.isin(np.arange(27), [4, 9])
+    np.testing.assert_array_equal(found["realisation"], np.arange(count - 3))
+    failed = np.isin(np.arange(count - 3), [4, 9])
     np.testing.assert_array_equal(found["failed"], failed)
     assert np.isnan(found["depth [um]"][failed]).all()
     good = {title: values[~failed] for title, values in found.items()}

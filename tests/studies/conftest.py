@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
 from wearsim.evolution.steppers import per_pass
-from wearsim.studies.run.in_progress import RunInProgress
+from wearsim.studies.run import in_progress
 
 
 @pytest.fixture
@@ -19,10 +20,8 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Set the measured duration of writing to zero, so that it does not limit the checkpoints."""
-    monkeypatch.setattr(
-        RunInProgress, "_last_write", property(lambda _: 0.0, lambda _, seconds: None)
-    )
+    """Let the duration of writing not limit the checkpoints."""
+    monkeypatch.setattr(in_progress, "WRITING", math.inf)
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ A single process compiles and forks for every run that is killed.
 from __future__ import annotations
 
 import json
+import math
 import os
 import random
 import signal
@@ -19,7 +20,7 @@ from tests.faulty_storage import WatchedStorage
 from wearsim.atomic_write import DISK, Storage
 from wearsim.scenario import Scenario
 from wearsim.studies.opening import open_results
-from wearsim.studies.run import run as studies
+from wearsim.studies.run import in_progress, run as studies
 from wearsim.studies.run.recorder import Event, Started
 from wearsim.studies.run.result import Result
 
@@ -171,7 +172,7 @@ def write_line(**row: object) -> None:
 
 
 if __name__ == "__main__":
-    studies.RunInProgress._last_write = property(lambda _: 0.0, lambda _, seconds: None)
+    in_progress.WRITING = math.inf  # the duration of writing does not limit the checkpoints
     mode, where = sys.argv[1], Path(sys.argv[2])
     if mode == "stages":
         kill_at_stages(short(**OFTEN, evolution__step=3000), where, sys.argv[3])

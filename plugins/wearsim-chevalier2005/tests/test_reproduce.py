@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import runpy
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -259,17 +261,16 @@ def test_white_friction_keeps_the_marginal(results: Reproduction) -> None:
     assert isinstance(white, DissipationResult)
 
 
-def test_scenarios_are_found_in_both_folders(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_scenarios_are_found_in_both_folders(tmp_path: Path) -> None:
     original = ROOT / "scenarios" / "mean-contact.toml"
     assert shipped.shipped_scenario("mean-contact").sha256 == load_scenario(original).sha256
-    (tmp_path / "scenarios").mkdir()
+    installed = tmp_path / "wearsim"
+    for name in ("scenario", "scenarios"):
+        (installed / name).mkdir(parents=True)
+    module = shutil.copy(str(shipped.__file__), installed / "scenario")
     text = original.read_text().replace("300 N", "301 N")
-    (tmp_path / "scenarios" / "mean-contact.toml").write_text(text)
-    folders = (tmp_path / "scenarios", ROOT / "scenarios")
-    monkeypatch.setattr(shipped, "_FOLDERS", folders)
-    assert shipped.shipped_scenario("mean-contact").text == text
+    (installed / "scenarios" / "mean-contact.toml").write_text(text)
+    assert runpy.run_path(str(module))["shipped_scenario"]("mean-contact").text == text
 
 
 def test_wheel_contains_the_scenarios(tmp_path: Path) -> None:

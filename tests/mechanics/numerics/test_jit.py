@@ -136,6 +136,14 @@ def test_cache_folder_of_other_functions_is_unchanged(place: str, monkeypatch, t
     assert own == numba.config.CACHE_DIR
 
 
+def _largest(x: float) -> float:
+    return 5.0 * x
+
+
+def _refused(**_: object) -> None:
+    raise PermissionError
+
+
 def _compile_others() -> None:
     raise AssertionError("is called in another process")
 
@@ -149,7 +157,9 @@ def test_other_kernels_are_compiled_in_a_process_alongside(cached, monkeypatch, 
     started = []
     fake = SimpleNamespace(DEVNULL=None, Popen=lambda command, **_: started.append(command))
     monkeypatch.setattr(jit, "subprocess", fake)
-    monkeypatch.setattr(jit, "_cache_folder", lambda: tmp_path if cached else None)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    if not cached:
+        monkeypatch.setattr(jit, "TemporaryFile", _refused)
     monkeypatch.setattr(jit.os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
 
     @kernel
@@ -166,23 +176,17 @@ def test_other_kernels_are_compiled_in_a_process_alongside(cached, monkeypatch, 
 
 
 def test_no_process_is_started_for_a_kernel_in_the_cache(monkeypatch, tmp_path):
-    monkeypatch.setattr(jit, "_cache_folder", lambda: tmp_path)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(jit.os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
-    compile_alongside("largest", _compile_others)
-    (tmp_path / "numerics").mkdir()
-    (tmp_path / "numerics" / "module.largest-7.py311.nbi").touch()
-
-    @kernel
-    def largest(x: float) -> float:
-        return 5.0 * x
-
+    assert kernel(_largest)(2.0) == 10.0  # the cache holds it from now on
+    compile_alongside("_largest", _compile_others)
     before = len(jit._STARTED)
-    assert largest(1.0) == 5.0
+    assert kernel(_largest)(1.0) == 5.0
     assert len(jit._STARTED) == before
 
 
 def test_nothing_is_started_on_one_processor(monkeypatch, tmp_path):
-    monkeypatch.setattr(jit, "_cache_folder", lambda: tmp_path)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(jit.os, "sched_getaffinity", lambda _: {0}, raising=False)
 
     @kernel

@@ -18,6 +18,7 @@ from wearsim.mechanics.slender.newton_step import (
     fill_jacobian,
     new_newton_state,
     number_strips,
+    predict_surface,
     rest_on_foundation,
     update_loads,
 )
@@ -92,6 +93,45 @@ def test_approach_keeps_the_load() -> None:
     np.testing.assert_allclose(
         state.step[0, :size] - step, approach[0] * state.unit_load[0, :size], rtol=1e-9
     )
+
+
+def test_strips_beside_loaded_ones_are_followed() -> None:
+    state, line_load = new_newton_state(1, STRIPS), np.zeros((1, STRIPS))
+    number_strips(0, line_load, 2, state)
+    assert (state.size[0], state.left[0], state.right[0]) == (0, 0, STRIPS)
+    line_load[0, 5] = 1.0
+    number_strips(0, line_load, 2, state)
+    assert (state.size[0], state.left[0], state.right[0]) == (1, 3, 8)
+    assert state.rows[0].tolist() == [0 if i == 5 else -1 for i in range(STRIPS)]
+    line_load[0, 1] = line_load[0, 13] = 2.0
+    number_strips(0, line_load, 2, state)
+    assert (state.size[0], state.left[0], state.right[0]) == (3, 0, STRIPS)
+    assert state.place[0, :3].tolist() == [1, 5, 13]
+
+
+@pytest.mark.parametrize("gap_in_contact", [False, True])
+def test_surface_beside_the_contact_follows_the_loads(gap_in_contact: bool) -> None:
+    contact, line_load = Contact("coupled"), loaded()
+    if gap_in_contact:
+        line_load[0, 7] = 0.0
+    state, own = contact.state, np.zeros((1, STRIPS))
+    number_strips(0, line_load, 1, state)
+    find_factors(0, line_load, True, contact.lengths)
+    state.surface[0] = 0.0
+    assert fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
+    state.change[0] = np.where(line_load[0] > 0.0, 1e2 * np.arange(STRIPS), 0.0)
+    surface = np.zeros((1, STRIPS))
+    predict_surface(0, surface, state)
+    size, left, right = int(state.size[0]), int(state.left[0]), int(state.right[0])
+    inside = state.place[0, :size]
+    expected = state.change[0, inside] @ state.outer[0, :size]
+    beside = np.zeros(STRIPS, bool)
+    beside[left : inside[0]] = beside[inside[-1] + 1 : right] = True
+    if gap_in_contact:
+        beside[left:right] = True
+    assert beside.sum() == (right - left if gap_in_contact else 2)
+    np.testing.assert_allclose(surface[0, beside], expected[beside], rtol=1e-12)
+    assert not surface[0, ~beside].any()
 
 
 def test_strips_in_tension_leave_the_contact() -> None:

@@ -234,3 +234,20 @@ def test_strips_without_contact_friction_or_creepage_have_no_force():
         assert np.isfinite(found).all()
         assert not found[:, :5].any()
         assert not found[:, 10:15].any()
+
+
+@pytest.mark.parametrize(
+    "creepage", [(8e-4, 0.0, 0.0), (5e-4, 4e-4, 0.0), (5e-4, 3e-4, 0.4), (-2e-2, 1e-2, 0.5)]
+)
+def test_sums_of_few_strips_are_integrals_of_their_fields(creepage):
+    case, points = Ellipse(*creepage, strips=2), 601
+    rows, (along, across, _, _) = case.rows(400), case.fields(points)
+    x = np.linspace(1.0, -1.0, points)[:, None] * case.half_length
+    forces = [-trapezoid(traction, x, axis=0) for traction in (along, across, x * across)]
+    scale = np.hypot(*rows[:2]).max()
+    np.testing.assert_allclose(rows[:2], forces[:2], atol=2e-3 * scale)
+    np.testing.assert_allclose(rows[2], forces[2], atol=2e-3 * scale * case.half_length.max())
+    bound = case.bound_peak * np.sqrt(np.maximum(1.0 - (x / case.half_length) ** 2, 0.0))
+    sliding = (np.hypot(along, across) > bound * (1.0 - 1e-9)) & (bound > 0.0)
+    assert sliding.any()
+    assert (np.hypot(along, across) <= bound * (1.0 + 1e-9)).all()

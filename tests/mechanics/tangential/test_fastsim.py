@@ -258,6 +258,16 @@ def test_march_converges_to_the_closed_form_without_spin(creepage, elliptic):
         assert np.max(np.abs(one - other) / scale) < 2e-4
 
 
+@pytest.mark.parametrize("elliptic", [False, True])
+def test_few_elements_are_close_to_the_closed_form(elliptic):
+    case = rig(strips=3, xi=3e-4, eta=2e-4, elliptic=elliptic)
+    found, expected = march(*case.arguments, 500), closed_form(*case.arguments[:5])
+    scale = np.hypot(expected[0], expected[1]).max()
+    np.testing.assert_allclose(found[:2], expected[:2], atol=8e-3 * scale)
+    np.testing.assert_allclose(found[2], expected[2], atol=8e-3 * scale * case.half_length.max())
+    np.testing.assert_allclose(found[3], expected[3], atol=8e-3 * case.half_length.max())
+
+
 def test_strips_without_contact_or_creepage_have_no_force():
     half_length, peak = np.array([0.0, 1e-4]), np.array([0.0, 1e8])
     none = np.zeros(2)

@@ -198,3 +198,13 @@ def test_call_that_compiles_strip_contacts_has_the_signature_of_the_model():
     compile_strip_contacts()
     wearsim.solve_contact(shipped_scenario("rig-450min"))
     assert len(strip_contacts.dispatcher.signatures) == 1
+
+
+def test_work_of_few_strips_is_that_of_the_effective_slip():
+    y, half_length, line_load = ellipse(1.4e-4, 1.5e-3, 300.0, strips=7)
+    slip_x, slip_y, spin = 6e-4 - 0.4 * y, 3e-4, 0.4
+    out = solve(half_length, line_load, 0.1, slip_x, slip_y, spin, y[1] - y[0])
+    rigid = -(out.force_x * slip_x + out.force_y * slip_y + spin * out.moment)
+    effective = rigid - out.force_x * out.induced_x - out.force_y * out.induced_y
+    assert np.abs(effective - rigid).max() > 1e-3 * rigid.max()
+    np.testing.assert_allclose(out.work, effective * rigid.sum() / effective.sum(), rtol=1e-12)

@@ -8,8 +8,8 @@ from cam_text import SCENARIOS
 
 import wearsim
 from wearsim.errors import Interrupted
-from wearsim.evolution import relocation
 from wearsim.evolution.contacts import contact_batch
+from wearsim.evolution.relocation import moved_depth, relocated
 from wearsim.evolution.state import fresh_state
 from wearsim.studies.cam.turn import CamTurn
 from wearsim.studies.effort import restarts_of
@@ -37,14 +37,15 @@ def scenario(
 @pytest.fixture
 def moves(monkeypatch):
     """Return a list that receives stations before and after, and the states, of each movement."""
-    found, original = [], relocation._moved
+    found = []
 
-    def watched(problem, state, old, new):
-        end = original(problem, state, old, new)
-        found.append((old, new, state, end))
-        return end
+    def watched(problem, state):
+        moved, end = relocated(problem, state)
+        if moved is not problem:
+            found.append((problem.kinematics.cam, moved.kinematics.cam, state, end))
+        return moved, end
 
-    monkeypatch.setattr(relocation, "_moved", watched)
+    monkeypatch.setattr("wearsim.evolution.integrate.relocated", watched)
     return found
 
 
@@ -133,9 +134,9 @@ def test_depth_at_moved_stations_is_that_of_the_worn_cam():
     new = cam.relocated(change)
     lift = test.cam.motion.lift  # smooth, and constant on the dwells
     smooth, expected = (1e-5 + 1e-3 * lift(one.angle.ravel())[0] for one in (cam, new))
-    moved = relocation.moved_depth(smooth[:, None], cam, new)[:, 0]
+    moved = moved_depth(smooth[:, None], cam, new)[:, 0]
     np.testing.assert_allclose(moved, expected, rtol=2e-3)
-    same = relocation.moved_depth(smooth[:, None], cam, cam)[:, 0]
+    same = moved_depth(smooth[:, None], cam, cam)[:, 0]
     assert (same == smooth).all()
 
 

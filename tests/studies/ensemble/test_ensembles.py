@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from itertools import chain
 
 import numpy as np
 import pytest
@@ -12,8 +13,8 @@ from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import LOGNORMAL, differences, small
 from tests.studies.random_examples import CREEPAGE, FRICTION, LOAD, SLACK, scenario_of
 from wearsim.errors import CapabilityError, Interrupted, ResultsFileError, ScenarioError
-from wearsim.studies.ensemble import driver as ensemble_work
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
+from wearsim.studies.ensemble.driver import AHEAD
 from wearsim.studies.opening import open_ensemble
 
 SERIAL = {"scheduler": "serial"}
@@ -81,11 +82,22 @@ def test_results_are_bitwise_independent_of_batches(twelve, tmp_path, monkeypatc
     assert differences(twelve, ensemble(small(), 12, tmp_path / "other.h5", **SERIAL)) == []
 
 
-def test_results_are_bitwise_independent_of_order(twelve, tmp_path, monkeypatch):
-    def backwards(self):
-        yield from np.flatnonzero(self.file.status == 0).tolist()[::-1]
+class Backwards:
+    """Executor that takes all batches, and runs them from the last to the first."""
 
-    monkeypatch.setattr(ensemble_work.EnsembleWork, "_pending", backwards)
+    workers, describe = 1, "1 worker"
+
+    def results(self, work, batches):
+        for batch in list(batches)[::-1]:
+            numbers = batch[::-1]
+            yield numbers, work(numbers)
+
+
+def test_results_are_bitwise_independent_of_order(twelve, tmp_path, monkeypatch):
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(4))
+    monkeypatch.setattr(
+        "wearsim.studies.ensemble.api.executor", lambda *_, **__: nullcontext(Backwards())
+    )
     assert differences(twelve, ensemble(small(), 12, tmp_path / "other.h5", **SERIAL)) == []
 
 
@@ -152,16 +164,8 @@ def test_time_left_is_estimated_from_three_batches_on(tmp_path, monkeypatch):
 
 
 def test_slow_batch_defers_few_outcomes(tmp_path, monkeypatch):
-    from wearsim.studies.ensemble.driver import AHEAD, EnsembleWork
-
     monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
-    taken, greatest = EnsembleWork._take, []
-
-    def watched(self, outcomes):
-        taken(self, outcomes)
-        greatest.append(len(self._deferred))
-
-    monkeypatch.setattr(EnsembleWork, "_take", watched)
+    taken = []
     monkeypatch.setattr("wearsim.studies.ensemble.designs.FIRST_ANALYSIS", 4)
 
     class Late:
@@ -171,6 +175,7 @@ def test_slow_batch_defers_few_outcomes(tmp_path, monkeypatch):
 
         def results(self, work, batches):
             outcomes = [(batch, work(batch)) for batch in batches]
+            taken.append([number for batch, _ in outcomes for number in batch])
             yield from [*outcomes[1:], *outcomes[:1]]
 
     monkeypatch.setattr(
@@ -178,7 +183,8 @@ def test_slow_batch_defers_few_outcomes(tmp_path, monkeypatch):
     )
     result = ensemble(small(), 20, tmp_path / "e.h5", precision="depth.mean 0.01%")
     assert result.count == 20
-    assert max(greatest) <= AHEAD
+    assert taken[0] == list(range(4 + AHEAD))  # up to the first analysis and beyond it
+    assert sorted(chain(*taken)) == list(range(20))
 
 
 def test_ensemble_stops_where_target_is_reached(tmp_path):

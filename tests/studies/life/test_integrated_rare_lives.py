@@ -13,7 +13,7 @@ from scipy.special import ndtr, ndtri
 from tests.studies.ensemble_cases import LOGNORMAL, differences
 from tests.studies.life.test_life import FRICTION, LOAD, design, lives
 from tests.studies.life.test_life_kills import Killed, counted
-from tests.studies.life.test_rare_lives import MEDIAN, closed_form, target_of
+from tests.studies.life.test_rare_lives import MEDIAN, target_of, use_closed_form
 from wearsim.cli.render import show_view
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import resume_ensemble
@@ -21,7 +21,6 @@ from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.life.api import life
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.rare.estimates import IMPORTANCE, SUBSET
-from wearsim.studies.life.realisation import LifeRunner
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.view import life_cells
 from wearsim.uq.survival.lives import median_positions
@@ -32,7 +31,7 @@ SPREAD = math.sqrt(math.log(1.5) ** 2 + math.log(1.6) ** 2 + math.log(1.1) ** 2)
 @pytest.fixture(autouse=True)
 def closed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lives of a closed form instead of tests."""
-    monkeypatch.setattr(LifeRunner, "_attempt", closed_form)
+    use_closed_form(monkeypatch)
 
 
 def wide(**changes: object) -> Scenario:
@@ -94,24 +93,11 @@ def test_correlated_inputs_are_sampled_given_the_factor(tmp_path: Path) -> None:
     normal = 2.0 * math.sin(math.pi / 6.0 * 0.5)
     both = 2.0 * normal * math.log(1.5) * math.log(1.6)
     target = MEDIAN * math.exp(float(ndtri(1e-4)) * math.sqrt(SPREAD**2 + both))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(LifeRunner, "_attempt", conditional)
-        result = study(tmp_path / "both.h5", rare=200, scenario=scenario, target=target)
+    result = study(tmp_path / "both.h5", rare=200, scenario=scenario, target=target)
     rare = result.rare
     assert rare is not None
     assert rare.variation < 0.1
     assert abs(rare.probability.value / 1e-4 - 1.0) < 3.5 * rare.variation
-
-
-def conditional(self: LifeRunner, *where: Any) -> list[int]:
-    """Set lives of the closed form with the mean score of the factor given the other draws."""
-    level, stage, numbers, outcomes = where
-    closed_form(self, level, stage, numbers, outcomes)
-    for number in numbers:
-        drawer = self._level(level, stage).drawer
-        assert self.factor is not None
-        outcomes[number].values["score_mean"] = self.factor.score_mean(drawer, number)
-    return []
 
 
 def test_subset_simulation_draws_the_factor_where_nothing_else_can_be_shifted(

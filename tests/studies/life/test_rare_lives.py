@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,14 +18,17 @@ from tests.studies.life.test_life_kills import Killed, counted
 from wearsim.cli.render import show_view
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import resume_ensemble
-from wearsim.studies.ensemble.file.data import Outcome
+from wearsim.studies.ensemble.batch import RealisationRun
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.ensemble.file.schema import OBSERVABLES
+from wearsim.studies.life import realisation
 from wearsim.studies.life.api import life
+from wearsim.studies.life.batch import LifeRun
 from wearsim.studies.life.rare.estimates import IMPORTANCE, SUBSET
-from wearsim.studies.life.realisation import LifeRunner
+from wearsim.studies.life.realisation import LevelRunner
 from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.draws import Drawer
+from wearsim.types import FloatArray
 from wearsim.uq.survival.rare_events import RareProbability, subset_stages
 
 MEDIAN = 1e6
@@ -40,31 +45,47 @@ MEDIANS = {
 }
 
 
-def closed_form(
-    self: LifeRunner, level: int, stage: int, numbers: list[int], outcomes: dict[int, Outcome]
-) -> list[int]:
-    """Set lives in inverse proportion to K/H, friction and load; of rollers to the mean of ln."""
-    runner = self._level(level, stage)
-    for number in numbers:
-        drawn = dict(runner.drawer.draw(number).values)
-        logs = [np.mean(np.log(drawn[key] / MEDIANS[key])) for key in MEDIANS if key in drawn]
+def without_problem(
+    self: LevelRunner, number: int, drawn: dict[str, float | FloatArray]
+) -> RealisationRun:
+    """Draw the inputs of a test that is not run."""
+    draws = self.drawer.draw(number)
+    drawn.update(draws.values)
+    unused: Any = SimpleNamespace(grid=self.grid, fixed=self.fixed)
+    return RealisationRun(number, drawn, draws, unused, unused)
+
+
+def closed_form(runs: Sequence[RealisationRun], _: object) -> list[LifeRun]:
+    """Return lives in inverse proportion to K/H, friction and load; of rollers to the mean of ln.
+
+    As a test does, they have the wear factor of the test, which is not that drawn where lives are
+    integrated over it.
+    """
+    found = []
+    for run in runs:
+        problem: Any = run.problem
+        given = dict(run.drawn) | problem.fixed
+        logs = [np.mean(np.log(given[key] / MEDIANS[key])) for key in MEDIANS if key in given]
         value = MEDIAN * math.exp(-sum(logs))
         scalars = dict.fromkeys(("life", "life_low", "life_high"), value)
-        scalars |= {"first_limit": 0.0, "limit_angle": math.nan, "score_mean": 0.0}
+        scalars |= {"first_limit": 0.0, "limit_angle": math.nan}
         scalars |= dict.fromkeys(("steps", "solves", "depth_error", "volume_error"), 1.0)
-        scalars |= {
-            "log_weight": runner.log_weight(number),
-            "depth_profile": np.zeros(len(self.grid.y)),
-        }
-        courses = {name: np.ones(2) for name in OBSERVABLES}
-        outcomes[number] = Outcome(number=number, values={**drawn, **courses, **scalars})
-    return []
+        rows: list[Any] = [dict.fromkeys(OBSERVABLES, 1.0)] * 2
+        curves = {"depth_profile": np.zeros(len(problem.grid.y))}
+        found.append(LifeRun(rows, scalars, curves, problem.grid))
+    return found
 
 
 @pytest.fixture
 def closed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lives of a closed form instead of tests."""
-    monkeypatch.setattr(LifeRunner, "_attempt", closed_form)
+    use_closed_form(monkeypatch)
+
+
+def use_closed_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(LevelRunner, "prepare", without_problem)
+    monkeypatch.setattr(realisation, "batch_groups", lambda runs: [runs])
+    monkeypatch.setattr(realisation, "observe_lives", closed_form)
 
 
 def target_of(probability: float, spread: float) -> float:

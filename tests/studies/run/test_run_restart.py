@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from study_examples import LOADS, OTHERS, ROLLERS, STEPPERS, run_differences, run_in_parts, short
 
+from tests.faulty_storage import WatchedStorage
 from wearsim.errors import Interrupted
 from wearsim.studies.opening import open_results
 from wearsim.studies.run import in_progress, run as studies
@@ -144,12 +146,12 @@ def test_checkpoint_before_the_test_on_coarse_strips_continues(
 
 def test_slow_disk_limits_the_checkpoints(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = short(outputs__checkpoint_every="1e-9 s")
-    for seconds in (1e-9, 1e9):
-        written = property(lambda _, held=seconds: held, lambda _, found: None)
-        monkeypatch.setattr(studies.RunInProgress, "_last_write", written)
+    for part in (math.inf, 1e-9):
+        monkeypatch.setattr(in_progress, "WRITING", part)
         events: list[Event] = []
         result = studies.run(scenario, path, force=True, on_event=events.append)
-        assert len(_checkpoints(events)) == (2 if seconds > 1.0 else len(result.passes) + 1)
+        # at the start and the end, and the one by which the duration of writing is found
+        assert len(_checkpoints(events)) == (3 if part < 1.0 else len(result.passes) + 1)
 
 
 EXTENSIONS = {
@@ -245,19 +247,18 @@ def test_resuming_finished_test_changes_nothing(until: float | None, path: Path)
     assert events == []
 
 
-def test_kill_before_last_write_is_completed_by_resume(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(self: studies.RunInProgress, finished: bool = False) -> None:
-        write(self, False)
-        if finished:
-            raise OSError
+@pytest.mark.usefixtures("quick_disk")
+def test_failure_of_the_last_write_is_completed_by_resume(path: Path) -> None:
+    def fail_at_last(stage: str) -> None:
+        if stage == "before rename":
+            written.append(stage)
+            if len(written) == 1 + len(whole.passes):
+                raise OSError(28, "No space left on device")
 
-    write = studies.RunInProgress._write
-    with monkeypatch.context() as patch:
-        patch.setattr(studies.RunInProgress, "_write", fail)
-        with pytest.raises(OSError):  # noqa: PT011  (it has no text)
-            studies.run(short(), path)
+    whole, written = studies.run(short()), list[str]()
+    scenario = short(outputs__checkpoint_every="1e-9 s")
+    with pytest.raises(studies.ResultsFileError, match="No space left"):
+        studies.run(scenario, path, storage=WatchedStorage(fail_at_last))
     standing = open_results(path)
     assert (standing.passes[-1], standing.finished) == (6000.0, False)
-    assert run_differences(studies.resume(path), studies.run(short())) == []
+    assert run_differences(studies.resume(path), whole) == ["sha256", "scenario_text"]

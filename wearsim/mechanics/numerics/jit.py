@@ -303,22 +303,37 @@ def kernel_input(array: FloatArray) -> FloatArray:
     return array if array.flags.carray and array.dtype == np.float64 else own_array(array)
 
 
-@cache
 def _cache_folder() -> Path | None:
-    """Return the folder of the compiled kernels of these sources; None where none is writable.
+    """Return the folder of the compiled kernels of these sources; None where none is writable."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or "~/.cache"
+    return cache_folder(Path(__file__).parents[1], os.environ.get("NUMBA_CACHE_DIR", ""), home)
+
+
+@cache
+def cache_folder(package: Path, of_user: str, home: str) -> Path | None:
+    """Return the folder of the kernels of a package, created if it does not exist.
 
     A kernel contains compiled copies of the subroutines it calls, whose files numba does not check.
-    The name of the folder therefore contains a digest of all Python files under
-    `wearsim/mechanics`: a change of any of them recompiles all kernels. The folder is in the user's
-    `NUMBA_CACHE_DIR`, next to the kernels, or in the user's folder of cached files.
+    The name of the folder therefore contains a digest of all Python files of the package: a change
+    of any of them recompiles all kernels.
+
+    Parameters
+    ----------
+    package : Path
+    of_user : str
+        The user's `NUMBA_CACHE_DIR`, or an empty string; preferred to the folder of the package.
+    home : str
+        Folder of cached files of the user, for a package in a folder that cannot be written.
+
+    Returns
+    -------
+    Path or None
+        None where none of the three can be written.
     """
-    package = Path(__file__).parents[1]
     install = f"wearsim-{sha256(str(package).encode()).hexdigest()[:8]}-"
     digest = sha256()
     for path in sorted(package.rglob("*.py")):
         digest.update(path.read_bytes())
-    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or "~/.cache"
-    of_user = os.environ.get("NUMBA_CACHE_DIR", "")
     places: list[Any] = [of_user, package / "__pycache__", os.path.expanduser(home)]
     for place in filter(None, places):
         folder = Path(place, install + digest.hexdigest()[:12])

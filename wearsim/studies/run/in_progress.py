@@ -56,6 +56,7 @@ from wearsim.types import FloatArray, Grid
 Watcher = Callable[[Event], None]
 
 FIRST_CHECKPOINT = 1.0  # s after the start of a run
+WRITING = 0.02  # greatest part of the time that is spent on checkpoints, with a slow disk
 
 
 class RunInProgress:
@@ -306,8 +307,7 @@ class RunInProgress:
         if interval is None:
             early = max(FIRST_CHECKPOINT, self._written - self.started)
             interval = min(self.scenario.outputs.checkpoint_every, early)
-        # with a slow disk, at most 2 % of the time is spent on writing
-        if time.monotonic() - self._written > max(interval, 50.0 * self._last_write):
+        if time.monotonic() - self._written > max(interval, self._last_write / WRITING):
             self._write()
 
     def _check_depth(self) -> None:

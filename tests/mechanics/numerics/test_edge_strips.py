@@ -1,0 +1,316 @@
+"""Kernels of strips that an edge crosses, interpreted, against plain formulas for each strip.
+
+Two rollers wear a cylinder in three tests, of which the last one does not resolve edges.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.numerics.edge_strips import (
+    ELASTIC,
+    FLAT,
+    FULL,
+    LEAST,
+    NONE,
+    SETTLED,
+    YOUNG_STEPS,
+    EdgeStrips,
+    by_others,
+    compare_edges,
+    edge_strips,
+    end_edges,
+    fill_resolved,
+    fill_separations,
+    linearise_edges,
+    mark_strips,
+    part_at,
+    start_edges,
+    sum_of_wear,
+)
+
+TESTS, STRIPS, ROLLERS = 3, 6, 2
+CONTACTS, SIZE = ROLLERS * TESTS, 1e-6
+ROLLERS_OF_ONE = np.array([[0, 1], [0, 2]])
+STATIONS = np.array([[0, 2], [1, 2]])  # of a cam that one roller passes
+
+
+class Edges:
+    """Strips with a random state, and their wear in a step."""
+
+    def __init__(self, bodies: np.ndarray = ROLLERS_OF_ONE) -> None:
+        rng = np.random.default_rng(8)
+        self.bodies, self.shape = bodies, (3, TESTS, STRIPS)
+        self.part = rng.random((CONTACTS, STRIPS))
+        self.part[rng.random(self.part.shape) < 0.25] = 0.0
+        self.part[rng.random(self.part.shape) < 0.25] = 1.0
+        self.separation = np.where(self.part < 1.0, SIZE * rng.random(self.part.shape), 0.0)
+        self.approach = SIZE * (2.0 + rng.random(CONTACTS))
+        self.wear = SIZE * rng.random((2, CONTACTS, STRIPS)) * (self.part > 0.0)
+        self.loads = np.where(rng.random(self.part.shape) < 0.7, 1.0 + self.part, 0.0)
+        self.whole_steps = np.floor((SETTLED + 3.0) * rng.random(self.part.shape))
+        self.resolved = np.array([True, True, False])
+        of_bodies = SIZE * rng.random((6, *self.shape))
+        gap = SIZE * rng.random(self.part.shape)
+        depths = SIZE * rng.random(self.shape)
+        self.strips: EdgeStrips = edge_strips(
+            bodies, self.resolved, gap, depths, self.part, of_bodies, np.zeros((2, *gap.shape))
+        )
+        start_edges(self.strips, self.separation, self.approach)
+        middle = self.strips.first + 0.5 * self.strips.rise
+        self.level = middle + self.strips.rise * (rng.random(gap.shape) - 0.6)
+
+    def each(self):
+        """Yield contact, test and strip of the tests that resolve edges."""
+        for k in range(CONTACTS):
+            for i in range(STRIPS if self.resolved[k % TESTS] else 0):
+                yield k, k % TESTS, i
+
+    def of(self, values: np.ndarray, k: int, i: int) -> float:
+        """Return the sum of depths of the two bodies of a contact."""
+        return sum(values[b, k % TESTS, i] for b in self.bodies[k // TESTS])
+
+    def sums(self, wear: np.ndarray) -> np.ndarray:
+        found = np.zeros(self.shape)
+        for c, pair in enumerate(self.bodies):
+            for side, b in enumerate(pair):
+                found[b] += wear[side, c * TESTS : (c + 1) * TESTS]
+        return found
+
+    def share(self, b: int, k: int, i: int) -> float:
+        """Return the part of the wear by others that lowers a strip ahead of the edge too."""
+        part = self.part[k, i]
+        reached = max(self.strips.greatest[b, k % TESTS, i] - part, 0.0)
+        return 1.0 if part >= 1.0 else reached / (1.0 - part)
+
+    def others(self, k: int, i: int) -> tuple[float, float, float]:
+        ahead = grown = joint = 0.0
+        total = self.sums(self.wear)[:, k % TESTS, i]
+        for side, b in enumerate(self.bodies[k // TESTS]):
+            rest = total[b] - self.wear[side, k, i]
+            if rest > 1e-9 * SIZE:
+                share = self.share(b, k, i)
+                ahead, joint = ahead + share * rest, joint + (1.0 - share) * rest
+                in_step = self.strips.added[b, k % TESTS, i] + total[b]
+                grown += share * rest / total[b] * in_step
+        return ahead, grown, joint
+
+    def part_of(self, k: int, i: int, level: float) -> float:
+        if self.part[k, i] == 1.0:
+            return 1.0
+        beyond = level - self.strips.first[k, i] - self.others(k, i)[1]
+        return float(np.clip(0.5 + beyond / self.strips.rise[k, i], 0.0, 1.0))
+
+    def mean_wear(self, k: int, i: int, level: float) -> float:
+        """Return the mean over a strip of the wear by the formula, at a depth in contact."""
+        ahead = self.others(k, i)[0]
+        return self.part_of(k, i, level) * (level - self.of(self.strips.base, k, i) - ahead)
+
+
+@pytest.fixture
+def edges() -> Edges:
+    return Edges()
+
+
+def test_rise_follows_from_the_separation(edges: Edges) -> None:
+    strips = edges.strips
+    for k, _, i in edges.each():
+        part, apart = edges.part[k, i], edges.separation[k, i]
+        depth = edges.of(strips.rows, k, i)
+        rise = FLAT
+        if 0.0 < part < 1.0:  # the parabola of the gap beyond the edge ends at the separation
+            rise = 2.0 * apart / (1.0 - part) ** 2
+        elif part == 0.0:
+            beside = [j for j in (i - 1, i + 1) if 0 <= j < STRIPS]
+            gaps = [strips.gap[k, j] + edges.of(strips.rows, k, j) for j in range(STRIPS)]
+            elastic = ELASTIC * (edges.approach[k] - min(gaps))
+            ahead = max([edges.separation[k, j] for j in beside] + [apart] * (len(beside) < 2))
+            rise = ahead - apart
+            if rise > 0.0:
+                rise *= np.clip((NONE - elastic / rise) / (NONE - FULL), LEAST, 1.0)
+            rise = min(rise, 2.0 * apart)
+        assert strips.rise[k, i] == pytest.approx(max(rise, FLAT), rel=1e-12)
+        expected = depth - 0.5 * strips.rise[k, i] * part**2
+        assert strips.first[k, i] == pytest.approx(expected, rel=1e-12)
+    for b in range(3):
+        touching = [c for c, pair in enumerate(edges.bodies) if b in pair]
+        for v in range(2):
+            greatest = np.max([edges.part[c * TESTS + v] for c in touching], axis=0)
+            np.testing.assert_array_equal(strips.greatest[b, v], greatest)
+
+
+def test_bodies_of_a_cam_have_no_greatest_part() -> None:
+    assert (Edges(STATIONS).strips.greatest == 1.0).all()
+
+
+def test_wear_by_others_is_divided_at_the_edge(edges: Edges) -> None:
+    sums = np.full(edges.shape, np.nan)
+    sum_of_wear(edges.strips, edges.wear, sums)
+    np.testing.assert_allclose(sums, edges.sums(edges.wear), rtol=1e-14)
+    for k, _, i in edges.each():
+        found = by_others(edges.strips, edges.wear, sums, k, i)
+        ahead, grown, joint = edges.others(k, i)
+        np.testing.assert_allclose(found, (ahead, grown, joint), rtol=1e-10, atol=1e-9 * SIZE)
+        for level in (edges.level[k, i], edges.level[k, i] + 0.3 * SIZE):
+            part = part_at(edges.strips, k, i, level, found[1])
+            assert part == pytest.approx(edges.part_of(k, i, level), abs=1e-9)
+
+
+def test_linearised_wear_has_value_and_slope_of_the_mean_wear(edges: Edges) -> None:
+    gaps, slopes = np.empty(edges.level.shape), np.empty(edges.level.shape)
+    linearise_edges(edges.strips, edges.level, edges.wear, gaps, slopes)
+    scaled = np.zeros_like(edges.wear)
+    for k, _, i in edges.each():
+        if np.isfinite(slopes[k, i]):
+            scaled[:, k, i] = (1.0 / slopes[k, i] - 1.0) * edges.wear[:, k, i]
+    crossed = 0
+    for k, v, i in edges.each():
+        level, step = edges.level[k, i], 1e-5 * SIZE
+        ahead, _, _ = edges.others(k, i)
+        part, mean = edges.part_of(k, i, level), edges.mean_wear(k, i, level)
+        opened = sum(
+            edges.share(b, k, i) * (edges.sums(scaled)[b, v, i] - scaled[side, k, i])
+            for side, b in enumerate(edges.bodies[k // TESTS])
+        )
+        without = gaps[k, i] - edges.strips.gap[k, i] + opened
+        if part == 0.0:
+            assert slopes[k, i] == np.inf
+            expected = max(level, edges.of(edges.strips.rows, k, i))
+        elif part == 1.0:
+            assert slopes[k, i] == 1.0
+            expected = edges.of(edges.strips.base, k, i)
+        elif mean > 0.0:
+            ends = [edges.mean_wear(k, i, level + sign * step) for sign in (1.0, -1.0)]
+            assert slopes[k, i] == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-6)
+            # wear = slope * (level - ahead - without) is the mean wear at this depth
+            expected = level - ahead - mean / slopes[k, i]
+            crossed += 1
+        else:
+            assert slopes[k, i] == part
+            expected = level - ahead - mean / slopes[k, i]
+        assert without == pytest.approx(expected, abs=1e-9 * SIZE)
+    assert crossed > 3
+    for k in (2, 5):
+        expected = edges.strips.gap[k] + edges.strips.base[edges.bodies[k // TESTS], 2].sum(axis=0)
+        np.testing.assert_allclose(gaps[k], expected, rtol=1e-13)
+        assert (slopes[k] == 1.0).all()
+
+
+def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges) -> None:
+    rng = np.random.default_rng(2)
+    gaps, slopes = np.empty(edges.level.shape), np.empty(edges.level.shape)
+    linearise_edges(edges.strips, edges.level, edges.wear, gaps, slopes)
+    linear, apart = SIZE * rng.random((2, CONTACTS, STRIPS))
+    level, active = edges.level.copy(), np.array([True, False, True])
+    arguments = edges.strips, active, gaps, slopes, linear, apart, edges.loads, edges.wear, level
+    rest, expected = compare_edges(*arguments), np.zeros(TESTS)
+    for k, v, i in edges.each():
+        moved = gaps[k, i] + linear[k, i] - apart[k, i] - edges.strips.gap[k, i]
+        assert level[k, i] == pytest.approx(moved if active[v] else edges.level[k, i], rel=1e-14)
+        mean, joint = edges.mean_wear(k, i, level[k, i]), edges.others(k, i)[2]
+        own = edges.wear[:, k, i].sum()
+        if edges.loads[k, i] == 0.0:
+            differs = mean - joint
+        else:
+            differs = own if slopes[k, i] == np.inf else abs(mean - own - joint)
+        expected[v] = max(expected[v], differs)
+    np.testing.assert_allclose(rest, expected, rtol=1e-8)
+    assert (level[[2, 5]] == edges.level[[2, 5]]).all()
+
+
+@pytest.mark.parametrize("counted", [True, False])
+def test_depths_grow_by_the_crossed_parts(edges: Edges, counted: bool) -> None:
+    worn = SIZE * np.random.default_rng(3).random(edges.shape)
+    depths, parts = np.empty(edges.shape), np.empty(edges.shape)
+    fields = np.empty((3, CONTACTS, STRIPS))
+    arguments = edges.whole_steps, edges.level, edges.loads, edges.wear, worn
+    end_edges(edges.strips, counted, *arguments, depths, parts, fields)
+    growth, crossed = edges.strips.rows.copy(), np.zeros(edges.shape, bool)
+    greatest = np.zeros(edges.shape)
+    for k, v, i in edges.each():
+        _, grown, joint = edges.others(k, i)
+        loaded, own = edges.loads[k, i] > 0.0, edges.wear[:, k, i].sum()
+        part = edges.part_of(k, i, edges.level[k, i]) if loaded else 0.0
+        added = 0.0
+        if loaded and part == 1.0:
+            added = edges.level[k, i] - edges.of(edges.strips.rows, k, i) - grown
+        elif loaded:
+            added = 0.5 * edges.strips.rise[k, i] * (part**2 - edges.part[k, i] ** 2)
+        for side, b in enumerate(edges.bodies[k // TESTS]):
+            crossed[b, v, i] |= edges.whole_steps[k, i] < SETTLED
+            if own > 0.0:
+                growth[b, v, i] += max(added, 0.0) / (own + joint) * edges.wear[side, k, i]
+            greatest[b, v, i] = max(greatest[b, v, i], part)
+        assert fields[1, k, i] == pytest.approx(part, abs=1e-9)
+        steps = min(edges.whole_steps[k, i] + 1.0, SETTLED)
+        assert fields[2, k, i] == (steps if part == 1.0 else 0.0)
+    expected = np.where(crossed, growth, edges.strips.base + worn)
+    np.testing.assert_allclose(depths[:, :2], expected[:, :2], rtol=1e-9)
+    for k, _, i in edges.each():
+        part = fields[1, k, i]
+        apart = max(edges.of(expected, k, i) - edges.level[k, i], 0.0)
+        apart = 0.5 * edges.strips.rise[k, i] * (1.0 - part) ** 2 if part > 0.0 else apart
+        assert fields[0, k, i] == pytest.approx(apart, abs=1e-9 * SIZE)
+    whole = edges.loads[[2, 5]] > 0.0
+    assert np.isnan(fields[0, [2, 5]]).all()
+    if counted:
+        np.testing.assert_array_equal(fields[1, [2, 5]], whole)
+        steps = np.minimum(edges.whole_steps[[2, 5]] + 1.0, SETTLED)
+        np.testing.assert_array_equal(fields[2, [2, 5]], np.where(whole, steps, 0.0))
+        greatest[0, 2], greatest[1:, 2] = whole.any(axis=0), whole
+    else:
+        assert np.isnan(fields[1:, [2, 5]]).all()
+    np.testing.assert_allclose(parts, greatest, atol=1e-9)
+
+
+@pytest.mark.parametrize("bodies", [ROLLERS_OF_ONE, STATIONS], ids=["cylinder", "cam"])
+@pytest.mark.parametrize("wears", [True, False])
+def test_strips_are_young_for_steps_of_twice_the_order(bodies: np.ndarray, wears: bool) -> None:
+    edges, orders = Edges(bodies), np.array([1, 2, 1])
+    wear = np.where(np.arange(STRIPS) % 3 > 0, np.ones(edges.shape), 0.0)
+    wear[2 if bodies is STATIONS else 1 :] *= wears
+    young, crossed = np.empty(edges.shape, bool), np.empty(edges.shape, bool)
+    parts = np.empty(edges.shape)
+    steps = edges.whole_steps
+    arguments = bodies, edges.resolved, edges.part, steps, orders, wear
+    mark_strips(*arguments, young, crossed, parts)
+    along_cam = bodies is STATIONS and wears
+    for b in range(3):
+        for v in range(2):
+            for i in range(STRIPS):
+                touching = [c * TESTS + v for c, pair in enumerate(bodies) if b in pair]
+                meets = [k for k in touching if edges.part[k, i] > 0.0]
+                greatest = max([edges.part[k, i] for k in meets], default=0.0)
+                few = YOUNG_STEPS * orders[v]
+                is_young = not meets or any(steps[k, i] < few for k in meets)
+                assert young[b, v, i] == (is_young and not along_cam)
+                assert crossed[b, v, i] == any(steps[k, i] < SETTLED for k in meets)
+                assert parts[b, v, i] == (greatest if wear[b, v, i] > 0.0 else 0.0)
+    assert not young[:, 2].any()
+    assert not crossed[:, 2].any()
+    assert (parts[:, 2] == 1.0).all()
+
+
+def test_tests_without_parts_do_not_resolve_edges() -> None:
+    part, resolved = np.array([[0.5, np.nan], [np.nan, 1.0]]), np.ones(2, bool)
+    fill_resolved(part, part, resolved)
+    assert resolved.tolist() == [True, False]
+    fill_resolved(np.empty((2, 0)), part, resolved)
+    assert resolved.tolist() == [False, False]
+
+
+def test_separations_of_two_bodies_add_up(edges: Edges) -> None:
+    share, parts = np.array([0.25, 1.0, 0.5]), np.full(edges.shape, np.nan)
+    fill_separations(edges.bodies, edges.resolved, edges.separation, share, parts)
+    by_contact = edges.separation.reshape(ROLLERS, TESTS, STRIPS)
+    for v in range(2):
+        least = by_contact[:, v].min(axis=0)
+        np.testing.assert_allclose(parts[0, v], share[v] * least, rtol=1e-14)
+        for c in range(ROLLERS):
+            np.testing.assert_allclose(parts[1 + c, v] + parts[0, v], by_contact[c, v], rtol=1e-14)
+    assert not parts[:, 2].any()
+    cam = np.full(edges.shape, np.nan)
+    fill_separations(STATIONS, edges.resolved, edges.separation, share, cam)
+    np.testing.assert_array_equal(cam[:2, :2], by_contact[:, :2])
+    assert not cam[2].any()

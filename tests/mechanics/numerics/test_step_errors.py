@@ -1,0 +1,177 @@
+"""Errors of an implicit step, interpreted, against plain formulas for each test.
+
+A cylinder and a roller wear in two tests, of which the first one resolves edges within a strip.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.numerics.edge_strips import mark_strips
+from wearsim.mechanics.numerics.implicit_step import WHOLE_PASSES
+from wearsim.mechanics.numerics.linearised_wear import carried_errors
+from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
+from wearsim.mechanics.numerics.step_errors import (
+    COVER,
+    EDGE_ORDER,
+    EDGES,
+    KEEP,
+    OF_EDGES,
+    OF_VOLUME,
+    SHARE,
+    YOUNG,
+    assess_step,
+    with_sum,
+)
+
+TESTS, STRIPS, SIZE = 2, 7, 1e-6
+BODIES, SHAPE = np.array([[0, 1]]), (2, TESTS, STRIPS)
+
+
+class Step:
+    """A step of two tests, with random errors and past points."""
+
+    def __init__(self) -> None:
+        rng = np.random.default_rng(4)
+        self.orders = np.array([2, 3])
+        self.spans = np.cumsum(10.0 + 90.0 * rng.random((ROWS - 1, TESTS)), axis=0)
+        self.past = SIZE * 1e-3 * rng.standard_normal((ROWS, *SHAPE))
+        self.past[2:] *= 0.01
+        self.past[0] = np.abs(self.past[0])
+        self.past[0, :, :, 0] = 0.0
+        self.sums = SIZE * 1e-6 * rng.standard_normal((ROWS, *SHAPE[:2], 1))
+        self.part = np.where(rng.random((TESTS, STRIPS)) < 0.4, rng.random((TESTS, STRIPS)), 1.0)
+        self.part[0, :2], self.part[1] = [0.0, 0.6], np.nan
+        self.whole_steps = np.floor(9.0 * rng.random((TESTS, STRIPS)))
+        self.depths = SIZE * (1.0 + rng.random(SHAPE))
+        self.stepping = 1e-4 * SIZE * rng.standard_normal(SHAPE)
+        self.gap = SIZE * rng.random((TESTS, STRIPS))
+        self.loads = 1e5 * rng.random((TESTS, STRIPS))
+        self.exponents = 1.0 + rng.random((TESTS, STRIPS))
+        self.wear = 1e-3 * SIZE * rng.random((2, TESTS, STRIPS))
+        self.approach, self.stiffness = SIZE * np.array([3.0, 4.0]), np.array([0.0, 1e7])
+        self.displaced = SIZE * np.array([0.0, 0.02])
+        self.volume_error = 1e-9 * SIZE * np.array([2.0, 3.0])
+        self.irreducible = SIZE * np.array([[0.01, 0.02], [1e-9, 2e-9], [1e2, 3e2]])
+        self.weights = np.array([[1.0, 0.5], [1e-6, 3e-7]])
+        self.passes = np.array([2.0 * WHOLE_PASSES, 0.5 * WHOLE_PASSES])
+        self.scale = np.array([1.0, 3.0])
+        self.resolved = np.array([True, False])
+
+    def assess(self):
+        return assess_step(
+            1e-3, self.scale, self.passes, self.displaced, self.volume_error, self.irreducible,
+            self.stepping, self.depths, self.orders, self.spans, self.past, self.sums, self.part,
+            self.whole_steps, BODIES, self.gap, self.approach, self.loads, self.wear.copy(),
+            self.exponents, self.stiffness, 1e-4, self.weights,
+        )  # fmt: skip
+
+
+def error_of_sum(step: Step, b: int, v: int) -> float:
+    """Return the error of the sum of the depths by the first term that a formula leaves out."""
+    order = step.orders[v]
+    spans = step.spans[: order + 1, v]
+    factor = np.prod(spans[:order]) / (1.0 / spans).sum()
+    return float(factor * step.sums[order + 1, b, v, 0])
+
+
+@pytest.mark.parametrize("resolved", [[True, False], [True, True]])
+def test_errors_of_strips_add_up_to_that_of_the_sum(resolved: list[bool]) -> None:
+    step, rng = Step(), np.random.default_rng(5)
+    errors, parts = SIZE * rng.standard_normal(SHAPE), rng.random(SHAPE)
+    crossed = rng.random(SHAPE) < 0.3
+    parts[1, 0] = np.where(crossed[1, 0], parts[1, 0], 0.0)  # nothing that could be shifted
+    arguments = crossed, np.array(resolved), step.sums, step.spans, step.orders
+    found = with_sum(errors, parts, *arguments)
+    for b in range(2):
+        for v in range(TESTS):
+            if not resolved[v]:
+                np.testing.assert_array_equal(found[b, v], errors[b, v])
+                continue
+            assert not found[b, v, crossed[b, v]].any()
+            free = ~crossed[b, v]
+            shift = (found - errors)[b, v, free]
+            if parts[b, v, free].any():
+                total = error_of_sum(step, b, v)
+                assert found[b, v].sum() == pytest.approx(total, rel=1e-9, abs=1e-12 * SIZE)
+                per_part = shift / parts[b, v, free]
+                np.testing.assert_allclose(per_part, per_part[0], rtol=1e-8)
+            else:
+                assert not shift.any()
+
+
+def test_sum_without_past_points_has_no_error() -> None:
+    step = Step()
+    step.spans[1:] = np.inf
+    errors, parts, none = np.zeros(SHAPE), np.ones(SHAPE), np.zeros(SHAPE, bool)
+    orders = np.ones(TESTS, np.int64)
+    resolved = np.ones(TESTS, bool)
+    found = with_sum(errors, parts, none, resolved, step.sums, step.spans, orders)
+    assert not found.any()
+
+
+def test_estimates_cover_errors_of_steps_edges_and_sums() -> None:
+    step = Step()
+    young, crossed = np.empty(SHAPE, bool), np.empty(SHAPE, bool)
+    parts, own, orders = np.empty(SHAPE), np.empty(SHAPE), np.empty(TESTS, np.int64)
+    state = step.part, step.whole_steps, step.orders, step.past[0]
+    mark_strips(BODIES, step.resolved, *state, young, crossed, parts)
+    assert young[:, 0].any()
+    parts[young] *= YOUNG
+    most = np.array([EDGE_ORDER, MAX_ORDER])
+    arguments = step.scale, SHARE * 1e-3, KEEP, most, parts, own, orders
+    expected = next_steps(step.past, step.spans, step.depths, step.orders, *arguments)
+    own[:, 1] *= 2.0  # less than a whole pass
+    added = with_sum(own, parts, crossed, step.resolved, step.sums, step.spans, step.orders)
+    worn = step.wear * step.passes[:, None]
+    carried, sizes = carried_errors(
+        step.stepping, added, step.loads, worn, step.exponents, step.approach, step.gap,
+        step.depths, BODIES, step.stiffness, 1e-4, step.weights,
+    )  # fmt: skip
+    found, next_orders, errors, estimates = step.assess()
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    np.testing.assert_array_equal(next_orders, orders)
+    np.testing.assert_allclose(errors, carried, rtol=1e-12)
+    for v in range(TESTS):
+        depth, volume, profile = sizes[:, v]
+        deepest = step.depths[:, v].max()
+        depth += step.displaced[v]
+        if step.displaced[v] > 0.0:
+            profile += step.displaced[v] / deepest
+        if step.resolved[v]:
+            spans = step.spans[:2, v]
+            first_order = spans[0] / (1.0 / spans).sum() * step.past[2, :, v]
+            at_edge = np.where(crossed[:, v], own[:, v], 0.0)
+            at_edge += np.where(young[:, v] & (step.past[0, :, v] > 0.0), first_order, 0.0)
+            edges = EDGES * np.linalg.norm(at_edge) / np.linalg.norm(step.depths[:, v])
+            profile = math.hypot(profile, edges)
+            depth, volume = OF_EDGES * depth, OF_EDGES * volume
+        least = step.irreducible[:, v]
+        volume = COVER[1] * volume + step.volume_error[v] - least[1]
+        relative = volume / (step.weights[1] @ step.depths[:, v].sum(axis=1))
+        depth = max(COVER[0] * depth, OF_VOLUME[0] * relative * deepest)
+        profile = max(COVER[2] * profile, OF_VOLUME[1] * relative)
+        wanted = np.array([depth, volume, profile]) + least
+        np.testing.assert_allclose(estimates[:, v], wanted, rtol=1e-9)
+
+
+def test_error_of_a_great_volume_is_one_of_depth_and_profile() -> None:
+    step = Step()
+    step.irreducible[:] = 0.0
+    volumes = np.einsum("b,bvi->v", step.weights[1], step.depths)
+    step.volume_error = 5000.0 * volumes
+    estimates = step.assess()[3]
+    relative = estimates[1] / volumes
+    deepest = step.depths.max(axis=(0, 2))
+    np.testing.assert_allclose(estimates[0], OF_VOLUME[0] * relative * deepest, rtol=1e-12)
+    np.testing.assert_allclose(estimates[2], OF_VOLUME[1] * relative, rtol=1e-12)
+
+
+def test_fresh_bodies_have_no_relative_errors() -> None:
+    step = Step()
+    step.displaced[:], step.depths[:] = 0.0, 0.0
+    estimates = step.assess()[3]
+    np.testing.assert_array_equal(estimates[2], step.irreducible[2])

@@ -1,0 +1,96 @@
+"""Damage that a step adds, interpreted, against quadrature of the damage per pass."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from wearsim.mechanics.fatigue import damage_of_step
+
+START, LENGTH, CONSTANT, BEFORE = 1000.0, 4000.0, 300.0, 200.0
+NONE = np.empty((0, 2))
+
+
+def step(rate, removed=NONE, slope: float = 2.0, before: float = BEFORE, old=None):
+    """Return damage and sums of two strips, of which the second one is never in contact."""
+    known = np.zeros((4, 1, 2)) if old is None else old
+    known[3, 0, 0] = rate(before) if np.isfinite(before) else 0.0
+    rates = np.array([[rate(passes), 0.0] for passes in (START, START + LENGTH)])
+    points = np.array([[before], [CONSTANT]])
+    times = np.array([START]), np.array([LENGTH])
+    return damage_of_step(known, rates[:1], rates[1:], removed, *times, points, slope)
+
+
+def added(rate) -> float:
+    return quad(rate, START, START + LENGTH, epsabs=0.0, epsrel=1e-12)[0]
+
+
+@pytest.mark.parametrize("power", [-1.0, -0.5, 0.7])
+@pytest.mark.parametrize("before", [BEFORE, np.nan])
+def test_powers_of_the_passes_are_integrated(power: float, before: float) -> None:
+    def rate(passes: float) -> float:
+        return float(1e-6 * ((passes + CONSTANT) / 1000.0) ** power)
+
+    damage, sums = step(rate, before=before)
+    assert damage[0, 0, 0] == pytest.approx(added(rate), rel=3e-3)
+    assert damage[2:, 0, 0].tolist() == [rate(START + LENGTH), rate(START)]
+    assert not damage[:, 0, 1].any()
+    assert sums[:, 0].tolist() == pytest.approx(
+        [0.0, damage[0, 0, 0] ** 2, (damage[0, 0, 0] + damage[1, 0, 0]) ** 2], rel=1e-12
+    )
+    if np.isfinite(before):  # the parabola agrees with the line
+        assert damage[1, 0, 0] < 1e-9 * damage[0, 0, 0]
+    else:
+        line = 0.5 * LENGTH * (rate(START) + rate(START + LENGTH))
+        assert damage[1, 0, 0] == pytest.approx(abs(line - damage[0, 0, 0]), rel=1e-9)
+
+
+def test_bent_powers_are_integrated_within_their_error() -> None:
+    def rate(passes: float) -> float:
+        logarithm = np.log((passes + CONSTANT) / 1000.0)
+        return float(1e-6 * np.exp(0.5 * logarithm - 0.3 * logarithm**2))
+
+    damage, _ = step(rate)
+    assert damage[0, 0, 0] == pytest.approx(added(rate), rel=1e-3)
+    span = np.log((START + LENGTH + CONSTANT) / (START + CONSTANT))
+    expected = 0.3 * span**2 / 12.0 * damage[0, 0, 0]
+    assert damage[1, 0, 0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_contact_that_begins_has_the_mean_damage() -> None:
+    damage, _ = step(lambda passes: 0.0 if passes < 2000.0 else 3e-7)
+    assert damage[0, 0, 0] == pytest.approx(0.5 * 3e-7 * LENGTH, rel=1e-12)
+    assert damage[1, 0, 0] == pytest.approx(0.5 * 3e-7 * LENGTH, rel=1e-12)
+
+
+@pytest.mark.parametrize("part", [0.0, 1e-7, 0.4, 3.0])
+def test_wear_removes_damage_evenly(part: float) -> None:
+    old = np.array([0.3, 0.02, 0.0, 0.0])[:, None, None] * np.array([1.0, 0.0])
+    damage, sums = step(lambda _: 2e-5, np.array([[part, part]]), old=old)
+    share = quad(lambda time: np.exp(-part * (1.0 - time)), 0.0, 1.0)[0]
+    kept = 0.3 * np.exp(-part)
+    assert damage[0, 0, 0] == pytest.approx(kept + share * 2e-5 * LENGTH, rel=1e-7)
+    assert damage[1, 0, 0] == pytest.approx(0.02, abs=1e-12)
+    assert sums[0, 0] == pytest.approx(0.3**2, rel=1e-12)
+    uneven = step(lambda passes: passes * 1e-8, np.array([[part, part]]))[0]
+    even = step(lambda passes: passes * 1e-8)[0]
+    first, last = START * 1e-8, (START + LENGTH) * 1e-8
+    more = even[0, 0, 0] * min(part, 1.0) * (last - first) / (last + first) / 6.0
+    assert uneven[1, 0, 0] - even[1, 0, 0] == pytest.approx(more, rel=1e-9, abs=1e-15)
+
+
+def test_greatest_damage_replaces_the_sum() -> None:
+    old = np.zeros((4, 1, 2))
+    old[0, 0] = 0.1, 0.4
+    damage, sums = step(lambda _: 1e-4, slope=0.0, old=old)
+    assert damage[0, 0].tolist() == pytest.approx([0.5, 0.4])
+    assert sums[:, 0].tolist() == pytest.approx([0.4, 0.5, 0.5 + damage[1, 0, 0]])
+
+
+def test_step_without_passes_adds_nothing() -> None:
+    rates, none = np.full((2, 1), 1e-6), np.zeros(2)
+    old, points = np.zeros((4, 2, 1)), np.array([[np.nan, np.nan], [1.0, 1.0]])
+    damage, sums = damage_of_step(old, rates, rates, NONE, none, none, points, 1.0)
+    assert not damage[:2].any()
+    assert not sums.any()
