@@ -159,7 +159,8 @@ def test_contact_totals_are_the_sums_over_strips():
     spacing, speed, friction = y[1] - y[0], 2.6, np.full(60, 0.2)
     longitudinal, lateral, spin = 3e-4, 4e-4, 0.6
     variation = 7.0 - spin * y
-    dissipation, sums = np.empty((2, 60)), np.empty((6, 2))
+    dissipation, sums, torque = np.empty((2, 60)), np.empty((6, 2)), np.empty(2)
+    radius = 0.02 + y
 
     def twice(value):
         return np.array([value, value])
@@ -176,14 +177,17 @@ def test_contact_totals_are_the_sums_over_strips():
         twice(spin),
         twice(variation),
         twice(friction),
+        twice(radius),
         dissipation,
         sums,
+        torque,
     )
     found = solve(half_length, line_load, friction, longitudinal - spin * y, lateral, spin, spacing)
     np.testing.assert_allclose(dissipation, twice(speed * found.work), rtol=1e-9)
     totals = dict(zip(SUMS, sums[:, 1] / spacing, strict=True))
     assert totals["force_x"] == pytest.approx(found.force_x.sum(), rel=1e-9)
     assert totals["force_y"] == pytest.approx(found.force_y.sum(), rel=1e-9)
+    assert torque == pytest.approx([-spacing * (found.force_x * radius).sum()] * 2, rel=1e-9)
     moment = (found.moment - y * found.force_x).sum()
     assert totals["spin_moment"] == pytest.approx(moment, rel=1e-9)
     work = longitudinal * sums[0, 1] + lateral * sums[1, 1] + spin * sums[2, 1]

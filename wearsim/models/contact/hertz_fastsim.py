@@ -178,8 +178,10 @@ class HertzFastsim(HertzModel):
         # axes without variation have the length 1
         rank, radius = batch.friction.ndim, batch.rolling_radius
         shape = {1: (contacts, 1, 1), 2: (contacts, 1, strips)}.get(rank, batch.friction.shape)
+        # by a closed form, friction that is not a number would give no traction
+        known = np.isfinite(batch.friction).reshape(contacts, -1).all(axis=1)
         inputs = ContactInputs(
-            _usable_loads(batch),
+            np.where(known, _usable_loads(batch), math.nan),
             _column(batch.longitudinal),
             _column(batch.lateral),
             _column(batch.spin),
