@@ -93,9 +93,9 @@ def test_sweep_refuses_existing_file_before_it_runs(swept, tmp_path):
 
 def test_sweep_continues_where_it_was_stopped(tmp_path):
     values, path = ["8e-4", "1e-3", "1.2e-3"], tmp_path / "creep.h5"
-    scenarios, answers = creepages(values), iter([False] * 4 + [True])
+    scenarios, second = creepages(values), tmp_path / "creep-1e-3.h5"
     with pytest.raises(Interrupted, match=r"not started: 1.2e-3; call sweep again"):
-        run_sweep(scenarios, values, 3, path, stop_requested=lambda: next(answers, True), **SERIAL)
+        run_sweep(scenarios, values, 3, path, stop_requested=second.exists, **SERIAL)
     kept = (tmp_path / "creep-8e-4.h5").read_bytes()
     results = run_sweep(scenarios, values, 3, path, **SERIAL)
     assert [result.count for result in results] == [3, 3, 3]
