@@ -170,8 +170,10 @@ def strip_problem(case: Case, strips: int, contacts: int) -> tuple[tuple[Any, ..
         per_contact(creepage.spin),
         per_strip(-creepage.spin * grid.y),
         per_strip(point.friction),
+        np.empty((contacts, 0)),
         dissipation,
         sums,
+        np.empty(contacts),
     )
     return arguments, sums
 
