@@ -150,7 +150,7 @@ def test_estimates_cover_errors_of_steps_edges_and_sums() -> None:
             profile = math.hypot(profile, edges)
             depth, volume = OF_EDGES * depth, OF_EDGES * volume
         least = step.irreducible[:, v]
-        volume = COVER[1] * volume + step.volume_error[v] - least[1]
+        volume = COVER[1] * volume + step.volume_error[v]
         relative = volume / (step.weights[1] @ step.depths[:, v].sum(axis=1))
         depth = max(COVER[0] * depth, OF_VOLUME[0] * relative * deepest)
         profile = max(COVER[2] * profile, OF_VOLUME[1] * relative)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import wearsim
+from tests.evolution import SCENARIOS
 from tests.studies.random_examples import scenario_of
 from tests.studies.run.quadrature_study import errors as quadrature_errors, statistics
 from wearsim.evolution.error_estimates import half_quadrature, volume_of
@@ -66,3 +68,19 @@ def test_stated_errors_of_the_quadrature_cover_the_true_ones():
     covered, ratio = statistics(*quadrature_errors(13, 20))
     assert covered >= 0.93
     assert ratio < 10.0
+
+
+def test_stated_error_of_the_volume_has_the_scatter_of_the_draws():
+    # at full slip wear is proportional to friction: the mean of 4000 draws scatters by 1/sqrt(4000)
+    friction = {"distribution": "uniform", "low": 0.08, "high": 0.12, "persistence": "per-pass"}
+    changes = {
+        "operation.rollers": 1,
+        "operation.duration": "4 min",
+        "creepage.longitudinal": 0.02,
+        "friction.coefficient": friction,
+        "evolution.stepper": "implicit",
+    }
+    result = wearsim.run(wearsim.load_scenario(SCENARIOS / "rig-450min.toml", changes))
+    relative = result.volume_error[-1] / result.worn_volume[-1]
+    scatter = 0.2 / np.sqrt(3.0)  # standard deviation over the mean, of one draw
+    assert relative == pytest.approx(2.0 * scatter / np.sqrt(4000.0), rel=0.1)

@@ -122,7 +122,7 @@ class ImplicitStepper(StepDoublingStepper):
             scale,
             step,
             displaced,
-            state.volume_error,
+            state.volume_error - state.irreducible[1],
             end.irreducible,
             np.asarray(state.stepping_error),
             end.stacked,

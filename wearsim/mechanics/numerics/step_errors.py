@@ -114,9 +114,9 @@ def assess_step(
         Displacement of a roller that the error of its load corresponds to [m]: a stiff spring holds
         the depth, and errors of its load remain.
     volume_error : ndarray, shape (realisations,)
-        Before the step [m^3].
+        By steps alone, before the step [m^3].
     irreducible : ndarray, shape (3, realisations)
-        Errors of depth, volume and profile that no step reduces.
+        Errors of depth, volume and profile after the step that no step reduces.
     stepping_error : ndarray, shape (bodies, realisations, strips)
         Errors of the depths before the step [m].
     depths : ndarray, shape (bodies, realisations, strips)
@@ -216,7 +216,7 @@ def assess_step(
             sizes[2, v] = math.hypot(sizes[2, v], part_of_edges)
             sizes[0, v], sizes[1, v] = OF_EDGES * sizes[0, v], OF_EDGES * sizes[1, v]
         # the error of the volume may cross zero
-        of_test = COVER[1] * sizes[1, v] + volume_error[v] - irreducible[1, v]
+        of_test = COVER[1] * sizes[1, v] + volume_error[v]
         relative_size = of_test / volume if volume > 0.0 else 0.0
         depth = max(COVER[0] * sizes[0, v], OF_VOLUME[0] * relative_size * deepest)
         profile = max(COVER[2] * sizes[2, v], OF_VOLUME[1] * relative_size)
