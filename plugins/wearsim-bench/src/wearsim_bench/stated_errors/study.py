@@ -25,6 +25,7 @@ from wearsim_bench.stated_errors.references import Worn, on_strips, reference_of
 QUANTITIES = ("depth", "profile", "volume")
 STATED = "stated_"  # prefix of the stated error of a quantity
 STEPS, STRIPS = "steps_", "strips_"  # prefixes of the true errors by steps and by strips alone
+DRAWN = "drawn_at_passes"  # count: whether inputs are drawn at every pass
 OWN = "reference_"  # prefix of the change of the reference by half its strips
 TESTS = "tests"  # group of the measurements of single tests
 SMALL = 1e-6  # true errors below it count as covered, and have no ratio
@@ -76,6 +77,7 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
         "solves": int(np.max(result.solves[-1])),
         "strips": len(own.y),
         "strips_grew": int(grew),
+        DRAWN: int(any(item.is_redrawn for item in test.scenario().random)),
         "final_depth": own.depth,
         "reference_strips": len(reference.y),
         "reference_seconds": float(reference.seconds),
@@ -165,7 +167,7 @@ class Coverage:
     true, stated, tolerances : sequence of float
         Relative errors of every test, and its tolerance.
     by_steps : sequence of float
-        True errors by steps alone.
+        True errors by steps alone, zero where inputs are drawn at every pass.
     """
 
     true: Sequence[float]
@@ -216,7 +218,8 @@ def coverage(rows: Sequence[Measurement], quantity: str) -> Coverage:
         [row.errors[quantity] for row in done],
         [row.errors[STATED + quantity] for row in done],
         [row.counts["tolerance"] for row in done],
-        [row.errors.get(STEPS + quantity, 0.0) for row in done],
+        # the scatter of draws is no error by steps
+        [0.0 if row.counts.get(DRAWN) else row.errors.get(STEPS + quantity, 0.0) for row in done],
     )
 
 

@@ -86,8 +86,10 @@ ABOUT = (
     " with those of the contacts on the worn profiles of the reference, of a cam at the stations of"
     " the test; errors of angles are in radians."
     " The true errors by steps alone, on the strips of the run, and by strips alone, without"
-    " stepping error, are given for every test. Tests that end with a clear error are counted"
-    f" apart, and so are those without a reference, as after {SECONDS:g} s of processor time. The"
+    " stepping error, are given for every test; with inputs drawn at every pass the former contain"
+    " the scatter of the draws, and are not compared with the tolerance. Tests that end with a"
+    " clear error are counted apart, and so are those without a reference, as after"
+    f" {SECONDS:g} s of processor time. The"
     " tests whose true error exceeds the stated one most are listed with their settings,"
     " and their scenarios are written to files."
 )
