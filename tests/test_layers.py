@@ -64,7 +64,7 @@ MAY_PATCH = re.compile(r"(set|del)attr\(|patch\(|\._\w+(\.\w+)* = ")
 
 
 def patched_names(module: ast.Module) -> Iterator[str]:
-    """Yield the attributes that a module of tests replaces, except those of its own `self`."""
+    """Yield the attributes that a test module replaces, except attributes of `self`."""
     for node in ast.walk(module):
         if isinstance(node, ast.Call):
             called = getattr(node.func, "attr", getattr(node.func, "id", ""))

@@ -83,7 +83,7 @@ class Campaign:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
-        """Find what each test executes, then try every mutant."""
+        """Find the functions that each test calls, then test every mutant."""
         modules = sorted({mutant.module for mutant in self.mutants})
         for module in modules:
             import_module(module.removesuffix(".py").replace("/", "."))

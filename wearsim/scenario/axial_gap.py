@@ -81,7 +81,7 @@ class AxialGap:
         return np.asarray(offset * (radius / crown))
 
     def drop(self, s: FloatArray) -> FloatArray:
-        """Return the gap of rollers whose apex is above the apex of the cylinder [m]."""
+        """Return the gap of the bodies at an axial distance from their coinciding apexes [m]."""
         return self._roller.drop(s) + self.cylinder_drop(s)
 
     def half_width(self, depth: FloatArray | float) -> FloatArray:

@@ -36,7 +36,7 @@ CONSTANTS = ContactConstants(
 
 @dataclass
 class Loop:
-    """Two contacts whose bodies wear, with a spring and load terms if asked for."""
+    """Two contacts whose bodies wear, optionally with a spring and with load terms."""
 
     stiffness: float = 0.0
     rests: bool = False
@@ -96,7 +96,7 @@ class Loop:
         return status
 
     def copies(self) -> dict[str, np.ndarray]:
-        """Return what the passes change."""
+        """Return the arrays that the passes change."""
         arrays = {**self.wear._asdict(), **self.loads._asdict()}
         arrays |= {"energy": self.energy, "terms": self.terms}
         return {name: array.copy() for name, array in arrays.items()}

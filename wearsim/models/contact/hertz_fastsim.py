@@ -201,13 +201,11 @@ class HertzFastsim(HertzModel):
         self, batch: ContactBatch, warm: ContactBatchSolution | None
     ) -> ContactBatch:
         """Return the contacts with the creepages at which the tractions balance the torques."""
-        if batch.bearing_torque is None or batch.rolling_radius is None:
-            raise ValueError("a bearing torque needs the rolling radius of each strip")
-        _, unloaded = self._solved(batch)
+        _, at_given_creepage = self._solved(batch)  # line loads do not depend on the creepage
         return with_balanced_creepage(
             batch,
-            unloaded.line_load,
-            unloaded.half_length,
+            at_given_creepage.line_load,
+            at_given_creepage.half_length,
             self._grid,
             self._tangential,
             warm,

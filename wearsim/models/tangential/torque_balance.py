@@ -131,7 +131,7 @@ def with_balanced_creepage(
 
 
 def _skidding(torque: float, carried: float, state: Mapping[str, Any]) -> ContactError:
-    """Return the error of a free roller whose torque friction cannot transmit."""
+    """Return the error of a free roller: friction cannot transmit its bearing torque."""
     return ContactError(
         f"the roller skids: its torque of {1e3 * torque:.4g} N mm exceeds the"
         f" {1e3 * carried:.4g} N mm that friction can transmit at a load of"

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from wearsim.report.surfaces import Sampling, Surface
 
 
-#: what wear tests of cams do not contain, beside what tests of cylinders do not
+#: effects that wear tests of cams neglect, besides those neglected on cylinders
 CAM_EXCLUDED = ("vibration of the follower", "uneven wear around the roller")
 # titles of the columns of the motion table, names of their values, and units
 _MOTION = (

@@ -246,7 +246,7 @@ class IdentificationResult(StudyResult[IdentificationData]):
 
     @cached_property
     def levels(self) -> TwoLevels:
-        """Distribution of K/H of the next specimen, with what is not known of median and scatter.
+        """Distribution of K/H of the next specimen, with the uncertainty of its median and scatter.
 
         Weights over mean m and scatter t of ln K/H. Its `contained` are inputs that were neither
         drawn nor known in all tests: where they differed, t contains it.

@@ -82,7 +82,7 @@ def random(
 def measured_scenarios(
     places: Sequence[int], seed: int, *, reduce: bool
 ) -> list[list[tuple[Measurement, dict[str, str]]]]:
-    """Return what `measured_scenario` returns of some scenarios, by number."""
+    """Measure the random scenarios of some numbers by `measured_scenario`."""
     return [measured_scenario(place, seed, reduce=reduce) for place in places]
 
 
