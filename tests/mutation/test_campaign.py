@@ -28,7 +28,7 @@ MODULE = '''
 def least(values: list[float], start: float = 1.0) -> float:
     """Return the least value, not above `start`."""
     found = start
-    for value in values:
+    for value, _ in zip(values, values, strict=True):
         if value < found and not value != value:
             found = -(-value)
     if not values:

@@ -234,7 +234,8 @@ def _weighted_quantile(
         after = np.clip((mean < probability).sum(axis=1), 1, len(grid) - 1)
         rows = np.arange(len(mean))
         below, above = mean[rows, after - 1], mean[rows, after]
-        part = (probability - below) / np.maximum(above - below, 1e-300)
+        # beyond the last life, where it is above 1, the quantile is infinite
+        part = np.minimum((probability - below) / np.maximum(above - below, 1e-300), 1.0)
         quantiles = np.exp(logs[after - 1] + part * (logs[after] - logs[after - 1]))
         return np.asarray(np.where(mean[:, -1] < probability, math.inf, quantiles))
 
