@@ -135,7 +135,7 @@ class Campaign:
         found: list[pytest.Item] = []
         for cases in tests.values():
             some = some_of(cases)
-            if any(self._calls(item, mutant, LONGEST) for item in some):
+            if any(mutant.module in self._traced(item)["calls"] for item in some):
                 found += [
                     item
                     for item in cases
@@ -316,25 +316,19 @@ def live_functions(modules: Iterable[str]) -> dict[tuple[str, str], list[Functio
     return found
 
 
-def equivalent() -> list[dict[str, str]]:
+def equivalent() -> list[dict[str, Any]]:
     """Return the mutants, or the functions, in which a change has no effect on results."""
-    listed: list[dict[str, str]] = tomllib.loads(EQUIVALENT.read_text(encoding="utf-8"))["mutant"]
+    listed: list[dict[str, Any]] = tomllib.loads(EQUIVALENT.read_text(encoding="utf-8"))["mutant"]
     return listed
 
 
-def is_listed(mutant: Mutant, listed: Iterable[dict[str, str]]) -> bool:
+def is_listed(mutant: Mutant, listed: Iterable[dict[str, Any]]) -> bool:
     """Return whether a mutant is one of those listed."""
     return any(
         fnmatchcase(mutant.module, one["module"])
         and fnmatchcase(mutant.function, one["function"])
-        and all(
-            one.get(name, value) == value
-            for name, value in (
-                ("line", mutant.line),
-                ("before", mutant.before),
-                ("after", mutant.after),
-            )
-        )
+        and one.get("line", mutant.line) == mutant.line
+        and mutant.change in one.get("changes", [mutant.change])
         for one in listed
     )
 

@@ -74,8 +74,12 @@ class Mutant:
     number: int
 
     def __str__(self) -> str:
-        where = f"{self.module}:{self.lines[0]} {self.function}"
-        return f"{where}: {self.before}  ->  {self.after}"
+        return f"{self.module}:{self.lines[0]} {self.function}: {self.change}"
+
+    @property
+    def change(self) -> str:
+        """Source before and after."""
+        return f"{self.before} -> {self.after}"
 
 
 Change = tuple[str, ast.AST, str, ast.AST]

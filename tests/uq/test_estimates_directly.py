@@ -318,7 +318,7 @@ def test_gamma_shape_inverts_log_minus_digamma(shape: float) -> None:
     from scipy.special import digamma
 
     gap = math.log(shape) - float(digamma(shape))
-    assert gamma_shape(gap) == pytest.approx(shape, rel=1e-9 * max(shape, 1.0) ** 0.5)
+    assert gamma_shape(gap) == pytest.approx(shape, rel=1e-13 + 2e-14 * shape)
     law = Gamma(3.0, math.log(3.0) - gap)
     x = np.array([0.5, 3.0, 4.0])
     l0, l1, l2 = law.multipliers
@@ -332,6 +332,7 @@ def test_gamma_shape_inverts_log_minus_digamma(shape: float) -> None:
     ("call", "message"),
     [
         (((0.0, 1e-151), 5e-152, None, None), "the width of the support 1e-151 is too small"),
+        (((-1e-151, 0.0), None, None, None), "the width of the support 1e-151 is too small"),
         (((0.0, 1.0), 0.5, 1e-151, None), "std 1e-151 is too small to be squared"),
         (((0.0, 1.0), 1e-151, None, None), "the distance from the mean to the nearer end 1e-151"),
         (((0.0, 1e151), 1.0, None, None), "high 1e.151 is too large to be squared"),
@@ -355,6 +356,23 @@ def test_gamma_shape_inverts_log_minus_digamma(shape: float) -> None:
 def test_impossible_moments_name_their_limit(call: tuple, message: str) -> None:
     with pytest.raises(Infeasible, match=message):
         maximum_entropy(*call)
+
+
+def test_moments_of_the_uniform_and_exponential_distributions_are_recognised() -> None:
+    uniform = maximum_entropy((1.0, 3.0), 2.0)
+    assert (uniform.family, uniform.parent) == ("uniform", None)
+    assert maximum_entropy((0.0, 1e150)).mean == 5e149
+    exponential = maximum_entropy((1.0, math.inf), 3.0, 2.0)
+    assert (exponential.family, exponential.parent) == ("exponential", None)
+    assert maximum_entropy((1.0, math.inf), 3.0).mean == 3.0
+    # the mean of a truncated exponential distribution, by its closed form
+    truncated = maximum_entropy((0.0, 2.0), 0.6)
+    rate = truncated.multipliers[1]
+    assert 1.0 / rate - 2.0 / math.expm1(2.0 * rate) == pytest.approx(0.6, rel=1e-12)
+    # its last quantile, where the end of the support is as far as the probability
+    steep = Exponential(0.0, 41.0, 1.0, 1.0, 1.0)
+    last = steep.quantile(np.array([1.0 - 2.0**-53]))[0]
+    assert last == pytest.approx(-math.log(2.0**-53 + math.exp(-41.0)), rel=1e-12)
 
 
 def test_posterior_on_a_grid_is_smoothed_and_has_exact_moments() -> None:
