@@ -24,7 +24,13 @@ from wearsim.uq.estimation.intervals import (
     t_quantile,
 )
 from wearsim.uq.estimation.mann_whitney import paired, part_below, superiority
-from wearsim.uq.estimation.moments import are_equal, converge, fractional_ranks, summarise
+from wearsim.uq.estimation.moments import (
+    are_equal,
+    converge,
+    fractional_ranks,
+    order_ranks,
+    summarise,
+)
 from wearsim.uq.estimation.standard_errors import Control, Controlled, Replicated
 
 VALUES = np.array([0.3, 1.2, 0.8, 2.9, 1.1, 0.5, 1.9, 0.7, 1.4, 1.0, 2.2, 0.2])
@@ -53,6 +59,18 @@ def test_moments_of_few_values_are_those_of_their_formulas(count: int) -> None:
     assert path.std[1] == pytest.approx(s)
     assert path.std_error[1] == pytest.approx(found.std_error)
     assert np.isnan([path.std[0], path.mean_error[0], path.std_error[0]]).all()
+
+
+def test_interval_of_a_summarised_quantile_is_between_order_statistics() -> None:
+    values = np.concatenate([VALUES, VALUES + 3.1])
+    low, high = order_ranks(24, 0.4)
+    found = summarise(values, (0.4,)).quantile(0.4)
+    ordered = np.sort(values)
+    assert (found.value, found.low, found.high) == (
+        np.quantile(values, 0.4),
+        ordered[low - 1],
+        ordered[high - 1],
+    )
 
 
 def test_two_values_that_agree_are_equal_and_one_is_not() -> None:
@@ -224,6 +242,8 @@ def test_targets_are_read_and_compared_with_the_half_width() -> None:
     assert Target("depth", "mean", 1.0001 * ratio).reached(found)
     assert not Target("depth", "mean", 0.9999 * ratio).reached(found)
     assert not Target("depth", "mean", 10.0).reached(estimate(values[:31]))
+    exact = Target("depth", "mean", 1.0).achieved(found)
+    assert Target("depth", "mean", exact).reached(found)
     negative = estimate(-values)
     assert Target("depth", "mean", 1.0).achieved(negative) == pytest.approx(ratio)
     around = estimate(np.array([-1.0, 1.0]))

@@ -89,15 +89,23 @@ def test_index_of_one_number_is_that_of_the_best_polynomial(shape) -> None:
 
 def test_index_of_several_numbers_has_products_by_their_degree() -> None:
     rng = np.random.default_rng(2)
-    x = rng.standard_normal((96, 2))
+    x = rng.standard_normal((104, 2))
     for values in (x[:, 0] * x[:, 1], x[:, 0] ** 4 - x[:, 1], x[:, 0] ** 2 * x[:, 1]):
-        noisy = values + 0.3 * rng.standard_normal(96)
+        noisy = values + 0.3 * rng.standard_normal(104)
         found = first_order(noisy, {"x": x})["x"]
         assert parts(found) == pytest.approx(index_of(noisy, x, TWO, [6, 10, 12]), abs=1e-6)
     y = rng.standard_normal((80, 3))
     values = y[:, 0] * y[:, 2] + y[:, 1] + 0.2 * rng.standard_normal(80)
     found = first_order(values, {"y": y})["y"]
     assert parts(found) == pytest.approx(index_of(values, y, THREE, [10]), abs=1e-6)
+
+
+def test_numbers_of_equal_ranks_add_no_information() -> None:
+    rng = np.random.default_rng(8)
+    x = rng.standard_normal((200, 1))
+    values = np.sin(x[:, 0]) + 0.3 * rng.standard_normal(200)
+    alone, both = (first_order(values, {"x": y})["x"] for y in (x, np.hstack([x, x**3])))
+    assert both.value == pytest.approx(alone.value, abs=0.02)
 
 
 def test_number_of_three_values_has_three_terms_and_mean_ranks() -> None:

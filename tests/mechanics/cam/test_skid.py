@@ -61,7 +61,8 @@ def test_slip_goes_on_through_a_jump_and_turns() -> None:
     slips = {
         arc.panel: (arc.slip[0], arc.slip[-1]) for arc in arcs if arc.theta[0] in (0.0, math.pi)
     }
-    # at half a turn the slip rises by 1 and falls at 0.1, at its start it falls by 1 and rises at 0.3
+    # at half a turn the slip rises by 1 and falls at 0.1 per rad, at its start it falls by 1 and
+    # rises at 0.3 per rad
     low = -1.0 + slips[1][1]
     assert slips[0][0] == pytest.approx(low, abs=1e-6)
     assert slips[0][1] == pytest.approx(min(low + 0.3 * math.pi, 0.0), abs=1e-6)

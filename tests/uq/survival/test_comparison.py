@@ -23,11 +23,12 @@ Z = 1.959963984540054
 
 
 def test_same_machine_counts_equal_and_undecided_pairs_one_half():
-    first, second = np.array([3.0, 1.0, 2.0, 5.0, 6.0, 4.0]), np.array([1.0, 3.0, 2.0, 5.0, 5.0, 1])
+    first = np.array([3.0, 1.0, 2.0, 5.0, 6.0, 4.0, 5.0])
+    second = np.array([1.0, 3.0, 2.0, 5.0, 5.0, 1.0, 6.0])
     found = same_machine(first, second, 5.0)
-    assert found == Interval(3.5 / 6.0, proportion(2, 6).low, proportion(5, 6).high)
+    assert found == Interval(4.0 / 7.0, proportion(2, 7).low, proportion(6, 7).high)
     free = same_machine(first, second)
-    assert free == Interval(4.0 / 6.0, proportion(3, 6).low, proportion(5, 6).high)
+    assert free == Interval(4.0 / 7.0, proportion(3, 7).low, proportion(5, 7).high)
     assert same_machine(first[:0], second[:0]) == UNKNOWN
 
 
