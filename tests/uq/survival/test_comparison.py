@@ -89,6 +89,20 @@ def outlives(first: float, second: float, most: float) -> float:
     )
 
 
+def never_or(first: float, second: float, most: float) -> float:
+    """Return the same where a kappa may be 0, which fails at once, or infinite."""
+    if first == 0.0 or second == 0.0:
+        return 0.5 * (first == second) + float(first > second)
+    if math.isfinite(first) and math.isfinite(second):
+        return outlives(first, second, most)
+    if math.isinf(first) and math.isinf(second):
+        return 0.5
+    reached = 0.0  # the other one reaches the censoring too
+    if math.isfinite(most):
+        reached = float(ndtr((math.log(min(first, second)) - math.log(most)) / SPREAD))
+    return 1.0 - 0.5 * reached if math.isinf(first) else 0.5 * reached
+
+
 @pytest.mark.parametrize("most", [math.inf, 1.1])
 def test_mixtures_of_two_specimens_are_compared_pair_by_pair(most: float):
     rng = np.random.default_rng(2)
@@ -100,6 +114,14 @@ def test_mixtures_of_two_specimens_are_compared_pair_by_pair(most: float):
         found = two_specimens(*pair, most, paired)
         expected = by_pairs(chance, paired, 0.5 * left[0] * left[1])
         assert parts(found) == pytest.approx(expected, abs=1e-4)
+    # realisations that never fail outlive all others, and tie with each other
+    some, rest = np.append(1.3 * first, math.inf), np.append(second, [math.inf, 0.0])
+    chance = np.array([[never_or(a, b, most) for b in rest] for a in some])
+    pair = FactorMixture(some, SCORE), FactorMixture(rest, SCORE)
+    left = [float(1.0 - item.failed(np.array([min(most, 1e9)])).mean()) for item in pair]
+    undecided = 0.5 * left[0] * left[1] if most < math.inf else 0.0
+    expected = by_pairs(chance, False, undecided)
+    assert parts(two_specimens(*pair, most, False)) == pytest.approx(expected, abs=1e-4)
     one, other = (FactorMixture(np.array([k]), SCORE, exact=True) for k in (1.4, 1.0))
     value = outlives(1.4, 1.0, most)
     half = 0.5 * math.prod(
