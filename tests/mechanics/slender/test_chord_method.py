@@ -18,6 +18,7 @@ from wearsim.mechanics.slender.chord_method import (
     solve_from_anchor,
     solve_fully,
 )
+from wearsim.mechanics.slender.half_length import REACH
 from wearsim.mechanics.slender.influence import (
     curvature_table,
     influence_table,
@@ -25,6 +26,7 @@ from wearsim.mechanics.slender.influence import (
     read_influence,
 )
 from wearsim.mechanics.slender.newton import CONVERGED, solve_slender
+from wearsim.mechanics.slender.pass_loop import _fill_growth
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 
 STRIPS, SPACING, MODULUS = 11, 3e-4, 1.15e11
@@ -168,3 +170,35 @@ def test_solution_from_an_anchor_is_that_of_newtons_method(coupled: bool, crown:
     before = loads.line_load.copy()
     assert solve_fully(1, 30.0, True, loads, known, state) != CONVERGED
     assert (loads.line_load == before).all()
+
+
+def test_growth_of_the_loads_is_a_logarithm() -> None:
+    anchor = np.array([[0.0, 2.0, 3.0, 4.0, 0.0]])
+    size = 5 + 4 * REACH
+    for part in (1.015, 1.5):
+        loads = Loads(
+            anchor * [1.0, part, 0.99, 1.0, 1.0], anchor, anchor, np.zeros(1), np.zeros(1)
+        )
+        growth = np.full(size, 9.0)
+        _fill_growth(0, 1, 3, loads, growth, size)
+        known = np.zeros(size)
+        known[2 * REACH + 1 : 2 * REACH + 4] = np.log([part, 0.99, 1.0])
+        assert growth == pytest.approx(known, abs=1e-10)
+
+
+def test_number_of_failed_sets_of_contacts_is_returned() -> None:
+    known, gaps = constants(), np.stack([5.0 * Y**2, 5.0 * Y**2, 1e-3 * Y**2, 5.0 * Y**2])
+    gaps[1, 3], gaps[3, 0] = math.inf, math.nan
+    shape = 4, 1, STRIPS
+    line_load, approach, status = np.zeros(shape), np.zeros((4, 1)), np.zeros((2, 4), np.int64)
+    failed = solve_slender(
+        *(gaps.reshape(shape), np.zeros(shape), None, None, np.full((4, 1), 30.0)),
+        *(np.full((4, 1), 100.0), SPACING, MODULUS, known.table, known.curvature_influence),
+        *(line_load, approach, np.empty(shape), np.empty(shape), *status),
+    )
+    # the second and the last gap are not finite, and the third contact reaches both ends
+    assert failed == 3
+    assert (status[0, [0, 2]] == CONVERGED).all()
+    assert (status[0, [1, 3]] != CONVERGED).all()
+    assert line_load[2, 0, 0] > 0.0
+    assert line_load[0, 0, 0] == 0.0
