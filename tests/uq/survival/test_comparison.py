@@ -197,6 +197,7 @@ def test_ratio_with_a_quantile_beyond_the_censoring_is_unbounded():
     assert quantile_ratio(long, short, 0.5, most=3.0) == UNKNOWN
     never = np.where(np.arange(8) < 4, np.inf, kappa)
     some = FactorMixture(never, SCORE)
+    assert two_specimens(some, some).value == pytest.approx(0.5)
     found = quantile_ratio(some, short, 0.4, samples=200)
     assert math.isfinite(found.value)
     assert (found.low, found.high) == (0.0, math.inf)

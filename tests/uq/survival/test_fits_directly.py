@@ -169,6 +169,8 @@ def test_integrated_fit_is_that_of_many_wear_factors(family: str) -> None:
     assert exact.degrees == math.inf
     assert not exact.covariance.any()
     assert fit_mixture(family, FactorMixture(kappa * [1, 1, 0, 1, 1], SCORE)) is None
+    # a wear factor that follows from another input, and one realisation: equal lives
+    assert fit_mixture(family, FactorMixture(kappa[:1], SCORE, 0.3, 0.0, exact=True)) is None
 
 
 def statistic(u: np.ndarray, count: int, end: float) -> float:

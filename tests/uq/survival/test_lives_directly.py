@@ -21,6 +21,8 @@ from wearsim.uq.survival.lives import (
     cumulative_incidence,
     life_quantile,
     lower_bound,
+    median_positions,
+    median_rank,
     probability_before,
     proportion,
     survival_curve,
@@ -224,7 +226,7 @@ def test_mixture_is_a_mean_of_log_normal_lives() -> None:
 
 
 def test_error_of_a_mixture_is_at_least_the_predicted_one() -> None:
-    log = np.array([-0.5, -0.2, 0.0, 0.1, 0.3, 0.4, 0.9])
+    log = np.array([-0.5, -0.2, 0.05, 0.1, 0.3, 0.4, 0.9])
     kappa = np.exp(np.append(log, [-math.inf, math.inf, math.inf]))
     mixture = FactorMixture(kappa, SCORE)
     # seven values have the fit by mean and standard deviation alone
@@ -291,3 +293,13 @@ def test_spread_is_widened_from_5_to_1_percent() -> None:
         [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]
     )
     assert caution(math.sqrt(0.05 * 0.01)) == pytest.approx(0.5)
+
+
+def test_median_ranks_reach_from_the_first_to_the_last_life() -> None:
+    positions = median_positions(7)
+    assert positions == pytest.approx(stats.beta(np.arange(1, 8), np.arange(7, 0, -1)).median())
+    assert median_rank(7, float(positions[0])) == 1.0
+    assert median_rank(7, float(positions[-1])) == 7.0
+    assert median_rank(7, float(0.5 * (positions[2] + positions[3]))) == pytest.approx(3.5)
+    assert math.isnan(median_rank(7, float(positions[-1]) + 1e-9))
+    assert math.isnan(median_rank(0, 0.5))

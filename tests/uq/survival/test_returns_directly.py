@@ -21,6 +21,9 @@ SCORE = ScoreFunction(ENDS, ENDS, np.zeros(0))
 T, M = 0.4, -10.0
 
 
+SINGLE = TwoLevels(np.array([M]), np.array([T]), np.ones(1))
+
+
 def one(kappa: float = 1e-4, **more: object) -> FactorMixture:
     """Return one realisation, whose lives are log-normal."""
     return FactorMixture(np.array([kappa]), SCORE, exact=True, **more)  # type: ignore[arg-type]
@@ -128,6 +131,17 @@ def test_sampling_error_of_realisations_widens_the_prior_of_the_factor() -> None
         assert factor == pytest.approx(0.04 / math.hypot(0.2, error), rel=5e-3)
 
 
+def test_known_wear_factor_leaves_the_life_factor_to_the_returns() -> None:
+    found = update([one()], SINGLE, FAILED, 0.2)
+    precision = 1.0 / 0.2**2 + 5.0 / T**2
+    mean = (M / 0.2**2 + (math.log(1e-4) - LOGS).sum() / T**2) / precision
+    average = found.after.weight @ found.after.m
+    assert average == pytest.approx(mean, abs=2e-3)
+    std = math.sqrt(found.after.weight @ (found.after.m - average) ** 2)
+    assert std == pytest.approx(precision**-0.5, rel=0.02)
+    assert found.factor_weight @ found.log_factor == pytest.approx(M - mean, abs=5e-3)
+
+
 def test_nearly_equal_scatters_are_one_and_few_are_kept() -> None:
     t = np.repeat([0.3, 0.3015, 0.4, 0.5], 81)
     m = np.tile(MEANS, 4)
@@ -144,9 +158,6 @@ def test_nearly_equal_scatters_are_one_and_few_are_kept() -> None:
     weight = np.exp(np.array(logs) - max(logs)) * [4.0, 2.0, 2.0]
     shares = [found.weight[found.t == scatter].sum() for scatter in np.unique(found.t)]
     assert shares == pytest.approx(weight / weight.sum(), abs=2e-3)
-
-
-SINGLE = TwoLevels(np.array([M]), np.array([T]), np.ones(1))
 
 
 def hazard(life: np.ndarray) -> np.ndarray:
@@ -204,6 +215,7 @@ def test_inspected_failures_are_spread_by_their_probability() -> None:
     none = Fleet(np.full(3, middle), np.full(3, math.inf), np.zeros(3, dtype=np.int64))
     found = check_fleet([one()], SINGLE, SINGLE, none)
     assert found.surprise == pytest.approx(math.exp(-3.0 * math.log(2.0)), rel=1e-3)
+    assert found.edges.tolist() == [0.0, middle]  # fewer than four failures predicted
 
 
 def test_remaining_lives_of_a_known_distribution_are_exact() -> None:
