@@ -42,7 +42,9 @@ def patches(given: Bodies, gaps: np.ndarray, loads: np.ndarray) -> Patches:
     return found
 
 
-@pytest.mark.parametrize(("centre", "b"), [(0.0, 0.42), (0.233, 0.37), (-0.7, 0.03), (0.9, 0.5)])
+@pytest.mark.parametrize(
+    ("centre", "b"), [(0.0, 0.42), (0.233, 0.37), (-0.7, 0.03), (0.9, 0.5), (-0.9, 0.5)]
+)
 def test_strips_of_a_patch_hold_the_elliptic_pressure(centre: float, b: float) -> None:
     length, load, middle, coverage = np.full((4, 21), -1.0)
     first, stop = cut_into_strips(bodies(), 0.2, b, centre, LOAD, length, load, middle, coverage)
