@@ -311,6 +311,7 @@ def test_uniform_and_exponential_densities_and_quantiles() -> None:
     )
     assert uniform.quantile(p) == pytest.approx(1.0 + 3.0 * p)
     assert uniform.bulk == (1.0, 4.0)
+    assert (uniform.mean, uniform.std) == pytest.approx((2.5, math.sqrt(0.75)), rel=1e-14)
     for rate, high in ((0.7, 4.0), (20.0, 4.0), (0.7, math.inf), (1e-9, 4.0)):
         law = (
             stats.truncexpon((high - 1.0) * rate, 1.0, 1.0 / rate)

@@ -158,7 +158,7 @@ def test_solution_from_an_anchor_is_that_of_newtons_method(coupled: bool, crown:
     for guard in (np.flatnonzero(inside)[0] - 1, np.flatnonzero(inside)[-1] + 1):
         for side in () if coupled else (-1.0, 1.0):
             state.gap[:] = tilted
-            state.gap[guard] = limit[guard] + side * 1e-3 * elastic
+            state.gap[guard] = limit[guard] + side * 1e-4 * elastic
             closed = not solve_from_anchor(1, 30.1, tilted.min(), loads, known, state)
             assert closed == (side < 0.0)
     state.gap[:] = tilted
