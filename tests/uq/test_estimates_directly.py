@@ -275,6 +275,19 @@ def test_superiority_has_the_interval_of_its_sources(shift: float) -> None:
         ]
     assert parts(superiority(first, second)) == pytest.approx([value, *ends], rel=1e-6)
     assert superiority(first[:5], second) != UNKNOWN
+    apart = superiority(VALUES + 9.0, second)
+    true = brentq(
+        lambda p: (
+            1.0
+            - p
+            - Z
+            * math.sqrt(
+                p * (1.0 - p) * (1.0 + 8.5 * ((1.0 - p) / (2.0 - p) + p / (1.0 + p))) / (12 * 7)
+            )
+        ),
+        *(0.1, 0.999),
+    )
+    assert parts(apart) == pytest.approx([1.0, true, 1.0])
 
 
 def test_pairs_have_wilsons_interval() -> None:

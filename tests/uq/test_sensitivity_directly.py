@@ -116,6 +116,21 @@ def test_number_of_three_values_has_three_terms_and_mean_ranks() -> None:
     assert parts(found) == pytest.approx(index_of(values, kind, ONE, [3]), abs=1e-6)
 
 
+def test_equal_numbers_have_their_mean_rank() -> None:
+    rng = np.random.default_rng(9)
+    kind = rng.choice(6, (72, 1), p=[0.4, 0.1, 0.2, 0.1, 0.15, 0.05]).astype(float)
+    values = np.sin(kind[:, 0]) + 0.4 * rng.standard_normal(72)
+    found = first_order(values, {"kind": kind})["kind"]
+    assert parts(found) == pytest.approx(index_of(values, kind, ONE, [3, 4, 5, 6]), abs=1e-6)
+
+
+def test_values_equal_but_for_rounding_have_no_indices() -> None:
+    more = np.random.default_rng(10).integers(0, 2, (30, 3))
+    blocks = np.where(more, 0.1, np.nextafter(0.1, 1.0))
+    none = Interval(0.0, 0.0, 0.0)
+    assert saltelli_indices(blocks, ["a"]) == {"a": (none, none)}
+
+
 def test_fewest_realisations_are_eight_for_each_term() -> None:
     assert [fewest_realisations(k) for k in (1, 2, 6)] == [24, 40, 104]
     x = np.random.default_rng(4).random((40, 2))

@@ -121,6 +121,11 @@ def test_known_least_noise_widens_the_likelihood_of_each_model():
         assert lines.T @ lines == pytest.approx(np.eye(2), abs=1e-12)
         assert lines.T @ away == pytest.approx([0.0, 0.0], abs=1e-9)
     assert free.exponent == pytest.approx(np.full(len(squares), 19.0))
+    # the likelihood with the lines integrated, and priors of the length and of the white share
+    volumes = [np.linalg.slogdet(columns[:, 1:].T @ columns[:, 1:])[1] for columns in z]
+    prior = np.log(free.length**2 * free.white * (1.0 - free.white))
+    log = np.log(free.scale).sum(axis=0) - 0.5 * np.array(volumes) + prior
+    assert free.log_weight == pytest.approx(log)
     # a likelihood of a greater variance is flatter by its ratio, and equal at the residuals
     wider = np.maximum(1.0, 1.96 / (np.array(squares) / 38.0))
     assert (wider > 1.0).any()
