@@ -34,7 +34,13 @@ from wearsim.mechanics.tangential.hertz_fastsim_batch import (
     Theory,
     solve_contacts,
 )
-from wearsim.mechanics.tangential.kalker_coefficients import spline
+from wearsim.mechanics.tangential.kalker_coefficients import (
+    CreepageCoefficients,
+    coefficient,
+    flexibilities,
+    one_flexibility,
+    spline,
+)
 from wearsim.types import Grid
 
 SHEAR, NU = 200e9 / 2.6, 0.3
@@ -262,3 +268,18 @@ def test_spin_varies_the_creepage_about_its_mean_by_load():
     lateral, _ = full_slip([[0.1]], lateral=-0.2, single=True)
     assert lateral.force_y[0] == pytest.approx(30.0 / math.sqrt(2.0), rel=0.05)
     assert lateral.force_x[0] == pytest.approx(-30.0 / math.sqrt(2.0), rel=0.05)
+
+
+def test_single_flexibility_is_that_of_the_creepages_and_the_spin():
+    none = np.zeros((0, len(Y)))
+    one = [np.array([value]) for value in (300.0, 2e-5, 0.0, 0.3)]
+    friction = np.full((1, 1, 1), 1e3)
+    inputs = ContactInputs(*one, friction, False, none, np.array([2.0]), none)
+    row = np.zeros(1, np.int64)
+    _, found, patches = solve(theory(single=True, points=200), inputs, row, GAPS[1:2])
+    a, b = patches.a[0], patches.b[0]
+    values = [coefficient(which, a / b, NU, spline(which)) for which in range(3)]
+    three = flexibilities(CreepageCoefficients(*values, math.nan), a, b, SHEAR)
+    length = one_flexibility(*three, 2e-5, 0.0, 0.3 * math.sqrt(a * b))
+    # without slip the traction grows from the leading edge, by the creepage over the flexibility
+    assert found.force_x[0] == pytest.approx(-2e-5 / length * 8.0 / 3.0 * a * a * b, rel=2e-2)
