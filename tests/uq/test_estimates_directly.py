@@ -135,7 +135,9 @@ def of_groups(part: np.ndarray, groups: np.ndarray) -> float:
     return math.sqrt((totals**2).sum() * many / (many - 1)) / len(part)
 
 
-@pytest.mark.parametrize("groups", [GROUPS, np.arange(12) % 2, np.arange(12) // 2])
+@pytest.mark.parametrize(
+    "groups", [GROUPS, np.arange(12) % 2, np.arange(12) // 2, np.argsort(np.argsort(VALUES)) % 2]
+)
 def test_replicated_estimates_have_the_error_of_their_groups(groups: np.ndarray) -> None:
     found, many = estimate(VALUES, (0.5,), "sobol", groups), len(np.unique(groups))
     error = of_groups(VALUES, groups)
@@ -399,6 +401,7 @@ def test_moments_of_the_uniform_and_exponential_distributions_are_recognised() -
     exponential = maximum_entropy((1.0, math.inf), 3.0, 2.0)
     assert (exponential.family, exponential.parent) == ("exponential", None)
     assert maximum_entropy((1.0, math.inf), 3.0).mean == 3.0
+    assert maximum_entropy((1.0, 4.0), 2.0).family == "truncated exponential"
     # the mean of a truncated exponential distribution, by its closed form
     truncated = maximum_entropy((0.0, 2.0), 0.6)
     rate = truncated.multipliers[1]
@@ -424,6 +427,7 @@ def test_posterior_on_a_grid_is_smoothed_and_has_exact_moments() -> None:
     assert found.t.tolist() == scatter.tolist()
     assert found.m.tolist() == m[kept].tolist()
     assert (found.specimens, found.contained) == (4, ("load",))
+    assert TwoLevels.on_grid(t, m, 1e-9 * density).m.tolist() == found.m.tolist()
     mean = found.weight @ np.exp(found.m + 0.5 * found.t**2)
     square = found.weight @ np.exp(2.0 * found.m + 2.0 * found.t**2)
     assert (found.mean, found.std) == pytest.approx((mean, math.sqrt(square - mean**2)))
