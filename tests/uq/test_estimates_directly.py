@@ -386,6 +386,7 @@ def test_gamma_shape_inverts_log_minus_digamma(shape: float) -> None:
         ),
         (((0.0, math.inf), 2.0, None, 0.7), "mean_log 0.7 is not less than log.mean. = 0.693147"),
         (((0.0, math.inf), 0.0, None, -1.0), "mean 0 is not inside"),
+        (((0.0, math.inf), 1.0, None, 0.0), "mean_log 0 is not less than log.mean. = 0"),
         (((0.0, 1.0), 0.5, 0.6, None), "limit of any distribution"),
     ],
 )
