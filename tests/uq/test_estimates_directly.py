@@ -407,7 +407,16 @@ def test_moments_of_the_uniform_and_exponential_distributions_are_recognised() -
     truncated = maximum_entropy((0.0, 2.0), 0.6)
     rate = truncated.multipliers[1]
     assert 1.0 / rate - 2.0 / math.expm1(2.0 * rate) == pytest.approx(0.6, rel=1e-12)
-    # its last quantile, where the end of the support is as far as the probability
+    families = [
+        cut_normal(low, high, 0.0, 1.0).family for low, high in ((0.0, math.inf), (-1.0, 2.0))
+    ]
+    assert families == ["truncated normal"] * 2
+    assert cut_normal(-math.inf, math.inf, 0.0, 1.0).family == "normal"
+    bent = maximum_entropy((1.0, 3.0), 1.8, 0.75)
+    x = np.linspace(1.0, 3.0, 20_001)
+    assert bent.antimode is not None
+    assert bent.antimode[0] == pytest.approx(x[bent.density(x).argmin()], abs=1e-3)
+    # the last quantile, where the end of the support is as far as the probability
     steep = Exponential(0.0, 41.0, 1.0, 1.0, 1.0)
     last = steep.quantile(np.array([1.0 - 2.0**-53]))[0]
     assert last == pytest.approx(-math.log(2.0**-53 + math.exp(-41.0)), rel=1e-12)
