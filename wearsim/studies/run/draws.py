@@ -257,8 +257,10 @@ class Drawer:
             If a value is out of its bounds, or the path of a process would be too long.
         """
         number = realisation if passes is None else passes
-        table = self.scenario.sampling.model_copy(update={"realisation": number})
-        scenario = replace(self.scenario, sampling=table)
+        scenario, table = self.scenario, self.scenario.sampling
+        if number != table.realisation:
+            table = table.model_copy(update={"realisation": number})
+            scenario = replace(scenario, sampling=table)
         numbers = dict.fromkeys((item.name for item in scenario.random), realisation)
         numbers |= sources or {}
         columns = {n: self.columns(n, 1) for n in sorted({numbers[i.name] for i in self.items})}
