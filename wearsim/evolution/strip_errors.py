@@ -121,9 +121,7 @@ def _means_and_middles(depths: FloatArray) -> float:
 
 def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the depths of all bodies, shape (bodies, realisations, strips) [m]."""
-    cam, cylinder = problem.kinematics.cam, state.cylinder_depth[:, 0]
-    if cam is not None:
-        cylinder = cam.at_unworn(cylinder)
+    cylinder = problem.kinematics.track.at_unworn(state.cylinder_depth[:, 0])
     return np.concatenate([cylinder, state.roller_depth[0]])
 
 

@@ -11,6 +11,7 @@ from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.plugins import Options
 from wearsim.profiles import split_name
 from wearsim.scenario.axial_gap import AxialGap
@@ -30,6 +31,7 @@ from wearsim.scenario.tables.plain import (
     SamplingTable,
 )
 from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, WearChoice
+from wearsim.types import Material
 
 Drawn: TypeAlias = float | tuple[float, ...]
 
@@ -273,6 +275,16 @@ class Scenario:
         """Whether a duration or a number of passes or turns is given."""
         operation = self.operation
         return bool(operation.passes or operation.turns or operation.duration)
+
+    @property
+    def materials(self) -> tuple[Material, Material]:
+        """Materials of cylinder and roller."""
+        return self.cylinder.material, self.roller.material
+
+    @cached_property
+    def pair(self) -> ElasticPair:
+        """Combined elastic constants of cylinder and roller."""
+        return combine(*self.materials)
 
     @cached_property
     def axial_gap(self) -> AxialGap:

@@ -23,7 +23,7 @@ from wearsim.report.panels import (
 from wearsim.report.surfaces import CHORD, Sampling
 from wearsim.report.text import shown
 from wearsim.studies.cam.surface import worn_surface
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import CamTurn, unchecked_turn_of
 from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray
 
@@ -109,7 +109,7 @@ def turning(result: Result) -> Animation:
 
     The roller follows the magnified lift error, and is drawn with its magnified depth.
     """
-    turn = CamTurn(result.scenario)
+    turn = unchecked_turn_of(result.scenario)
     follower, stations = turn.cam.follower, turn.stations
     worn_roller = float(np.max(result.roller_depth[-1]))
     factor = factor_for(turn, max(float(np.max(result.depth[-1])), worn_roller))

@@ -79,11 +79,9 @@ def lift_curves(
     stations : sequence of Stations
         Stations of each realisation.
     """
-    cam = problem.kinematics.cam
-    assert cam is not None
-    errors = lift_errors(problem, state)
-    roller = peak_to_peak(cam, errors).argmax(axis=0)
-    curves = cam.at_unworn(errors)
+    track, errors = problem.kinematics.track, lift_errors(problem, state)
+    roller = peak_to_peak(track, errors).argmax(axis=0)
+    curves = track.at_unworn(errors)
     return [
         stations_of_test.values_at_angles(curves[:, roller[place], place], CURVE_ANGLES)
         for place, stations_of_test in enumerate(stations)
@@ -101,11 +99,9 @@ def at_every_station(problem: WearProblem, values: FloatArray) -> FloatArray:
 
     They are not negative where they have been interpolated to its stations.
     """
-    cam = problem.kinematics.cam
-    if cam is None:
-        return values
-    at_stations = cam.at_unworn(values)
-    return at_stations if cam.recorded is None else np.maximum(at_stations, 0.0)
+    track = problem.kinematics.track
+    at_stations = track.at_unworn(values)
+    return at_stations if track.recorded is None else np.maximum(at_stations, 0.0)
 
 
 def station_columns(problem: WearProblem) -> dict[str, FloatArray]:

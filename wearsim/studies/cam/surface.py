@@ -17,7 +17,7 @@ from wearsim.mechanics.cam.outline import Points
 from wearsim.mechanics.cam.stations import interpolation
 from wearsim.report.surfaces import Curve, Sampling, Surface
 from wearsim.report.view import Column
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import CamTurn, unchecked_turn_of
 from wearsim.studies.run.result import Result
 from wearsim.types import BoolArray, FloatArray
 
@@ -34,7 +34,7 @@ def worn_surface(result: Result, sampling: Sampling) -> Surface:
         Run of a cam.
     sampling : Sampling
     """
-    turn = CamTurn(result.scenario)
+    turn = unchecked_turn_of(result.scenario)
     depth = np.asarray(result.raw.history["station_depth"])[-1, :, 0]
     if sampling.position is not None:
         profiles = np.asarray(result.raw.records["cylinder_depth_profile"])[-1, :, 0]

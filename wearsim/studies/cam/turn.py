@@ -303,6 +303,8 @@ class CamTurn:
     @cached_property
     def greatest_demand(self) -> float:
         """Greatest traction of a rolling free roller, over the limit of friction; at most 1."""
+        if not self.free:
+            return 0.0
 
         def demand(panel: Panel, theta: FloatArray) -> FloatArray:
             torque = np.abs(self.torque(self.at(panel, theta)))
@@ -377,6 +379,23 @@ class CamTurn:
         return float(
             sum(fine.weight[i : i + n] @ values(p, fine.angle[i : i + n]) for p, n, i in parts)
         )
+
+    @property
+    def mean_radius(self) -> float:
+        """Radius of the cylinder on which a roller would roll as far in a turn [m]."""
+        return self.integral("travel") / math.tau
+
+    def loads_and_curvatures(self, load: float) -> list[tuple[float, float]]:
+        """Return normal forces [N] and relative curvatures [1/m] at the stations of a run.
+
+        Parameters
+        ----------
+        load : float
+            Load of a roller on a cylinder; a turn of a cam has its own loads.
+        """
+        point = self.at_stations(self.stations)
+        curvatures = point.kinematics.relative_curvature.tolist()
+        return list(zip(point.normal_force.tolist(), curvatures, strict=True))
 
     def at_stations(self, stations: Stations) -> Point:
         """Return the state at stations, at both sides of a boundary between segments."""
@@ -512,7 +531,32 @@ class _Path:
 _path_of = lru_cache(maxsize=4)(_Path)
 
 
+class CylinderTurn:
+    """A turn of a cylinder: that of a cam with one station, whose kinematics are constant.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    """
+
+    varies, greatest_demand, greatest_skid = False, 0.0, 0.0  # as of `CamTurn`
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.mean_radius = scenario.cylinder.radius
+        self.curvatures = (1.0 / self.mean_radius + 1.0 / scenario.roller.radius,)
+
+    def loads_and_curvatures(self, load: float) -> list[tuple[float, float]]:
+        """Return the load of a roller [N] and the relative curvature [1/m], of the one station."""
+        return [(load, *self.curvatures)]
+
+
+@lru_cache(maxsize=16)
+def unchecked_turn_of(scenario: Scenario) -> CamTurn:
+    """Return the turn of a scenario's cam, which its roller need not be able to follow."""
+    return CamTurn(scenario)
+
+
 @lru_cache(maxsize=16)
 def turn_of(scenario: Scenario) -> CamTurn:
     """Return the turn of a scenario's cam; errors as `CamTurn.checked`."""
-    return CamTurn(scenario).checked()
+    return unchecked_turn_of(scenario).checked()

@@ -45,7 +45,7 @@ from wearsim.report.text import (
     too_few,
 )
 from wearsim.studies.cam.panels import ANGLE, segment_marks
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import unchecked_turn_of
 from wearsim.studies.ensemble.file.data import Effect
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.fatigue.panels import DAMAGE
@@ -250,7 +250,7 @@ def _lift_error(result: EnsembleResult) -> Panel:
         "Lift error at the end",
         ANGLE,
         Axis("difference from its mean", "um"),
-        [*marks, *segment_marks(CamTurn(result.scenario).cam.motion, names=False)],
+        [*marks, *segment_marks(unchecked_turn_of(result.scenario).cam.motion, names=False)],
         f"Change of the lift by wear. Peak to peak it is {mean} in the mean of"
         f" {count(result.count)} tests.",
     )

@@ -11,8 +11,8 @@ import numpy as np
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, Redraw
 from wearsim.scenario import RandomInput, Scenario
-from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.inputs import contact_values
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.sampler import GaussianCopula, Sampler
 from wearsim.uq.sampling.sobol import Stream
@@ -70,9 +70,7 @@ def minimum_nodes(items: Sequence[RandomInput]) -> int:
     return 8 if sum(item.dimension for item in items) == 1 else 64
 
 
-def with_nodes(
-    problem: WearProblem, scenario: Scenario, items: Sequence[RandomInput], count: int
-) -> WearProblem:
+def with_nodes(problem: WearProblem, setup: Setup, count: int) -> WearProblem:
     """Return the problem with `count` contacts for each roller, a quadrature over its passes.
 
     The nodes are scrambled Sobol points. Their weights are the nearest to equal ones that integrate
@@ -84,13 +82,12 @@ def with_nodes(
     ----------
     problem : WearProblem
         With one contact for each roller.
-    scenario : Scenario
-        Scenario with seed and correlations.
-    items : sequence of RandomInput
-        Inputs that are drawn at every pass.
+    setup : Setup
+        With the inputs that are drawn at every pass.
     count : int
         Nodes of each roller, a multiple of 4.
     """
+    scenario, items = setup.scenario, setup.passes
     names = [(item.name, item.dimension) for item in items]
     per_turn = any(item.persistence == "per-turn" for item in items)
     sampler, copula = Sampler(scenario.seed, names, "sobol"), _copula(scenario, items)
@@ -102,7 +99,7 @@ def with_nodes(
 
     (load,) = problem.loads
     force = float(load.force(np.zeros(1))[0]) or float(problem.greatest_load[0])  # 0 in a pause
-    full_slip = _full_slip_creepage(problem, scenario, abs(force))
+    full_slip = _full_slip_creepage(problem, setup, abs(force))
     inputs, reference = inputs_of(count), inputs_of(REFERENCE_POINTS)
     weights, error = [], 0.0
     for number in range(problem.rollers):
@@ -130,16 +127,14 @@ def with_nodes(
     )
 
 
-def _full_slip_creepage(problem: WearProblem, scenario: Scenario, force: float) -> float:
+def _full_slip_creepage(problem: WearProblem, setup: Setup, force: float) -> float:
     """Return the creepage of full slip over friction, in the middle of the unworn bodies' contact.
 
     By Carter's theory it is the half-length times the curvature along rolling; of a cam, the mean
     over the stations.
     """
     curvatures = np.maximum(np.ravel(problem.kinematics.longitudinal_curvature), 1e-3)
-    half_lengths = [
-        curvature * fresh_patch(scenario, force, curvature).a for curvature in curvatures
-    ]
+    half_lengths = [curvature * setup.fresh_patch(force, curvature).a for curvature in curvatures]
     return float(np.mean(half_lengths))
 
 
