@@ -11,7 +11,6 @@ from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import (
     Track,
-    greatest_between,
     mean_along,
     sum_in_order,
     worn_volume,
@@ -266,3 +265,19 @@ def centroid(y: FloatArray, worn: FloatArray) -> float:
     """Return the axial position of the worn area's centroid [m], or 0 without wear."""
     total = worn.sum()
     return float(np.dot(y, worn) / total) if total > 0.0 else 0.0
+
+
+def greatest_between(values: FloatArray) -> FloatArray:
+    """Return the greatest values between strips, the last axis, by parabolas.
+
+    They go through the greatest strip and its neighbours.
+    """
+    rows = values.reshape(-1, values.shape[-1])
+    each, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
+    top, inner = rows[each, place], (place > 0) & (place < last)
+    before, after = rows[each, place - inner], rows[each, place + inner]
+    inner &= np.isfinite(before) & np.isfinite(after)  # a gap is infinite beyond a roller's end
+    before, after = np.where(inner, before, top), np.where(inner, after, top)
+    curvature = 2.0 * top - before - after
+    rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
+    return np.asarray((top + rise).reshape(values.shape[:-1]))

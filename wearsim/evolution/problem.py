@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import cycle
@@ -486,6 +486,7 @@ class WearProblem:
         physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
         return np.asarray(self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0])
 
-    def mean_over_turn(self, values: FloatArray) -> FloatArray:
-        """Return the mean over the stations weighted by their time, first axis of length one."""
-        return self.kinematics.track.mean_over_turn(values)
+    @cached_property
+    def mean_over_turn(self) -> Callable[[FloatArray], FloatArray]:
+        """Mean of values over the stations weighted by their time, first axis of length one."""
+        return self.kinematics.track.mean_over_turn

@@ -416,22 +416,19 @@ class Kinematics:
         """Roller passes per second, all rollers together."""
         return self.physical_rollers * (self.rolling_speed / (2.0 * np.pi * self.cylinder_radius))
 
-    @property
+    @cached_property
     def longitudinal_curvature(self) -> FloatArray | float:
         """Relative curvature along rolling; of a cam at every station, (stations, 1, 1) [1/m]."""
         return self.track.longitudinal_curvature
 
-    @property
+    @cached_property
     def speed(self) -> FloatArray | float:
         """Rolling velocity; of a cam at every station, (stations, 1, 1) [m/s]."""
         return self.track.rolling_speed
 
     @cached_property
     def track_radius(self) -> FloatArray | float:
-        """Radius of the track whose volume each station represents [m]; of a cam (stations, 1, 1).
-
-        The mean over the stations is the volume worn off a cam.
-        """
+        """Radius of the track whose volume each station represents, as `speed` [m]."""
         return self.track.track_radius
 
     @cached_property
@@ -490,22 +487,6 @@ def mean_along(values: FloatArray, axis: int) -> FloatArray:
     """
     count = values.shape[axis]
     return values if count == 1 else np.expand_dims(sum_in_order(values, axis) / count, axis)
-
-
-def greatest_between(values: FloatArray) -> FloatArray:
-    """Return the greatest values between strips, the last axis, by parabolas.
-
-    They go through the greatest strip and its neighbours.
-    """
-    rows = values.reshape(-1, values.shape[-1])
-    each, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
-    top, inner = rows[each, place], (place > 0) & (place < last)
-    before, after = rows[each, place - inner], rows[each, place + inner]
-    inner &= np.isfinite(before) & np.isfinite(after)  # a gap is infinite beyond a roller's end
-    before, after = np.where(inner, before, top), np.where(inner, after, top)
-    curvature = 2.0 * top - before - after
-    rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
-    return np.asarray((top + rise).reshape(values.shape[:-1]))
 
 
 def sum_in_order(values: FloatArray, axis: int) -> FloatArray:

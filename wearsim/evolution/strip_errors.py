@@ -27,9 +27,8 @@ import numpy as np
 
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import Advance, Evolution
-from wearsim.evolution.observables import greatest
+from wearsim.evolution.observables import greatest, greatest_between
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import greatest_between
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import elastic_approaches

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
-from typing import TypeVar
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from wearsim.mechanics.cam import (
 )
 from wearsim.models.loads import FollowerLoad
 from wearsim.scenario import Scenario
-from wearsim.scenario.tables.cam import Cam
+from wearsim.studies.cam.path import path_of
 from wearsim.studies.cam.point import Point
 from wearsim.types import BoolArray, FloatArray
 
@@ -33,8 +32,6 @@ SHARP = 2.0  # radius of the pitch curve over the roller's, below which the cont
 PART_OF_TOLERANCE = 0.25  # for the stations
 LEAST_LOAD = 1e-4  # of the greatest, where the flank of a groove changes
 _FINE = 1e-10  # tolerance of integrals over a turn
-_Fact = TypeVar("_Fact")
-MOST_KNOWN = 1000  # sets of angles of a cam at which the motion of the roller is kept
 
 
 class CamTurn:
@@ -56,7 +53,7 @@ class CamTurn:
             what = "is needed for the kinematics of a cam"
             raise ScenarioError(scenario.file, [Mistake("cam", "", what, "none", "a table [cam]")])
         self.scenario, self.cam = scenario, scenario.cam
-        self._path = _path_of(self.cam)
+        self._path = path_of(self.cam)
         self.speed = scenario.operation.speed
         load = scenario.load.build()
         self.load = load if isinstance(load, FollowerLoad) else None
@@ -281,7 +278,7 @@ class CamTurn:
 
     @property
     def _sides(self) -> tuple[tuple[Panel, bool], ...]:
-        """Panels and whether the roller touches the inner flank: what its motion depends on."""
+        """Panels and whether the roller touches the inner flank, which decide its motion."""
         return tuple((panel, self.is_inner(panel)) for panel in self.panels)
 
     @cached_property
@@ -294,10 +291,7 @@ class CamTurn:
     def _extreme(
         self, name: str, values: Callable[[Panel, FloatArray], FloatArray]
     ) -> tuple[float, float]:
-        """Return the greatest of values of the motion alone, by name, and its angle [rad].
-
-        It is computed once for the turns of all loads with the same panels and flanks.
-        """
+        """Return the greatest of values of the motion alone, by name, and its angle [rad]."""
         return self._path.once((name, *self._sides), lambda: extreme(self.panels, values))
 
     @cached_property
@@ -388,10 +382,7 @@ class CamTurn:
     def loads_and_curvatures(self, load: float) -> list[tuple[float, float]]:
         """Return normal forces [N] and relative curvatures [1/m] at the stations of a run.
 
-        Parameters
-        ----------
-        load : float
-            Load of a roller on a cylinder; a turn of a cam has its own loads.
+        The forces are those of the cam, whatever the load of a roller on a cylinder.
         """
         point = self.at_stations(self.stations)
         curvatures = point.kinematics.relative_curvature.tolist()
@@ -495,59 +486,6 @@ class CamTurn:
         number = int(motion.segment_at(np.array([theta]))[0])
         degrees = round(math.degrees(theta), 4) % 360.0
         return f"{degrees:.4g} deg, {motion.segment_label(number)}"
-
-
-class _Path:
-    """Motion of the roller of a cam, computed once for the turns of all loads.
-
-    Parameters
-    ----------
-    cam : Cam
-    """
-
-    def __init__(self, cam: Cam) -> None:
-        self._cam = cam
-        self._known: dict[tuple[int, bool, bytes], RollerKinematics] = {}
-        self._facts: dict[Hashable, object] = {}
-
-    def once(self, name: Hashable, compute: Callable[[], _Fact]) -> _Fact:
-        """Return a fact about the motion by its name, computed when it is first needed."""
-        if name not in self._facts:
-            self._facts[name] = compute()
-        return self._facts[name]  # type: ignore[return-value]
-
-    def at(self, segment: int, theta: FloatArray, inner: bool) -> RollerKinematics:
-        """Return the motion at angles within a segment [rad], on the inner flank of a groove."""
-        key = segment, inner, theta.tobytes()
-        kinematics = self._known.get(key)
-        if kinematics is None:
-            lift = self._cam.motion.lift_in(segment, theta)
-            kinematics = self._cam.follower.kinematics(lift, inner)
-            if len(self._known) < MOST_KNOWN:
-                self._known[key] = kinematics
-        return kinematics
-
-
-_path_of = lru_cache(maxsize=4)(_Path)
-
-
-class CylinderTurn:
-    """A turn of a cylinder: that of a cam with one station, whose kinematics are constant.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    """
-
-    varies, greatest_demand, greatest_skid = False, 0.0, 0.0  # as of `CamTurn`
-
-    def __init__(self, scenario: Scenario) -> None:
-        self.mean_radius = scenario.cylinder.radius
-        self.curvatures = (1.0 / self.mean_radius + 1.0 / scenario.roller.radius,)
-
-    def loads_and_curvatures(self, load: float) -> list[tuple[float, float]]:
-        """Return the load of a roller [N] and the relative curvature [1/m], of the one station."""
-        return [(load, *self.curvatures)]
 
 
 @lru_cache(maxsize=16)

@@ -16,7 +16,7 @@ from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.cam.point import Point
-from wearsim.studies.cam.turn import CamTurn, CylinderTurn, turn_of
+from wearsim.studies.cam.turn import CamTurn, turn_of
 from wearsim.studies.run.inputs import contact_inputs, load_range, origin
 from wearsim.studies.start.heights import StartExtent, start_extent
 from wearsim.types import ContactSolution, FloatArray
@@ -25,6 +25,25 @@ _BISECTIONS = 40
 LINE_APPROACH = 12.0  # of a line contact, roughly, over q/(pi E*)
 _MIDPOINTS = np.linspace(0.5, 63.5, 64) / 64.0  # probabilities to average over a distribution
 RARE = 1e-7  # fraction of the passes that may exceed the range of the strips
+
+
+class CylinderTurn:
+    """A turn of a cylinder: that of a cam with one station, whose kinematics are constant.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    """
+
+    varies, greatest_demand, greatest_skid = False, 0.0, 0.0  # as of `CamTurn`
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.mean_radius = scenario.cylinder.radius
+        self.curvatures = (1.0 / self.mean_radius + 1.0 / scenario.roller.radius,)
+
+    def loads_and_curvatures(self, load: float) -> list[tuple[float, float]]:
+        """Return the load of a roller [N] and the relative curvature [1/m], of the one station."""
+        return [(load, *self.curvatures)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +120,7 @@ class Setup:
         values += [float(end) for path in paths for end in (path.min(), path.max())]
         return min(values), max(values)
 
-    @property
+    @cached_property
     def turn(self) -> CamTurn | CylinderTurn:
         """Turn of the cam, or of the cylinder."""
         return turn_of(self.scenario) if self.scenario.cam else CylinderTurn(self.scenario)
