@@ -29,7 +29,7 @@ from wearsim.studies.cam.stations import cam_stations
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.grid import growth_of, strips_of_run
 from wearsim.studies.run.inputs import contact_inputs
-from wearsim.studies.run.nodes import MAX_NODES, minimum_nodes, redrawing, with_nodes
+from wearsim.studies.run.nodes import MAX_NODES, PassQuadrature, minimum_nodes, redrawing
 from wearsim.studies.run.setup import Setup
 from wearsim.studies.start.heights import roller_height, roller_profile, start_height
 from wearsim.types import FloatArray, Grid
@@ -229,7 +229,7 @@ def assemble_problem(
         mistake = Mistake("evolution", "stepper", what, "per-pass", "another stepper")
         raise ScenarioError(scenario.file, [mistake])
     if setup.passes and stepper.pass_by_pass:
-        nodes = with_nodes(problem, setup, minimum_nodes(setup.passes))
+        nodes = PassQuadrature(problem, setup).with_nodes(minimum_nodes(setup.passes))
         stepper = PerPassStepper(redrawing(scenario, setup.passes), nodes)
     elif setup.passes:
         problem = with_converged_nodes(problem, setup)
@@ -290,8 +290,9 @@ def with_converged_nodes(problem: WearProblem, setup: Setup) -> WearProblem:
     """
     evolution = setup.scenario.evolution
     count, single_pass = evolution.nodes or minimum_nodes(setup.passes), np.ones(1)
+    quadrature = PassQuadrature(problem, setup)
     while True:
-        refined = with_nodes(problem, setup, count)
+        refined = quadrature.with_nodes(count)
         if evolution.nodes or 2 * count > MAX_NODES:
             return refined
         fresh = fresh_state(refined)
