@@ -47,7 +47,6 @@ OF_PROFILE = 0.1  # estimates of depth and volume over that of the profile, all 
 # edge of a groove within a strip: from 1 to 4 by the angle at which the depth begins
 IN_MIDDLE = 2.0
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
-COARSE_TOLERANCE = 1e-5  # of the iterations of a step
 
 #: Function that returns observables of a state by name, with the realisations last.
 Observe: TypeAlias = Callable[[WearProblem, WearState], Mapping[str, FloatArray]]

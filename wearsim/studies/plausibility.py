@@ -9,6 +9,7 @@ import numpy as np
 
 from wearsim.models.loads import FollowerLoad, gap_text
 from wearsim.scenario import RandomInput, Scenario
+from wearsim.scenario.tables.fatigue import FatigueChoice
 from wearsim.studies.cam.checks import cam_warnings, skids_of
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.roller_ends import (
@@ -57,13 +58,13 @@ def plausibility_warnings(setup: Setup) -> list[str]:
     list of str
         Each begins with a different name of what is implausible, and a colon.
     """
-    scenario = setup.scenario
+    scenario, force = setup.scenario, greatest_load(setup.scenario)
+    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
     return [
-        *_of_pressure(setup),
-        *fatigue_warnings(setup),
-        *_of_slip(scenario),
-        *_of_width(setup),
-        *_of_shape(setup),
+        *(_of_pressure(setup, force, friction) if force > 0.0 else ()),
+        *_of_slip(scenario, friction),
+        *_of_width(setup, force),
+        *(_of_shape(setup, force) if force > 0.0 else ()),
         *_of_log(scenario),
         *_of_cam(scenario),
         *_of_model(scenario),
@@ -87,14 +88,10 @@ def _greatest(scenario: Scenario, key: str, value: float | tuple[float, ...]) ->
     return float(np.abs(value).max())
 
 
-def _of_pressure(setup: Setup) -> Iterator[str]:
-    scenario, force = setup.scenario, greatest_load(setup.scenario)
-    if force <= 0.0:
-        return
-    patch, force = setup.hardest_patch(force)
+def _of_pressure(setup: Setup, load: float, friction: float) -> Iterator[str]:
+    scenario, (patch, force) = setup.scenario, setup.hardest_patch(load)
     pressure = patch.peak_pressure
     text = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
-    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
     other = "cylinder" if scenario.cam is None else "cam"
     for name, body in (("roller", scenario.roller), (other, scenario.cylinder)):
         strength, hardness = body.material.yield_stress, body.material.hardness
@@ -108,31 +105,21 @@ def _of_pressure(setup: Setup) -> Iterator[str]:
                 f"{name}.material: {text} exceeds {what} of {limit / 1e6:.4g} MPa;"
                 " the model is elastic"
             )
-    modulus = scenario.pair.contact_modulus
-    if pressure > ELASTIC_PART * modulus:
+    if pressure > ELASTIC_PART * scenario.pair.contact_modulus:
         file = load_file(scenario)
         remedy = f"is the unit of the load in {file[1]} right?" if file else "is the load right?"
         yield (
             f"load: {text} exceeds {ELASTIC_PART:.0%} of the contact modulus, more than hardened"
             f" steel bears; {remedy} A thousandth of it gives {pressure / 1e7:.4g} MPa"
         )
+    if scenario.fatigue is not None:
+        yield from _of_fatigue(scenario.fatigue, pressure, friction, text)
 
 
-def fatigue_warnings(setup: Setup) -> Iterator[str]:
-    """Yield warnings of friction by which the surface yields first, and of unfit constants.
-
-    Parameters
-    ----------
-    setup : Setup
-    """
-    scenario, force = setup.scenario, greatest_load(setup.scenario)
-    choice = scenario.fatigue
-    if choice is None or force <= 0.0:
-        return
-    patch, force = setup.hardest_patch(force)
-    pressure = patch.peak_pressure
-    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
-    at = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
+def _of_fatigue(
+    choice: FatigueChoice, pressure: float, friction: float, text: str
+) -> Iterator[str]:
+    """Yield warnings of friction by which the surface yields first, and of unfit constants."""
     if friction > SURFACE_YIELDS:
         yield (
             f"fatigue, friction: with a coefficient of {friction:.3g}, above {SURFACE_YIELDS:g}, a"
@@ -142,12 +129,12 @@ def fatigue_warnings(setup: Setup) -> Iterator[str]:
         valid = law.valid_pressure
         if valid is not None and not valid[0] <= pressure <= valid[1]:
             yield (
-                f"fatigue.{body_name}: {at} is outside the {valid[0] / 1e6:.4g} to"
+                f"fatigue.{body_name}: {text} is outside the {valid[0] / 1e6:.4g} to"
                 f" {valid[1] / 1e6:.4g} MPa for which the constants hold ({law.source})"
             )
 
 
-def _of_slip(scenario: Scenario) -> Iterator[str]:
+def _of_slip(scenario: Scenario, friction: float) -> Iterator[str]:
     creepage = scenario.creepage
     for key in ("longitudinal", "yaw"):
         value = getattr(creepage, key)
@@ -157,21 +144,19 @@ def _of_slip(scenario: Scenario) -> Iterator[str]:
                 f"creepage.{key}: a creepage of {size:.3g} exceeds {GREATEST_CREEPAGE:.0%}; it is"
                 " assumed to be small, and 0.1 % is written 0.001"
             )
-    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
     if friction > GREATEST_FRICTION:
         yield f"friction.coefficient: {friction:.3g} exceeds {GREATEST_FRICTION:g}"
 
 
-def _of_width(setup: Setup) -> Iterator[str]:
-    scenario, force = setup.scenario, greatest_load(setup.scenario)
-    radius = scenario.roller.radius
+def _of_width(setup: Setup, force: float) -> Iterator[str]:
+    scenario = setup.scenario
     if scenario.roller.width is not None:
         yield from _of_edge(setup, force)
     if scenario.contact.width or scenario.roller.width or force <= 0.0:
         return
     half_width = setup.widest_patch(force).b
     crown = scenario.roller.crown_radius
-    if half_width > WIDEST * radius:
+    if half_width > WIDEST * scenario.roller.radius:
         form = "" if math.isnan(crown) else f" of {crown * 1e3:.4g} mm"
         key = "axial_profile" if math.isnan(crown) else "crown_radius"
         yield (
@@ -180,12 +165,9 @@ def _of_width(setup: Setup) -> Iterator[str]:
         )
 
 
-def _of_shape(setup: Setup) -> Iterator[str]:
-    scenario, force = setup.scenario, greatest_load(setup.scenario)
-    if scenario.contact.model != "slender" or force <= 0.0:
-        return
+def _of_shape(setup: Setup, force: float) -> Iterator[str]:
     patch = setup.widest_patch(force)
-    if patch.a > patch.b:
+    if setup.scenario.contact.model == "slender" and patch.a > patch.b:
         yield (
             f"contact.model: the unworn contact, {2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm along"
             " and across rolling, is longer than wide, and 'slender' assumes the opposite;"
