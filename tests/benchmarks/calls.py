@@ -30,7 +30,7 @@ FACTS = {
     "pair of materials": ("mechanics/hertz/elasticity.py", {"combine"}),
     "turn of the cam": ("studies/cam/turn.py", {"__init__"}),
     "patch after Hertz": ("mechanics/hertz/ellipse.py", {"hertz"}),
-    "patches and groove": ("studies/run/setup.py", {"_patch", "half_width", "_wear_per_load"}),
+    "groove": ("studies/run/setup.py", {"half_width"}),
 }
 
 
