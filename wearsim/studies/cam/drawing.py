@@ -22,7 +22,7 @@ from wearsim.report.panels import (
 )
 from wearsim.report.surfaces import CHORD, Sampling
 from wearsim.report.text import shown
-from wearsim.studies.cam.surface import worn_surface
+from wearsim.studies.cam.surface import worn_outlines
 from wearsim.studies.cam.turn import CamTurn, unchecked_turn_of
 from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray
@@ -118,11 +118,8 @@ def turning(result: Result) -> Animation:
     errors = stations.values_at_angles(curve, theta)
     lifts = turn.at_angles(theta).kinematics.lift
     moved = lifts + factor * errors / follower.lever
-    places = [c.x + 1j * c.y for c in worn_surface(result, Sampling(20.0 * CHORD)).curves]
-    outlines = [
-        (unworn, unworn + factor * (worn - unworn))
-        for unworn, worn in zip(places[::2], places[1::2], strict=True)
-    ]
+    places = worn_outlines(result, Sampling(20.0 * CHORD))
+    outlines = [(unworn, unworn + factor * (worn - unworn)) for unworn, worn in places]
     starts = turn.cam.motion.starts[:-1]
     edges = surface_points(follower, turn.at_angles(starts).kinematics, starts)[1]
     rays = edges[0] + 1j * edges[1]
