@@ -35,7 +35,7 @@ from wearsim.evolution.steppers.loads import elastic_approaches
 from wearsim.evolution.strips import coarse_problem
 from wearsim.types import FloatArray, Grid
 
-LOOSER = 10.0  # tolerance of the coarse test over that of the test
+LOOSER = 20.0  # tolerance of the coarse test over that of the test
 LOOSEST = 0.1  # greatest tolerance of a coarse test
 # safety factors on the differences of depth, volume and profile where the rate of wear does not
 # depend on the strips, where it does, and before wear: later, wear reduces errors of the shape
@@ -92,8 +92,8 @@ def sizes_of(problem: WearProblem, state: WearState, between: bool = False) -> F
         neighbours, instead of those of strips.
     """
     top = greatest_between if between else partial(np.max, axis=-1)
-    cylinder = greatest(problem, top(state.cylinder_depth[:, 0]))
-    rollers = top(state.roller_depth).max(axis=(0, 1))
+    tops, stations = top(state.stacked), state.cylinder_depth.shape[0]
+    cylinder, rollers = greatest(problem, tops[:stations]), tops[stations:].max(axis=0)
     return np.array([cylinder, rollers, volume_of(problem, state.depths)])
 
 

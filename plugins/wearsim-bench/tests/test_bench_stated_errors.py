@@ -106,7 +106,7 @@ def test_steps_of_a_reference_are_short_where_the_estimated_error_misses_a_falli
     prepared = PreparedTest(test.scenario(), grid)
     ends = []
     for longest in (LONGEST_STEP, 1e6):
-        stepper, state = CappedStepper(1e-6, longest), fresh_state(prepared.problem)
+        stepper, state = CappedStepper(1e-6, longest, False), fresh_state(prepared.problem)
         for advance in evolve(
             prepared.problem, state, stepper, prepared.stop, lambda _: np.inf, 10_000
         ):

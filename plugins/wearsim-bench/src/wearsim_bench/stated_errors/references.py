@@ -131,14 +131,14 @@ class CappedStepper(ImplicitStepper):
 
     Parameters
     ----------
-    tolerance : float
+    tolerance, by_doubling
         As of `ImplicitStepper`.
     longest : float
         Greatest ratio of a step to the passes done; a first step is a single pass or less.
     """
 
-    def __init__(self, tolerance: float, longest: float) -> None:
-        super().__init__(tolerance)
+    def __init__(self, tolerance: float, longest: float, by_doubling: bool) -> None:
+        super().__init__(tolerance, by_doubling=by_doubling)
         self.longest = longest
 
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
@@ -186,7 +186,8 @@ def worn_at_end(
         if prepared.stop <= few:
             prepared, stepper, method = every, every.stepper, EVERY_PASS
         elif isinstance(stepper, ImplicitStepper):
-            stepper = CappedStepper(tolerance, longest)
+            # with the same treatment of strips at the edge of a contact
+            stepper = CappedStepper(tolerance, longest, stepper.by_doubling)
     problem = prepared.problem if grows else replace(prepared.problem, growth=())
     state = fresh_state(problem)
     most = test.scenario().evolution.max_steps
