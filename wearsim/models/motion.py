@@ -113,11 +113,11 @@ class Sinusoidal(MotionLaw):
         """Return lift and derivatives by the angle, shape (3, points)."""
         place = np.asarray(angle) / self._angle
         pieces = np.searchsorted(self._starts, place, side="right") - 1
-        found = np.empty((3, len(place)))
+        lift = np.empty((3, len(place)))
         for number in range(len(self._pieces)):
             chosen = pieces == number
-            found[:, chosen] = self._piece(number, place[chosen])
-        return found * (self._scale / self._angle ** np.arange(3.0))[:, None]
+            lift[:, chosen] = self._piece(number, place[chosen])
+        return lift * (self._scale / self._angle ** np.arange(3.0))[:, None]
 
 
 class ConstantVelocityOptions(Options):

@@ -67,7 +67,7 @@ class Design:
             name = ".".join(parts[:whole])
             overrides[name] = value if whole == len(parts) else _value_at(tables, name)
         nested = [
-            name for name in overrides if any(name.startswith(f"{other}.") for other in overrides)
+            name for name in overrides if any(name.startswith(f"{table}.") for table in overrides)
         ]
         return {name: value for name, value in overrides.items() if name not in nested}
 

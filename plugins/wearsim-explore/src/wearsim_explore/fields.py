@@ -173,19 +173,20 @@ def _alternative(
         discriminator = next(iter(keys)) if keys else ""
         now = value.get(discriminator) if isinstance(value, dict) else None
         chosen = named.get((discriminator, str(now))) or next(
-            (one for one in tables if _is_default(one, discriminator)), tables[0]
+            (table for table in tables if _is_default(table, discriminator)), tables[0]
         )
         return chosen, discriminator, [name for _, name in named]
     if isinstance(value, list):
-        return next((one for one in options if one.get("type") == "array"), options[0]), "", []
-    return next(one for one in options if "properties" not in one), "", []
+        arrays = (option for option in options if option.get("type") == "array")
+        return next(arrays, options[0]), "", []
+    return next(option for option in options if "properties" not in option), "", []
 
 
 def _options(definitions: Mapping[str, Any], part: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return an alternative, or those within it."""
+    """Return an alternative, or all alternatives within it."""
     resolved = _resolved(definitions, part)
-    inner = [item for one in resolved.get("anyOf", ()) for item in _options(definitions, one)]
-    return inner or [resolved]
+    nested = resolved.get("anyOf", ())
+    return [option for inner in nested for option in _options(definitions, inner)] or [resolved]
 
 
 def _name(option: Mapping[str, Any]) -> tuple[str, str] | None:

@@ -246,7 +246,7 @@ class Page:
         """
         if request.stage == "report":
             if isinstance(content, Answer):
-                texts = [one.text for one in content.mistakes]
+                texts = [mistake.text for mistake in content.mistakes]
                 self._reply(page=content.page, message="\n".join(texts))
             return
         if isinstance(content, int):
@@ -284,7 +284,7 @@ class Page:
             self._reply(progress=request.tests)
 
     def _refine_at_rest(self) -> None:
-        """Refine the first answer as soon as the hand rests."""
+        """Refine the first answer after a time without changes."""
         if self._timer is not None:
             self._timer.cancel()
         if self._answered == self.session.number and self._stage == "first":
@@ -326,20 +326,20 @@ class Page:
         self._slots[place].children = [drawn.figure]
 
     def _fields_now(self) -> str:
-        """Return what changes of the fields beside the values that were typed."""
+        """Return the properties of the fields that a change may alter, apart from their values."""
         fields = self.session.fields_of(self.session.design)
-        return json.dumps([(one.key, one.kind, one.unit, one.choices) for one in fields])
+        return json.dumps([(item.key, item.kind, item.unit, item.choices) for item in fields])
 
     def _reply(self, *, fields: bool = False, **further: Any) -> None:
         session = self.session
-        beside, others = session.beside_fields()
+        beside, other_mistakes = session.beside_fields()
         content: dict[str, Any] = {
             "count": next(self._replies),
             "seen": self._seen,
             "number": session.number,
             "stage": self._stage,
             "mistakes": beside,
-            "others": others,
+            "others": other_mistakes,
             "undo": session.can_undo,
             "pins": [pin.name for pin in session.pins],
             "differences": session.differences(),
@@ -367,7 +367,7 @@ class Page:
             self._fields = self._fields_now()
             shown = session.fields_of(session.design)
             content["fields"] = [
-                {**asdict(one), "table": one.table, "label": one.label} for one in shown
+                {**asdict(item), "table": item.table, "label": item.label} for item in shown
             ]
             content["files"] = sorted(
                 path.name for path in session.design.file.parent.iterdir() if path.is_file()

@@ -228,13 +228,13 @@ def solve(
         # the first coarser grid has the same rows, for the extrapolation
         coarse, loose = problem.coarser(across=below), max(LOOSE, tolerance)
         pressure = halved(normal.pressure, (0, 1) if below else (1,))
-        found = solve_normal(
+        coarse_normal = solve_normal(
             coarse.elements, coarse.gap, coarse.force, pressure, loose, coarse.compliance
         )
-        coarser = solve(coarse, found, loose, below=True)
+        coarser = solve(coarse, coarse_normal, loose, below=True)
         rows, columns = finest
         start = doubled(coarser.rolling.traction, 2, columns)
-        turn = doubled(_turn(coarser.rolling, found.pressure), 1, columns)
+        turn = doubled(_turn(coarser.rolling, coarse_normal.pressure), 1, columns)
         if below:
             start, turn = doubled(start, 1, rows), doubled(turn, 0, rows)
     given = bound, slip, tolerance, start
@@ -268,7 +268,7 @@ def edges(normal: NormalSolution) -> tuple[FloatArray, FloatArray]:
     last = np.argmax(touches[rows], axis=1)
     ahead, behind = np.zeros((2, *touches.shape)), np.zeros(touches.shape)
     near, far = _increases(normal.separation, rows, first, 1)
-    # only the nearest where the grid ends
+    # where the grid ends, the ratio of the nearest element alone is used
     ahead[:, rows, first] = np.where(far > 0.0, 2.0 * near, near), -far
     near, _ = _increases(normal.separation, rows, last, -1)
     root = np.sqrt(np.maximum(0.63 - near, 0.0067))
@@ -285,9 +285,9 @@ def _increases(
     and over that to the third one, and zero where the grid ends before these.
     """
     places = np.clip(ends[:, None] + step * np.arange(4), 0, separation.shape[1] - 1)
-    found = np.maximum(np.diff(separation[rows[:, None], places], axis=1), 0.0)
-    nearest, others = found[:, :1], found[:, 1:]
-    ratio = np.divide(nearest, others, out=np.zeros_like(others), where=others > nearest)
+    increases = np.maximum(np.diff(separation[rows[:, None], places], axis=1), 0.0)
+    nearest, farther = increases[:, :1], increases[:, 1:]
+    ratio = np.divide(nearest, farther, out=np.zeros_like(farther), where=farther > nearest)
     return ratio[:, 0], ratio[:, 1]
 
 
@@ -301,9 +301,9 @@ def _turn(rolling: TangentialSolution, pressure: FloatArray) -> FloatArray:
     sine = ahead[0] * behind[1] - ahead[1] * behind[0]
     cosine = (ahead * behind).sum(axis=0)
     smooth = slides[:, 1:] & slides[:, :-1] & (cosine > 0.0)
-    found = np.zeros_like(pressure)
-    found[:, 1:] = np.where(smooth, 0.25 * np.arctan2(sine, cosine), 0.0)
-    return found
+    turn = np.zeros_like(pressure)
+    turn[:, 1:] = np.where(smooth, 0.25 * np.arctan2(sine, cosine), 0.0)
+    return turn
 
 
 def halved(field: FloatArray, axes: tuple[int, ...]) -> FloatArray:
@@ -331,11 +331,11 @@ def doubled(field: FloatArray, axis: int, length: int) -> FloatArray:
     The arrangement is that of `halved`; `length` is the number of elements along the axis.
     """
     means = np.moveaxis(field, axis, 0)
-    found = np.empty((length, *means.shape[1:]))
+    fine = np.empty((length, *means.shape[1:]))
     if length % 2:
-        found[::2] = means
-        found[1::2] = 0.5 * (means[:-1] + means[1:])
+        fine[::2] = means
+        fine[1::2] = 0.5 * (means[:-1] + means[1:])
     else:
-        found[::2] = 0.75 * means + 0.25 * np.concatenate([means[:1], means[:-1]])
-        found[1::2] = 0.75 * means + 0.25 * np.concatenate([means[1:], means[-1:]])
-    return np.moveaxis(found, 0, axis)
+        fine[::2] = 0.75 * means + 0.25 * np.concatenate([means[:1], means[:-1]])
+        fine[1::2] = 0.75 * means + 0.25 * np.concatenate([means[1:], means[-1:]])
+    return np.moveaxis(fine, 0, axis)

@@ -160,10 +160,10 @@ class Halfspace(ws.SingleContactModel):
         density *= shares[:, None]
 
         def sampled(values: FloatArray) -> FloatArray:
-            found = np.zeros((points_along, len(length)))
+            samples = np.zeros((points_along, len(length)))
             rows = np.arange(patch.strips.stop - patch.strips.start)
-            found[:, patch.strips] = values[rows, place[:, patch.strips]]
-            return np.where(length > 0.0, found, 0.0)
+            samples[:, patch.strips] = values[rows, place[:, patch.strips]]
+            return np.where(length > 0.0, samples, 0.0)
 
         return ContactFields(
             x=x,
@@ -280,13 +280,15 @@ class Halfspace(ws.SingleContactModel):
         for _ in range(4):
             # approach of a line contact of finite width, over its line load
             soft = (2.0 * np.log(2.0 * slenderness) + 1.0) / (np.pi * self.contact_modulus)
-            each = soft + compliance
-            low, high = 0.0, force * float(np.max(each)) / spacing
+            total_compliance = soft + compliance
+            low, high = 0.0, force * float(np.max(total_compliance)) / spacing
             for _ in range(60):
                 approach = 0.5 * (low + high)
-                carried = float((np.maximum(approach - depth, 0.0) / each).sum()) * spacing
+                carried = (
+                    float((np.maximum(approach - depth, 0.0) / total_compliance).sum()) * spacing
+                )
                 low, high = (approach, high) if carried < force else (low, approach)
-            load = np.maximum(high - depth, 0.0) / each
+            load = np.maximum(high - depth, 0.0) / total_compliance
             half_length = np.sqrt(4.0 * load / (np.pi * self.contact_modulus * curvature))
             width = 0.5 * spacing * np.count_nonzero(load)
             slenderness = max(width / float(half_length.max()), 1.0)

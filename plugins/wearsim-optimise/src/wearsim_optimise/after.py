@@ -1,4 +1,4 @@
-"""What follows the optimum: its sensitivity, active constraints, tolerances and confirmation."""
+"""Sensitivity, active constraints, tolerances and confirmation of an optimum."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ def sensitivity(designs: Designs, best: Design) -> list[dict[str, Any]]:
             ends.append(moved if moved[number] != place[number] else None)
         pairs.append((number, ends))
     wanted = [end for _, ends in pairs for end in ends if end is not None]
-    found = iter(designs.at(wanted, "sensitivity"))
+    evaluated = iter(designs.at(wanted, "sensitivity"))
     rows = []
     for number, ends in pairs:
-        low, high = (best if end is None else next(found) for end in ends)
+        low, high = (best if end is None else next(evaluated) for end in ends)
         variable = designs.variables[number]
         apart = designs.places(high)[number] - designs.places(low)[number]
         if not (low.is_evaluated and high.is_evaluated and apart > 0.0):
@@ -107,15 +107,15 @@ def active_constraints(
         losses = np.array([by_name[v.name]["loss"] for v in known])
         if np.isfinite(matrix).all() and np.isfinite(losses).all():
             multipliers, _ = nnls(matrix, losses)
-    found = []
+    constraints = []
     for name, multiplier in zip(names, multipliers.tolist(), strict=True):
         is_bound = name not in goals.slack_names
         relaxed = 0.01 * (_per_part(known, name) if is_bound else 1.0)
         gain = math.nan
         if math.isfinite(multiplier):
             gain = math.expm1(_sign(designs) * multiplier * relaxed)
-        found.append({"constraint": name, "multiplier": multiplier, "gain": gain})
-    return found
+        constraints.append({"constraint": name, "multiplier": multiplier, "gain": gain})
+    return constraints
 
 
 def _per_part(known: Sequence[Any], name: str) -> float:
@@ -156,8 +156,8 @@ def tolerances(designs: Designs, best: Design, given: Mapping[str, float]) -> di
         for place, sign in zip(moved, row, strict=True):
             numbers[place] += sign * given[names[place]]
         neighbours.append(tuple(numbers))
-    found = designs.with_numbers(neighbours, "tolerance")
-    known = [design for design in found if design.is_evaluated]
+    tried = designs.with_numbers(neighbours, "tolerance")
+    known = [design for design in tried if design.is_evaluated]
     worst = max(known, key=lambda design: design.loss, default=None)
     violated = {}
     for number, name in enumerate(goals.slack_names):
@@ -167,8 +167,8 @@ def tolerances(designs: Designs, best: Design, given: Mapping[str, float]) -> di
             violated[name] = {"design": least.number, "beyond": -float(least.slacks[number])}
     return {
         "tolerances": dict(given),
-        "neighbours": len(found),
-        "failed": len(found) - len(known),
+        "neighbours": len(tried),
+        "failed": len(tried) - len(known),
         "worst": None if worst is None else worst.number,
         "part": None if worst is None else worst.values[main] / best.values[main],
         "violated": violated,
@@ -198,8 +198,8 @@ def confirmation(designs: Designs, first: Design, best: Design) -> list[dict[str
         pair = [overrides(designs.variables, design.numbers) for design in (best, first)]
         job = {"overrides": pair[0], "other": pair[1], "name": name}
         (design,) = designs.evaluate([job], [best.numbers], "confirmation")
-        found = design.outcome.get("gain") or {"why": design.outcome["reason"]}
-        rows.append({"name": name, **gain, **found})
+        ratio_or_reason = design.outcome.get("gain") or {"why": design.outcome["reason"]}
+        rows.append({"name": name, **gain, **ratio_or_reason})
     return rows
 
 

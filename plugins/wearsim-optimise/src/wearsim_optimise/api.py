@@ -269,7 +269,7 @@ def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
 
 def _tolerances(texts: Sequence[str], variables: Sequence[Variable]) -> dict[str, float]:
     """Return tolerances in the units of the variables, by name."""
-    found = {}
+    tolerances = {}
     known = {v.name: v for v in variables if v.kind == "continuous"}
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -289,8 +289,8 @@ def _tolerances(texts: Sequence[str], variables: Sequence[Variable]) -> dict[str
             raise ValueError(f"'{text}': {error}") from error
         if not number > 0.0:
             raise ValueError(f"'{text}': a tolerance must be above zero")
-        found[name] = number
-    return found
+        tolerances[name] = number
+    return tolerances
 
 
 class _Study:

@@ -57,8 +57,8 @@ class Design:
     @property
     def values(self) -> Mapping[str, float]:
         """Quantities that are asked for, in SI."""
-        found: Mapping[str, float] = self.outcome["values"]
-        return found
+        values: Mapping[str, float] = self.outcome["values"]
+        return values
 
     @property
     def is_evaluated(self) -> bool:
@@ -182,15 +182,15 @@ class Designs:
         missing = [n for n in missing if keys.index(keys[n]) == n]
         if missing:
             self._run([jobs[n] for n in missing], [keys[n] for n in missing])
-        found = []
+        designs = []
         for key, chosen in zip(keys, numbers, strict=True):
             if key not in self._by_key:
                 self._by_key[key] = len(self.all)
                 outcome = self.known[key]
                 design = Design(len(self.all) + 1, tuple(chosen), purpose, outcome, key)
                 self.all.append(with_goals(design, self.goals))
-            found.append(self.all[self._by_key[key]])
-        return found
+            designs.append(self.all[self._by_key[key]])
+        return designs
 
     def _run(self, jobs: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> None:
         if self._stop is not None and self._stop():
@@ -220,8 +220,9 @@ class Designs:
 def completed(designs: Designs, chosen: Design, loss: Callable[[Design], float]) -> Answer:
     """Return loss and slacks of a design, those that are not known from similar designs.
 
-    A design that violates a limit before wear by far is not run, and one that fails has no values:
-    a smooth interpolation of the others stands for them, so that the search keeps its models.
+    A design that violates a limit before wear by far is not run, and one that fails has no values.
+    Values interpolated smoothly from the evaluated designs replace them, so that the models of the
+    search remain valid.
 
     Parameters
     ----------
@@ -233,13 +234,13 @@ def completed(designs: Designs, chosen: Design, loss: Callable[[Design], float])
     wanted = np.concatenate([[loss(chosen)], chosen.slacks])
     missing = ~np.isfinite(wanted)
     if missing.any():
-        others = [design for design in designs.evaluated if math.isfinite(loss(design))]
-        if others:
+        evaluated = [design for design in designs.evaluated if math.isfinite(loss(design))]
+        if evaluated:
             place = designs.places(chosen)
-            places = np.array([designs.places(design) for design in others])
-            rows = np.array([np.concatenate([[loss(d)], d.slacks]) for d in others])
+            places = np.array([designs.places(design) for design in evaluated])
+            rows = np.array([np.concatenate([[loss(d)], d.slacks]) for d in evaluated])
             wanted[missing] = _interpolated(places, rows[:, missing], place)
-            if chosen.status == "failed":  # nothing is known of it: away from there
+            if chosen.status == "failed":  # a great loss leads the search away from it
                 wanted[0] = max(float(rows[:, 0].max()), wanted[0]) + 0.1
         wanted[~np.isfinite(wanted)] = 1.0
     slacks = wanted[1:]

@@ -68,10 +68,10 @@ class Studies:
             If the study cannot be made.
         """
         if verb not in self._answers:
-            found = getattr(self, verb)
-            if getattr(found, "count", 1) == 0:
-                raise WearsimError(next(iter(found.errors.values()), "no realisation is completed"))
-            self._answers[verb] = found.view.answers()
+            study = getattr(self, verb)
+            if getattr(study, "count", 1) == 0:
+                raise WearsimError(next(iter(study.errors.values()), "no realisation is completed"))
+            self._answers[verb] = study.view.answers()
         return self._answers[verb]
 
     @cached_property
@@ -243,8 +243,8 @@ class Evaluation:
         low = high = ratio
         if named["verb"] == "life":
             share = float(_LIFE.search(name)[1])  # type: ignore[index]
-            found = pair[0].life.compare(pair[1].life, share).b10_ratio
-            ratio, low, high = found.value, found.low, found.high
+            interval = pair[0].life.compare(pair[1].life, share).b10_ratio
+            ratio, low, high = interval.value, interval.low, interval.high
         elif named["verb"] == "ensemble":
             low, high = _bootstrap(pair, named["name"])
         return {"values": values, "ratio": ratio, "low": low, "high": high}

@@ -125,17 +125,17 @@ class Goals:
     def slacks(self, values: Mapping[str, float], margins: Mapping[str, float]) -> list[float]:
         """Return how far a design is within each constraint, over its limit; not below zero.
 
-        The margins of a cam follow those that are given. A value that is not known is not a number.
+        The margins of a cam follow the given constraints. The slack of an unknown value is NaN.
         """
-        found = []
+        slacks = []
         for constraint in self.constraints:
             limit, value = self.limit(constraint), values.get(constraint.name, math.nan)
             side = 1.0 if constraint.sign == "<" else -1.0
-            found.append(side * (limit - value) / (abs(limit) or 1.0))
+            slacks.append(side * (limit - value) / (abs(limit) or 1.0))
         for name in self.margin_names:
             scale, value = abs(self.first[f"margin {name}"]) or 1.0, margins.get(name, math.nan)
-            found.append(min(value / scale, 1e3))
-        return found
+            slacks.append(min(value / scale, 1e3))
+        return slacks
 
     @property
     def margin_names(self) -> list[str]:

@@ -108,14 +108,14 @@ def _some_design(designs: Designs, plan: Plan, first: Design) -> Design:
 
 def _nearest_to_feasible(designs: Designs, tried: Sequence[Design]) -> str:
     """Return which margin of a cam is least violated, and where, in words."""
-    found = [
+    margins = [
         (min(design.outcome["margins"].values()), design)
         for design in tried
         if design.outcome["margins"]
     ]
-    if not found:
+    if not margins:
         return ""
-    best = max(found, key=lambda item: item[0])[1]
+    best = max(margins, key=lambda item: item[0])[1]
     return f"nearest to a feasible one is {described(designs, best)}: "
 
 
@@ -286,9 +286,9 @@ def _rank(design: Design, loss: Loss) -> tuple[float, float]:
     return violation(design), value
 
 
-def best_of(found: Sequence[Design], loss: Loss) -> Design | None:
+def best_of(designs: Sequence[Design], loss: Loss) -> Design | None:
     """Return the feasible design with the least loss; the first of equal ones."""
-    feasible = [design for design in found if design.is_feasible and math.isfinite(loss(design))]
+    feasible = [design for design in designs if design.is_feasible and math.isfinite(loss(design))]
     return min(feasible, key=lambda design: (loss(design), design.number), default=None)
 
 
@@ -315,7 +315,7 @@ def optimum(
     Raises
     ------
     NoFeasibleDesignError
-        If none is feasible; says which constraint is least violated, and where.
+        If no design is feasible; the message names the least violated constraint, and where.
     """
     first = first_goals(designs, plan)
     runner = Runner(designs, plan)
@@ -380,8 +380,9 @@ def _then(runner: Runner, start: Design) -> bool:
         return goals.scaled(goals.then, value)
 
     def rated(design: Design) -> Answer:
-        found, main = (completed(designs, design, each) for each in (loss, objective(0)))
-        return Answer(found.loss, np.append(found.slacks, limit - main.loss))
+        second = completed(designs, design, loss)
+        main = completed(designs, design, objective(0))
+        return Answer(second.loss, np.append(second.slacks, limit - main.loss))
 
     return not runner.run([runner.way(start, rated, SECOND, 1)], runner.plan.evaluations, "then")
 

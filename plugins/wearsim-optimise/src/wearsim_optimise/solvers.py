@@ -110,10 +110,10 @@ class Cobyqa:
 
     def tell(self, rated: Sequence[Rated]) -> None:
         """Take losses and slacks of the designs, or of the first of them."""
-        for place, found in zip(self._next, rated, strict=False):
-            beyond = min(violation(found), 1.0)
-            loss = found.loss + PENALTY * beyond**2
-            self._known[place.tobytes()] = Answer(loss, found.slacks)
+        for place, answer in zip(self._next, rated, strict=False):
+            beyond = min(violation(answer), 1.0)
+            loss = answer.loss + PENALTY * beyond**2
+            self._known[place.tobytes()] = Answer(loss, answer.slacks)
 
     def _at(self, place: Vector) -> Rated:
         place = self._within(place)
@@ -230,17 +230,17 @@ def _or(values: Any) -> Any:
 
 
 def feasible_first(rated: Sequence[Rated]) -> list[float]:
-    """Return the order of designs: feasible ones by loss, after them the others by violation."""
+    """Return numbers that order designs: feasible ones by loss, then the rest by violation."""
     losses = [item.loss for item in rated if violation(item) == 0.0 and math.isfinite(item.loss)]
     worst = max(losses, default=0.0)
-    found = []
+    order = []
     for item in rated:
         beyond = violation(item)
         if beyond == 0.0 and math.isfinite(item.loss):
-            found.append(item.loss)
+            order.append(item.loss)
         else:
-            found.append(worst + 1.0 + (beyond if math.isfinite(beyond) else 1e6))
-    return found
+            order.append(worst + 1.0 + (beyond if math.isfinite(beyond) else 1e6))
+    return order
 
 
 def violation(rated: Rated) -> float:

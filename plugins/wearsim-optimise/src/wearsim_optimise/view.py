@@ -103,8 +103,8 @@ class OptimisationView(StudyView[OptimisationResult]):
 
     def _activity(self, text: str) -> str:
         """Return whether a constraint is active, with what relaxing it would bring."""
-        found = [item for item in self.result.raw.active if item["constraint"] == text]
-        return f", active{self._brings(found[0])}" if found else ""
+        matching = [item for item in self.result.raw.active if item["constraint"] == text]
+        return f", active{self._brings(matching[0])}" if matching else ""
 
     def _brings(self, item: Mapping[str, Any]) -> str:
         name = self.result.goals.objectives[0][0]

@@ -36,9 +36,9 @@ def stated_errors_figure(topic: Topic, under: str) -> Figure:
             for tolerance, colour, marker in zip(
                 tolerances, (BLUE, ORANGE, GREEN), "os^", strict=False
             ):
-                own = [row for row in rows if row.counts["tolerance"] == tolerance]
+                of_tolerance = [row for row in rows if row.counts["tolerance"] == tolerance]
                 true, stated = (
-                    [100.0 * max(row.errors[key], _LOWEST) for row in own]
+                    [100.0 * max(row.errors[key], _LOWEST) for row in of_tolerance]
                     for key in (name, STATED + name)
                 )
                 label = f"tolerance {tolerance:g}"
@@ -50,9 +50,9 @@ def stated_errors_figure(topic: Topic, under: str) -> Figure:
             axes.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high))
             set_log_axis(axes.xaxis, lambda value: f"{value:g}")
             set_log_axis(axes.yaxis, lambda value: f"{value:g}")
-            found = coverage(rows, name)
-            title = f"{name}: {found.covered} of {len(rows)} covered"
-            ratio = found.counts.get("median")
+            statistics = coverage(rows, name)
+            title = f"{name}: {statistics.covered} of {len(rows)} covered"
+            ratio = statistics.counts.get("median")
             title += f",\nmedian ratio {ratio:.2g}" if ratio is not None else ""
             name_axes(axes, title, "true error [%]", "")
         panels[0].set_ylabel("stated error [%]")

@@ -76,10 +76,10 @@ class RobustnessCase:
         assert isinstance(passes, int)
         return passes
 
-    def scenario(self, passes: int, others: Mapping[str, object]) -> Scenario:
+    def scenario(self, passes: int, further: Mapping[str, object]) -> Scenario:
         """Return the scenario with further changes; `passes` is the default of the case."""
         base = _base()
-        changes = {"operation.passes": passes, **self.changes, **others}
+        changes = {"operation.passes": passes, **self.changes, **further}
         return parse_scenario(base.text, f"{self.name}.toml", self.files.__getitem__, changes)
 
 

@@ -131,10 +131,12 @@ def _random_inputs(draws: Draws, base: str) -> None:
     if "rig" in base and "creepage" in draws.changes and draws.chance(0.3):
         creepage = draws.changes["creepage"]
         assert isinstance(creepage, dict)
-        others = {key: value for key, value in creepage.items() if key not in ("yaw", "tilt")}
+        without_angles = {
+            key: value for key, value in creepage.items() if key not in ("yaw", "tilt")
+        }
         radius = f"{draws.log_uniform(0.05, 1.0)} mrad"
         angles = {"distribution": "disc", "radius": radius, "persistence": "per-roller"}
-        draws.changes["creepage"] = {**others, "misalignment": angles}
+        draws.changes["creepage"] = {**without_angles, "misalignment": angles}
 
 
 def _contact_model(draws: Draws, _base: str) -> None:

@@ -109,11 +109,12 @@ class Worn:
     volume: float
 
     def changes_from(self, exact: Worn | Reference) -> FloatArray:
-        """Return the relative errors of depth, profile and volume, shape (3,), signed but for it.
+        """Return the relative errors of depth, profile and volume, shape (3,).
 
-        Profiles are compared on the strips of this object, in the L2 norm over all bodies.
+        Profiles are compared on the strips of this object, in the L2 norm over all bodies; the
+        errors of depth and volume have a sign.
         """
-        true = np.array([np.interp(self.y, exact.y, one) for one in exact.profiles])
+        true = np.array([np.interp(self.y, exact.y, profile) for profile in exact.profiles])
         weights = np.gradient(self.y)
         norm, difference = (
             float(np.sqrt((weights * part**2).sum())) for part in (true, self.profiles - true)
@@ -282,16 +283,16 @@ def reference_of(test: RandomTest, folder: Path | None) -> Reference:
 
 
 def kept(path: Path | None, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Return the arrays of a file, or compute them and write it; also a failure is kept."""
+    """Return the arrays of a file, or compute and write them; a failure is written too."""
     if path is not None and path.exists():
         try:
             with np.load(path) as arrays:
-                found = {name: arrays[name][()] for name in arrays}
+                stored = {name: arrays[name][()] for name in arrays}
         except (OSError, ValueError, TypeError, EOFError, BadZipFile) as error:
             raise ResultsFileError(f"{path}: is not a reference solution; delete it") from error
-        if _FAILURE in found:
-            raise SolverError(f"{found[_FAILURE]} (kept in {path.name})")
-        return found
+        if _FAILURE in stored:
+            raise SolverError(f"{stored[_FAILURE]} (kept in {path.name})")
+        return stored
     failure: SolverError | None = None
     try:
         computed = compute()

@@ -195,15 +195,15 @@ def _angles(
     if stratum == ADHESION:
         greatest["yaw"] = 0.5 * sizes.creepage
     keys: dict[str, object] = {}
-    found = 0.0
+    greatest_yaw = 0.0
     for name, limit in greatest.items():
         angles = [draws.uniform(-limit, limit) for _ in range(rollers)]
         if draws.chance(0.2):
             texts = [f"{1e3 * angle:.4g} mrad" for angle in angles]
             same = rollers == 1 or draws.chance(0.5)
             keys[name] = texts[0] if same else texts
-            found = max(map(abs, angles)) if name == "yaw" else found
-    return keys, found
+            greatest_yaw = max(map(abs, angles)) if name == "yaw" else greatest_yaw
+    return keys, greatest_yaw
 
 
 def _set_wear(
