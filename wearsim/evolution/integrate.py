@@ -217,9 +217,9 @@ class Evolution:
         problem, state, scheme = self.problem, self.state, self._scheme
 
         def attempt(places: IntArray) -> Attempt:
-            some = problem.at(places), state.at(places), lengths[places]
-            tried = _finite(self.stepper.attempt(*some, self.stop, scheme))
-            return self.stepper.with_damage(*some[:2], tried) if problem.fatigue else tried
+            selected = problem.at(places), state.at(places), lengths[places]
+            tried = _finite(self.stepper.attempt(*selected, self.stop, scheme))
+            return self.stepper.with_damage(*selected[:2], tried) if problem.fatigue else tried
 
         resting = self._resting()
         done, failed = bisect_failures(attempt, (~resting).nonzero()[0])
@@ -227,8 +227,8 @@ class Evolution:
         failures = self._rejected(failed, lengths) if failed else {}
         accepted: list[tuple[IntArray, list[WearState]]] = []
         if places.size:
-            some = problem.at(places), state.at(places), lengths[places]
-            accepted.append((places, list(self.stepper.rest(*some, self.stop))))
+            selected = problem.at(places), state.at(places), lengths[places]
+            accepted.append((places, list(self.stepper.rest(*selected, self.stop))))
         for places, tried in done:
             numbers, ratios = self.numbers[places].tolist(), tried.ratio.tolist()
             errors = tried.excess.tolist(), lengths[places].tolist(), ratios

@@ -255,13 +255,13 @@ def first_crossings(
         start = before.at(places[chosen]).replaced(
             coarse_step_solution=None, half_quadrature_solution=None
         )
-        some = problem.at(chosen), start, end.at(chosen)
+        reaching = problem.at(chosen), start, end.at(chosen)
         locate = _first_passes if stepper.pass_by_pass else _between
-        state = locate(limits, stepper, *some, tolerance)
+        state = locate(limits, stepper, *reaching, tolerance)
         last = advance.end.at(places[chosen])
         state = state.replaced(depth_error=last.depth_error, volume_error=last.volume_error)
-        first = ratios(limits, stepper, some[0], state).argmax(axis=0)
-        crossings.append(Crossings(places[chosen], some[0], state, first, start))
+        first = ratios(limits, stepper, reaching[0], state).argmax(axis=0)
+        crossings.append(Crossings(places[chosen], reaching[0], state, first, start))
         places = places[~reached]
         if not places.size:
             break
@@ -287,10 +287,10 @@ def _between(
         located = take_side_step(stepper.side_step, problem, start, length)
         return located.replaced(passes=np.full_like(done, limits[0].value))
 
-    def trial(which: IntArray, passes: FloatArray) -> tuple[WearState, FloatArray]:
-        some = problem.at(which), start.at(which)
-        state = take_side_step(stepper.side_step, *some, passes)
-        return state, _logs(limits, stepper, some[0], state) - tolerance
+    def trial(places: IntArray, passes: FloatArray) -> tuple[WearState, FloatArray]:
+        tests = problem.at(places), start.at(places)
+        state = take_side_step(stepper.side_step, *tests, passes)
+        return state, _logs(limits, stepper, tests[0], state) - tolerance
 
     every = np.arange(len(done))
     located, high = trial(every, span)

@@ -149,8 +149,8 @@ def opened(
     if not unloaded.any():
         return contacts, loads
     numbers: IntArray = np.flatnonzero(np.broadcast_to(unloaded, loads.shape))
-    some = contacts.at(numbers)
-    given = {n: column for n, column in vars(some).items() if n != "y" and column is not None}
-    zeros = {n: np.zeros_like(column) for n, column in given.items()}
-    empty = ContactBatchSolution(some.y, **zeros)
+    affected = contacts.at(numbers)
+    columns = {n: column for n, column in vars(affected).items() if n != "y" and column is not None}
+    zeros = {n: np.zeros_like(column) for n, column in columns.items()}
+    empty = ContactBatchSolution(affected.y, **zeros)
     return contacts.with_others(numbers, empty), np.where(unloaded, 0.0, loads)

@@ -238,8 +238,8 @@ def strip_errors(
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = [
             np.interp(np.log(common), np.log(points), np.log(size))
-            for points, both in ((steps, np.array(coarse.sizes).T), (passes, sizes))
-            for size in both
+            for points, columns in ((steps, np.array(coarse.sizes).T), (passes, sizes))
+            for size in columns
         ]
         ratio = np.abs(np.expm1(np.array(logs[:3]) - np.array(logs[3:])))
     ratio = np.where(np.isfinite(ratio), ratio, 0.0)

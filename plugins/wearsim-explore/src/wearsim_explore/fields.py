@@ -13,7 +13,7 @@ Kind: TypeAlias = Literal["number", "integer", "quantity", "choice", "flag", "fi
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*?)\s*$")
 _UNIT = re.compile(r"(?:[A-Za-zµμ°]|1 ?/)[\w^*/().°µμ -]{0,30}")
 _SPAN = 4.0  # the slider of a value reaches from a quarter of it to four times
-_STEPS = 200  # of a slider
+_STEPS = 200  # steps of a slider
 _OF_CAMS = ("cam", "follower", "lubricant")
 _FILE = "load.csv"  # the example that the schema gives for a file
 
@@ -52,7 +52,7 @@ class Field:
     unit : str
         Unit of a quantity.
     default : str
-        What holds without a value.
+        Value that is used where the key is missing.
     choices : tuple of str
     slider : Slider, optional
     """
@@ -151,7 +151,7 @@ def _walk(
 
 
 def _resolved(definitions: Mapping[str, Any], part: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a part of the schema without a reference; its description is the nearer one."""
+    """Return a part of the schema with its reference resolved; its own keys take precedence."""
     if "$ref" not in part:
         return dict(part)
     named = definitions[part["$ref"].rpartition("/")[2]]
@@ -224,7 +224,7 @@ def _leaf(path: Path, part: Mapping[str, Any], value: Any) -> Field:
     if "pattern" in part or (has_unit and of_table):
         unit = number[2] if number else (example[2] if example else "")
         now = float(number[1]) if number else None
-        # a pattern that a negative number does not match says that there is none
+        # a pattern that negative numbers do not match excludes them
         signed = re.match(part.get("pattern", ""), f"-1 {unit}") is not None
         slider = slider_of(part, now, float(example[1]) if example else 1.0, signed=signed)
         text = number[1] if number else written

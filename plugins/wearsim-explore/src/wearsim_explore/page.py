@@ -1,4 +1,4 @@
-"""One page: a document of Bokeh that shows a session, and what is done on it."""
+"""One page: a Bokeh document that shows a session and performs the actions of its user."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Page:
     Parameters
     ----------
     document : Document
-        It is filled.
+        Document that is filled.
     design : Design
         The scenario of the file.
     schema : mapping
@@ -124,10 +124,10 @@ class Page:
             self._timer.cancel()
 
     def end(self) -> None:
-        """Say that the server ends, since a websocket of a notebook may stay open."""
+        """Tell the page that the server ends, since a websocket of a notebook may stay open."""
         self._reply(ended=True)
 
-    # what is asked on the page
+    # actions of the user
 
     def _on_request(self, _: str, __: str, new: str) -> None:
         try:
@@ -137,7 +137,7 @@ class Page:
             self._reply(message=f"refused: {type(error).__name__}: {error}")
 
     def act(self, action: str, **values: Any) -> None:
-        """Do what is asked on the page.
+        """Perform an action of the user.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class Page:
             "change", "release", "undo", "reset", "restore", "pin", "unpin", "save", "report" or
             "show".
         **values
-            What belongs to it.
+            Values of the action.
 
         Raises
         ------
@@ -223,7 +223,7 @@ class Page:
         else:
             self._reply(message=f"saved: {path}")
 
-    # what is computed
+    # computations
 
     def _ask(self, stage: Stage) -> None:
         session = self.session
@@ -296,7 +296,7 @@ class Page:
         if self._answered == self.session.number:
             self._ask("final")
 
-    # what is shown
+    # display
 
     def _show_panels(self) -> None:
         """Show the panels of the session in the slots; the next reply has their columns."""

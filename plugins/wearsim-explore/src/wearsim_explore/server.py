@@ -49,8 +49,8 @@ class _Token(AuthProvider):
             # Bokeh opens a websocket only with a session that it has signed for a page
             if handler.request.path.endswith("/ws"):
                 return "page"
-            given = handler.get_query_argument("token", "")
-            return "page" if hmac.compare_digest(given.encode(), self._token.encode()) else None
+            token = handler.get_query_argument("token", "")
+            return "page" if hmac.compare_digest(token.encode(), self._token.encode()) else None
 
         return user
 

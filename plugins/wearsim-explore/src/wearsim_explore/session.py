@@ -17,7 +17,7 @@ _ENTRY = re.compile(r"(.*?)(?: \(entry (\d+)\))?$")
 _GREYS = ("#6b6b6b", "#8a5a00", "#5a3d8a", "#00695c")  # of pinned designs
 _DASHES = ("--", ":", "-.", "--")
 MOST_PINS = len(_GREYS)
-_LEAST_WIDTH = 1.0  # of a line that is the content of a panel
+_LEAST_WIDTH = 1.0  # least width of a line that is a curve, not an axis or a boundary
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Session:
         del self.pins[place]
 
     def receive(self, answer: Answer, *, lives: bool) -> None:
-        """Take an answer; mistakes leave the last good one."""
+        """Store an answer; one with mistakes does not replace the last one without."""
         if answer.mistakes:
             self.mistakes = answer.mistakes
         elif lives:

@@ -20,9 +20,10 @@ from wearsim_halfspace.tangential import (
 
 FEWEST = 16  # rows or columns of a grid that is started from a coarser one
 LOOSE = 1e-4  # tolerance on coarser grids
-#: Of the difference of two grids, added in an extrapolation: that of the orders 1.08 and 2.
+#: Part of the difference of two grids that is added in an extrapolation, by the order of elements;
+#: the observed orders of convergence are 1.08 and 2.
 FURTHER = {1: 0.9, 2: 1.0 / 3.0}
-#: Where the rigid slip is taken, in elements ahead of the middle, for elements of each order.
+#: Distance ahead of the middle at which the rigid slip is taken, in elements, by their order.
 AHEAD = {1: 1.0 / 6.0, 2: 0.5}
 
 
@@ -47,11 +48,11 @@ class Problem:
     rigid_slip : ndarray, shape (2, rows, columns)
         Rigid slip of body 1 on body 2 per distance rolled, at the middle of the elements.
     spin : float
-        [1/m].
+        Spin [1/m].
     x, y : ndarray, shapes (columns,) and (rows,)
         Positions of the elements about the centre of the spin moment [m].
     order : int
-        Of the elements along rolling: 1 as in CONTACT, or 2 by positions within elements.
+        Order of the elements along rolling: 1 as in CONTACT, or 2 by positions within elements.
     difference : float
         K of different bodies, see `Elements`. The opening of the gap by traction is part of `gap`.
     creep_factor : float
@@ -166,7 +167,8 @@ class Solution(NamedTuple):
     def extrapolated(self) -> Work:
         """Return forces and power extrapolated from this grid and the coarser one.
 
-        The rows are not: where single elements enter adhesion, they vary irregularly.
+        The powers of the rows are not extrapolated, since they vary irregularly where single
+        elements enter adhesion.
         """
         fine = self.work()
         if self.coarser is None:
@@ -205,7 +207,7 @@ def solve(
     normal : NormalSolution
         Solution of its normal problem.
     tolerance : float
-        Of the tractions, see `solve_tangential`.
+        Tolerance of the tractions, see `solve_tangential`.
     below : bool
         Whether this is a coarser grid itself.
 
@@ -237,12 +239,12 @@ def solve(
         turn = doubled(_turn(coarser.rolling, coarse_normal.pressure), 1, columns)
         if below:
             start, turn = doubled(start, 1, rows), doubled(turn, 0, rows)
-    given = bound, slip, tolerance, start
+    arguments = bound, slip, tolerance, start
     if problem.order == 2:
         within = Within(*edges(normal), turn)
-        rolling = solve_rolling(problem.elements.rolling_averaged, *given, within)
+        rolling = solve_rolling(problem.elements.rolling_averaged, *arguments, within)
     else:
-        rolling = solve_tangential(problem.elements.rolling, *given)
+        rolling = solve_tangential(problem.elements.rolling, *arguments)
     return Solution(problem, normal, rolling, coarser)
 
 
@@ -315,7 +317,7 @@ def halved(field: FloatArray, axes: tuple[int, ...]) -> FloatArray:
     for axis in axes:
         fine = np.moveaxis(field, axis, 0)
         if len(fine) % 2:
-            # continued along a straight line
+            # extrapolated linearly beyond both ends
             ends = 2.0 * fine[:1] - fine[1:2], 2.0 * fine[-1:] - fine[-2:-1]
             wider = np.concatenate([ends[0], fine, ends[1]])
             means = 0.25 * (wider[:-2:2] + wider[2::2]) + 0.5 * fine[::2]

@@ -73,14 +73,14 @@ class Convolution:
     Parameters
     ----------
     coefficients : ndarray, shape (kernels, 2 rows - 1, 2 columns - 1)
-        For all distances of two elements, zero in the middle.
+        Influence coefficients for all distances of two elements, with distance zero in the middle.
 
     Attributes
     ----------
     middle : ndarray, shape (kernels, 2 columns - 1)
         Coefficients of elements in one row.
     quarter : ndarray, shape (rows, columns)
-        Those of the first kernel for distances that are not negative.
+        Coefficients of the first kernel for distances that are not negative.
     """
 
     def __init__(self, coefficients: FloatArray) -> None:
@@ -149,7 +149,8 @@ class Elements:
     dx, dy : float
         Sizes of an element [m].
     shear_modulus, poisson_ratio : float
-        Of both bodies combined: 1/G = (1/G_1 + 1/G_2)/2, nu/G = (nu_1/G_1 + nu_2/G_2)/2.
+        Constants of both bodies combined: 1/G = (1/G_1 + 1/G_2)/2,
+        nu/G = (nu_1/G_1 + nu_2/G_2)/2.
     difference : float
         K = G/4 ((1 - 2 nu_1)/G_1 - (1 - 2 nu_2)/G_2), zero for quasi-identical bodies.
     creep_factor : float

@@ -14,9 +14,10 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim_halfspace.influence import Convolution, inner
 
 MAX_ITERATIONS = 60  # of Newton's method
-MOST_PRODUCTS = 80  # in the solution of a linear system
-REUSED_UP_TO = 8  # products for which the preconditioner is kept
-FIRST_RATE, SLOWER, PATIENCE = 0.3, 0.3, 15  # rate r, its ratio, and iterations between changes
+MOST_PRODUCTS = 80  # matrix-vector products in the solution of a linear system
+REUSED_UP_TO = 8  # products of a solution up to which its preconditioner is used again
+#: first rate r over its scale, ratio of a rate to the one before, and iterations with each rate
+FIRST_RATE, SLOWER, PATIENCE = 0.3, 0.3, 15
 TINY = 1e-300  # against division by zero
 LOOSEST, TIGHTEST = 0.1, 1e-4  # relative residual of the linear systems
 
@@ -148,15 +149,15 @@ def solve_tangential(
         removed = np.where(sticks, 0.0, part)
 
         def product(
-            given: FloatArray,
+            vector: FloatArray,
             rate: float = rate,
             unit: FloatArray = unit,
             part: FloatArray = part,
             removed: FloatArray = removed,
         ) -> FloatArray:
-            change = given - rate * opposed(kernel.of_vector(given))
+            change = vector - rate * opposed(kernel.of_vector(vector))
             along = removed * (unit * change).sum(axis=0)
-            return np.asarray(given - part * change + unit * along)
+            return np.asarray(vector - part * change + unit * along)
 
         change, products = _gmres(
             product, preconditioner, residual, max(min(LOOSEST, error), TIGHTEST)

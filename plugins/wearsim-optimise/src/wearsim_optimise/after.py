@@ -12,7 +12,7 @@ import numpy as np
 from wearsim_optimise.designs import Design, Designs
 from wearsim_optimise.variables import overrides
 
-STEP = 0.02  # of the range of a variable, for derivatives
+STEP = 0.02  # step of the derivatives, over the range of a variable
 ACTIVE = 0.01  # slack over the limit below which a constraint is active
 _CORNERS = 3  # variables up to which all corners of the tolerances are evaluated
 

@@ -40,7 +40,7 @@ from wearsim_optimise.variables import (
 
 Watcher = Callable[[int, int, str], object]
 METHODS = ("auto", "cobyqa", "evolution")
-_BASE, _PER_VARIABLE = 10, 15  # designs of a search by default
+_BASE, _PER_VARIABLE = 10, 15  # default number of designs of a search, and more per variable
 _PRELOAD = "wearsim_optimise.evaluation numba scipy.special"
 
 
@@ -129,14 +129,14 @@ def optimise(
     Examples
     --------
     >>> import wearsim
-    >>> found = wearsim.optimise(
+    >>> result = wearsim.optimise(
     ...     "rig.toml",
     ...     ["roller.crown_radius=300mm:900mm"],
     ...     minimise="contact.power",
     ...     subject_to=["peak_pressure < 650 MPa"],
     ...     scheduler="serial",
     ... )
-    >>> found.best.is_feasible
+    >>> result.best.is_feasible
     True
     """
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
@@ -222,7 +222,7 @@ def _given(value: int | None, default: int | None) -> int | None:
 
 
 def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
-    """Return what is asked for as plain data; raises a ValueError for what cannot be read."""
+    """Return the request as plain data; raise a ValueError for arguments that cannot be read."""
     variables = [parse_variable(text) for text in given["vary"]]
     if not variables:
         raise ValueError("nothing is varied; name a variable, such as cam.base_radius=35mm:60mm")
@@ -325,7 +325,7 @@ class _Study:
         )
 
     def finish(self) -> OptimisationResult:
-        """Compute what is left; return the result."""
+        """Compute the remaining designs and return the result."""
         workers, scheduler = self._hands
         plan, request = self.plan, self.data.request
         with executor(

@@ -1,4 +1,4 @@
-"""Designs that are evaluated: asked for in rounds, kept in order, and found again after a kill."""
+"""Designs of an optimisation: evaluated in rounds, kept in order, and read again after a kill."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Design:
     key : str
         Text that identifies it.
     loss, slacks
-        For the search; the loss is not a number if the objective is not known.
+        Numbers for the search; the loss is NaN if the objective is not known.
     """
 
     number: int
@@ -149,7 +149,7 @@ class Designs:
         )
 
     def use(self, goals: Goals) -> None:
-        """Use goals, whose limits before wear spare runs, for all designs."""
+        """Apply goals to all designs; designs that violate limits before wear are not run."""
         self.goals = goals
         cheap = [c for c in goals.constraints if goals.named[c.name]["verb"] in CHEAP]
         self.limits = {item.name: (item.sign, goals.limit(item)) for item in cheap}

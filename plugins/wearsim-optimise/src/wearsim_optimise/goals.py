@@ -1,4 +1,4 @@
-"""What is looked for: objectives, constraints and their numbers for the search."""
+"""Objectives and constraints of an optimisation, and their values on the scales of the search."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from wearsim.plugins import QuantityError, kind_of, quantity
 from wearsim.report.text import PER_SI, shown
 
 _CONSTRAINT = re.compile(r"\s*([A-Za-z][\w.%+-]*)\s*(<=?|>=?)\s*(.+?)\s*")
-TIGHTER = 1e-4  # of a limit, by which the search stays within it
-_SMALL = 1e-3  # of the first value, below which an objective is not on a logarithmic scale
-ONE_PERCENT = math.log(1.01)  # of the objective, within which `then` chooses
+TIGHTER = 1e-4  # margin within each limit that the search keeps, over the limit
+_SMALL = 1e-3  # part of the first value below which the scale of an objective is linear
+ONE_PERCENT = math.log(1.01)  # difference of the loss within which `then` selects
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def parse_constraint(text: str) -> Constraint:
     Raises
     ------
     ValueError
-        If it is none.
+        If the text is not a constraint.
     """
     match = _CONSTRAINT.fullmatch(text)
     if match is None:

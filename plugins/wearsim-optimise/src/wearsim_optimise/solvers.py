@@ -18,12 +18,13 @@ from wearsim.errors import PluginError
 from wearsim_optimise.variables import Variable, Vector
 
 RADIUS = 0.2  # first trust region, of the range of a variable
-FINAL = 4e-4  # last one; the error of an optimum is much smaller
-_MOST = 10_000  # evaluations of one search; the budget ends it before
+FINAL = 4e-4  # last trust region; the error of an optimum is much smaller
+_MOST = 10_000  # evaluations of one search, more than the budget allows
 
 
-#: weight of the squared violation of a limit, over it, in the loss: COBYQA may otherwise end where
-#: no limit is kept, if all its first designs violate one; it is zero and flat at a feasible optimum
+#: weight in the loss of the squared violation of a limit, relative to the limit: if all its first
+#: designs violate a limit, COBYQA may otherwise end at an infeasible design. The added term and its
+#: derivative are zero at a feasible optimum
 PENALTY = 10.0
 
 
@@ -220,7 +221,7 @@ class Evolution:
         return np.array(places)
 
     def tell(self, rated: Sequence[Rated]) -> None:
-        """Take the generation, ordered."""
+        """Order the designs of the generation, and update the distribution by them."""
         ranks = np.argsort(np.argsort(self._order(rated), kind="stable"), kind="stable")
         self._solver.tell(list(zip(self._solutions, ranks.astype(float).tolist(), strict=True)))
 

@@ -70,7 +70,7 @@ class OptimisationView(StudyView[OptimisationResult]):
         return rows
 
     def _convergence(self) -> str:
-        """Return whether the search has converged, and else what to do."""
+        """Return whether the search has converged, and the remedy if not."""
         raw = self.result.raw
         return "converged" if raw.converged else not_converged(raw.request["evaluations"])
 
@@ -94,7 +94,7 @@ class OptimisationView(StudyView[OptimisationResult]):
         return {name: (best.values[name], self.result.goals.unit(name))}
 
     def _at_bound(self, number: float, variable: Any) -> str:
-        """Return that a variable is at a bound, with what moving the bound would bring."""
+        """Return text on a variable at a bound, with the gain from moving the bound."""
         for item in self.result.raw.active:
             if item["constraint"].startswith(f"{variable.name} "):
                 side = "lower" if ">" in item["constraint"] else "upper"
@@ -102,7 +102,7 @@ class OptimisationView(StudyView[OptimisationResult]):
         return ""
 
     def _activity(self, text: str) -> str:
-        """Return whether a constraint is active, with what relaxing it would bring."""
+        """Return whether a constraint is active, with the gain from relaxing it."""
         matching = [item for item in self.result.raw.active if item["constraint"] == text]
         return f", active{self._brings(matching[0])}" if matching else ""
 

@@ -259,8 +259,8 @@ def _judge_values(series: Series, difference: FloatArray, relative: FloatArray) 
         "scatter": bool(((relative >= low) & (relative <= high)).all()),
         "tolerance": bool((np.abs(relative) <= (series.tolerance or 0.0)).all()),
     }
-    given = series.reading_error, series.scatter, series.tolerance
-    asked = [name for name, value in zip(holds, given, strict=True) if value is not None]
+    limits = series.reading_error, series.scatter, series.tolerance
+    asked = [name for name, value in zip(holds, limits, strict=True) if value is not None]
     best: list[Verdict] = [name for name in asked if holds[name]]
     return best[0] if best else "not" if asked else "misfit"
 

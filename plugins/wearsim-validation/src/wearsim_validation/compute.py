@@ -35,7 +35,7 @@ CONTACT: dict[str, Callable[[wearsim.ContactStudy], float]] = {
 }
 #: energy per rolled distance and contact area where full slip begins
 FULL_SLIP = "T gamma over A where full slip begins"
-_LITTLE = 0.1  # of the greatest wear
+_LITTLE = 0.1  # part of the greatest wear below which a place counts as unworn
 _ADHERING = 0.01  # fraction below which a contact slides fully: its ends adhere longest
 
 
@@ -138,7 +138,7 @@ def rigid_depth(scenario: wearsim.Scenario, passes: FloatArray) -> FloatArray:
 def wear_rate(scenario: wearsim.Scenario) -> float:
     """Return the K/H by which the bodies of a contact wear together in a roller pass [1/Pa].
 
-    A place on a roller touches less often than one on the cylinder, or more.
+    A point of a roller is in contact less or more often than a point of the cylinder.
     """
     if scenario.wear is None:
         raise ValueError("a scenario without wear")
@@ -149,12 +149,12 @@ def wear_rate(scenario: wearsim.Scenario) -> float:
 
 
 def jumped(scenario: wearsim.Scenario, jump: Jump) -> tuple[FloatArray, FloatArray]:
-    """Return passes and the depth of both bodies, by steps that take their first wear for all.
+    """Return passes and the depth of both bodies, by steps that multiply the wear of one pass.
 
     Parameters
     ----------
     scenario : Scenario
-        With width and number of the strips, which do not change.
+        Scenario with the width and number of the strips, which do not change.
     jump : Jump
         Passes of a step, and the smoothing of the wear across the track.
     """

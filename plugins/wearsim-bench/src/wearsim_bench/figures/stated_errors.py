@@ -11,7 +11,7 @@ from wearsim_bench.measure.measurement import Topic
 from wearsim_bench.stated_errors.study import QUANTITIES, SMALL, STATED, TESTS, coverage
 
 _SIZE = 10.5, 4.6  # in
-_LOWEST = 1e-8  # errors below it are drawn there
+_LOWEST = 1e-8  # smaller errors are drawn at this value
 
 
 def stated_errors_figure(topic: Topic, under: str) -> Figure:

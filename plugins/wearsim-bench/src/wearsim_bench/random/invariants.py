@@ -60,7 +60,7 @@ COMPARED = {
 
 
 class InapplicableError(Exception):
-    """An invariant says nothing on a scenario."""
+    """An invariant does not apply to a scenario."""
 
 
 @dataclass

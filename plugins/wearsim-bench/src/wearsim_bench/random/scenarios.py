@@ -15,7 +15,7 @@ GROOVE = "cam-groove"
 GROOVES = 0.25  # part of the cams that are grooves
 MOST_PASSES, MOST_PER_PASS = 3e6, 1e4  # of any test, and of those that solve many passes
 TOLERANCES = {"1e-2": 0.5, "1e-3": 0.5}
-ATTEMPTS = 50  # to draw values that the scenario language accepts
+ATTEMPTS = 50  # attempts to draw values that the scenario language accepts
 MODELS = {
     "hertz": 0.3, "hertz-fastsim": 0.25, "semi-hertzian": 0.25, "slender": 0.2,
 }  # fmt: skip

@@ -211,8 +211,8 @@ def requirements(rows: Sequence[Measurement]) -> str:
             ratio = f"{name}: median of stated/true {median:.3g}"
             lines.append(_verdict(median < MOST_RATIO, ratio))
         for stratum in dict.fromkeys(row.setting for row in counted):
-            some = [row for row in counted if row.setting == stratum]
-            statistics = coverage(some, name)
+            of_stratum = [row for row in counted if row.setting == stratum]
+            statistics = coverage(of_stratum, name)
             part = statistics.covered / max(len(statistics.true), 1)
             if statistics.true and part < COVERED_IN_STRATUM:
                 lines.append(_verdict(False, f"{name} covered in {part:.1%} of '{stratum}'"))
@@ -246,16 +246,16 @@ def statistics(rows: Sequence[Measurement]) -> dict[str, list[Measurement]]:
         tests[STRATUM.format(stratum)] = [row for row in rows if row.setting == stratum]
     tolerances = {row.counts["tolerance"] for row in rows if not row.failed}
     for tolerance in sorted(tolerances, reverse=True):
-        same = [row for row in rows if row.counts.get("tolerance") == tolerance]
-        tests[TOLERANCE.format(tolerance)] = same
+        of_tolerance = [row for row in rows if row.counts.get("tolerance") == tolerance]
+        tests[TOLERANCE.format(tolerance)] = of_tolerance
     groups = {}
-    for group, some in tests.items():
-        lost = {"failed": sum(bool(row.failed) for row in some)}
-        if some:
+    for group, of_group in tests.items():
+        lost = {"failed": sum(bool(row.failed) for row in of_group)}
+        if of_group:
             groups[group] = [
-                Measurement(group, name, "", counts=coverage(some, name).counts | lost)
+                Measurement(group, name, "", counts=coverage(of_group, name).counts | lost)
                 for name in ALL_QUANTITIES
-                if name in QUANTITIES or coverage(some, name).true
+                if name in QUANTITIES or coverage(of_group, name).true
             ]
     for name in ALL_QUANTITIES:
         group = UNCOVERED.format(name)
