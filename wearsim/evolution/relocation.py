@@ -198,11 +198,11 @@ def moved_depth(depth: FloatArray, old: CamStations, new: CamStations) -> FloatA
     lengths = [stations.length.reshape(-1, *(1,) * (depth.ndim - 1)) for stations in (old, new)]
     for part in np.unique(new_part[new_part >= 0]):
         before, after = old_part == part, new_part == part
-        worn = (lengths[0][before] * depth[before]).sum(axis=0)
-        now = (lengths[1][after] * new_depth[after]).sum(axis=0)
-        scaled = now > 0.5 * worn
-        factor = np.where(scaled, worn / np.where(now > 0.0, now, 1.0), 0.0)
+        kept_volume = (lengths[0][before] * depth[before]).sum(axis=0)
+        volume = (lengths[1][after] * new_depth[after]).sum(axis=0)
+        scaled = volume > 0.5 * kept_volume
+        factor = np.where(scaled, kept_volume / np.where(volume > 0.0, volume, 1.0), 0.0)
         # at the edge of the groove all depth may lie between two stations
-        added = np.where(scaled, 0.0, worn / lengths[1][after].sum())
+        added = np.where(scaled, 0.0, kept_volume / lengths[1][after].sum())
         new_depth[after] = new_depth[after] * factor + added
     return new_depth

@@ -236,12 +236,11 @@ def strip_errors(
     steps, last = np.array(coarse.passes), float(passes[-1])
     common = np.append(steps[steps < last], last)  # passes at which the tests are compared
     with np.errstate(divide="ignore", invalid="ignore"):
-        logs = [
-            np.interp(np.log(common), np.log(points), np.log(size))
-            for points, columns in ((steps, np.array(coarse.sizes).T), (passes, sizes))
-            for size in columns
-        ]
-        ratio = np.abs(np.expm1(np.array(logs[:3]) - np.array(logs[3:])))
+        coarse_logs, logs = (
+            np.array([np.interp(np.log(common), np.log(points), np.log(size)) for size in rows])
+            for points, rows in ((steps, np.array(coarse.sizes).T), (passes, sizes))
+        )
+        ratio = np.abs(np.expm1(coarse_logs - logs))
     ratio = np.where(np.isfinite(ratio), ratio, 0.0)
     # the error at a point is the greatest of the last steps, as it may cross zero
     recent = (common[None, :] > common[:, None] / BACK) & (common[None, :] <= common[:, None])

@@ -104,8 +104,7 @@ def next_grids(
     grids = []
     for v, (growth, width, count) in enumerate(zip(problem.growth, free, counts, strict=True)):
         near = v in outgrown or loaded[:, v, :width].any() or loaded[:, v, -width:].any()
-        outer = width and near
-        grids.append(_next(problem.grid, growth, count) if outer else None)
+        grids.append(_next(problem.grid, growth, count) if width and near else None)
     return grids
 
 

@@ -136,14 +136,16 @@ class NormalContacts(NamedTuple):
                 whole = len(numbers) == sets and np.array_equal(chosen, np.arange(contacts))
                 places = numbers[:, None], chosen
                 taken = self if whole else NormalContacts._make(array[places] for array in self)
-                apart = NormalContacts._make(a.reshape(-1, size, *a.shape[2:]) for a in taken)
+                systems = NormalContacts._make(a.reshape(-1, size, *a.shape[2:]) for a in taken)
                 softness = compliance if whole else compliance[:, chosen]
                 worn = None
                 if bodies is not None:
                     worn = (shared if whole else shared[:, chosen]).reshape(
                         -1, size, *shared.shape[2:]
                     )
-                failed += apart._solve(softness.reshape(apart.gap.shape), bodies, worn, constants)
+                failed += systems._solve(
+                    softness.reshape(systems.gap.shape), bodies, worn, constants
+                )
                 for array, solved in () if whole else zip(self, taken, strict=True):
                     array[places] = solved
         return failed

@@ -103,10 +103,7 @@ def with_balanced_creepage(
     """
     if batch.bearing_torque is None or batch.rolling_radius is None:
         raise ValueError("a bearing torque needs the rolling radius of each strip")
-    first = np.zeros(len(batch))
-    if guess is not None:
-        first = np.nan_to_num(guess.longitudinal_creepage)
-
+    guesses = np.zeros(len(batch)) if guess is None else guess.longitudinal_creepage
     friction = batch.friction.reshape(len(batch), -1).max(axis=1)
     full_slip = friction * half_length.max(axis=1) * batch.longitudinal_curvature
     added_creepage = 100.0 * np.abs(batch.lateral)
@@ -118,7 +115,7 @@ def with_balanced_creepage(
         lambda creepage: torque_of(batch.replaced(longitudinal=creepage)),
         batch.bearing_torque,
         batch.longitudinal,
-        first,
+        np.nan_to_num(guesses),
         full_slip / pair.creep_factor,
         added_creepage,
         lambda k: {

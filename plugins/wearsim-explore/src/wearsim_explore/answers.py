@@ -19,7 +19,7 @@ FIRST_TESTS, MOST_TESTS = 16, 1024  # of a study of lives
 _NUMBER = re.compile(
     r"(-?[\d,]*\.?\d+(?:e[+-]?\d+)?)(?: ± \S+)? ?([^\d\[,;]*(?:\^\d)?)(?: ± \S+ ?\2)?(?:\[.*\])?"
 )
-_EVERY = 2  # frames of an animation that are left out between those shown, plus one
+_EVERY = 2  # every second frame of an animation is shown
 
 
 @dataclass(frozen=True)
@@ -157,9 +157,8 @@ def answer(
     except wearsim.ScenarioError as error:
         mistakes = [FieldMistake(item.table, item.key, str(item)) for item in error.mistakes]
         return Answer(mistakes=tuple(mistakes))
-    except wearsim.WearsimError as error:
-        return Answer(mistakes=(FieldMistake("", "", str(error)),))
-    except (ValueError, TypeError) as error:  # arguments that the scenario does not allow
+    # the last two are those of arguments that the scenario does not allow
+    except (wearsim.WearsimError, ValueError, TypeError) as error:
         return Answer(mistakes=(FieldMistake("", "", str(error)),))
 
 
@@ -184,11 +183,10 @@ def _test(request: Request, stop_requested: Callable[[], bool]) -> Answer:
         panels |= {f"{prefix}{name}": Drawn(panel, record(panel)) for name, panel in shown.items()}
     if (moving := main.animation()) is not None:
         numbers = range(0, moving.count, _EVERY)
-        shown_now = numbers[request.frame % len(numbers) :][:1] if coarse else numbers
-        frames = [record(_without_text(moving.frame(number))) for number in shown_now]
-        panel = _without_text(moving.frame(shown_now[0]))
+        first = numbers[request.frame % len(numbers)] if coarse else numbers[0]
+        frames = [] if coarse else [record(_without_text(moving.frame(n))) for n in numbers]
+        panel = _without_text(moving.frame(first))
         panel = replace(panel, title="Turning cam", caption=panel.title)
-        frames = [] if coarse else frames
         panels = {"turning": Drawn(panel, record(panel), tuple(frames)), **panels}
     return _answer(views, panels, steps)
 

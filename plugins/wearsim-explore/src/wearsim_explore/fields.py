@@ -162,9 +162,7 @@ def _alternative(
     definitions: Mapping[str, Any], parts: Sequence[Mapping[str, Any]], value: Any
 ) -> tuple[dict[str, Any], str, list[str]]:
     """Return the alternative that a value has, the key that chooses it, and all choices."""
-    options: list[dict[str, Any]] = []
-    for part in parts:
-        options += _options(definitions, part)
+    options = [option for part in parts for option in _options(definitions, part)]
     tables = [option for option in options if "properties" in option]
     pairs = ((_name(option), option) for option in tables)
     named = {name: option for name, option in pairs if name is not None}

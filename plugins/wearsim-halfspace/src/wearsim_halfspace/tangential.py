@@ -125,7 +125,7 @@ def solve_tangential(
     """
     of_row = kernel.middle[:2]  # influence within a row of both components
     self_influence = float(of_row[:, kernel.columns - 1].max())  # of an element on itself
-    touches, most = bound > 0.0, float(bound.max())
+    touches, greatest_bound = bound > 0.0, float(bound.max())
     if start is None:
         start = -rigid_slip / np.maximum(np.hypot(*rigid_slip), TINY) * bound
     opposed = _unchanged if within is None else within
@@ -139,7 +139,7 @@ def solve_tangential(
         sticks = (size <= bound) & touches
         unit, part = trial / size, np.where(sticks, 1.0, bound / size)
         residual = part * trial - traction
-        error = float(np.abs(residual).max()) / most
+        error = float(np.abs(residual).max()) / greatest_bound
         if error <= tolerance:
             return TangentialSolution(traction, np.where(sticks, 0.0, slip), sticks)
         if preconditioner is None or products > REUSED_UP_TO or iteration % PATIENCE == 0:
@@ -264,22 +264,22 @@ def _gmres(
     hessenberg = np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS))
     # vector normal to the columns of the Hessenberg matrix; its length gives the residual
     normal = np.zeros(MOST_PRODUCTS + 1)
-    normal[0], tried = 1.0, []
+    normal[0], directions = 1.0, []
     for count in range(1, MOST_PRODUCTS + 1):
-        tried.append(preconditioner(basis[count - 1].reshape(right.shape)))
-        new, known = product(tried[-1]).ravel(), basis[:count]
+        directions.append(preconditioner(basis[count - 1].reshape(right.shape)))
+        new, known = product(directions[-1]).ravel(), basis[:count]
         for _ in range(2):  # orthogonalised twice, against round-off
             # in one thread, see `inner`
             parts = np.einsum("ij,j->i", known, new)
             new -= np.einsum("i,ij->j", parts, known)
             hessenberg[:count, count - 1] += parts
-        rest = float(np.sqrt(inner(new, new)))
-        hessenberg[count, count - 1] = rest
-        normal[count] = -float(normal[:count] @ hessenberg[:count, count - 1]) / max(rest, TINY)
-        basis[count] = new / max(rest, TINY)
+        norm = float(np.sqrt(inner(new, new)))
+        hessenberg[count, count - 1] = norm
+        normal[count] = -float(normal[:count] @ hessenberg[:count, count - 1]) / max(norm, TINY)
+        basis[count] = new / max(norm, TINY)
         if tolerance * float(np.linalg.norm(normal)) >= 1.0:
             break
     right_side = np.zeros(count + 1)
     right_side[0] = length
     weights = np.linalg.lstsq(hessenberg[: count + 1, :count], right_side, rcond=None)[0]
-    return np.einsum("i,i...->...", weights, np.stack(tried)), count
+    return np.einsum("i,i...->...", weights, np.stack(directions)), count

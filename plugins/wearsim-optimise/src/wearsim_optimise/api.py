@@ -243,10 +243,9 @@ def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
         raise ValueError("a second choice goes with one objective, not with a front of two")
     if given["method"] not in METHODS:
         raise ValueError(f"'{given['method']}' is no method, expected one of {', '.join(METHODS)}")
-    least = 3
     evaluations = given["evaluations"] or _BASE + _PER_VARIABLE * len(variables)
     for name, value, lowest in (
-        ("evaluations", evaluations, least),
+        ("evaluations", evaluations, 3),
         ("starts", given["starts"], 1),
         ("realisations", given["realisations"], 1),
     ):
@@ -308,7 +307,7 @@ class _Study:
         stop_requested: Callable[[], bool] | None,
     ) -> None:
         self.scenario, self.data, self.path = scenario, data, path
-        self._hands = workers, scheduler
+        self._workers, self._scheduler = workers, scheduler
         self._watch, self._notice, self._stop = watch, on_notice, stop_requested
         self._started, self._before = time.monotonic(), data.wall_seconds
         self._designs: Designs | None = None
@@ -326,11 +325,10 @@ class _Study:
 
     def finish(self) -> OptimisationResult:
         """Compute the remaining designs and return the result."""
-        workers, scheduler = self._hands
         plan, request = self.plan, self.data.request
         with executor(
-            scheduler,
-            workers,
+            self._scheduler,
+            self._workers,
             on_notice=self._notice,
             stop_requested=self._stop,
             preload=_PRELOAD,
@@ -351,11 +349,11 @@ class _Study:
 
                 def neighbours(design: Design) -> None:
                     rows = sensitivity(designs, design)
-                    near = tolerances(designs, design, request["tolerances"])
-                    around[design.number] = rows, near
+                    robustness = tolerances(designs, design, request["tolerances"])
+                    around[design.number] = rows, robustness
 
                 best, converged = optimum(designs, plan, neighbours)
-                rows, near = around.get(best.number, ([], None))
+                rows, robustness = around.get(best.number, ([], None))
                 active = active_constraints(designs, best, rows)
                 gains = confirmation(designs, designs.all[0], best) if request["confirm"] else []
             except Interrupted as error:
@@ -368,7 +366,7 @@ class _Study:
             sensitivity=rows,
             active=active,
             gains=gains,
-            robustness=near,
+            robustness=robustness,
             converged=converged,
             warnings=self._warnings(designs, converged=converged),
         )

@@ -231,20 +231,20 @@ def completed(designs: Designs, chosen: Design, loss: Callable[[Design], float])
     loss : callable
         Loss of a design; not a number where it is not known.
     """
-    wanted = np.concatenate([[loss(chosen)], chosen.slacks])
-    missing = ~np.isfinite(wanted)
+    values = np.concatenate([[loss(chosen)], chosen.slacks])
+    missing = ~np.isfinite(values)
     if missing.any():
         evaluated = [design for design in designs.evaluated if math.isfinite(loss(design))]
         if evaluated:
             place = designs.places(chosen)
             places = np.array([designs.places(design) for design in evaluated])
             rows = np.array([np.concatenate([[loss(d)], d.slacks]) for d in evaluated])
-            wanted[missing] = _interpolated(places, rows[:, missing], place)
+            values[missing] = _interpolated(places, rows[:, missing], place)
             if chosen.status == "failed":  # a great loss leads the search away from it
-                wanted[0] = max(float(rows[:, 0].max()), wanted[0]) + 0.1
-        wanted[~np.isfinite(wanted)] = 1.0
-    slacks = wanted[1:]
-    return Answer(float(wanted[0]), slacks - TIGHTER if len(slacks) else slacks)
+                values[0] = max(float(rows[:, 0].max()), values[0]) + 0.1
+        values[~np.isfinite(values)] = 1.0
+    slacks = values[1:]
+    return Answer(float(values[0]), slacks - TIGHTER if len(slacks) else slacks)
 
 
 def _interpolated(places: Vector, rows: Vector, place: Vector) -> Vector:

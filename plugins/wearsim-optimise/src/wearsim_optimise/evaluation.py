@@ -131,8 +131,10 @@ class Studies:
                 answer = answers[plain]
                 return {"verb": verb, "name": plain, "unit": answer.unit, "label": answer.label}
             known += [f"{verb}.{key}" for key in answers]
-        near = difflib.get_close_matches(name, [*known, *(k.split(".", 1)[1] for k in known)], n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else ""
+        similar = difflib.get_close_matches(
+            name, [*known, *(k.split(".", 1)[1] for k in known)], n=1
+        )
+        hint = f"; did you mean '{similar[0]}'?" if similar else ""
         raise UnknownQuantityError(
             f"no quantity is named '{name}'{hint} (known: {', '.join(known)}; lives: life.b10)"
         )
@@ -227,8 +229,8 @@ class Evaluation:
         """Return whether a limit before wear is violated by far."""
         for name, (sign, limit) in self.limits.items():
             if name in values:
-                beyond = values[name] - limit if sign == "<" else limit - values[name]
-                if beyond > FAR * (abs(limit) or 1.0):
+                excess = values[name] - limit if sign == "<" else limit - values[name]
+                if excess > FAR * (abs(limit) or 1.0):
                     return True
         return False
 

@@ -25,8 +25,8 @@ def pareto_first(rated: Sequence[Any]) -> list[float]:
         for row in losses
     ]
     for n, row in enumerate(scaled):
-        apart = np.sort(np.abs(scaled - row).sum(axis=1))[1] if len(scaled) > 1 else 1.0
-        order[feasible[n]] = dominated[n] - 0.5 * min(float(apart), 1.0) - 1e6
+        distance = np.sort(np.abs(scaled - row).sum(axis=1))[1] if len(scaled) > 1 else 1.0
+        order[feasible[n]] = dominated[n] - 0.5 * min(float(distance), 1.0) - 1e6
     return list(map(float, order))
 
 

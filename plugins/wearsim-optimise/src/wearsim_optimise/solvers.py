@@ -112,8 +112,8 @@ class Cobyqa:
     def tell(self, rated: Sequence[Rated]) -> None:
         """Take losses and slacks of the designs, or of the first of them."""
         for place, answer in zip(self._next, rated, strict=False):
-            beyond = min(violation(answer), 1.0)
-            loss = answer.loss + PENALTY * beyond**2
+            violated = min(violation(answer), 1.0)
+            loss = answer.loss + PENALTY * violated**2
             self._known[place.tobytes()] = Answer(loss, answer.slacks)
 
     def _at(self, place: Vector) -> Rated:
@@ -236,11 +236,11 @@ def feasible_first(rated: Sequence[Rated]) -> list[float]:
     worst = max(losses, default=0.0)
     order = []
     for item in rated:
-        beyond = violation(item)
-        if beyond == 0.0 and math.isfinite(item.loss):
+        violated = violation(item)
+        if violated == 0.0 and math.isfinite(item.loss):
             order.append(item.loss)
         else:
-            order.append(worst + 1.0 + (beyond if math.isfinite(beyond) else 1e6))
+            order.append(worst + 1.0 + (violated if math.isfinite(violated) else 1e6))
     return order
 
 

@@ -64,8 +64,8 @@ class OptimisationView(StudyView[OptimisationResult]):
             rows.append(Row(constraint.text, value + self._activity(constraint.text)))
         if result.raw.front:
             rows.append(Row("front", f"{count(len(result.raw.front))} designs, see the table"))
-        if (near := result.raw.robustness) is not None:
-            rows.append(Row("within the tolerances", self._robustness(near)))
+        if (robustness := result.raw.robustness) is not None:
+            rows.append(Row("within the tolerances", self._robustness(robustness)))
         rows.append(Row("search", self._convergence()))
         return rows
 
@@ -112,16 +112,16 @@ class OptimisationView(StudyView[OptimisationResult]):
             return ""
         return f"; 1 % more changes {name} by {100.0 * item['gain']:+.2g} %"
 
-    def _robustness(self, near: Mapping[str, Any]) -> str:
+    def _robustness(self, robustness: Mapping[str, Any]) -> str:
         """Return the worst neighbour in words."""
         name = self.result.goals.objectives[0][0]
-        if near["worst"] is None:
-            return f"none of {near['neighbours']} neighbours could be evaluated"
-        change = 100.0 * (near["part"] - 1.0)
-        text = f"{name} {change:+.2g} % at worst of {near['neighbours']} neighbours"
-        for constraint, item in near["violated"].items():
+        if robustness["worst"] is None:
+            return f"none of {robustness['neighbours']} neighbours could be evaluated"
+        change = 100.0 * (robustness["part"] - 1.0)
+        text = f"{name} {change:+.2g} % at worst of {robustness['neighbours']} neighbours"
+        for constraint, item in robustness["violated"].items():
             text += f"; {constraint} is exceeded by up to {100.0 * item['beyond']:.2g} %"
-        return text + (f"; {near['failed']} failed" if near["failed"] else "")
+        return text + (f"; {robustness['failed']} failed" if robustness["failed"] else "")
 
     def study(self) -> Rows:
         """Return rows on the designs, their number and the effort."""
