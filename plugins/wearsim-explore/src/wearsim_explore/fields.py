@@ -125,11 +125,11 @@ def _walk(
     if "anyOf" in part:
         chosen, discriminator, names = _alternative(definitions, part["anyOf"], value)
         if discriminator:
-            now = value.get(discriminator) if isinstance(value, dict) else None
+            choice = value.get(discriminator) if isinstance(value, dict) else None
             default = str(chosen["properties"][discriminator].get("default", ""))
             description = chosen["properties"][discriminator].get("description", "")
             key = _dotted((*path, discriminator))
-            yield Field(key, "choice", description, now, default=default, choices=tuple(names))
+            yield Field(key, "choice", description, choice, default=default, choices=tuple(names))
         part = {**{k: v for k, v in part.items() if k != "anyOf"}, **chosen}
         if "description" in chosen and "properties" not in chosen:
             part["description"] = chosen["description"]
@@ -169,8 +169,8 @@ def _alternative(
     if isinstance(value, dict) or len(tables) == len(options):
         keys = {key for key, _ in named}
         discriminator = next(iter(keys)) if keys else ""
-        now = value.get(discriminator) if isinstance(value, dict) else None
-        chosen = named.get((discriminator, str(now))) or next(
+        choice = value.get(discriminator) if isinstance(value, dict) else None
+        chosen = named.get((discriminator, str(choice))) or next(
             (table for table in tables if _is_default(table, discriminator)), tables[0]
         )
         return chosen, discriminator, [name for _, name in named]
@@ -221,17 +221,17 @@ def _leaf(path: Path, part: Mapping[str, Any], value: Any) -> Field:
     has_unit = isinstance(value, str) and number is not None and bool(_UNIT.fullmatch(number[2]))
     if "pattern" in part or (has_unit and of_table):
         unit = number[2] if number else (example[2] if example else "")
-        now = float(number[1]) if number else None
+        present = float(number[1]) if number else None
         # a pattern that negative numbers do not match excludes them
         signed = re.match(part.get("pattern", ""), f"-1 {unit}") is not None
-        slider = slider_of(part, now, float(example[1]) if example else 1.0, signed=signed)
+        slider = slider_of(part, present, float(example[1]) if example else 1.0, signed=signed)
         text = number[1] if number else written
         return Field(key, "quantity", description, text, unit, shown, slider=slider)
     if types & {"number", "integer"} or (isinstance(value, int | float) and "const" in part):
         whole = types == {"integer"}
         known = value if isinstance(value, int | float) else default
-        now = float(known) if isinstance(known, int | float) else None
-        slider = slider_of(part, now, 1.0, whole=whole)
+        present = float(known) if isinstance(known, int | float) else None
+        slider = slider_of(part, present, 1.0, whole=whole)
         kind: Kind = "integer" if whole else "number"
         return Field(key, kind, description, written, default=shown, slider=slider)
     kind = "file" if _FILE in examples else "text"

@@ -37,7 +37,7 @@ _KEPT = 1000  # server times that are kept
 
 
 class Exchange(DataModel):
-    """What the page asks, and what it is to show; both are JSON."""
+    """Requests of the page and replies to it, both as JSON."""
 
     request = String(default="")
     reply = String(default="")
@@ -263,8 +263,7 @@ class Page:
         self._reply()
         if request.stage == "first" and request.number in self._received:
             self.server_times.append(time.perf_counter() - self._received[request.number])
-            later = {n: then for n, then in self._received.items() if n > request.number}
-            self._received = later
+            self._received = {n: at for n, at in self._received.items() if n > request.number}
         self.finals += request.stage == "final"
         if request.number == self.session.number and not content.mistakes:
             self._follow(request, content)

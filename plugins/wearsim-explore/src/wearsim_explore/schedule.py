@@ -67,7 +67,7 @@ class Schedule:
         self.waiting.pop(session, None)
 
     def to_start(self) -> list[tuple[int, Request]]:
-        """Return requests with the workers that now compute them."""
+        """Return workers with the requests that they compute from now on."""
         started = []
         for worker in range(self.workers):
             if worker in self.running or not (request := self._next()):
@@ -79,7 +79,7 @@ class Schedule:
         return started
 
     def to_stop(self) -> list[int]:
-        """Return workers that are now to be asked to stop."""
+        """Return the workers to ask to stop, each once."""
         stop = set(self._outdated)
         request = self._next()
         if request and request.stage == "first" and not (self.stopping | stop):

@@ -230,10 +230,10 @@ def _free_port(host: str, port: int) -> int:
     import socket  # noqa: PLC0415
 
     kind = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(kind) as tried:
-        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        tried.bind((host, port))
-        return int(tried.getsockname()[1])
+    with socket.socket(kind) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((host, port))
+        return int(probe.getsockname()[1])
 
 
 def explore(scenario: Any) -> Exploration:

@@ -69,8 +69,8 @@ class Session:
     def fields_of(self, design: Design) -> list[Field]:
         """Return the fields of a design; ranges of sliders lie around the values of the file."""
         if self._last[0] is not design:
-            now = fields_of(self.schema, design.tables)
-            self._last = design, [_with_range(item, self._start.get(item.key)) for item in now]
+            fields = fields_of(self.schema, design.tables)
+            self._last = design, [_with_range(item, self._start.get(item.key)) for item in fields]
         return self._last[1]
 
     @property
@@ -204,8 +204,8 @@ class Session:
             for fields in map(self.fields_of, designs)
         ]
         rows = [[key, *(texts.get(key, "") or "none" for texts in values)] for key in keys]
-        now = [row for answer in (self.test, self.lives) if answer for row in answer.rows]
-        for row in now:
+        present = [row for answer in (self.test, self.lives) if answer for row in answer.rows]
+        for row in present:
             cells = [_compared(_row_of(pin, row.label), row) for pin in self.pins]
             rows.append([row.label, row.text, *cells])
         return heads, rows
@@ -306,11 +306,11 @@ def _row_of(pin: Pin, label: str) -> Quantity | None:
     return next((row for row in rows if row.label == label), None)
 
 
-def _compared(pinned: Quantity | None, now: Quantity) -> str:
+def _compared(pinned: Quantity | None, present: Quantity) -> str:
     """Return the text of a pinned row, with how much the present one differs from it."""
     if pinned is None:
         return ""
-    before, after = pinned.number, now.number
+    before, after = pinned.number, present.number
     if before and after and before[0] and before[1] == after[1]:
         return f"{pinned.text} (now {100.0 * (after[0] / before[0] - 1.0):+.1f} %)"
     return pinned.text

@@ -168,30 +168,30 @@ def _fit(case: Case, comparison: Comparison, values: Callable[..., FloatArray]) 
     assert fit is not None
     rows = np.flatnonzero(comparison.x <= fit.upto)
     grid = np.linspace(fit.low, fit.high, 9)
-    table = np.array([np.log(values(None, {fit.key: float(k)})[rows]) for k in grid])
+    table = np.array([np.log(values(None, {fit.key: float(point)})[rows]) for point in grid])
     target = np.log(comparison.published[rows])
-    alone: list[float | None] = [None] * len(comparison.x)
+    row_fits: list[float | None] = [None] * len(comparison.x)
 
-    def at(k: float) -> FloatArray:
-        return np.array([np.interp(k, grid, column) for column in table.T])
+    def predicted(parameter: float) -> FloatArray:
+        return np.array([np.interp(parameter, grid, column) for column in table.T])
 
     for place, row in enumerate(rows):
-        gap = table[:, place] - target[place]
-        if gap[0] * gap[-1] < 0.0:
-            alone[row] = float(np.interp(0.0, *_rising(gap, grid)))
+        differences = table[:, place] - target[place]
+        if differences[0] * differences[-1] < 0.0:
+            row_fits[row] = float(np.interp(0.0, *_rising(differences, grid)))
     best = minimize_scalar(
-        lambda k: float(((at(k) - target) ** 2).sum()),
+        lambda parameter: float(((predicted(parameter) - target) ** 2).sum()),
         bounds=(fit.low, fit.high),
         method="bounded",
     )
-    comparison.fits[fit.key] = alone
+    comparison.fits[fit.key] = row_fits
     comparison.columns[f"{fit.key} {best.x:.2f}"] = values(None, {fit.key: float(best.x)})
-    misfits = np.expm1(at(best.x) - target)
+    misfits = np.expm1(predicted(best.x) - target)
     comparison.facts.append(
         f"best single {fit.key} for these {len(rows)} rows: {best.x:.2f}, which misses them by "
         + ", ".join(f"{100.0 * part:+.0f} %" for part in misfits)
     )
-    fitted = [value for value in alone if value is not None]
+    fitted = [value for value in row_fits if value is not None]
     if fitted:
         comparison.facts.append(
             f"{fit.key} by which each row agrees: "
@@ -200,10 +200,10 @@ def _fit(case: Case, comparison: Comparison, values: Callable[..., FloatArray]) 
         )
 
 
-def _rising(gap: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return gaps in rising order, and the values that belong to them."""
-    order = np.argsort(gap)
-    return gap[order], grid[order]
+def _rising(differences: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return differences in rising order, and the points of the grid that belong to them."""
+    order = np.argsort(differences)
+    return differences[order], grid[order]
 
 
 def exponent(x: FloatArray, values: FloatArray, error: float = 0.0) -> tuple[float, float]:

@@ -47,8 +47,8 @@ def _greatest(depths: FloatArray) -> FloatArray:
 def _unworn_lines(run: wearsim.Result) -> float:
     """Return the number of places within the final groove with little of its greatest wear."""
     worn = run.profiles[-1] - run.profiles[0]
-    least = (worn[1:-1] < worn[:-2]) & (worn[1:-1] <= worn[2:]) & (worn[1:-1] > 0.0)
-    return float(np.count_nonzero(least & (worn[1:-1] < _LITTLE * worn.max())))
+    minima = (worn[1:-1] < worn[:-2]) & (worn[1:-1] <= worn[2:]) & (worn[1:-1] > 0.0)
+    return float(np.count_nonzero(minima & (worn[1:-1] < _LITTLE * worn.max())))
 
 
 def _force(contact: wearsim.ContactStudy) -> float:
@@ -84,11 +84,11 @@ def computed(
     changes : mapping, optional
         Further changes of the scenario.
     """
-    every = {**(variant.set if variant else {}), **(changes or {})}
+    overrides = {**(variant.set if variant else {}), **(changes or {})}
     x = case.columns[series.x]
     if case.file.kind == "contact":
-        return np.array([_contact(case, series, every, value) for value in x.values * x.si])
-    scenario = scenario_of(case, series, every)
+        return np.array([_contact(case, series, overrides, value) for value in x.values * x.si])
+    scenario = scenario_of(case, series, overrides)
     if variant and variant.rigid:
         return rigid_depth(scenario, x.values)
     if variant and variant.jump:
@@ -100,10 +100,10 @@ def computed(
 
 def _contact(case: Case, series: Series, changes: Mapping[str, Any], x: float) -> float:
     """Return a quantity of the contact at one x [SI]."""
-    at = {**changes, case.file.vary: float(x)} if case.file.vary else dict(changes)
+    overrides = {**changes, case.file.vary: float(x)} if case.file.vary else dict(changes)
     if series.computed == FULL_SLIP:
         return _index_of_full_slip(case, series, changes)
-    return CONTACT[series.computed](wearsim.study_contact(scenario_of(case, series, at)))
+    return CONTACT[series.computed](wearsim.study_contact(scenario_of(case, series, overrides)))
 
 
 def _index_of_full_slip(case: Case, series: Series, changes: Mapping[str, Any]) -> float:
