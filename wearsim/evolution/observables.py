@@ -28,6 +28,10 @@ from wearsim.evolution.steppers.single_step import (
 from wearsim.mechanics.cam import Extreme, integral_error
 from wearsim.types import FloatArray
 
+LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
+LEAST_STRIPS = 8  # strips in contact from which the loads of the outermost ones are corrected
+STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
+
 
 def present_contacts(
     stepper: Stepper, problem: WearProblem, state: WearState
@@ -177,11 +181,6 @@ def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:
 def clearance(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest worn descent of a roller, shape (realisations,) [m]."""
     return np.asarray(greatest(problem, worn_descents(problem, state)).max(axis=0))
-
-
-LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
-LEAST_STRIPS = 8  # strips in contact from which the loads of the outermost ones are corrected
-STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
 
 
 def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:

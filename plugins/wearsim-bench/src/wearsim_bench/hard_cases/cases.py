@@ -183,7 +183,7 @@ def _loads(duration: float) -> list[RobustnessCase]:
         RobustnessCase("spring unloaded by wear", spring("6.9 kN/mm")),
         RobustnessCase(
             "spring unloaded to zero",
-            # to 1 mN; a limit on the steps of models that cannot reach it
+            # the load falls to 1 mN; models that cannot reach it stop at the limit of the steps
             {**spring("69 kN/mm"), "operation.passes": 600_000, "evolution.max_steps": 2000},
             steps=16,
         ),
