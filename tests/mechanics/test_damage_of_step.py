@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from wearsim.mechanics.fatigue import damage_of_step
+from wearsim.mechanics.fatigue import damage_of_step, greatest_von_mises
 
 START, LENGTH, CONSTANT, BEFORE = 1000.0, 4000.0, 300.0, 200.0
 NONE = np.empty((0, 2))
@@ -94,3 +94,27 @@ def test_step_without_passes_adds_nothing() -> None:
     damage, sums = damage_of_step(old, rates, rates, NONE, none, none, points, 1.0)
     assert not damage[:2].any()
     assert not sums.any()
+
+
+@pytest.mark.parametrize(("ratio", "stress"), [(0.3, 0.557), (0.0, 1.0)])
+def test_greatest_stress_of_von_mises_is_that_of_the_textbook(ratio: float, stress: float) -> None:
+    found, depth = greatest_von_mises(ratio)
+    # Johnson, Contact Mechanics, section 4.2: 0.558 p0 at 0.70 a for a Poisson ratio of 0.3
+    assert found == pytest.approx(stress, abs=2e-3)
+    z = depth
+    root = np.sqrt(1.0 + z * z)
+    x, n = -((1.0 + 2.0 * z * z) / root - 2.0 * z), -1.0 / root
+    across = ratio * (x + n)
+    mises = np.sqrt(x * x + n * n + across * across - x * n - n * across - across * x)
+    assert found == pytest.approx(mises, rel=1e-12)
+    assert depth == pytest.approx(0.70 if ratio else 0.0, abs=0.01)
+
+
+def test_row_of_a_realisation_has_its_own_passes() -> None:
+    rates, old = np.full((4, 1), 1e-6), np.zeros((4, 4, 1))
+    old[0, :, 0] = 0.1, 0.2, 0.3, 0.4
+    start, lengths = np.array([0.0, 50.0]), np.array([100.0, 0.0])
+    points = np.array([[np.nan, np.nan], [1.0, 1.0]])
+    damage, sums = damage_of_step(old, rates, rates, NONE, start, lengths, points, 1.0)
+    assert damage[0, :, 0] == pytest.approx([0.1001, 0.2, 0.3001, 0.4])
+    assert sums[0] == pytest.approx([0.1, 0.2, 0.3, 0.4])

@@ -9,9 +9,10 @@ mutmut leaves functions with a decorator alone, which here are all kernels, and 
 process for each mutant, which takes seconds to import the libraries. Here the tests are collected
 once; each test is run once to find its duration and the functions that it calls, and for each
 mutant a forked process replaces the code of the function. Kernels, in `wearsim/mechanics`, are
-interpreted (NUMBA_DISABLE_JIT), for other modules they are compiled. Tests that take longer than
-`LIMIT`, and more than `CASES` cases of a parametrized test, are left out, so that the share is a
-lower bound.
+interpreted (NUMBA_DISABLE_JIT), for other modules they are compiled. Tests up to `LIMIT`, with
+`CASES` cases of a parametrized one, are tried first; a mutant that passes them is tried with the
+other cases and with tests up to `LONGEST`. Longer tests, and those beyond `MOST`, are left out, so
+that the share is a lower bound.
 """
 
 from __future__ import annotations
@@ -28,11 +29,13 @@ import sys
 import time
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from fnmatch import fnmatchcase
+from functools import _lru_cache_wrapper, cached_property, partial
 from importlib import import_module
+from itertools import accumulate
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType
 from typing import Any
@@ -47,15 +50,21 @@ KERNELS = "wearsim/mechanics/"
 # tests by kind of mutants: of interpreted kernels, and of other functions
 TESTS = {
     "interpreted": ["tests/mechanics"],
-    "compiled": ["tests/evolution", "tests/uq", "tests/scenario/test_mixtures.py"],
+    "compiled": [
+        "tests/evolution",
+        "tests/uq",
+        "tests/models/test_distributions.py",
+        "tests/scenario/test_mixtures.py",
+    ],
 }
-LIMIT = 1.2  # processor time of a test with its fixtures [s]
-CASES = 4  # of a parametrized test, from its first to its last one
-MOST = 6.0  # processor time of the tests of a mutant, the quickest ones first [s]
+# processor time of a test with its fixtures, first and for the mutants that pass [s]
+LIMIT, LONGEST = 1.2, 10.0
+CASES = 4  # of a parametrized test that are tried first, from its first to its last one
+MOST = 6.0, 30.0  # processor time of the tests of a mutant in both stages, the quickest first [s]
 OFTEN = 5.0  # ratio of the time limit of a test on a mutant to its duration
 LOADING = 3.0  # processor time for kernels that a test loads in addition [s]
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
-Calls = dict[str, list[str]]  # names of the functions called, by module
+CACHES: list[Callable[[], None]] = []  # emptied before each test
 SURVIVED, KILLED, UNTESTED = "survived", "killed", "not called"
 
 
@@ -80,74 +89,99 @@ class Campaign:
     record: Path
     report: Callable[[str], None]
     outcomes: dict[Mutant, str] = field(default_factory=dict)
+    known: dict[str, dict[str, Any]] = field(default_factory=dict)
+    stamp: dict[str, int] = field(default_factory=dict)
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Find the functions that each test calls, then test every mutant."""
-        modules = sorted({mutant.module for mutant in self.mutants})
-        for module in modules:
+        modules = {path.relative_to(ROOT).as_posix() for part in PARTS for path in modules_of(part)}
+        interpreted = "NUMBA_DISABLE_JIT" in os.environ
+        modules = {name for name in modules if name.startswith(KERNELS) == interpreted}
+        modules |= {mutant.module for mutant in self.mutants}
+        self.stamp = {name: (ROOT / name).stat().st_mtime_ns for name in sorted(modules)}
+        if self.record.exists():
+            self.known = json.loads(self.record.read_text())
+        for module in self.stamp:
             import_module(module.removesuffix(".py").replace("/", "."))
-        functions = live_functions(modules)
+        functions = live_functions(self.stamp)
+        CACHES.extend(caches())
         gc.collect()
         gc.freeze()
-        called = self._called(session, modules)
-        items = {item.nodeid: item for item in session.items}
-        if "NUMBA_DISABLE_JIT" not in os.environ:
-            load_kernels(items[name] for name in called)
+        tests = cases_of(session.items)
+        some = [item for cases in tests.values() for item in some_of(cases)]
+        for item in some:
+            self._traced(item)
+        if not interpreted:
+            load_kernels(item for item in some if self._traced(item)["calls"])
         for mutant in self.mutants:
-            chosen = [
-                (seconds, items[name])
-                for name, (seconds, calls) in called.items()
-                if mutant.function in calls.get(mutant.module, ())
-            ]
             outcome = UNTESTED
-            if chosen:
-                killed = self._is_killed(mutant, functions, sorted(chosen, key=lambda one: one[0]))
-                outcome = KILLED if killed else SURVIVED
+            for stage in (self._first(mutant, some), self._others(mutant, tests)):
+                if outcome != KILLED and stage:
+                    killed = self._is_killed(mutant, functions, stage)
+                    outcome = KILLED if killed else SURVIVED
             self.outcomes[mutant] = outcome
             if outcome != KILLED:
                 self.report(f"{outcome}: {mutant}\n")
+        self._save()
         return True
 
-    def _called(
-        self, session: pytest.Session, modules: list[str]
-    ) -> dict[str, tuple[float, Calls]]:
-        """Return the duration [s] and the functions called of every test that is quick and passes.
+    def _first(self, mutant: Mutant, some: Sequence[pytest.Item]) -> list[pytest.Item]:
+        """Return the quickest tests of a mutant."""
+        return self._up_to(MOST[0], [item for item in some if self._calls(item, mutant, LIMIT)])
+
+    def _others(self, mutant: Mutant, tests: dict[str, list[pytest.Item]]) -> list[pytest.Item]:
+        """Return the other cases of the tests of a mutant, and the tests that take longer."""
+        found: list[pytest.Item] = []
+        for cases in tests.values():
+            some = some_of(cases)
+            if any(mutant.module in self._traced(item)["calls"] for item in some):
+                found += [
+                    item
+                    for item in cases
+                    if self._calls(item, mutant, LONGEST)
+                    and not (item in some and self._calls(item, mutant, LIMIT))
+                ]
+        return self._up_to(MOST[1], found)
+
+    def _calls(self, item: pytest.Item, mutant: Mutant, limit: float) -> bool:
+        """Return whether a test passes within a time [s] and calls the function of a mutant."""
+        found = self._traced(item)
+        called = mutant.function in found["calls"].get(mutant.module, ())
+        return bool(called and found["passed"] and found["seconds"] <= limit)
+
+    def _up_to(self, most: float, items: Iterable[pytest.Item]) -> list[pytest.Item]:
+        """Return the quickest tests up to a sum of their durations [s], at least one."""
+        ordered = sorted(items, key=lambda item: float(self._traced(item)["seconds"]))
+        sums = accumulate(self._traced(item)["seconds"] for item in ordered)
+        return ordered[: 1 + sum(total <= most for total in sums)]
+
+    def _traced(self, item: pytest.Item) -> dict[str, Any]:
+        """Return the duration [s] of a test, the functions that it calls, and whether it passes.
 
         They are read from a file where neither the test nor the modules have changed since.
         """
-        known: dict[str, Any] = {}
-        if self.record.exists():
-            known = json.loads(self.record.read_text())
-        stamp = {name: (ROOT / name).stat().st_mtime_ns for name in modules}
-        found: dict[str, tuple[float, Calls]] = {}
-        for number, item in enumerate(some_cases(session.items)):
-            key = item.nodeid
-            written = item.path.stat().st_mtime_ns
-            old = known.get(key)
-            if (
-                old is None
-                or old["written"] != written
-                or any(old["stamp"].get(name) != at for name, at in stamp.items())
-            ):
-                old = {"written": written, "stamp": stamp, **traced(item, modules)}
-                known[key] = old
-                if number % 100 == 0:
-                    self._save(known)
-            if old["passed"] and old["calls"]:
-                found[key] = old["seconds"], old["calls"]
-        self._save(known)
-        return found
+        written, old = item.path.stat().st_mtime_ns, self.known.get(item.nodeid)
+        if (
+            old is None
+            or old["written"] != written
+            or any(old["stamp"].get(name) != at for name, at in self.stamp.items())
+        ):
+            old = {"written": written, "stamp": self.stamp, **traced(item, list(self.stamp))}
+            self.known[item.nodeid] = old
+            if len(self.known) % 100 == 0:
+                self._save()
+        return old
 
-    def _save(self, known: dict[str, Any]) -> None:
+    def _save(self) -> None:
         self.record.parent.mkdir(parents=True, exist_ok=True)
-        self.record.write_text(json.dumps(known))
+        self.record.write_text(json.dumps(self.known))
 
     def _is_killed(
         self,
         mutant: Mutant,
         functions: dict[tuple[str, str], list[FunctionType]],
-        chosen: list[tuple[float, pytest.Item]],
+        chosen: Sequence[pytest.Item],
     ) -> bool:
         code = mutated_code(ROOT, mutant)
         replaced = functions.get((code.co_filename, code.co_qualname), [])
@@ -155,14 +189,11 @@ class Campaign:
         def work() -> bool:
             for function in replaced:
                 function.__code__ = code
-            total = 0.0
-            for seconds, item in chosen:
+            for item in chosen:
+                seconds = self._traced(item)["seconds"]
                 signal.setitimer(signal.ITIMER_PROF, LOADING + OFTEN * seconds)
-                total += seconds
                 if fails(item):
                     return True
-                if total > MOST:
-                    break
             return False
 
         assert replaced, mutant
@@ -171,6 +202,8 @@ class Campaign:
 
 def fails(item: pytest.Item) -> bool:
     """Run a test, with its fixtures; return whether it fails."""
+    for clear in CACHES:  # results of functions as they were before a change
+        clear()
     noted = Failures()
     item.config.pluginmanager.register(noted)
     try:
@@ -180,6 +213,31 @@ def fails(item: pytest.Item) -> bool:
     return noted.failed or not noted.passed
 
 
+def caches() -> Iterator[Callable[[], None]]:
+    """Yield functions that empty the caches of functions and objects of this repository."""
+    for item in gc.get_objects():
+        if isinstance(item, _lru_cache_wrapper):
+            code = getattr(item.__wrapped__, "__code__", None)
+            if code is not None and code.co_filename.startswith(str(ROOT)):
+                yield item.cache_clear
+        elif str(type(item).__module__).startswith("wearsim.") and hasattr(item, "__dict__"):
+            kinds = type(item).__mro__
+            names = {
+                key
+                for kind in kinds
+                for key, value in vars(kind).items()
+                if isinstance(value, cached_property)
+            }
+            if names:
+                yield partial(forget, item, names)
+
+
+def forget(item: object, names: Iterable[str]) -> None:
+    """Remove cached properties of an object."""
+    for name in names:
+        vars(item).pop(name, None)
+
+
 def load_kernels(items: Iterable[pytest.Item]) -> None:
     """Run one test of each file of whole tests, so that forked processes have compiled kernels."""
     files = {item.path: item for item in items if "evolution" in item.path.parts}
@@ -187,16 +245,18 @@ def load_kernels(items: Iterable[pytest.Item]) -> None:
         fails(item)
 
 
-def some_cases(items: Iterable[pytest.Item]) -> list[pytest.Item]:
-    """Return tests, with at most `CASES` cases of each parametrized one."""
-    functions: dict[str, list[pytest.Item]] = {}
+def cases_of(items: Iterable[pytest.Item]) -> dict[str, list[pytest.Item]]:
+    """Return the cases of each test."""
+    tests: dict[str, list[pytest.Item]] = {}
     for item in items:
-        functions.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    return [
-        cases[place]
-        for cases in functions.values()
-        for place in sorted({round(k * (len(cases) - 1) / (CASES - 1)) for k in range(CASES)})
-    ]
+        tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    return tests
+
+
+def some_of(cases: Sequence[pytest.Item]) -> list[pytest.Item]:
+    """Return at most `CASES` cases of a test, from its first to its last one."""
+    last = len(cases) - 1
+    return [cases[place] for place in sorted({round(k * last / (CASES - 1)) for k in range(CASES)})]
 
 
 def traced(item: pytest.Item, modules: list[str]) -> dict[str, Any]:
@@ -219,10 +279,9 @@ def traced(item: pytest.Item, modules: list[str]) -> dict[str, Any]:
         return {"passed": passed, "seconds": time.process_time() - begin, "calls": called}
 
     if "NUMBA_DISABLE_JIT" in os.environ:
-        return in_child(work, LIMIT) or {"passed": False, "seconds": math.inf, "calls": {}}
+        return in_child(work, LONGEST) or {"passed": False, "seconds": math.inf, "calls": {}}
     found = work()  # in this process, which then holds the compiled kernels
-    found = work() if found["seconds"] > LIMIT else found
-    return found | {"passed": found["passed"] and found["seconds"] <= LIMIT}
+    return work() if LIMIT < found["seconds"] <= 2.0 * LONGEST else found
 
 
 def in_child(work: Callable[[], Any], limit: float) -> Any:
@@ -257,25 +316,19 @@ def live_functions(modules: Iterable[str]) -> dict[tuple[str, str], list[Functio
     return found
 
 
-def equivalent() -> list[dict[str, str]]:
+def equivalent() -> list[dict[str, Any]]:
     """Return the mutants, or the functions, in which a change has no effect on results."""
-    listed: list[dict[str, str]] = tomllib.loads(EQUIVALENT.read_text(encoding="utf-8"))["mutant"]
+    listed: list[dict[str, Any]] = tomllib.loads(EQUIVALENT.read_text(encoding="utf-8"))["mutant"]
     return listed
 
 
-def is_listed(mutant: Mutant, listed: Iterable[dict[str, str]]) -> bool:
+def is_listed(mutant: Mutant, listed: Iterable[dict[str, Any]]) -> bool:
     """Return whether a mutant is one of those listed."""
     return any(
         fnmatchcase(mutant.module, one["module"])
         and fnmatchcase(mutant.function, one["function"])
-        and all(
-            one.get(name, value) == value
-            for name, value in (
-                ("line", mutant.line),
-                ("before", mutant.before),
-                ("after", mutant.after),
-            )
-        )
+        and one.get("line", mutant.line) == mutant.line
+        and mutant.change in one.get("changes", [mutant.change])
         for one in listed
     )
 
@@ -284,10 +337,14 @@ def all_mutants(parts: Iterable[str]) -> list[Mutant]:
     """Return the mutants of all modules of packages, or of modules, except the equivalent ones."""
     found, left_out = [], equivalent()
     for part in parts:
-        paths = [ROOT / part] if part.endswith(".py") else sorted((ROOT / part).rglob("*.py"))
-        for path in paths:
+        for path in modules_of(part):
             found += [one for one in mutants_of(ROOT, path) if not is_listed(one, left_out)]
     return found
+
+
+def modules_of(part: str) -> list[Path]:
+    """Return the files of a package, or of a module."""
+    return [ROOT / part] if part.endswith(".py") else sorted((ROOT / part).rglob("*.py"))
 
 
 def try_mutants(

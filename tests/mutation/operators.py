@@ -1,8 +1,9 @@
 """Mutants of a module: its functions with one operator, constant or statement changed.
 
 Operators are replaced by others of their kind: arithmetic, comparison, boolean and sign; constants,
-conditions, results and statements are changed as well. Text of error messages, annotations,
-docstrings and assertions, which state what type checkers cannot see, are left alone.
+conditions, results and statements are changed as well. Text of error messages, annotations and
+docstrings are left alone, and so are assertions and `strict` of `zip`, which state what type
+checkers cannot see.
 """
 
 from __future__ import annotations
@@ -73,8 +74,12 @@ class Mutant:
     number: int
 
     def __str__(self) -> str:
-        where = f"{self.module}:{self.lines[0]} {self.function}"
-        return f"{where}: {self.before}  ->  {self.after}"
+        return f"{self.module}:{self.lines[0]} {self.function}: {self.change}"
+
+    @property
+    def change(self) -> str:
+        """Source before and after."""
+        return f"{self.before} -> {self.after}"
 
 
 Change = tuple[str, ast.AST, str, ast.AST]
@@ -86,7 +91,7 @@ def changes_of(function: Function) -> Iterator[Change]:
     stack: list[tuple[ast.AST, bool]] = [(node, True) for node in reversed(body)]
     while stack:
         node, counts = stack.pop()
-        if isinstance(node, LEFT_ALONE):
+        if isinstance(node, LEFT_ALONE) or (isinstance(node, ast.keyword) and node.arg == "strict"):
             continue
         if counts:
             yield from changes_at(node)

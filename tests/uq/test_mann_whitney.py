@@ -84,6 +84,6 @@ def test_paired_sobol_differences_use_the_replicates():
 def test_no_pairs_are_unknown_and_unequal_numbers_refused():
     empty = paired(np.array([]), np.array([]))
     assert math.isnan(empty.difference.value)
-    assert empty.share == UNKNOWN
+    assert (empty.share, empty.count) == (UNKNOWN, 0)
     with pytest.raises(ValueError, match="got 3 and 4"):
         paired(np.zeros(3), np.zeros(4))

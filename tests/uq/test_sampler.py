@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.special import ndtr, ndtri
 
-from wearsim.uq.sampling.sampler import PLANS, Sampler
+from wearsim.uq.sampling.sampler import PLANS, Sampler, latin_hypercube, monte_carlo
+from wearsim.uq.sampling.sobol import scrambled
 
 INPUTS = [
     ("load.normal_force", 1),
@@ -99,3 +101,58 @@ def test_replicates_are_independent_of_the_batch_size(batch):
         count = min(batch, TOTAL - start)
         part = sampler.uniforms(start, count)
         assert_same({name: whole[name][start : start + count] for name in whole}, part)
+
+
+def test_designs_are_those_of_their_names():
+    for plan in PLANS:
+        sampler = Sampler(4, INPUTS[:1], plan, TOTAL)
+        name, dimension = INPUTS[0]
+        known = {
+            "monte-carlo": monte_carlo(4, name, dimension, 3, 9),
+            "latin-hypercube": latin_hypercube(4, TOTAL, name, dimension, 3, 9),
+            "sobol": scrambled(4, name, dimension, 3, 9),
+        }[plan]
+        np.testing.assert_array_equal(sampler.uniforms(3, 9)[name], known)
+
+
+def test_sobol_points_are_those_of_scipy_scrambled_by_their_key():
+    # the unscrambled words follow from equal keys: differences of bits above the first are kept
+    one, other = (scrambled(1, "load.normal_force", 1, first, 8)[:, 0] for first in (0, 5))
+    np.testing.assert_array_equal(one[5:], other[:3])
+    assert scrambled(1, "load.normal_force", 1, 0, 0).shape == (0, 1)
+    assert scrambled(1, "shaft.runout", 1, 2**32 - 3, 3).shape == (3, 1)
+
+
+@pytest.mark.parametrize("value", [-1.0, 1.0])
+def test_correlation_of_one_is_allowed_but_singular(value):
+    with pytest.raises(ValueError, match="not positive definite"):
+        Sampler(1, [("a", 1), ("b", 1)], correlations=[("a", "b", value)])
+
+
+def test_chain_of_correlations_is_one_group():
+    names = ["a", "b", "c", "d", "e"]
+    chain = [("a", "b", 0.5), ("c", "d", 0.5), ("b", "c", 0.5)]
+    drawn = Sampler(3, [(n, 1) for n in names], correlations=chain).uniforms(0, 4000)
+    free = Sampler(3, [(n, 1) for n in names]).uniforms(0, 4000)
+    matrix = np.eye(4)
+    for row, column in ((0, 1), (2, 3), (1, 2)):
+        matrix[row, column] = matrix[column, row] = 2.0 * np.sin(np.pi / 12.0)
+    scores = ndtri(np.column_stack([free[n][:, 0] for n in names[:4]]))
+    known = ndtr(scores @ np.linalg.cholesky(matrix).T)
+    found = np.column_stack([drawn[n][:, 0] for n in names[:4]])
+    assert found == pytest.approx(known, abs=1e-12)
+    assert (drawn["e"] == free["e"]).all()
+
+
+def test_errors_of_designs_name_the_range():
+    with pytest.raises(ValueError, match="got 2 of them from -1 on"):
+        Sampler(1, INPUTS).uniforms(-1, 2)
+    with pytest.raises(ValueError, match="got -1 of them from 0 on"):
+        Sampler(1, INPUTS).uniforms(0, -1)
+    with pytest.raises(ValueError, match="replicates must be 1 or more sequences, got 0"):
+        Sampler(1, INPUTS, "sobol", replicates=0)
+    with pytest.raises(ValueError, match="the inputs are none"):
+        Sampler(1, [], correlations=[("a", "b", 0.1)])
+    assert Sampler(1, INPUTS, "latin-hypercube", 1).uniforms(0, 1)["shaft.runout"].shape == (1, 1)
+    with pytest.raises(ValueError, match="beyond this latin-hypercube plan"):
+        Sampler(1, INPUTS, "latin-hypercube", 10).uniforms(1, 10)

@@ -225,3 +225,20 @@ def test_replicates_are_independent_of_each_other():
 def test_zero_replicates_are_refused():
     with pytest.raises(ValueError, match="replicates must be 1 or more sequences, got 0"):
         drawing("sobol", 1, None, 0)
+
+
+def test_nested_scramble_is_that_of_plain_integers():
+    def reversed_bits(word):
+        return int(f"{word:032b}"[::-1], 2)
+
+    words = Stream(2, "words").words(0, 20).astype(np.uint32)
+    key = sobol._key(1, "a", 0, 0)
+    known = []
+    for word in words.tolist():
+        mixed = reversed_bits(word)
+        for added, even, odd in key.tolist():
+            mixed = (mixed + added) * odd % 2**32
+            mixed ^= mixed * even % 2**32
+        known.append(reversed_bits(mixed))
+    assert sobol.nested_scramble(words, key).tolist() == known
+    assert sobol.reverse_bits(words).tolist() == [reversed_bits(word) for word in words.tolist()]

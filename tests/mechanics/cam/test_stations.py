@@ -10,7 +10,7 @@ import pytest
 from cams import MM, Motion, rise_and_return, segment
 
 from wearsim.mechanics.cam import Panel, Stations, choose_stations, extreme, motion_mistakes
-from wearsim.mechanics.cam.stations import NUMBERS, interpolation, lobatto
+from wearsim.mechanics.cam.stations import NUMBERS, interpolation, lobatto, moved_stations
 
 WHOLE = Panel(0, 0.0, math.tau, dwell=False)
 
@@ -109,3 +109,96 @@ def test_motion_at_a_boundary_is_that_of_the_following_segment():
     assert second[0] > 0.0
     assert second[1] == 0.0
     assert isinstance(motion, Motion)
+
+
+THREE = (
+    Panel(0, 0.0, 1.0, dwell=True),
+    Panel(1, 1.0, 2.5, dwell=False),
+    Panel(2, 2.5, math.tau, dwell=False),
+)
+
+
+def polynomial(panel: Panel, angle: np.ndarray) -> np.ndarray:
+    """Return values and a second column that are polynomials on each panel."""
+    one = 1.0 + panel.segment + panel.segment * (angle - 2.0) ** 3
+    return np.column_stack([one, panel.segment * angle**2])
+
+
+def on_stations(stations: Stations) -> np.ndarray:
+    each = zip(stations.panels, stations.numbers, stations.first, strict=True)
+    return np.concatenate(
+        [polynomial(panel, stations.angle[first : first + n]) for panel, n, first in each]
+    )
+
+
+def test_values_at_angles_are_those_of_the_polynomials():
+    stations = Stations(THREE, (1, 5, 7))
+    assert stations.first.tolist() == [0, 1, 6]
+    assert stations.panel.tolist() == [0] + [1] * 5 + [2] * 7
+    assert stations.count == 13
+    assert [(p.tolist(), s.tolist()) for p, s in stations.groups] == [
+        ([0], [[0]]),
+        ([1], [[1, 2, 3, 4, 5]]),
+        ([2], [[6, 7, 8, 9, 10, 11, 12]]),
+    ]
+    values = on_stations(stations)
+    angles = np.array([0.0, 0.7, 1.0, 1.3, 2.2, 2.5, 4.0, 6.0, math.tau])
+    known = np.concatenate(
+        [
+            polynomial(THREE[k], angles[part])
+            for k, part in enumerate((slice(0, 2), slice(2, 5), slice(5, 9)))
+        ]
+    )
+    assert stations.values_at_angles(values, angles) == pytest.approx(known, rel=1e-12)
+    few = angles[[1, 6]]
+    assert stations.values_at_angles(values, few) == pytest.approx(known[[1, 6]], rel=1e-12)
+    at, between = stations.values_at(values, 3)
+    assert at == pytest.approx(
+        [0.0, 0.5, 1.0, 1.0, 1.75, 2.5, 2.5, 0.5 * (2.5 + math.tau), math.tau]
+    )
+    assert between[3:6] == pytest.approx(polynomial(THREE[1], at[3:6]))
+
+
+def test_moved_stations_keep_polynomials_and_equal_panels():
+    old = Stations(THREE, (1, 5, 7))
+    halves = THREE[2]._replace(stop=4.0), THREE[2]._replace(start=4.0)
+    new = Stations((THREE[0], THREE[1], *halves), (1, 4, 5, 6))
+    matrix, old_part, new_part = moved_stations(old, new)
+    assert matrix.shape == (16, 13)
+    assert matrix @ on_stations(old) == pytest.approx(on_stations(new), rel=1e-11, abs=1e-11)
+    assert matrix[0].tolist() == [1.0] + [0.0] * 12
+    # edges at 0, 1 and 2.5 are common; the first panel is equal
+    assert old_part.tolist() == [-1] + [2] * 5 + [3] * 7
+    assert new_part.tolist() == [-1] + [2] * 4 + [3] * 11
+    same, parts, others = moved_stations(old, old)
+    assert (same == np.eye(13)).all()
+    assert set(parts) == set(others) == {-1}
+
+
+def test_choice_halves_panels_and_is_scaled_by_the_whole_turn():
+    def quantities(panel, theta):
+        return np.stack([np.abs(np.sin(theta - 1.0)), 1e-9 * np.sin(40.0 * theta) + 1.0])
+
+    stations = choose_stations([WHOLE], quantities, 1e-3)
+    assert stations.weight.sum() == pytest.approx(math.tau)
+    starts = [panel.start for panel in stations.panels]
+    assert starts == sorted(starts)
+    assert all(n in NUMBERS for n in stations.numbers)
+    angle, values = stations.values_at(quantities(WHOLE, stations.angle)[0], 30)
+    away = np.abs(values - np.abs(np.sin(angle - 1.0)))
+    # the kinks are in panels that were halved six times
+    width = min(panel.stop - panel.start for panel in stations.panels)
+    assert width == pytest.approx(math.tau / 64.0)
+    smooth = np.abs(np.sin(angle - 1.0)) > math.sin(width)
+    assert away[smooth].max() < 1e-3
+    many = choose_stations([WHOLE], lambda panel, theta: np.sin(theta)[None], 1e-3)
+    assert many.numbers == (13,)
+
+
+def test_extreme_skips_values_that_are_not_defined():
+    def quantity(panel, theta):
+        return np.where(theta > 3.0, np.nan, theta)
+
+    value, angle = extreme([WHOLE], quantity)
+    assert value == angle
+    assert value == pytest.approx(3.0, abs=1e-9)

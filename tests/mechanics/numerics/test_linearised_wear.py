@@ -148,3 +148,18 @@ def test_wear_fills_the_errors_of_a_shape(stiffness):
     assert sizes[0, 0] == pytest.approx(greatest)
     assert sizes[1, 0] == pytest.approx(abs(2.0 * expected.sum()))
     assert sizes[2, 0] == pytest.approx(np.linalg.norm(expected) / np.sqrt(n))
+
+
+def test_exponents_of_finished_realisations_are_kept():
+    load, new = np.array([[1.0, 2.0], [1.0, 2.0]]), np.array([[1.5, 1.0], [1.5, 1.0]])
+    wear, old = np.stack([new**0.7, 0.0 * new]), np.stack([load**0.7, 0.0 * load])
+    exponents, worn = np.full((2, 2), 0.9), np.empty((2, 2, 2))
+    sizes = wear_of_bodies(
+        *(new, load, wear, old, np.zeros((2, 1, 2, 2)), np.zeros((2, 2, 2)), np.array([[0, 1]])),
+        *(np.zeros((2, 2, 2)), 1.0, np.ones((2, 2)), np.array([False, True]), exponents, worn),
+        np.empty((2, 2)),
+    )
+    assert exponents[0].tolist() == [0.9, 0.9]
+    assert exponents[1] == pytest.approx([0.7, 0.7])
+    assert worn[0] == pytest.approx(new**0.7)
+    assert sizes[1] == pytest.approx([1.5**0.7] * 2)

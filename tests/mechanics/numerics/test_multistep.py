@@ -174,3 +174,20 @@ def test_first_steps_raise_the_order():
     assert chosen([], 1) == (0.0, 1, GROW[0])
     assert chosen([0.5], 1)[1] == 2
     assert chosen([5.0], 1)[:2] == (pytest.approx(5.0 / LIMIT), 1)
+
+
+def test_local_errors_are_products_of_the_distances():
+    spans = np.array([[1.0], [2.5], [4.0], [np.inf], [np.inf]])
+    differences = np.arange(12.0).reshape(6, 1, 1, 2) + 1.0
+    depths, parts, errors = np.array([[[3.0, 4.0]]]), np.array([[[1.0, 0.5]]]), np.ones((1, 1, 2))
+    sizes = local_errors(differences, spans, depths, np.array([2]), parts, errors)
+    for k in range(2):
+        factor = np.prod(spans[: k + 1]) / (1.0 / spans[: k + 2]).sum()
+        change = parts[0, 0] * differences[k + 2, 0, 0]
+        assert sizes[k, 0] == pytest.approx(factor * np.linalg.norm(change) / 5.0)
+        if k == 1:
+            assert errors[0, 0] == pytest.approx(factor * change)
+    assert np.isinf(sizes[2:, 0]).all()
+    none = local_errors(differences, spans, 0.0 * depths, np.array([0]), parts, errors)
+    assert none[:2, 0].tolist() == [0.0, 0.0]
+    assert not errors.any()

@@ -34,7 +34,13 @@ from wearsim.mechanics.tangential.hertz_fastsim_batch import (
     Theory,
     solve_contacts,
 )
-from wearsim.mechanics.tangential.kalker_coefficients import spline
+from wearsim.mechanics.tangential.kalker_coefficients import (
+    CreepageCoefficients,
+    coefficient,
+    flexibilities,
+    one_flexibility,
+    spline,
+)
 from wearsim.types import Grid
 
 SHEAR, NU = 200e9 / 2.6, 0.3
@@ -205,3 +211,75 @@ def test_first_failed_contact_is_returned():
         curvature_x=1.0,
     )
     assert (failed, patches.status[0]) == (0, NO_LIMIT)
+
+
+def full_slip(friction, variation=None, spin=0.0, lateral=0.0, carried=False, **options):
+    """Return the results of one contact with creepages far beyond those of adhesion."""
+    none = np.zeros((0, len(Y)))
+    one = [np.array([value]) for value in (300.0, 0.2, lateral, spin)]
+    field = np.asarray(friction, dtype=float).reshape(1, *np.shape(friction))
+    varied = none if variation is None else variation[None]
+    inputs = ContactInputs(*one, field, carried, varied, np.array([2.0]), none)
+    failed, found, patches = solve(theory(**options), inputs, np.zeros(1, np.int64), GAPS[1:2])
+    assert failed == 1
+    return found, patches
+
+
+def bounds_of(patches):
+    """Return the integral along each strip of a bound that is parabolic over the patch [N/m]."""
+    b = patches.b[0]
+    section = np.maximum(1.0 - ((Y - patches.centre[0]) / b) ** 2, 0.0)
+    return 300.0 * 8.0 / (3.0 * np.pi * b) * section**1.5
+
+
+@pytest.mark.parametrize("options", [{}, {"closed_form": ALWAYS}, {"single": True}])
+def test_forces_in_full_slip_are_friction_times_load(options):
+    found, _ = full_slip([[0.1]], **options)
+    assert found.force_x[0] == pytest.approx(-30.0, rel=1e-3)
+    assert found.power[0] == pytest.approx(2.0 * 0.2 * 30.0, rel=1e-3)
+    assert found.adhesion_fraction[0] < 0.02
+    slope = 0.02 * Y / Y[-1]
+    local, patches = full_slip([[0.1]], slope, **options)
+    load, bound = local.line_load[0], bounds_of(patches)
+    creepage = 0.2 + slope - (slope @ load) / load.sum()
+    inside = local.half_length[0] > 0.5 * local.half_length[0].max()
+    assert local.dissipation[0][inside] == pytest.approx(
+        (2.0 * creepage * 0.1 * bound)[inside], rel=0.02
+    )
+    # of several material points the mean counts, and along a strip the integral over the patch
+    carried, _ = full_slip([[0.05], [0.15]], carried=True, **options)
+    assert carried.force_x[0] == pytest.approx(-30.0, rel=1e-3)
+    along, _ = full_slip(np.full((24, len(Y)), 0.1), **options)
+    assert along.force_x[0] == pytest.approx(-30.0, rel=2e-2)
+    strips = 0.1 + 0.05 * Y / Y[-1]
+    across, patches = full_slip(strips[None], **options)
+    assert across.force_x[0] == pytest.approx(-(strips @ bound) * GRID.spacing, rel=1e-3)
+    assert patches.centre[0] == pytest.approx(4e-4, rel=1e-9)
+
+
+def test_spin_varies_the_creepage_about_its_mean_by_load():
+    found, patches = full_slip([[0.1]], spin=10.0, single=True)
+    load = found.line_load[0]
+    slope = -10.0 * (Y - (Y @ load) / load.sum())
+    inside = found.half_length[0] > 0.7 * found.half_length[0].max()
+    assert found.dissipation[0][inside] == pytest.approx(
+        (2.0 * (0.2 + slope) * 0.1 * bounds_of(patches))[inside], rel=0.02
+    )
+    lateral, _ = full_slip([[0.1]], lateral=-0.2, single=True)
+    assert lateral.force_y[0] == pytest.approx(30.0 / math.sqrt(2.0), rel=0.05)
+    assert lateral.force_x[0] == pytest.approx(-30.0 / math.sqrt(2.0), rel=0.05)
+
+
+def test_single_flexibility_is_that_of_the_creepages_and_the_spin():
+    none = np.zeros((0, len(Y)))
+    one = [np.array([value]) for value in (300.0, 2e-5, 0.0, 0.3)]
+    friction = np.full((1, 1, 1), 1e3)
+    inputs = ContactInputs(*one, friction, False, none, np.array([2.0]), none)
+    row = np.zeros(1, np.int64)
+    _, found, patches = solve(theory(single=True, points=200), inputs, row, GAPS[1:2])
+    a, b = patches.a[0], patches.b[0]
+    values = [coefficient(which, a / b, NU, spline(which)) for which in range(3)]
+    three = flexibilities(CreepageCoefficients(*values, math.nan), a, b, SHEAR)
+    length = one_flexibility(*three, 2e-5, 0.0, 0.3 * math.sqrt(a * b))
+    # without slip the traction grows from the leading edge, by the creepage over the flexibility
+    assert found.force_x[0] == pytest.approx(-2e-5 / length * 8.0 / 3.0 * a * a * b, rel=2e-2)

@@ -92,3 +92,63 @@ def test_integral_over_the_noise_equals_that_of_a_fine_grid(length: float):
     means, stds = np.array(got).T
     assert means == pytest.approx(mean, abs=0.1 * std.min())
     assert stds == pytest.approx(std, rel=0.05)
+
+
+def test_sampled_noise_is_a_chain_and_independent_errors():
+    y, normal = (
+        np.array([0.0, 1.0, 1.5, 4.0]),
+        np.array([[1.0, -0.5, 2.0, 0.3], [0.4, 1.0, -1.0, 0.2]]),
+    )
+    noise, chain = Noise(2.0, 1.5, 0.5), [1.0]
+    for j in range(1, 4):
+        decay = np.exp(-(y[j] - y[j - 1]) / 1.5)
+        chain.append(decay * chain[-1] + np.sqrt(1.0 - decay**2) * normal[0, j])
+    assert noise.sample(y, normal) == pytest.approx(2.0 * np.array(chain) + 0.5 * normal[1])
+    assert noise.std == pytest.approx(np.sqrt(4.25))
+
+
+def test_known_least_noise_widens_the_likelihood_of_each_model():
+    rng = np.random.default_rng(6)
+    y = np.cumsum(rng.uniform(0.5, 1.5, 40))
+    forms = np.column_stack([np.ones(40), y])
+    residual = Noise(1.0, 3.0, 0.5).sample(y, rng.standard_normal((2, 40)))
+    free, known = noise_models(y, residual, forms), noise_models(y, residual, forms, 1.4)
+    z = free.whitened(np.column_stack([residual, forms])).transpose(1, 0, 2)
+    squares = []
+    for columns, lines in zip(z, free.lines.transpose(2, 1, 0), strict=True):
+        away = columns[:, 0] - columns[:, 1:] @ np.linalg.lstsq(columns[:, 1:], columns[:, 0])[0]
+        squares.append((away**2).sum())
+        assert lines.T @ lines == pytest.approx(np.eye(2), abs=1e-12)
+        assert lines.T @ away == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert free.exponent == pytest.approx(np.full(len(squares), 19.0))
+    # the likelihood with the lines integrated, and priors of the length and of the white share
+    volumes = [np.linalg.slogdet(columns[:, 1:].T @ columns[:, 1:])[1] for columns in z]
+    prior = np.log(free.length**2 * free.white * (1.0 - free.white))
+    log = np.log(free.scale).sum(axis=0) - 0.5 * np.array(volumes) + prior
+    assert free.log_weight == pytest.approx(log)
+    # a likelihood of a greater variance is flatter by its ratio, and equal at the residuals
+    wider = np.maximum(1.0, 1.96 / (np.array(squares) / 38.0))
+    assert (wider > 1.0).any()
+    assert known.exponent == pytest.approx(19.0 / wider)
+    free_log, known_log = (
+        models.log_weight - models.exponent * np.log(squares) for models in (free, known)
+    )
+    assert known_log == pytest.approx(free_log)
+
+
+def test_line_without_noise_is_refused_and_lines_do_not_change_the_fit():
+    y = np.arange(30.0)
+    with pytest.raises(ValueError, match="straight line without any noise"):
+        fit_noise(y, np.zeros(30))
+    rng = np.random.default_rng(7)
+    height = Noise(1.0, 3.0, 0.5).sample(y, rng.standard_normal((2, 30)))
+    one, other = fit_noise(y, height), fit_noise(y, height + 40.0 - 3.0 * y)
+    assert (one.sigma, one.length, one.white) == pytest.approx(
+        (other.sigma, other.length, other.white), rel=1e-6
+    )
+    # in other units
+    scaled = fit_noise(1e-3 * y, 2.0 * height)
+    assert (scaled.sigma, scaled.length, scaled.white) == pytest.approx(
+        (2.0 * one.sigma, 1e-3 * one.length, 2.0 * one.white), rel=1e-6
+    )
+    fit_noise(y[:8], height[:8])

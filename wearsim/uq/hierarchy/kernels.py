@@ -62,7 +62,7 @@ class LikelihoodMixture:
         size = 1.0 / float(np.sum(weight**2))
         mean = float(weight @ centre)
         spread = float(np.sqrt(weight @ (centre - mean) ** 2))
-        width = min(0.9 * size**-0.2, 0.9)
+        width = 0.9 * size**-0.2  # the size is at least one
         moved = mean + np.sqrt(1.0 - width**2) * (centre - mean)
         return cls(weight, moved, np.hypot(std, width * spread), spread**2, size)
 

@@ -16,6 +16,7 @@ from wearsim.uq.survival.lives import median_rank, proportion
 SAMPLES = 2000  # bootstrap samples
 _GRID = 401  # lives at which mixtures are evaluated
 _ROUNDING = 1e-12  # relative distance of lives about a step
+_FARTHEST = 50.0  # of ln life from the middle, beyond which lives are 0 or infinite
 _MOST = 4_000_000  # numbers of a block of samples
 _LARGEST = 40_000_000  # probabilities at all lives, beyond which steps are not resolved
 FEWEST = 5  # realisations for an interval
@@ -192,14 +193,21 @@ def _common_grid(designs: tuple[LifeDistribution, ...], most: float) -> FloatArr
 
     Each step of a probability is between two lives that are equal but for rounding.
     """
-    ends = [item.quantile_of_mean(p) for item in designs for p in (1e-7, 1.0 - 1e-7)]
-    finite = [end for end in ends if 0.0 < end < math.inf] or [1.0]
+    finite = [end for item in designs for end in _ends(item) if 0.0 < end < math.inf] or [1.0]
     last = min(max(finite), most)
     grid = np.exp(np.linspace(math.log(min(*finite, 0.5 * last)), math.log(last), _GRID))
     steps = np.concatenate([item.steps for item in designs])
     about = (steps[:, None] * (1.0 + _ROUNDING * np.array([-1.0, 1.0]))).ravel()
     inner = np.concatenate([grid[:-1], about[(about > 0.0) & (about < last)]])
     return np.append(np.unique(inner), last)
+
+
+def _ends(design: LifeDistribution) -> list[float]:
+    """Return lives between which nearly all lives are that are neither 0 nor infinite."""
+    middle, far = design.middle, math.exp(_FARTHEST)
+    at_once, ever = design.failed(np.array([middle / far, middle * far])).mean(axis=0).tolist()
+    levels = (at_once + p * (ever - at_once) for p in (1e-7, 1.0 - 1e-7))
+    return [design.quantile_of_mean(level) for level in levels]
 
 
 def _with_start(failed: FloatArray) -> FloatArray:
@@ -234,7 +242,8 @@ def _weighted_quantile(
         after = np.clip((mean < probability).sum(axis=1), 1, len(grid) - 1)
         rows = np.arange(len(mean))
         below, above = mean[rows, after - 1], mean[rows, after]
-        part = (probability - below) / np.maximum(above - below, 1e-300)
+        # beyond the last life, where it is above 1, the quantile is infinite
+        part = np.minimum((probability - below) / np.maximum(above - below, 1e-300), 1.0)
         quantiles = np.exp(logs[after - 1] + part * (logs[after] - logs[after - 1]))
         return np.asarray(np.where(mean[:, -1] < probability, math.inf, quantiles))
 

@@ -22,6 +22,7 @@ _SHORTEST = 3  # steps of a Markov chain
 _AHEAD = 1.0 / 3.0  # part of the levels to `LEAST` for which tests are kept
 _TOLERATED = 0.2  # levels that the last one may be longer than the others
 _FAR = 6.5  # greatest distance of a shift; P = 4e-11
+_NO_SLOPE = 1e-9  # of the constant, below which a slope is rounding
 _STAGES = 4  # of the search for the shift, which take half of the tests
 _ACCEPTANCE = 0.44  # aim of the Markov chains
 
@@ -137,7 +138,7 @@ def design_point(scores: FloatArray, response: FloatArray) -> FloatArray:
     constant, *slopes = np.linalg.lstsq(design, response, rcond=None)[0]
     slope = np.array(slopes)
     square = float(slope @ slope)
-    if square == 0.0 or constant <= 0.0:
+    if constant <= 0.0 or square <= (_NO_SLOPE * constant) ** 2:
         return np.zeros(scores.shape[1])
     point = -constant / square * slope
     return np.asarray(point * min(1.0, _FAR / float(np.linalg.norm(point))))
@@ -296,7 +297,7 @@ def subset_stages(
         probability *= share
         if share == 0.0:
             return _result(0.0, math.inf, done, obstacle="no test of the last level has the event")
-        if threshold > 0.0 and share > 0.5:
+        if threshold > 0.0 and share >= 0.5:
             text = f"{100.0 * share:.0f} % of the tests of a level have the same response, such as"
             text += " a censored life"
             return _result(0.0, math.inf, done, obstacle=text)

@@ -89,7 +89,9 @@ class UncertainLives:
 
     def _quantile(self, share: float) -> UncertainLife:
         value, low, high = self._quantiles(share)
-        errors = ((high - low) / (2.0 * _NORMAL))[self._owner]
+        with np.errstate(invalid="ignore"):  # where a life is never reached
+            half = np.where(np.isfinite(high), 0.5 * (high - low), value - low)
+        errors = (np.where(np.isfinite(value), half, 0.0) / _NORMAL)[self._owner]
         logs, weight = value[self._owner] - self.levels.m, self.levels.weight
         first, last = np.exp(weighted_quantiles(*_with_errors(logs, errors, weight), ENDS))
         middle = float(weight @ logs)
@@ -98,7 +100,7 @@ class UncertainLives:
             self.given(*self.levels.plug_in).quantile_of_mean(share),
             float(first),
             float(last),
-            float(weight @ (logs - middle) ** 2),
+            float(weight @ (logs - middle) ** 2) if math.isfinite(middle) else math.inf,
             float(weight @ errors**2),
         )
 
@@ -111,7 +113,9 @@ class UncertainLives:
         if self.mixture.exact:
             return value, value, value
         ends = []
-        for log, t, failed in zip(value, self.scatters, self._failed(value), strict=True):
+        for log, t, failed in zip(
+            value, self.scatters, self._failed(np.minimum(value, _WIDE)), strict=True
+        ):
             error = self.given(0.0, float(t)).error(math.exp(min(log, _WIDE)), failed)
             ends.append(logit_interval(share, *error))
         low, high = (

@@ -1,0 +1,65 @@
+"""Minima of gaps, first contact points and displacements, interpreted, by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.semi_hertzian.penetration import (
+    contact_places,
+    displacement_at,
+    first_contacts,
+)
+from wearsim.mechanics.slender.influence import HIGHEST, influence_table, read_value
+
+
+@pytest.mark.parametrize(
+    ("gap", "minima"),
+    [
+        ([3, 1, 1, 1, 2, 0, 5, 4], [(2, 2), (5, 5), (7, 7)]),
+        ([1, 1, 2, 2, 1, 1], [(0, 1), (4, 5)]),
+        ([2, 2, 2, 2], [(1, 2)]),
+        ([0, 1, 0], [(0, 0), (2, 2)]),
+        ([5, 4, 4, 3, 6], [(3, 3)]),
+    ],
+)
+def test_minima_have_one_or_two_strips_in_their_middle(gap: list, minima: list) -> None:
+    places = np.full((len(gap), 2), -1)
+    count = first_contacts(np.array(gap, float), places)
+    assert [tuple(pair) for pair in places[:count].tolist()] == minima
+
+
+def test_first_contact_point_is_the_mean_by_the_depth_below_the_level() -> None:
+    gap = np.array([9.0, 2.0, 1.0, 3.0, 9.0, 1.0, 9.0, 5.0])
+    places, points = np.zeros((8, 2), np.int64), np.zeros(8)
+    count = first_contacts(gap, places)
+    assert count == 3
+    found = contact_places(gap, places, count, 4.0, points)
+    # shares 3/4, 1 and 1/2 of the strips 1 to 3 about the first one; 5 alone; 7 is higher
+    assert found == 2
+    mean = (0.75 * 1 + 1.0 * 2 + 0.5 * 3) / 2.25
+    assert points[:2] == pytest.approx([mean, 5.0])
+    flat = np.array([4.0, 1.0, 1.0, 4.0])
+    count = first_contacts(flat, places)
+    assert contact_places(flat, places, count, 2.0, points) == 1
+    assert points[0] == pytest.approx(1.5)
+
+
+def test_displacement_is_linear_between_the_strips() -> None:
+    depth, spacing, curvature = np.array([0.0, 2e-6, 3e-6, 0.0, 1e-6]), 3e-4, 100.0
+    table = influence_table(5)
+
+    def at(strip: int) -> float:
+        total = 0.0
+        for i in (1, 2, 4):
+            tau = min(math.log(math.sqrt(2.0 * depth[i] / curvature) / spacing), HIGHEST)
+            total += depth[i] * read_value(table, tau, abs(i - strip))
+        return total
+
+    for strip in range(5):
+        found = displacement_at(float(strip), depth, spacing, curvature, table)
+        assert found == pytest.approx(at(strip), rel=1e-12)
+    found = displacement_at(2.3, depth, spacing, curvature, table)
+    assert found == pytest.approx(0.7 * at(2) + 0.3 * at(3), rel=1e-12)
