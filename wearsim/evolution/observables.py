@@ -26,6 +26,10 @@ from wearsim.evolution.steppers.single_step import (
 from wearsim.mechanics.cam import Extreme, integral_error
 from wearsim.types import FloatArray, IntArray
 
+LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
+LEAST_STRIPS = 8  # strips in contact from which the loads of the outermost ones are corrected
+STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
+
 
 def present_contacts(
     stepper: Stepper, problem: WearProblem, state: WearState
@@ -142,7 +146,7 @@ def groove_width(problem: WearProblem, state: WearState, threshold: float) -> Fl
 def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest lift error, peak to peak over a turn, shape (realisations,) [m].
 
-    It is 0 of a cylinder.
+    It is 0 for a cylinder.
     """
     errors = peak_to_peak(problem.kinematics.track, lift_errors(problem, state))
     return np.asarray(errors.max(axis=0))
@@ -151,16 +155,17 @@ def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
 def worn_descents(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the worn descent of each contact's roller, shape (S, C, N) [m].
 
-    It is that between strips, by which a roller descends that is tilted or beside its groove.
+    The least gaps are those between strips, where a roller that is tilted or beside its groove
+    touches first.
     """
     worn = least_gaps(problem, problem.gap(*state.depths))
     return np.asarray(worn - least_gaps(problem, problem.nominal_gap))
 
 
 def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:
-    """Return the least of gaps between strips, the last axis; of strips where loads have springs.
+    """Return the least gaps over the last axis, the strips, interpolated between these.
 
-    The load of a spring follows from the descent of strips.
+    Where loads have springs, they are the least gaps of strips, from which the loads follow.
     """
     return np.asarray(gaps.min(axis=-1) if problem.has_spring else -greatest_between(-gaps))
 
@@ -168,11 +173,6 @@ def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:
 def clearance(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest worn descent of a roller, shape (realisations,) [m]."""
     return np.asarray(greatest(problem, worn_descents(problem, state)).max(axis=0))
-
-
-LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
-LEAST_STRIPS = 8  # in contact, of which the outermost do not carry the greatest pressure by chance
-STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
 
 
 def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
@@ -192,41 +192,42 @@ def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
     square = np.square(2.0 / np.pi * load / np.where(half > 0.0, half, np.inf))
     greatest_square = square.max(axis=-1)
     for side in (slice(None), slice(None, None, -1)):
-        part, own = state.part[..., side], square[..., side]
-        crossed, inner, next_inner = own[..., 2:], own[..., 1:-1], own[..., :-2]
+        part, from_edge = state.part[..., side], square[..., side]
+        crossed, inner, next_inner = from_edge[..., 2:], from_edge[..., 1:-1], from_edge[..., :-2]
         at_edge = (part[..., 2:] >= LEAST_PART) & (part[..., 2:] < 1.0)
         at_edge &= (part[..., 1:-1] >= 1.0) & (part[..., :-2] >= 1.0)
         # the load of a strip of which little is in contact is uncertain
         most = inner + STEEPER * np.maximum(inner - next_inner, 0.0)
-        found = np.minimum(crossed / np.where(at_edge, part[..., 2:], 1.0), most)
-        greatest_square = np.maximum(greatest_square, (found * at_edge).max(axis=-1))
+        square_at_edge = np.minimum(crossed / np.where(at_edge, part[..., 2:], 1.0), most)
+        greatest_square = np.maximum(greatest_square, (square_at_edge * at_edge).max(axis=-1))
     return problem.per_roller(np.maximum(values, np.sqrt(greatest_square)))
 
 
 def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the greatest pressure, with the outermost loads on a part of the next strips too.
+    """Return the greatest pressure if the outermost loads extend to a part of the next strips.
 
-    It is relative to that on whole strips, (S, C, N). The edge has crossed the part 1/2 - s/r of a
-    strip with the separation s in its middle, which rises by r to the next one; and half of a strip
-    that has just come into contact, until it carries half the load of the one inside.
+    It is relative to the greatest pressure on whole strips, shape (S, C, N). The edge of a contact
+    has crossed the part 1/2 - s/r of a strip with the separation s in its middle, which rises by r
+    to the next strip. Of a strip that has just come into contact it has crossed half, until the
+    strip carries half the load of its inner neighbour.
     """
     names = "line_load", "half_length", "separation"
-    load, half, apart = (problem.values_of(state.contacts, name) for name in names)
+    load, half, separations = (problem.values_of(state.contacts, name) for name in names)
     square = np.square(load / np.where(half > 0.0, half, np.inf))
     most = square.max(axis=-1)
     several = (load > 0.0).sum(axis=-1, keepdims=True) >= LEAST_STRIPS
     for side in (slice(None), slice(None, None, -1)):
-        own, ahead = square[..., side], apart[..., side]
-        inner, outer, free = own[..., :-3], own[..., 1:-2], own[..., 2:-1]
+        from_edge, separation = square[..., side], separations[..., side]
+        inner, outer, free = from_edge[..., :-3], from_edge[..., 1:-2], from_edge[..., 2:-1]
         at_edge = (outer > 0.0) & (free == 0.0) & several
         with np.errstate(invalid="ignore"):  # infinite beyond the end of a roller
-            rise = ahead[..., 3:] - ahead[..., 2:-1]
+            rise = separation[..., 3:] - separation[..., 2:-1]
             known = at_edge & (rise > 0.0) & (rise < np.inf)
-            crossed = 0.5 - ahead[..., 2:-1] / np.where(known, rise, 1.0)
+            crossed = 0.5 - separation[..., 2:-1] / np.where(known, rise, 1.0)
         young = known & (outer < 0.5 * inner)
         part = 1.0 + np.where(known & ~young, np.clip(crossed, 0.0, 0.5), 0.0)
-        own[..., :-3] = np.where(young, (inner + outer) / 1.5, inner)
-        own[..., 1:-2] /= part
+        from_edge[..., :-3] = np.where(young, (inner + outer) / 1.5, inner)
+        from_edge[..., 1:-2] /= part
     return np.asarray(np.sqrt(square.max(axis=-1) / np.where(most > 0.0, most, 1.0)))
 
 
@@ -268,14 +269,14 @@ def centroid(y: FloatArray, worn: FloatArray) -> float:
 
 
 def greatest_between(values: FloatArray) -> FloatArray:
-    """Return the greatest values between strips, the last axis, by parabolas.
+    """Return the greatest values over the last axis, the strips, interpolated between these.
 
-    They go through the greatest strip and its neighbours.
+    The interpolation is a parabola through the greatest value and its neighbours.
     """
     rows = values.reshape(-1, values.shape[-1])
-    each, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
-    top, inner = rows[each, place], (place > 0) & (place < last)
-    before, after = rows[each, place - inner], rows[each, place + inner]
+    row, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
+    top, inner = rows[row, place], (place > 0) & (place < last)
+    before, after = rows[row, place - inner], rows[row, place + inner]
     inner &= np.isfinite(before) & np.isfinite(after)  # a gap is infinite beyond a roller's end
     before, after = np.where(inner, before, top), np.where(inner, after, top)
     curvature = 2.0 * top - before - after

@@ -265,14 +265,14 @@ class CamStations:
 
     def at_unworn(self, values: FloatArray) -> FloatArray:
         """Return values of the stations, first axis, at all stations of the unworn cam."""
-        found = values[self.places]
-        return found if self.recorded is None else np.tensordot(self.recorded, found, axes=1)
+        along = values[self.places]
+        return along if self.recorded is None else np.tensordot(self.recorded, along, axes=1)
 
     def greatest(self, values: FloatArray) -> Extreme:
         """Return the greatest value over the angle, of values of the stations, first axis.
 
-        It is that of the interpolation between the stations, as the exported surface of the cam;
-        at given angles without panels it is the greatest of the values.
+        The interpolation between the stations is that of the exported surface of the cam. Without
+        panels, at given angles, the greatest of the values is returned.
         """
         if self.panels is not None:
             return greatest(self.panels, values[self.places])
@@ -337,7 +337,10 @@ class CamStations:
         return sum_in_order(share * values, axis=0)[None]
 
     def matches(self, other: Track) -> bool:
-        """Return whether tests with both stations can be joined: they stay at the same angles."""
+        """Return whether tests at these and at other stations can be joined.
+
+        Both must stay at the same angles, and have no feedback by inertia.
+        """
         if isinstance(other, OneStation):
             return False
         fixed = self.relocated is None and other.relocated is None
@@ -345,8 +348,8 @@ class CamStations:
             fixed
             and self.inertia.size == other.inertia.size == 0
             and all(
-                np.array_equal(getattr(one, name), getattr(two, name))
-                for one, two in ((self, other), (self.along, other.along))
+                np.array_equal(getattr(first, name), getattr(second, name))
+                for first, second in ((self, other), (self.along, other.along))
                 for name in ("angle", "segment", "time_share", "length", "places")
             )
         )
@@ -355,13 +358,13 @@ class CamStations:
     def joined(cls, stations: Sequence[CamStations]) -> CamStations:
         """Return the stations of several tests, of which each `matches` the first."""
         first, differing = stations[0], dict[str, Any]()
-        others = {"whole", "panels", "relocated", "moved_skids", "recorded"}
-        names = [item.name for item in fields(first) if item.name not in others]
+        excluded = {"whole", "panels", "relocated", "moved_skids", "recorded"}
+        names = [item.name for item in fields(first) if item.name not in excluded]
         for name in names:
-            values = [getattr(one, name) for one in stations]
-            if not all(np.array_equal(one, values[0], equal_nan=True) for one in values[1:]):
+            values = [getattr(test, name) for test in stations]
+            if not all(np.array_equal(v, values[0], equal_nan=True) for v in values[1:]):
                 differing[name] = np.concatenate(values, axis=2)
-        whole = [one.whole for one in stations if one.whole is not None]
+        whole = [test.whole for test in stations if test.whole is not None]
         return replace(first, **differing, whole=cls.joined(whole) if whole else None)
 
 
@@ -471,8 +474,8 @@ def values_between(
     values: Sequence[Callable[[float, float], float]], start: FloatArray, stop: FloatArray
 ) -> FloatArray:
     """Return ``values[v](start[v], stop[v])`` for each realisation v."""
-    each = zip(values, start.tolist(), stop.tolist(), strict=True)
-    return np.array([value(first, last) for value, first, last in each])
+    spans = zip(values, start.tolist(), stop.tolist(), strict=True)
+    return np.array([value(first, last) for value, first, last in spans])
 
 
 def sum_along(values: FloatArray, axis: int) -> FloatArray:

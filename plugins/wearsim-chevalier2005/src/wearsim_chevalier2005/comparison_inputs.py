@@ -121,8 +121,17 @@ def _multipliers(
         (printed.l0, printed.l1, printed.l2), distribution.multipliers, units, why, strict=True
     )
     return [
-        Row("inputs", f"lambda{power} of {what}", own, value, printed.place, here, None, reason)
-        for power, (value, here, own, reason) in enumerate(values)
+        Row(
+            "inputs",
+            f"lambda{power} of {what}",
+            multiplier_unit,
+            value,
+            printed.place,
+            computed,
+            None,
+            reason,
+        )
+        for power, (value, computed, multiplier_unit, reason) in enumerate(values)
     ]
 
 

@@ -75,10 +75,10 @@ class RobustnessCase:
         assert isinstance(passes, int)
         return passes
 
-    def scenario(self, passes: int, others: Mapping[str, object]) -> Scenario:
+    def scenario(self, passes: int, further: Mapping[str, object]) -> Scenario:
         """Return the scenario with further changes; `passes` is the default of the case."""
         base = _base()
-        changes = {"operation.passes": passes, **self.changes, **others}
+        changes = {"operation.passes": passes, **self.changes, **further}
         return parse_scenario(base.text, f"{self.name}.toml", self.files.__getitem__, changes)
 
 
@@ -182,7 +182,7 @@ def _loads(duration: float) -> list[RobustnessCase]:
         RobustnessCase("spring unloaded by wear", spring("6.9 kN/mm")),
         RobustnessCase(
             "spring unloaded to zero",
-            # to 1 mN; a limit on the steps of models that cannot reach it
+            # the load falls to 1 mN; models that cannot reach it stop at the limit of the steps
             {**spring("69 kN/mm"), "operation.passes": 600_000, "evolution.max_steps": 2000},
             steps=16,
         ),

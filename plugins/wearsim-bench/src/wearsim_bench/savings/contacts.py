@@ -99,14 +99,14 @@ def closed_forms() -> Iterator[Saving]:
 
 def _closed_form(method: Method) -> Alternatives:
     rig = MeanContact(method)
-    none, some = (
+    without_spin, slight_spin = (
         _slipping(rig.point, rig.point.creepage.longitudinal, spin) for spin in (0.0, _SLIGHT)
     )
     ways = {
-        "no spin": rig.batch("dissipation", none),
-        "negligible spin": rig.batch("dissipation", some),
+        "no spin": rig.batch("dissipation", without_spin),
+        "negligible spin": rig.batch("dissipation", slight_spin),
     }
-    return Alternatives(ways, _limit(method, some))
+    return Alternatives(ways, _limit(method, slight_spin))
 
 
 def _limit(method: Method, point: OperatingPoint) -> Callable[[], FloatArray] | None:
