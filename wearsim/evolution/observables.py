@@ -10,11 +10,9 @@ from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import (
-    CamStations,
-    greatest_between,
+    Track,
     mean_along,
     sum_in_order,
-    width,
     worn_volume,
 )
 from wearsim.evolution.state import WearState
@@ -26,7 +24,7 @@ from wearsim.evolution.steppers.single_step import (
     solve_at_record,
 )
 from wearsim.mechanics.cam import Extreme, integral_error
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
 
 LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
 LEAST_STRIPS = 8  # strips in contact from which the loads of the outermost ones are corrected
@@ -64,22 +62,20 @@ def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:
     The roller's centre moves by -D/cos(alpha) along its path, with the rise D of the least gap of
     the unloaded bodies, and by +D/cos(alpha) on the inner flank of a groove.
     """
-    cam = problem.kinematics.cam
-    assert cam is not None
+    track = problem.kinematics.track
     descent = problem.per_roller(descents(problem, state.depths))
-    return np.asarray(-np.sign(cam.load_factor) * descent / np.cos(cam.pressure_angle))
+    return np.asarray(-np.sign(track.load_factor) * descent / np.cos(track.pressure_angle))
 
 
-def peak_to_peak(cam: CamStations, errors: FloatArray) -> FloatArray:
+def peak_to_peak(track: Track, errors: FloatArray) -> FloatArray:
     """Return greatest less smallest lift error over the angle, shape (rollers, N) [m]."""
-    least, most = cam.greatest_value(np.stack([-errors, errors], axis=1))
+    least, most = track.greatest_value(np.stack([-errors, errors], axis=1))
     return np.asarray(most + least)
 
 
 def greatest(problem: WearProblem, values: FloatArray) -> FloatArray:
     """Return the greatest of values, stations first, over the angle of a cam."""
-    cam = problem.kinematics.cam
-    return np.asarray(values.max(axis=0)) if cam is None else cam.greatest_value(values)
+    return problem.kinematics.track.greatest_value(values)
 
 
 def extremes(problem: WearProblem, state: WearState) -> dict[str, Extreme]:
@@ -103,10 +99,8 @@ def extremes(problem: WearProblem, state: WearState) -> dict[str, Extreme]:
 
 def depth_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the error of the greatest depth between the stations of a cam, (realisations,) [m]."""
-    cam = problem.kinematics.cam
-    if cam is None:
-        return np.zeros(len(state.passes))
-    return np.nan_to_num(cam.greatest(state.cylinder_depth[:, 0].max(axis=-1)).error)
+    depths = state.cylinder_depth[:, 0].max(axis=-1)
+    return np.nan_to_num(problem.kinematics.track.greatest(depths).error)
 
 
 def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
@@ -115,8 +109,8 @@ def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArr
     The relative error is that of the integral of the worn cross-section over the cam's surface,
     shape (realisations,) [m^3].
     """
-    cam = problem.kinematics.cam
-    if cam is None or cam.panels is None:
+    cam = problem.kinematics.track
+    if cam.panels is None:
         return np.zeros(len(state.passes))
     area = state.cylinder_depth[:, 0].sum(axis=-1)[cam.places]
     weight = cam.panels.weight[:, None]
@@ -154,10 +148,8 @@ def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
 
     It is 0 for a cylinder.
     """
-    cam = problem.kinematics.cam
-    if cam is None:
-        return np.zeros(len(state.passes))
-    return np.asarray(peak_to_peak(cam, lift_errors(problem, state)).max(axis=0))
+    errors = peak_to_peak(problem.kinematics.track, lift_errors(problem, state))
+    return np.asarray(errors.max(axis=0))
 
 
 def worn_descents(problem: WearProblem, state: WearState) -> FloatArray:
@@ -243,3 +235,50 @@ def peak_pressure(stepper: Stepper, problem: WearProblem, state: WearState) -> F
     """Return the greatest pressure at the present loads, shape (realisations,) [Pa]."""
     recorded, state, _ = present_contacts(stepper, problem, state)
     return np.asarray(greatest(recorded, peak_pressures(recorded, state)).max(axis=0))
+
+
+def width(y: FloatArray, worn: FloatArray, threshold: float) -> FloatArray:
+    """Return the extent of grooves, shape (..., strips), deeper than `threshold`, (...) [m].
+
+    The crossing is interpolated linearly between strips, so that the width grows continuously.
+    """
+    rows, last = worn.reshape(-1, len(y)), len(y) - 1
+    above = rows > threshold
+    ends = above.argmax(axis=1), last - above[:, ::-1].argmax(axis=1)
+    left, right = (
+        _crossing(y, rows, threshold, inner, np.minimum(np.maximum(inner + side, 0), last))
+        for inner, side in zip(ends, (-1, 1), strict=True)
+    )
+    return np.where(above.any(axis=1), right - left, 0.0).reshape(worn.shape[:-1])
+
+
+def _crossing(
+    y: FloatArray, rows: FloatArray, threshold: float, inner: IntArray, outer: IntArray
+) -> FloatArray:
+    """Return where the depths of each row fall to a threshold between two strips [m]."""
+    row = np.arange(len(rows))
+    high, low = rows[row, inner], rows[row, outer]
+    part = (high - threshold) / np.where(high > low, high - low, np.inf)
+    return np.asarray(y[inner] + part * (y[outer] - y[inner]))
+
+
+def centroid(y: FloatArray, worn: FloatArray) -> float:
+    """Return the axial position of the worn area's centroid [m], or 0 without wear."""
+    total = worn.sum()
+    return float(np.dot(y, worn) / total) if total > 0.0 else 0.0
+
+
+def greatest_between(values: FloatArray) -> FloatArray:
+    """Return the greatest values over the last axis, the strips, interpolated between these.
+
+    The interpolation is a parabola through the greatest value and its neighbours.
+    """
+    rows = values.reshape(-1, values.shape[-1])
+    row, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
+    top, inner = rows[row, place], (place > 0) & (place < last)
+    before, after = rows[row, place - inner], rows[row, place + inner]
+    inner &= np.isfinite(before) & np.isfinite(after)  # a gap is infinite beyond a roller's end
+    before, after = np.where(inner, before, top), np.where(inner, after, top)
+    curvature = 2.0 * top - before - after
+    rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
+    return np.asarray((top + rise).reshape(values.shape[:-1]))

@@ -31,8 +31,8 @@ SMALL = 0.05  # of the greatest normal force, which smaller ones are compared wi
 
 def located(problem: WearProblem, state: WearState) -> WearProblem:
     """Return the problem at the stations of a state, from that of the unworn cam."""
-    cam = problem.kinematics.cam
-    if cam is None or cam.relocated is None or state.skid_loads is None:
+    cam = problem.kinematics.track
+    if cam.relocated is None or state.skid_loads is None:
         return problem
     changes = state.skid_loads[0, :, 0]
     return _at_stations(problem, cam.relocated(changes)) if changes.any() else problem
@@ -55,8 +55,8 @@ def relocated(problem: WearProblem, state: WearState) -> tuple[WearProblem, Wear
     state : WearState
         Without past points if the stations have moved.
     """
-    cam = problem.kinematics.cam
-    if cam is None or cam.relocated is None or cam.panels is None or not problem.has_spring:
+    cam = problem.kinematics.track
+    if cam.relocated is None or cam.panels is None or not problem.has_spring:
         return problem, state
     assert cam.moved_skids is not None
     change, last = _changes(problem, state, cam), state.skid_loads

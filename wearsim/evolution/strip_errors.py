@@ -28,9 +28,8 @@ import numpy as np
 
 from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import Advance, Evolution
-from wearsim.evolution.observables import greatest
+from wearsim.evolution.observables import greatest, greatest_between
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import greatest_between
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import elastic_approaches
@@ -49,7 +48,6 @@ OF_PROFILE = 0.1  # least relative errors of depth and volume over that of the p
 # edge of a groove within a strip: from 1 to 4 by the angle at which the depth begins
 IN_MIDDLE = 2.0
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
-COARSE_TOLERANCE = 1e-5  # of the iterations of a step
 
 #: Function that returns observables of a state by name, with the realisations last.
 Observe: TypeAlias = Callable[[WearProblem, WearState], Mapping[str, FloatArray]]
@@ -122,9 +120,7 @@ def _means_and_middles(depths: FloatArray) -> float:
 
 def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the depths of all bodies, shape (bodies, realisations, strips) [m]."""
-    cam, cylinder = problem.kinematics.cam, state.cylinder_depth[:, 0]
-    if cam is not None:
-        cylinder = cam.at_unworn(cylinder)
+    cylinder = problem.kinematics.track.at_unworn(state.cylinder_depth[:, 0])
     return np.concatenate([cylinder, state.roller_depth[0]])
 
 

@@ -143,8 +143,7 @@ def on_grid(problem: WearProblem, grid: Grid) -> WearProblem:
 
 def with_surfaces(problem: WearProblem) -> WearProblem:
     """Return a problem with the surfaces of the unworn bodies on its strips, at its stations."""
-    cam, grid = problem.kinematics.cam, problem.grid
-    angles = None if cam is None else cam.angle[:, 0, 0]
+    grid, angles = problem.grid, problem.kinematics.track.angles
     parts = [growth.surfaces(grid, angles) for growth in problem.growth]
     gap = np.concatenate([part.gap for part in parts], axis=2)
     stations, shared = 1 if angles is None else len(angles), problem.from_apex.shape[1] == 1

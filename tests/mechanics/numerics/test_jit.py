@@ -103,6 +103,18 @@ def test_garbage_collector_is_restored_after_compilation(collecting: bool):
         (gc.enable if before else gc.disable)()
 
 
+def test_only_kernels_are_compiled_at_their_own_level(monkeypatch):
+    levels = []
+
+    def level(_: str) -> None:
+        levels.append(numba.config.OPT)
+
+    monkeypatch.setattr(numba.config, "OPT", 3)
+    with jit.compilation_reported(level), pytest.raises(numba.TypingError):
+        _misnamed(1)
+    assert (levels, numba.config.OPT) == ([jit.OPTIMISATION], 3)
+
+
 def test_subroutine_in_a_kernel_is_bitwise_equal_to_a_kernel():
     third_of_root = kernel(_third_of_root)
     separate = 0.0

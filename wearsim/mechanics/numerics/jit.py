@@ -27,6 +27,7 @@ R = TypeVar("R")
 
 # kernels are never passed to C code, for which numba would compile a second wrapper
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIMISATION = 2  # level at which LLVM optimises kernels
 KEPT = 86400.0  # seconds for which the compiled kernels of other sources are kept
 _KERNELS: list[Kernel] = []
 _SUBROUTINES: list[Callable[..., Any]] = []  # those that numba has not been given yet
@@ -105,18 +106,29 @@ def _prepared_numba() -> Any:
     from numba.core import event  # noqa: PLC0415
     from numba.extending import typeof_impl  # noqa: PLC0415
 
+    config: Any = numba.config
+
     class Compilations(event.Listener):
-        """Listener that reports every kernel when its compilation starts."""
+        """Listener that reports every kernel when its compilation starts, and sets its level.
+
+        The highest level makes compilation a tenth longer, and no kernel faster.
+        """
+
+        def __init__(self) -> None:
+            self.levels: list[Any] = []  # of the compilations in progress, each within the last
 
         def on_start(self, event: Any) -> None:
             """Report the kernel; subroutines are compiled as a part of it."""
             dispatcher = event.data["dispatcher"]
+            self.levels.append(config.OPT)
             if any(kernel.is_compiled_by(dispatcher) for kernel in _KERNELS):
+                config.OPT = min(config.OPT, OPTIMISATION)
                 for report in _REPORTS:
                     report(dispatcher.__name__)
 
         def on_end(self, event: Any) -> None:
-            """Do nothing at the end of a compilation."""
+            """Restore the optimisation of other functions."""
+            config.OPT = self.levels.pop()
 
     event.register("numba:compile", Compilations())
     _compile_borrowed()

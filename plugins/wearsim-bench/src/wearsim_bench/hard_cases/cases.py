@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.scenario.examples import shipped_scenario
@@ -115,7 +114,7 @@ def crown_radius_of(ratio: float) -> float:
     """Return the crown radius of the rig for a fresh patch with b/a = `ratio` [m]."""
     base = _base()
     along = 0.5 * (1.0 / base.cylinder.radius + 1.0 / base.roller.radius)
-    modulus = combine(base.cylinder.material, base.roller.material).contact_modulus
+    modulus = base.pair.contact_modulus
     low, high = 1e-4, 1e4
     while high > low * (1.0 + 1e-12):
         middle = (low * high) ** 0.5

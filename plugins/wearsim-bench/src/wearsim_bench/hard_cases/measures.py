@@ -7,7 +7,8 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from wearsim.evolution.quantities import centroid, oscillation
+from wearsim.evolution.observables import centroid
+from wearsim.evolution.quantities import oscillation
 from wearsim.evolution.strips import averaged
 from wearsim.scenario import Scenario
 from wearsim.studies.run.assemble import merged_rollers

@@ -37,7 +37,7 @@ class MeanContact:
 
     def __init__(self, method: Method, wide: int = 1, fine: int = 1) -> None:
         scenario = shipped_scenario("mean-contact")
-        materials = scenario.cylinder.material, scenario.roller.material
+        materials = scenario.materials
         self.curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
         across, self.point = 1.0 / scenario.roller.crown_radius, study_contact(scenario).point
         usual = grid_about_hertz(None, across, self.curvature, self.point.normal_force, materials)

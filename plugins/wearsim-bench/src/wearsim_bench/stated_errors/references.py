@@ -22,9 +22,8 @@ from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import is_compiled
 from wearsim.evolution.strips import same_strips
 from wearsim.studies.run.draws import draw
-from wearsim.studies.run.grid import contact_centre, contact_positions
-from wearsim.studies.run.groove import widest_patch
-from wearsim.studies.run.inputs import contact_inputs, load_range
+from wearsim.studies.run.inputs import load_range
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray, Grid
 from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE, RandomTest
 from wearsim_bench.stated_errors.strata import FEW_PASSES
@@ -226,13 +225,10 @@ def final_grid(test: RandomTest, until: float) -> tuple[Grid, float, float]:
     ones are not worn.
     """
     scenario = test.scenario()
-    load = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
+    means, load = Setup(scenario), load_range(scenario, scenario.total_time)[1]
     load += draw(scenario).range_of("normal_force_offset")[1]
-    patch = widest_patch(scenario, load).b
-    rollers = range(scenario.operation.rollers)
-    centre = contact_centre(scenario, rollers)
-    positions = contact_positions(scenario, contact_inputs(scenario, rollers))
-    shift = float(np.abs(positions - centre).max())
+    patch, centre = means.widest_patch(load).b, means.centre
+    shift = float(np.abs(means.positions - centre).max())
     half, reason = shift + 1.5 * patch, "the groove is wider than all strips"
     for _ in range(MOST_PILOTS):
         strips = 2 * int(np.ceil(min(PILOT_STRIPS * half / patch, 90.0))) + 1

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim_bench.stated_errors.cam_tests import cam_changes
 from wearsim_bench.stated_errors.random_tests import Draws, RandomTest, rounded, shipped
@@ -61,7 +60,7 @@ class Sizes:
     def patch(self) -> HertzContact:
         """The patch of the unworn bodies."""
         rig = shipped(RIG)
-        modulus = combine(rig.cylinder.material, rig.roller.material).contact_modulus
+        modulus = rig.pair.contact_modulus
         return hertz(0.5 * self.curvature, 0.5 / self.crown, self.load, modulus)
 
     @property
