@@ -337,10 +337,7 @@ class CamStations:
         return sum_in_order(share * values, axis=0)[None]
 
     def matches(self, other: Track) -> bool:
-        """Return whether tests at these and at other stations can be joined.
-
-        Both must stay at the same angles, and have no feedback by inertia.
-        """
+        """Return whether tests can be joined: at equal, fixed stations without inertia."""
         if isinstance(other, OneStation):
             return False
         fixed = self.relocated is None and other.relocated is None
