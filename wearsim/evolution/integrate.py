@@ -197,6 +197,8 @@ class Evolution:
 
     def _end_finished(self) -> None:
         """Leave only the tests that have neither failed nor ended."""
+        if not self.failures and not self._ended and self.state.passes.max() < self.stop:
+            return
         tests = enumerate(zip(self.numbers.tolist(), self.state.passes.tolist(), strict=True))
         over = self.failures.keys() | self._ended
         going = [k for k, (n, passes) in tests if passes < self.stop and n not in over]

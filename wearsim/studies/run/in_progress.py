@@ -314,7 +314,7 @@ class RunInProgress:
 
     def _check_depth(self) -> None:
         """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
-        depth = max(float(worn.max()) for worn in self.recorder.state.depths)
+        depth = float(self.recorder.state.stacked.max())
         less = f"the limit {self.limit.text}" if self.limit else ""
         resuming = "; with the option allow_deep, resume continues" if self.path else ""
         if failure := too_deep_failure(self.scenario, depth, self._passes, less, resuming):
