@@ -335,10 +335,7 @@ class CamStations:
         return sum_in_order(share * values, axis=0)[None]
 
     def matches(self, other: Track) -> bool:
-        """Return whether tests at these and at other stations can be joined.
-
-        Both must stay at the same angles, and have no feedback by inertia.
-        """
+        """Return whether tests can be joined: at equal, fixed stations without inertia."""
         if isinstance(other, OneStation):
             return False
         fixed = self.relocated is None and other.relocated is None
@@ -402,10 +399,10 @@ class Kinematics:
         return self if self.cam is None else replace(self, cam=self.cam.at(realisations))
 
     @classmethod
-    def joined(cls, each: Sequence[Kinematics]) -> Kinematics:
+    def joined(cls, tests: Sequence[Kinematics]) -> Kinematics:
         """Return the kinematics of several tests, whose tracks match."""
-        cams = [one.cam for one in each if one.cam is not None]
-        return replace(each[0], cam=CamStations.joined(cams)) if cams else each[0]
+        cams = [test.cam for test in tests if test.cam is not None]
+        return replace(tests[0], cam=CamStations.joined(cams)) if cams else tests[0]
 
     @cached_property
     def physical_rollers(self) -> float:
