@@ -17,18 +17,27 @@ from scipy.optimize import brentq
 from tests.evolution import built, stepped
 from tests.evolution.black_box import BlackBox, boxed
 from tests.evolution.test_fatigue import fatigue
+from wearsim.errors import ContactError, StepError
 from wearsim.evolution.error_estimates import COVER, DEPTH_EXPONENT, SHARE
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.base import GROW, SAFETY
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, decay_rates, stability_limit
+from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import (
     CHUNK,
     DAMAGE_PART,
+    LOAD_TOLERANCE,
     SLOW_CHUNK,
     PerPassStepper,
+    run_compiled,
     run_in_python,
 )
 from wearsim.evolution.steppers.single_step import explicit_step
-from wearsim.evolution.steppers.stabilised import StabilisedStepper, stabilised_step
+from wearsim.evolution.steppers.stabilised import (
+    StabilisedStepper,
+    _never_negative,
+    stabilised_step,
+)
 from wearsim.evolution.steppers.step_doubling import LEAST
 
 LOAD, FRICTION, SLIP, FACTOR, MODULUS = 300.0, 0.1, 1e-3, 1.1e-11, 2e13  # K/H [1/Pa], [Pa/m]
@@ -94,46 +103,92 @@ def errors_of(state):
     return np.array([state.depth_error[0], state.volume_error[0], state.profile_error[0]])
 
 
-def test_passes_equal_a_plain_loop():
+@pytest.mark.parametrize("offsets", [["0 mm", "0.5 mm", "-1 mm"], ["0 mm", "0 mm", "0 mm"]])
+def test_passes_equal_a_plain_loop(offsets, tmp_path):
     gain, time_constant, stiffness = 500.0, 2.0, 690e3
+    log = tmp_path / "log.csv"
+    log.write_text("time [s], load [N]\n0, 300\n0.2, 310\n10, 310\n")
     problem, _, _ = boxed(
         foundation=True,
         contact__strips=41,
-        roller__offset=["0 mm", "0.5 mm", "-1 mm"],
-        load__kind="spring",
-        load__stiffness="690 N/mm",
+        operation__passes=450,
+        roller__offset=offsets,
         wear__cylinder__k_over_h="1.1e-9 1/Pa",
         wear__roller__k_over_h="2.2e-9 1/Pa",
-        **{"load.thermal": {"gain": "500 N/W", "time_constant": "2 s"}},
+        load={
+            "kind": "recorded",
+            "file": str(log),
+            "stiffness": "690 N/mm",
+            "thermal": {"gain": "500 N/W", "time_constant": "2 s"},
+        },
     )
     state, spacing = fresh_state(problem), problem.grid.spacing
     found = run_in_python(problem, run_in_python(problem, state, 4), 3)
-    gaps, turn = problem.nominal_gap[0, :, 0], 60.0 / 1000.0
-    fresh = [solved(gap, LOAD, spacing)[1] for gap in gaps]
-    cylinder, rollers, terms, energy = np.zeros(41), np.zeros((3, 41)), np.zeros(3), 0.0
+    gaps, turn, bodies = problem.nominal_gap[0, :, 0], 60.0 / 1000.0, problem.rollers
+    fresh = [solved(gap, LOAD, spacing)[1] - gap.min() for gap in gaps]
+    cylinder, rollers, terms, energy = np.zeros(41), np.zeros((bodies, 41)), np.zeros(bodies), 0.0
     for number in range(7):
-        r = number % 3
-        gap, free = gaps[r] + cylinder + rollers[r], LOAD + terms[r]
+        r, shared = number % bodies, 3 / bodies  # rollers on one track are merged
+        force = LOAD + 50.0 * (number + 0.5) * turn / 3.0
+        gap, free = gaps[r] + cylinder + rollers[r], force + terms[r]
+        zero = gaps[r].min() + fresh[r] * (force / LOAD) ** (2.0 / 3.0)
 
-        def excess(load, gap=gap, free=free, r=r):
-            return free - stiffness * (solved(gap, load, spacing)[1] - fresh[r]) - load
+        def excess(load, gap=gap, free=free, zero=zero):
+            return free - stiffness * (solved(gap, load, spacing)[1] - zero) - load
 
         q = solved(gap, brentq(excess, 1.0, 2.0 * LOAD, xtol=1e-9, rtol=1e-12), spacing)[0]
         cylinder += 100.0 * PER_LOAD * q
-        rollers[r] += 200.0 * PER_LOAD * q * RADII[0] / RADII[1]
+        rollers[r] += 200.0 * PER_LOAD * q * RADII[0] / RADII[1] / shared
         power = FRICTION * SLIP * q.sum() * spacing * 2.0 * math.pi * RADII[0] / turn
         energy += power * turn
-        terms[r] += (gain * power - terms[r]) * -math.expm1(-turn / time_constant)
+        terms[r] += (gain * power - terms[r]) * -math.expm1(-turn / shared / time_constant)
     assert found.passes[0] == found.steps == 7
     assert found.solves - state.solves == found.full_solves - state.full_solves == 7
     for name, exact in (("cylinder_depth", cylinder), ("roller_depth", rollers)):
         np.testing.assert_allclose(
-            np.squeeze(getattr(found, name)), exact, rtol=1e-5, atol=1e-6 * exact.max()
+            np.squeeze(getattr(found, name)), np.squeeze(exact), rtol=1e-5, atol=1e-6 * exact.max()
         )
     np.testing.assert_allclose(found.terms[0, :, 0], terms, rtol=1e-5)
     assert found.energy[0] == pytest.approx(energy, rel=1e-6)
-    carried = [contact.line_load.sum() * spacing for contact in found.contacts]
-    assert max(carried) - min(carried) > 0.1  # the springs have unloaded the rollers unequally
+
+
+@pytest.mark.parametrize("tilt", ["tilt", "differential_slip"])
+def test_compiled_passes_equal_python_ones(tilt):
+    changes = {"tilt": ["1 mrad", "-2 mrad"], "differential_slip": True}
+    problem, _, _ = built(
+        contact__strips=41,
+        operation__rollers=2,
+        roller__offset=["0 mm", "1 mm"],
+        load__kind="spring",
+        load__stiffness="690 N/mm",
+        wear__cylinder__k_over_h="1e-9 1/Pa",
+        wear__roller__k_over_h="5e-10 1/Pa",
+        **{f"creepage__{tilt}": changes[tilt]},
+        **{"load.thermal": {"gain": "50 N/W", "time_constant": "2 s"}},
+    )
+    state = fresh_state(problem)
+    slow = run_in_python(problem, state, 7)
+    middle = run_compiled(problem, state, 3)
+    fast = run_compiled(problem, middle, 4)
+    for name in ("cylinder_depth", "roller_depth", "terms", "energy"):
+        one, other = getattr(slow, name), getattr(fast, name)
+        # the load of a spring has this accuracy
+        assert np.abs(one - other).max() < LOAD_TOLERANCE * np.abs(one).max(), name
+    assert (fast.steps, fast.solves, fast.passes[0]) == (7, state.solves + 7, 7.0)
+    # at the start of the loop each roller is solved fully
+    assert fast.full_solves - middle.full_solves == middle.full_solves - state.full_solves == 2
+    unbroken = run_compiled(problem, state, 7)
+    for name in ("cylinder_depth", "roller_depth", "terms", "energy"):
+        assert (getattr(unbroken, name) == getattr(fast, name)).all()
+
+
+def test_records_of_passes_have_the_strips_of_the_run(rig):
+    problem, other = rig.problem, boxed(foundation=True, contact__strips=43)[0]
+    stepper = PerPassStepper(expectation=other)
+    assert PerPassStepper().recorded(problem) is problem
+    found = stepper.recorded(problem)
+    assert found.grid is problem.grid
+    assert stepper.recorded(problem) is found
 
 
 def test_passes_are_taken_together_up_to_a_check_or_the_stop(rig):
@@ -163,6 +218,7 @@ def test_explicit_step_is_the_wear_at_its_start(rig):
     allowed = SHARE * 1e-3 * depth.max()
     by_volume = errors[1] / (SHARE * 1e-3 * volume)
     assert tried.excess[0] == pytest.approx(max(errors[0] / allowed, by_volume), rel=1e-6)
+    assert tried.ratio[0] == pytest.approx(SAFETY * tried.excess[0] ** -0.5, rel=1e-12)
     half = stepper.attempt(rig.problem, rig.state, np.array([count]), 4.0 * count, explicit_step)
     longer = errors[0] / (allowed / 0.25**DEPTH_EXPONENT)
     assert half.excess[0] == pytest.approx(max(longer, by_volume * 0.25**0.75), rel=1e-6)
@@ -207,6 +263,8 @@ def test_doubled_step_has_the_error_of_its_whole_step(rig):
         np.testing.assert_allclose(errors_of(end), [depth, volume, reached[2]], rtol=1e-4)
         assert (middle.passes[0], end.passes[0]) == ((number - 0.5) * count, number * count)
         assert end.steps == number
+        ratio = min(GROW, SAFETY * tried.excess[0] ** (-1.0 / 3.0))
+        assert tried.ratio[0] == pytest.approx(ratio, rel=1e-12)
         state = end
     assert state.coarse_step_solution.passes[0] == 2.0 * count
     assert state.coarse_step_solution.coarse_step_solution is None
@@ -240,3 +298,59 @@ def test_stabilised_step_equals_the_recursion_of_its_source(rig, count):
     assert end.solves - rig.state.solves == count
     volume = 2.0 * math.pi * RADII[0] * rig.spacing * end.cylinder_depth.sum()
     assert volume == pytest.approx(FACTOR * end.energy[0], rel=1e-12)
+
+
+def test_solves_count_the_contacts_of_all_rollers():
+    problem, _, _ = boxed(
+        foundation=True, contact__strips=41, roller__offset=["0 mm", "1 mm", "2 mm"]
+    )
+    state = fresh_state(problem)
+    end = stabilised_step(problem, state, np.array([1000.0]), np.zeros(1))
+    assert end.solves - state.solves == 9
+    tried = StabilisedStepper(1e-3).attempt(problem, state, np.array([10.0]), 1e6, explicit_step)
+    assert tried.path[-1].solves - state.solves == 9
+
+
+def test_depths_are_not_negative_and_keep_their_sum():
+    depths = np.array([[3.0, -1.0, 2.0], [0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+    exact = [[2.4, 0.0, 1.6], [0.0, 0.0, 0.0], [1.0, 0.0, 1.0]]
+    np.testing.assert_allclose(_never_negative(depths), exact, rtol=1e-15)
+
+
+def test_steps_in_a_groove_advance_its_edges_by_half_a_strip():
+    problem, _, _ = built(contact__strips=41)
+    state, _ = stepped(problem, ImplicitStepper(1e-3, forced_step=30_000.0), 300_000.0)
+    state, stepper = state.replaced(step=np.array([1e9])), StabilisedStepper(1e-3)
+    loaded = np.count_nonzero(state.contacts[0].line_load)
+    # the width grows as the cubic root of the passes, at either edge by half of it
+    longest = 3.0 * 300_000.0 / (0.5 * loaded) * 0.5
+    assert stepper.proposed(problem, state)[0] == pytest.approx(longest, rel=1e-12)
+    short = state.replaced(step=np.array([100.0]))
+    assert stepper.proposed(problem, short)[0] == 100.0
+    assert StabilisedStepper(1e-3, forced_step=1e9).proposed(problem, state)[0] == 1e9
+
+
+def test_forced_explicit_steps_stop_at_the_limit_unless_allowed(rig):
+    limit = stability_limit(rig.problem, rig.state)[0]
+    for factor, allowed in ((0.9, False), (1.1, True), (0.9, True)):
+        stepper = ExplicitStepper(1e-3, factor * limit, allow_unstable=allowed)
+        assert stepper.proposed(rig.problem, rig.state)[0] == factor * limit
+    with pytest.raises(StepError, match="exceeds the stability limit"):
+        ExplicitStepper(1e-3, 1.1 * limit).proposed(rig.problem, rig.state)
+
+
+class Failing(BlackBox):
+    """Contact model that solves no contact."""
+
+    def solve_contact(self, *_):
+        raise ContactError("no contact")
+
+
+def test_decay_rate_without_a_solution_is_that_of_the_state(rig):
+    failing = replace(rig.problem, model=Failing(rig.problem.model.inner))
+    with pytest.raises(ContactError):
+        decay_rates(failing, rig.state)
+    assert decay_rates(failing, rig.state.replaced(decay=np.array([0.25])))[0] == 0.25
+    unworn, _, _ = boxed(foundation=True, contact__strips=41, wear__cylinder__k_over_h="0 1/Pa")
+    assert decay_rates(unworn, fresh_state(unworn))[0] == 0.0
+    assert stability_limit(unworn, fresh_state(unworn))[0] == np.inf
