@@ -175,10 +175,10 @@ def test_compiled_passes_equal_python_ones(tilt):
         # the load of a spring has this accuracy
         assert np.abs(one - other).max() < LOAD_TOLERANCE * np.abs(one).max(), name
     assert (fast.steps, fast.solves, fast.passes[0]) == (7, state.solves + 7, 7.0)
-    # at the start of the loop each roller is solved fully
-    assert fast.full_solves - middle.full_solves == middle.full_solves - state.full_solves == 2
+    # the first pass of each roller is solved fully
+    assert middle.full_solves - state.full_solves == 2
     unbroken = run_compiled(problem, state, 7)
-    for name in ("cylinder_depth", "roller_depth", "terms", "energy"):
+    for name in ("cylinder_depth", "roller_depth", "terms", "energy", "full_solves"):
         assert (getattr(unbroken, name) == getattr(fast, name)).all()
 
 
