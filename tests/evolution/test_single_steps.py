@@ -18,7 +18,13 @@ from tests.evolution import built, stepped
 from tests.evolution.black_box import BlackBox, boxed
 from tests.evolution.test_fatigue import fatigue
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.error_estimates import COVER, DEPTH_EXPONENT, SHARE
+from wearsim.evolution.error_estimates import (
+    COVER,
+    DEPTH_EXPONENT,
+    SHARE,
+    UNCERTAIN,
+    VARYING_COVER,
+)
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import GROW, SAFETY
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, decay_rates, stability_limit
@@ -75,14 +81,14 @@ class Rising(BlackBox):
 class Rig:
     """One roller on a cylinder that wears: problem, start, gap of unworn bodies and wear rates."""
 
-    def __init__(self):
-        self.problem, _, _ = boxed(foundation=True, box=Rising, contact__strips=41)
+    def __init__(self, **changes):
+        self.problem, _, _ = boxed(foundation=True, box=Rising, contact__strips=41, **changes)
         self.state = fresh_state(self.problem)
         self.gap, self.spacing = self.problem.nominal_gap[0, 0, 0], self.problem.grid.spacing
 
-    def rate(self, depth):
+    def rate(self, depth, load=LOAD):
         """Return the wear of a pass on a profile [m]."""
-        q = solved(self.gap + depth, LOAD, self.spacing)[0]
+        q = solved(self.gap + depth, load, self.spacing)[0]
         return PER_LOAD * q * (1.0 + q / RISE)
 
     def sizes(self, depth, difference):
@@ -268,6 +274,37 @@ def test_doubled_step_has_the_error_of_its_whole_step(rig):
         state = end
     assert state.coarse_step_solution.passes[0] == 2.0 * count
     assert state.coarse_step_solution.coarse_step_solution is None
+
+
+def test_doubled_step_contains_the_variation_of_the_load(tmp_path):
+    count, times, loads = 500, [0.0, 4.0, 6.0, 11.0, 30.0], [280.0, 380.0, 250.0, 330.0, 330.0]
+    log = tmp_path / "log.csv"
+    lines = ["time [s], load [N]", *(f"{t}, {load}" for t, load in zip(times, loads, strict=True))]
+    log.write_text("\n".join(lines))
+    load = {"kind": "recorded", "file": str(log)}
+    rig = Rig(load=load, operation__passes=count)
+
+    def over(first, last):
+        passes = (np.arange(100_000.0) + 0.5) / 100_000.0 * (last - first) + first
+        values = np.interp(passes * 0.02, times, loads)
+        return values.mean(), values.std()
+
+    half = 0.5 * count * rig.rate(0.0, over(0, count / 2)[0])
+    worn = half + 0.5 * count * rig.rate(half, over(count / 2, count)[0])
+    coarse = count * rig.rate(0.0, over(0, count)[0])
+    last, deviation = np.interp(count * 0.02, times, loads), over(0, count)[1]
+    lower, middle, upper = (rig.rate(worn, last + part * deviation) for part in (-1.0, 0.0, 1.0))
+    bias = 0.5 * count * (lower - 2.0 * middle + upper)
+    # a part of the bias increases the difference of the two solutions
+    side = 1.0 if ((coarse - worn) * bias).sum() >= 0.0 else -1.0
+    worn, coarse = worn + bias, coarse + bias + UNCERTAIN * side * bias
+    step = np.array([float(count)])
+    end = StabilisedStepper(1e-3).attempt(rig.problem, rig.state, step, 1e6, explicit_step).path[1]
+    np.testing.assert_allclose(end.cylinder_depth[0, 0, 0], worn, rtol=1e-6, atol=1e-14)
+    errors = COVER * VARYING_COVER * rig.sizes(worn, worn - coarse)
+    errors[0] = max(errors[0], LEAST * errors[2] * worn.max())
+    np.testing.assert_allclose(errors_of(end), errors, rtol=1e-4)
+    assert rig.sizes(worn, worn)[1] == pytest.approx(FACTOR * end.energy[0], rel=1e-9)
 
 
 def test_first_step_wears_a_tenth_of_the_elastic_approach(rig):
