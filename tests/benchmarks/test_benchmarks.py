@@ -12,6 +12,7 @@ import pytest
 
 import wearsim
 from tests.benchmarks import (
+    calls,
     contacts,
     ensemble_cases,
     ensembles,
@@ -22,6 +23,7 @@ from tests.benchmarks import (
     wear_tests,
 )
 from tests.benchmarks.report import QUICK, TABLES
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.dissipation.monte_carlo import dissipation
 
 
@@ -106,3 +108,13 @@ def test_saved_tables_have_date_machine_and_cells(tmp_path):
         "rows": [["a | b", "12 ms", "", "1 %"]],
         "notes": ["A note."],
     }
+
+
+def test_facts_of_a_test_are_computed_once():
+    scenario = wearsim.load_scenario(calls.SCENARIOS / f"{calls.CAM}.toml")
+    found = calls.start_of(lambda: wearsim.run(scenario))
+    assert found["pair of materials"] == 3  # of scenario, forms along the axis and contact model
+    assert found["turn of the cam"] == 1
+    assert found["groove"] == 2  # in full and in partial slip
+    # at the stations, and at two curvatures and the greatest load
+    assert found["patch after Hertz"] <= turn_of(scenario).stations.count + 3

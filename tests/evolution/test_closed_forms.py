@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tests.evolution import built, cylinder_depth_of, cylinder_volume_of, stepped, worn
-from wearsim.evolution.quantities import width, worn_volume
+from wearsim.evolution.observables import width
+from wearsim.evolution.quantities import worn_volume
 from wearsim.evolution.steppers.single_step import recovery_at
 
 K_OVER_H = 1.1e-11

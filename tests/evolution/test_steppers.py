@@ -9,7 +9,8 @@ from tests.evolution import built, cylinder_depth_of, cylinder_volume_of, never,
 from wearsim.errors import SolverError, StepError
 from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.quantities import centroid, oscillation
+from wearsim.evolution.observables import centroid
+from wearsim.evolution.quantities import oscillation
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import Attempt
 from wearsim.evolution.steppers.edges import unresolved

@@ -113,6 +113,6 @@ def test_greatest_depths_of_coarse_strips_are_those_between_them() -> None:
     y, width = problem.grid.y, problem.grid.spacing
     depths = 1e-6 - np.square(y - 0.3 * width)
     worn = state.replaced(cylinder_depth=np.broadcast_to(depths, state.cylinder_depth.shape).copy())
-    by_strips, between = (sizes_of(problem, worn, kind)[0, 0] for kind in (False, True))
+    by_strips, between = (sizes_of(problem, worn.stacked, kind)[0, 0] for kind in (False, True))
     assert between == pytest.approx(1e-6, rel=1e-9)
     assert by_strips == pytest.approx(1e-6 - (0.3 * width) ** 2, rel=1e-9)

@@ -118,3 +118,5 @@ def test_row_of_a_realisation_has_its_own_passes() -> None:
     damage, sums = damage_of_step(old, rates, rates, NONE, start, lengths, points, 1.0)
     assert damage[0, :, 0] == pytest.approx([0.1001, 0.2, 0.3001, 0.4])
     assert sums[0] == pytest.approx([0.1, 0.2, 0.3, 0.4])
+    assert sums[1] == pytest.approx(damage[0, :, 0])
+    assert sums[2] == pytest.approx(damage[:2, :, 0].sum(axis=0))

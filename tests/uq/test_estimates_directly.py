@@ -135,7 +135,9 @@ def of_groups(part: np.ndarray, groups: np.ndarray) -> float:
     return math.sqrt((totals**2).sum() * many / (many - 1)) / len(part)
 
 
-@pytest.mark.parametrize("groups", [GROUPS, np.arange(12) % 2, np.arange(12) // 2])
+@pytest.mark.parametrize(
+    "groups", [GROUPS, np.arange(12) % 2, np.arange(12) // 2, np.argsort(np.argsort(VALUES)) % 2]
+)
 def test_replicated_estimates_have_the_error_of_their_groups(groups: np.ndarray) -> None:
     found, many = estimate(VALUES, (0.5,), "sobol", groups), len(np.unique(groups))
     error = of_groups(VALUES, groups)
@@ -384,6 +386,7 @@ def test_gamma_shape_inverts_log_minus_digamma(shape: float) -> None:
         ),
         (((0.0, math.inf), 2.0, None, 0.7), "mean_log 0.7 is not less than log.mean. = 0.693147"),
         (((0.0, math.inf), 0.0, None, -1.0), "mean 0 is not inside"),
+        (((0.0, math.inf), 1.0, None, 0.0), "mean_log 0 is not less than log.mean. = 0"),
         (((0.0, 1.0), 0.5, 0.6, None), "limit of any distribution"),
     ],
 )
@@ -399,11 +402,21 @@ def test_moments_of_the_uniform_and_exponential_distributions_are_recognised() -
     exponential = maximum_entropy((1.0, math.inf), 3.0, 2.0)
     assert (exponential.family, exponential.parent) == ("exponential", None)
     assert maximum_entropy((1.0, math.inf), 3.0).mean == 3.0
+    assert maximum_entropy((1.0, 4.0), 2.0).family == "truncated exponential"
     # the mean of a truncated exponential distribution, by its closed form
     truncated = maximum_entropy((0.0, 2.0), 0.6)
     rate = truncated.multipliers[1]
     assert 1.0 / rate - 2.0 / math.expm1(2.0 * rate) == pytest.approx(0.6, rel=1e-12)
-    # its last quantile, where the end of the support is as far as the probability
+    families = [
+        cut_normal(low, high, 0.0, 1.0).family for low, high in ((0.0, math.inf), (-1.0, 2.0))
+    ]
+    assert families == ["truncated normal"] * 2
+    assert cut_normal(-math.inf, math.inf, 0.0, 1.0).family == "normal"
+    bent = maximum_entropy((1.0, 3.0), 1.8, 0.75)
+    x = np.linspace(1.0, 3.0, 20_001)
+    assert bent.antimode is not None
+    assert bent.antimode[0] == pytest.approx(x[bent.density(x).argmin()], abs=1e-3)
+    # the last quantile, where the end of the support is as far as the probability
     steep = Exponential(0.0, 41.0, 1.0, 1.0, 1.0)
     last = steep.quantile(np.array([1.0 - 2.0**-53]))[0]
     assert last == pytest.approx(-math.log(2.0**-53 + math.exp(-41.0)), rel=1e-12)
@@ -424,6 +437,7 @@ def test_posterior_on_a_grid_is_smoothed_and_has_exact_moments() -> None:
     assert found.t.tolist() == scatter.tolist()
     assert found.m.tolist() == m[kept].tolist()
     assert (found.specimens, found.contained) == (4, ("load",))
+    assert TwoLevels.on_grid(t, m, 1e-9 * density).m.tolist() == found.m.tolist()
     mean = found.weight @ np.exp(found.m + 0.5 * found.t**2)
     square = found.weight @ np.exp(2.0 * found.m + 2.0 * found.t**2)
     assert (found.mean, found.std) == pytest.approx((mean, math.sqrt(square - mean**2)))

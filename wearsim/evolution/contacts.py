@@ -67,9 +67,9 @@ def _bearing_torque(
     the present load and at the present radius, until wear has moved the skids so far that they are
     located again.
     """
-    batch, cam = problem.nominal_batch, problem.kinematics.cam
+    batch, track = problem.nominal_batch, problem.kinematics.track
     torque = np.asarray(batch.bearing_torque)
-    if cam is None or not (cam.relocated or len(cam.skids)):
+    if not (track.relocated or len(track.skids)):
         return torque
     radius = problem.kinematics.roller_radius - roller_depth.max(axis=-1)
     most = GRIP * batch.friction * np.abs(loads * radius).ravel()
@@ -113,19 +113,11 @@ def _creepage_variation(
     variation: FloatArray = (
         problem.at_contacts(problem.slip_profile)
         + roller_depth / problem.kinematics.roller_radius
-        - _per_radius(problem, cylinder_depth)
+        - problem.kinematics.track.over_radius(cylinder_depth)
     )
     if not problem.tilt_shifts:
         variation = variation - problem.spin[:, :, None] * problem.from_apex[problem.roller]
     return _of_contacts(problem, variation)
-
-
-def _per_radius(problem: WearProblem, depth: FloatArray) -> FloatArray:
-    """Return the depth of the cylinder over its radius of curvature, shape as `depth`."""
-    cam = problem.kinematics.cam
-    if cam is None:
-        return np.asarray(depth / problem.kinematics.cylinder_radius)
-    return np.asarray(depth * cam.surface_curvature[..., None])
 
 
 def _of_contacts(problem: WearProblem, values: FloatArray) -> FloatArray:

@@ -22,7 +22,7 @@ from wearsim.types import FloatArray
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 COVER = 1.5  # safety factor on an error estimate
 UNCERTAIN = 0.3  # part of the bias by variation within a step that may be wrong
-VARYING_COVER = 2.0  # another one where inputs vary, so that errors change irregularly
+VARYING_COVER = 2.0  # further safety factor where inputs vary, so that errors change irregularly
 SHARE = 0.7  # part of the tolerance that one step may use
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
 DEPTHS = ("cylinder_depth", "roller_depth")
@@ -63,9 +63,9 @@ def sizes(problem: WearProblem, state: WearState, differences: FloatArray) -> Fl
         Greatest difference where the state is worn deep [m]; volume [m^3], with its sign; Euclidean
         norm over all bodies, relative to that of the depths.
     """
-    found = difference_sizes(state.stacked, differences, problem.volume_weights)
-    found[2] /= np.where(found[3] > 0.0, found[3], np.inf)
-    return np.asarray(found[:3])
+    measures = difference_sizes(state.stacked, differences, problem.volume_weights)
+    measures[2] /= np.where(measures[3] > 0.0, measures[3], np.inf)
+    return np.asarray(measures[:3])
 
 
 def state_difference(problem: WearProblem, one: WearState, other: WearState) -> FloatArray:
@@ -114,12 +114,12 @@ def variation_bias(
         if name == "normal_force_offset":
             deviation = np.where(smooth_loads(problem, first, passes), 0.0, deviation)
             deviations[0] = name, rollers, deviation
-    here = problem.at_time(start, stop)
+    averaged = problem.at_time(start, stop)
     loads = carried_loads(problem, end.contacts)
     mean: WearIncrement | None = None
     biases: list[tuple[FloatArray, FloatArray, FloatArray]] = []
     for name, rollers, deviation in deviations:
-        values = loads if name == "normal_force_offset" else getattr(here.inputs, name)
+        values = loads if name == "normal_force_offset" else getattr(averaged.inputs, name)
         values = values.reshape(-1, values.shape[-1])
         significant = deviation > 1e-9 * np.abs(values).max(axis=0)
         if not significant.any():
@@ -129,11 +129,12 @@ def variation_bias(
         greatest = 0.9 * values.min(axis=0) if bounded else np.inf
         size = np.where(significant, np.minimum(deviation, greatest), 0.0)
         shift = np.where(np.isin(problem.roller, rollers)[:, None], size, 0.0)
-        mean = mean or _shifted_wear(here, end, loads, {}, passes)
+        mean = mean or _shifted_wear(averaged, end, loads, {}, passes)
         less, more = (
-            _shifted_wear(here, end, loads, {name: sign * shift}, passes) for sign in (-1.0, 1.0)
+            _shifted_wear(averaged, end, loads, {name: sign * shift}, passes)
+            for sign in (-1.0, 1.0)
         )
-        columns = zip(*(_wear_and_energy(one, passes) for one in (less, mean, more)), strict=True)
+        columns = zip(*(_wear_and_energy(wear, passes) for wear in (less, mean, more)), strict=True)
         cylinder, roller, energy = (0.5 * (low - 2.0 * mid + up) for low, mid, up in columns)
         biases.append((cylinder, roller, energy))
     if not biases:

@@ -134,11 +134,8 @@ def greatest_damages(problem: WearProblem, damage: FloatArray) -> tuple[FloatArr
     problem : WearProblem
     damage : ndarray, shape (stations + rollers, realisations, strips)
     """
-    stations, cam = problem.shape[0], problem.kinematics.cam
-    rows = damage.max(axis=-1)
-    cylinder = rows[:stations]
-    greatest = cylinder.max(axis=0) if cam is None else cam.greatest_value(cylinder)
-    return np.asarray(greatest), rows[stations:]
+    stations, rows = problem.shape[0], damage.max(axis=-1)
+    return problem.kinematics.track.greatest_value(rows[:stations]), rows[stations:]
 
 
 def effective_damage(problem: WearProblem, damage: FloatArray) -> FloatArray:

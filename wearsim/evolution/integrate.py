@@ -49,9 +49,9 @@ def bisect_failures(
         if len(places) == 1:
             return [], {int(places[0]): error}
     middle = len(places) // 2
-    first, failed = bisect_failures(work, places[:middle])
-    second, others = bisect_failures(work, places[middle:])
-    return first + second, failed | others
+    first, failed_first = bisect_failures(work, places[:middle])
+    second, failed_second = bisect_failures(work, places[middle:])
+    return first + second, failed_first | failed_second
 
 
 @dataclass(frozen=True)
@@ -149,8 +149,8 @@ class Evolution:
         chosen = [identical_strips(problem.grid, grid) for _, problem, _ in self._waiting]
         parts = [part for part, use in zip(self._waiting, chosen, strict=True) if use]
         self._waiting = [part for part, use in zip(self._waiting, chosen, strict=True) if not use]
-        (self.numbers, self.problem, self.state), *others = parts
-        if others:
+        (self.numbers, self.problem, self.state), *rest = parts
+        if rest:
             numbers = np.concatenate([part for part, _, _ in parts])
             order = np.argsort(numbers)
             self.numbers = numbers[order]
@@ -162,8 +162,8 @@ class Evolution:
         """Continue on wider strips with tests whose contacts are close to the outer strips."""
         outgrown: set[int] = set()
         if self._outgrown:
-            each = enumerate(self.numbers.tolist())
-            outgrown = {place for place, number in each if number in self._outgrown}
+            tests = enumerate(self.numbers.tolist())
+            outgrown = {place for place, number in tests if number in self._outgrown}
             self._outgrown = set()
         grids = next_grids(self.problem, self.state, outgrown)
         moving = [place for place, grid in enumerate(grids) if grid is not None]
@@ -174,8 +174,8 @@ class Evolution:
             assert grid is not None
             places = np.array([k for k in moving if identical_strips(grids[k] or grid, grid)])
             moving = [place for place in moving if place not in places]
-            one = self.problem.at(places), self.state.at(places)
-            self._waiting.append((self.numbers[places], *grown(*one, grid)))
+            growing = self.problem.at(places), self.state.at(places)
+            self._waiting.append((self.numbers[places], *grown(*growing, grid)))
         kept = np.array([k for k, grid in enumerate(grids) if grid is None], dtype=np.int64)
         self.numbers = self.numbers[kept]
         if kept.size:
@@ -197,6 +197,8 @@ class Evolution:
 
     def _end_finished(self) -> None:
         """Leave only the tests that have neither failed nor ended."""
+        if not self.failures and not self._ended and self.state.passes.max() < self.stop:
+            return
         tests = enumerate(zip(self.numbers.tolist(), self.state.passes.tolist(), strict=True))
         over = self.failures.keys() | self._ended
         going = [k for k, (n, passes) in tests if passes < self.stop and n not in over]
@@ -217,9 +219,9 @@ class Evolution:
         problem, state, scheme = self.problem, self.state, self._scheme
 
         def attempt(places: IntArray) -> Attempt:
-            some = problem.at(places), state.at(places), lengths[places]
-            tried = _finite(self.stepper.attempt(*some, self.stop, scheme))
-            return self.stepper.with_damage(*some[:2], tried) if problem.fatigue else tried
+            selected = problem.at(places), state.at(places), lengths[places]
+            tried = _finite(self.stepper.attempt(*selected, self.stop, scheme))
+            return self.stepper.with_damage(*selected[:2], tried) if problem.fatigue else tried
 
         resting = self._resting()
         done, failed = bisect_failures(attempt, (~resting).nonzero()[0])
@@ -227,13 +229,13 @@ class Evolution:
         failures = self._rejected(failed, lengths) if failed else {}
         accepted: list[tuple[IntArray, list[WearState]]] = []
         if places.size:
-            some = problem.at(places), state.at(places), lengths[places]
-            accepted.append((places, list(self.stepper.rest(*some, self.stop))))
+            selected = problem.at(places), state.at(places), lengths[places]
+            accepted.append((places, list(self.stepper.rest(*selected, self.stop))))
         for places, tried in done:
             numbers, ratios = self.numbers[places].tolist(), tried.ratio.tolist()
             errors = tried.excess.tolist(), lengths[places].tolist(), ratios
-            each = enumerate(zip(numbers, *errors, strict=True))
-            taken = [k for k, (n, *error) in each if self._trials[n].accepts(*error)]
+            tests = enumerate(zip(numbers, *errors, strict=True))
+            taken = [k for k, (n, *error) in tests if self._trials[n].accepts(*error)]
             if taken:
                 chosen = np.array(taken)
                 accepted.append((places[chosen], [item.at(chosen) for item in tried.path]))

@@ -27,10 +27,10 @@ _EXAMPLES = (
 )
 _LOCATED = 1e-9  # relative error of the quantity at a limit
 _MOST_TRIALS = 100
-_POWER = 2.0 / 3.0  # of the passes, with which a depth begins
+_POWER = 2.0 / 3.0  # exponent of the passes with which the depth of a fresh contact grows
 SAME_VALUE = 1e-6  # relative difference of a value from a limit at which the limit is reached
 
-#: unit, name in the history, and value of a state by the name of the quantity
+#: SI unit, and name in the history, by the name of the quantity
 _QUANTITIES: dict[str, tuple[str, str]] = {
     "depth": ("m", "depth"),
     "roller depth": ("m", "roller_depth"),
@@ -46,6 +46,7 @@ _QUANTITIES: dict[str, tuple[str, str]] = {
 }
 #: quantities that end a life
 OF_LIFE = tuple(name for name in _QUANTITIES if name not in {"time", "passes"})
+#: functions that return the quantity of each realisation of a state
 _VALUES: dict[str, Callable[[WearProblem, WearState], FloatArray]] = {
     "depth": observables.depth,
     "roller depth": observables.roller_depth,
@@ -169,8 +170,8 @@ class Limit:
         WearState or None
             With the error estimates of the end of the step; None if the limit is not reached.
         """
-        found = first_crossings((self,), stepper, advance, np.array([place]))
-        return found[0].state if found else None
+        crossings = first_crossings((self,), stepper, advance, np.array([place]))
+        return crossings[0].state if crossings else None
 
 
 def _value(text: str, unit: str) -> float:
@@ -197,7 +198,7 @@ class Crossings:
     limit : ndarray of int, shape (tests,)
         Number of the limit that is reached first.
     start : WearState
-        A state of each within the step before the limit.
+        A state of each test within the step, before its limit.
     """
 
     places: IntArray
@@ -244,7 +245,7 @@ def first_crossings(
     StepError, ContactError
         If a side step fails.
     """
-    found = []
+    crossings = []
     for before, after in pairwise(advance.path):
         problem, end = advance.problem.at(places), after.at(places)
         reached = ratios(limits, stepper, problem, end).max(axis=0) >= 1.0
@@ -254,17 +255,17 @@ def first_crossings(
         start = before.at(places[chosen]).replaced(
             coarse_step_solution=None, half_quadrature_solution=None
         )
-        some = problem.at(chosen), start, end.at(chosen)
+        reaching = problem.at(chosen), start, end.at(chosen)
         locate = _first_passes if stepper.pass_by_pass else _between
-        state = locate(limits, stepper, *some, tolerance)
+        state = locate(limits, stepper, *reaching, tolerance)
         last = advance.end.at(places[chosen])
         state = state.replaced(depth_error=last.depth_error, volume_error=last.volume_error)
-        first = ratios(limits, stepper, some[0], state).argmax(axis=0)
-        found.append(Crossings(places[chosen], some[0], state, first, start))
+        first = ratios(limits, stepper, reaching[0], state).argmax(axis=0)
+        crossings.append(Crossings(places[chosen], reaching[0], state, first, start))
         places = places[~reached]
         if not places.size:
             break
-    return found
+    return crossings
 
 
 def _between(
@@ -283,21 +284,21 @@ def _between(
     done, span = start.passes, end.passes - start.passes
     if len(limits) == 1 and limits[0].quantity == "passes":
         length = limits[0].value - done
-        found = take_side_step(stepper.side_step, problem, start, length)
-        return found.replaced(passes=np.full_like(done, limits[0].value))
+        located = take_side_step(stepper.side_step, problem, start, length)
+        return located.replaced(passes=np.full_like(done, limits[0].value))
 
-    def trial(which: IntArray, passes: FloatArray) -> tuple[WearState, FloatArray]:
-        some = problem.at(which), start.at(which)
-        state = take_side_step(stepper.side_step, *some, passes)
-        return state, _logs(limits, stepper, some[0], state) - tolerance
+    def trial(places: IntArray, passes: FloatArray) -> tuple[WearState, FloatArray]:
+        tests = problem.at(places), start.at(places)
+        state = take_side_step(stepper.side_step, *tests, passes)
+        return state, _logs(limits, stepper, tests[0], state) - tolerance
 
     every = np.arange(len(done))
-    found, high = trial(every, span)
+    located, high = trial(every, span)
     low = _logs(limits, stepper, problem, start) - tolerance
     # a single step instead of those that led to `end` may not reach the limit
     short = np.flatnonzero(high < -tolerance)
     if short.size:
-        found = found.with_others(short, end.at(short))
+        located = located.with_others(short, end.at(short))
     active = every[high > tolerance]
     before, after = np.zeros_like(span), span.copy()
     for count in range(_MOST_TRIALS):
@@ -326,11 +327,11 @@ def _between(
         ready |= beyond & (after - before <= 1e-13 * (done + after))[active]
         if ready.any():
             places = np.flatnonzero(ready)
-            found = found.with_others(active[places], state.at(places))
+            located = located.with_others(active[places], state.at(places))
         active = active[~ready]
     if active.size:
         raise StepError(f"a limit was not located after pass {done[active[0]]:.0f}")
-    return found
+    return located
 
 
 def _logs(
@@ -349,19 +350,19 @@ def _first_passes(
     tolerance: float,
 ) -> WearState:
     """Return the states after the first pass of each test that reaches a limit."""
-    found = []
+    states = []
     for place in range(len(start.passes)):
         chosen = np.array([place])
-        own, first, last = problem.at(chosen), start.at(chosen), end.at(chosen)
+        single, first, last = problem.at(chosen), start.at(chosen), end.at(chosen)
         while last.passes[0] - first.passes[0] > 1.0:
             half = np.array([float((last.passes[0] - first.passes[0]) // 2)])
-            middle = stepper.side_step(own, first, half)
-            if _logs(limits, stepper, own, middle)[0] >= 0.0:
+            middle = stepper.side_step(single, first, half)
+            if _logs(limits, stepper, single, middle)[0] >= 0.0:
                 last = middle
             else:
                 first = middle
-        found.append(last)
-    return joined_states(found)
+        states.append(last)
+    return joined_states(states)
 
 
 def take_side_step(

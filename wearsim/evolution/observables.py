@@ -10,11 +10,9 @@ from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import (
-    CamStations,
-    greatest_between,
+    Track,
     mean_along,
     sum_in_order,
-    width,
     worn_volume,
 )
 from wearsim.evolution.state import WearState
@@ -26,7 +24,11 @@ from wearsim.evolution.steppers.single_step import (
     solve_at_record,
 )
 from wearsim.mechanics.cam import Extreme, integral_error
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
+
+LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
+LEAST_STRIPS = 8  # strips in contact from which the loads of the outermost ones are corrected
+STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
 
 
 def present_contacts(
@@ -60,22 +62,20 @@ def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:
     The roller's centre moves by -D/cos(alpha) along its path, with the rise D of the least gap of
     the unloaded bodies, and by +D/cos(alpha) on the inner flank of a groove.
     """
-    cam = problem.kinematics.cam
-    assert cam is not None
+    track = problem.kinematics.track
     descent = problem.per_roller(descents(problem, state.depths))
-    return np.asarray(-np.sign(cam.load_factor) * descent / np.cos(cam.pressure_angle))
+    return np.asarray(-np.sign(track.load_factor) * descent / np.cos(track.pressure_angle))
 
 
-def peak_to_peak(cam: CamStations, errors: FloatArray) -> FloatArray:
+def peak_to_peak(track: Track, errors: FloatArray) -> FloatArray:
     """Return greatest less smallest lift error over the angle, shape (rollers, N) [m]."""
-    least, most = cam.greatest_value(np.stack([-errors, errors], axis=1))
+    least, most = track.greatest_value(np.stack([-errors, errors], axis=1))
     return np.asarray(most + least)
 
 
 def greatest(problem: WearProblem, values: FloatArray) -> FloatArray:
     """Return the greatest of values, stations first, over the angle of a cam."""
-    cam = problem.kinematics.cam
-    return np.asarray(values.max(axis=0)) if cam is None else cam.greatest_value(values)
+    return problem.kinematics.track.greatest_value(values)
 
 
 def extremes(problem: WearProblem, state: WearState) -> dict[str, Extreme]:
@@ -99,10 +99,8 @@ def extremes(problem: WearProblem, state: WearState) -> dict[str, Extreme]:
 
 def depth_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the error of the greatest depth between the stations of a cam, (realisations,) [m]."""
-    cam = problem.kinematics.cam
-    if cam is None:
-        return np.zeros(len(state.passes))
-    return np.nan_to_num(cam.greatest(state.cylinder_depth[:, 0].max(axis=-1)).error)
+    depths = state.cylinder_depth[:, 0].max(axis=-1)
+    return np.nan_to_num(problem.kinematics.track.greatest(depths).error)
 
 
 def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
@@ -111,8 +109,8 @@ def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArr
     The relative error is that of the integral of the worn cross-section over the cam's surface,
     shape (realisations,) [m^3].
     """
-    cam = problem.kinematics.cam
-    if cam is None or cam.panels is None:
+    cam = problem.kinematics.track
+    if cam.panels is None:
         return np.zeros(len(state.passes))
     area = state.cylinder_depth[:, 0].sum(axis=-1)[cam.places]
     weight = cam.panels.weight[:, None]
@@ -148,27 +146,26 @@ def groove_width(problem: WearProblem, state: WearState, threshold: float) -> Fl
 def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest lift error, peak to peak over a turn, shape (realisations,) [m].
 
-    It is 0 of a cylinder.
+    It is 0 for a cylinder.
     """
-    cam = problem.kinematics.cam
-    if cam is None:
-        return np.zeros(len(state.passes))
-    return np.asarray(peak_to_peak(cam, lift_errors(problem, state)).max(axis=0))
+    errors = peak_to_peak(problem.kinematics.track, lift_errors(problem, state))
+    return np.asarray(errors.max(axis=0))
 
 
 def worn_descents(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the worn descent of each contact's roller, shape (S, C, N) [m].
 
-    It is that between strips, by which a roller descends that is tilted or beside its groove.
+    The least gaps are those between strips, where a roller that is tilted or beside its groove
+    touches first.
     """
     worn = least_gaps(problem, problem.gap(*state.depths))
     return np.asarray(worn - least_gaps(problem, problem.nominal_gap))
 
 
 def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:
-    """Return the least of gaps between strips, the last axis; of strips where loads have springs.
+    """Return the least gaps over the last axis, the strips, interpolated between these.
 
-    The load of a spring follows from the descent of strips.
+    Where loads have springs, they are the least gaps of strips, from which the loads follow.
     """
     return np.asarray(gaps.min(axis=-1) if problem.has_spring else -greatest_between(-gaps))
 
@@ -176,11 +173,6 @@ def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:
 def clearance(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest worn descent of a roller, shape (realisations,) [m]."""
     return np.asarray(greatest(problem, worn_descents(problem, state)).max(axis=0))
-
-
-LEAST_PART = 0.1  # part of a strip in contact from which its pressure counts as the greatest
-LEAST_STRIPS = 8  # in contact, of which the outermost do not carry the greatest pressure by chance
-STEEPER = 2.0  # greatest slope of the line load at an edge over that between the strips inside it
 
 
 def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
@@ -200,41 +192,42 @@ def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
     square = np.square(2.0 / np.pi * load / np.where(half > 0.0, half, np.inf))
     greatest_square = square.max(axis=-1)
     for side in (slice(None), slice(None, None, -1)):
-        part, own = state.part[..., side], square[..., side]
-        crossed, inner, next_inner = own[..., 2:], own[..., 1:-1], own[..., :-2]
+        part, from_edge = state.part[..., side], square[..., side]
+        crossed, inner, next_inner = from_edge[..., 2:], from_edge[..., 1:-1], from_edge[..., :-2]
         at_edge = (part[..., 2:] >= LEAST_PART) & (part[..., 2:] < 1.0)
         at_edge &= (part[..., 1:-1] >= 1.0) & (part[..., :-2] >= 1.0)
         # the load of a strip of which little is in contact is uncertain
         most = inner + STEEPER * np.maximum(inner - next_inner, 0.0)
-        found = np.minimum(crossed / np.where(at_edge, part[..., 2:], 1.0), most)
-        greatest_square = np.maximum(greatest_square, (found * at_edge).max(axis=-1))
+        square_at_edge = np.minimum(crossed / np.where(at_edge, part[..., 2:], 1.0), most)
+        greatest_square = np.maximum(greatest_square, (square_at_edge * at_edge).max(axis=-1))
     return problem.per_roller(np.maximum(values, np.sqrt(greatest_square)))
 
 
 def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the greatest pressure, with the outermost loads on a part of the next strips too.
+    """Return the greatest pressure if the outermost loads extend to a part of the next strips.
 
-    It is relative to that on whole strips, (S, C, N). The edge has crossed the part 1/2 - s/r of a
-    strip with the separation s in its middle, which rises by r to the next one; and half of a strip
-    that has just come into contact, until it carries half the load of the one inside.
+    It is relative to the greatest pressure on whole strips, shape (S, C, N). The edge of a contact
+    has crossed the part 1/2 - s/r of a strip with the separation s in its middle, which rises by r
+    to the next strip. Of a strip that has just come into contact it has crossed half, until the
+    strip carries half the load of its inner neighbour.
     """
     names = "line_load", "half_length", "separation"
-    load, half, apart = (problem.values_of(state.contacts, name) for name in names)
+    load, half, separations = (problem.values_of(state.contacts, name) for name in names)
     square = np.square(load / np.where(half > 0.0, half, np.inf))
     most = square.max(axis=-1)
     several = (load > 0.0).sum(axis=-1, keepdims=True) >= LEAST_STRIPS
     for side in (slice(None), slice(None, None, -1)):
-        own, ahead = square[..., side], apart[..., side]
-        inner, outer, free = own[..., :-3], own[..., 1:-2], own[..., 2:-1]
+        from_edge, separation = square[..., side], separations[..., side]
+        inner, outer, free = from_edge[..., :-3], from_edge[..., 1:-2], from_edge[..., 2:-1]
         at_edge = (outer > 0.0) & (free == 0.0) & several
         with np.errstate(invalid="ignore"):  # infinite beyond the end of a roller
-            rise = ahead[..., 3:] - ahead[..., 2:-1]
+            rise = separation[..., 3:] - separation[..., 2:-1]
             known = at_edge & (rise > 0.0) & (rise < np.inf)
-            crossed = 0.5 - ahead[..., 2:-1] / np.where(known, rise, 1.0)
+            crossed = 0.5 - separation[..., 2:-1] / np.where(known, rise, 1.0)
         young = known & (outer < 0.5 * inner)
         part = 1.0 + np.where(known & ~young, np.clip(crossed, 0.0, 0.5), 0.0)
-        own[..., :-3] = np.where(young, (inner + outer) / 1.5, inner)
-        own[..., 1:-2] /= part
+        from_edge[..., :-3] = np.where(young, (inner + outer) / 1.5, inner)
+        from_edge[..., 1:-2] /= part
     return np.asarray(np.sqrt(square.max(axis=-1) / np.where(most > 0.0, most, 1.0)))
 
 
@@ -242,3 +235,50 @@ def peak_pressure(stepper: Stepper, problem: WearProblem, state: WearState) -> F
     """Return the greatest pressure at the present loads, shape (realisations,) [Pa]."""
     recorded, state, _ = present_contacts(stepper, problem, state)
     return np.asarray(greatest(recorded, peak_pressures(recorded, state)).max(axis=0))
+
+
+def width(y: FloatArray, worn: FloatArray, threshold: float) -> FloatArray:
+    """Return the extent of grooves, shape (..., strips), deeper than `threshold`, (...) [m].
+
+    The crossing is interpolated linearly between strips, so that the width grows continuously.
+    """
+    rows, last = worn.reshape(-1, len(y)), len(y) - 1
+    above = rows > threshold
+    ends = above.argmax(axis=1), last - above[:, ::-1].argmax(axis=1)
+    left, right = (
+        _crossing(y, rows, threshold, inner, np.minimum(np.maximum(inner + side, 0), last))
+        for inner, side in zip(ends, (-1, 1), strict=True)
+    )
+    return np.where(above.any(axis=1), right - left, 0.0).reshape(worn.shape[:-1])
+
+
+def _crossing(
+    y: FloatArray, rows: FloatArray, threshold: float, inner: IntArray, outer: IntArray
+) -> FloatArray:
+    """Return where the depths of each row fall to a threshold between two strips [m]."""
+    row = np.arange(len(rows))
+    high, low = rows[row, inner], rows[row, outer]
+    part = (high - threshold) / np.where(high > low, high - low, np.inf)
+    return np.asarray(y[inner] + part * (y[outer] - y[inner]))
+
+
+def centroid(y: FloatArray, worn: FloatArray) -> float:
+    """Return the axial position of the worn area's centroid [m], or 0 without wear."""
+    total = worn.sum()
+    return float(np.dot(y, worn) / total) if total > 0.0 else 0.0
+
+
+def greatest_between(values: FloatArray) -> FloatArray:
+    """Return the greatest values over the last axis, the strips, interpolated between these.
+
+    The interpolation is a parabola through the greatest value and its neighbours.
+    """
+    rows = values.reshape(-1, values.shape[-1])
+    row, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
+    top, inner = rows[row, place], (place > 0) & (place < last)
+    before, after = rows[row, place - inner], rows[row, place + inner]
+    inner &= np.isfinite(before) & np.isfinite(after)  # a gap is infinite beyond a roller's end
+    before, after = np.where(inner, before, top), np.where(inner, after, top)
+    curvature = 2.0 * top - before - after
+    rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
+    return np.asarray((top + rise).reshape(values.shape[:-1]))

@@ -4,9 +4,9 @@ The coarse test of `strip_errors` has strips of twice the width and a greater to
 steps. Its observables differ from those of the test by at least the errors of the test where these
 are proportional to the width of the strips, and by three times as much where they are proportional
 to its square. The error estimate is the greatest of the last differences times a safety factor,
-since a peak pressure rises and falls as single strips come into contact. What is worn off a roller
-has at least the relative error by strips of what is worn off both bodies: single differences may be
-small by chance, and depths and volumes of both bodies follow from the same contacts.
+since a peak pressure rises and falls as single strips come into contact. Depth and volume of a
+roller have at least the relative error by strips of depth and volume of both bodies: single
+differences may be small by chance, and both bodies are worn by the same contacts.
 
 At the edge of a groove the line load falls within a layer to zero. Where the layer is shorter than
 the contact is long, the contact is shorter there under the same load, and its pressure higher.
@@ -26,8 +26,8 @@ from wearsim.evolution.strip_errors import BACK, Course
 from wearsim.types import FloatArray
 
 # safety factor on the greatest of the last differences: the error of the coarse test may have the
-# sign of that of the test. Of the pressures of whole strips in the rig's test, against rigid
-# bodies, a factor of 1 covers 0.7 to 0.8, this one 0.96 or more
+# sign of that of the test. In the rig's test against rigid bodies, of the pressures of whole strips
+# a factor of 1 covers 70 % to 80 %, and this factor at least 96 %
 COVER = 1.5
 #: observables whose relative error is at least that of the greatest depth or of the volume worn off
 #: both bodies
@@ -84,26 +84,29 @@ def observed_errors(
     if coarse is None:
         return {name: np.full(values.shape, np.nan) for name, values in observed.items()}
     steps = np.array([0.0, *coarse.passes])
-    # also at the steps of the test, whose pressure may rise and fall several times in a coarse one
+    # compared also at the steps of the test: its pressure may rise and fall within a coarse step
     after = passes[passes >= steps[1]] if len(steps) > 1 else passes[-1:]
-    there = np.union1d(steps[steps < passes[-1]], np.append(after, passes[-1]))
-    # logarithmic but well before the first step, where a pressure is that of the unworn bodies
-    first = 0.01 * float(max(there[1:].min(initial=np.inf), 1e-300))
-    at_steps, at_there, at_passes = (np.log1p(points / first) for points in (steps, there, passes))
+    common = np.union1d(steps[steps < passes[-1]], np.append(after, passes[-1]))
+    # interpolated over the logarithm of the passes, and over the passes themselves well before the
+    # first step, where a pressure is that of the unworn bodies
+    first = 0.01 * float(max(common[1:].min(initial=np.inf), 1e-300))
+    at_steps, at_common, at_passes = (
+        np.log1p(points / first) for points in (steps, common, passes)
+    )
     differences, widths = [], []
     for name, values in observed.items():
-        own = values.reshape(len(passes), -1)
-        other = np.array([item[name].ravel() for item in coarse.observed])
-        fine = _interpolated(at_there, at_passes, own)
-        difference = np.abs(_interpolated(at_there, at_steps, other) - fine)
+        fine_values = values.reshape(len(passes), -1)
+        coarse_values = np.array([item[name].ravel() for item in coarse.observed])
+        fine = _interpolated(at_common, at_passes, fine_values)
+        difference = np.abs(_interpolated(at_common, at_steps, coarse_values) - fine)
         if name.endswith("angle"):
             difference = np.minimum(difference, math.tau - difference)
         else:
             difference /= np.where(fine != 0.0, np.abs(fine), np.inf)
         differences.append(difference)
-        widths.append(own.shape[1])
-    greatest = _greatest_of_last(there, np.concatenate(differences, axis=1))
-    part = np.column_stack([np.interp(at_passes, at_there, one) for one in greatest.T])
+        widths.append(fine_values.shape[1])
+    greatest = _greatest_of_last(common, np.concatenate(differences, axis=1))
+    part = np.column_stack([np.interp(at_passes, at_common, column) for column in greatest.T])
     columns = np.split(COVER * part, np.cumsum(widths)[:-1], axis=1)
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
@@ -112,12 +115,14 @@ def observed_errors(
     # a life observes the quantities of its limits only
     if crown_radius is not None and observed.keys() >= set(_OF_EDGES):
         edge_peaks = _edge_peaks(observed, crown_radius, spacing)
-    for (name, values), found in zip(observed.items(), columns, strict=True):
+    for (name, values), estimate in zip(observed.items(), columns, strict=True):
         scale = 1.0 if name.endswith("angle") else np.abs(values)
         lowest = [
-            one for names, one in zip((OF_DEPTH, OF_VOLUME), least, strict=True) if name in names
+            bound
+            for names, bound in zip((OF_DEPTH, OF_VOLUME), least, strict=True)
+            if name in names
         ]
-        relative = np.maximum(found, lowest[0][:, None]) if lowest else found
+        relative = np.maximum(estimate, lowest[0][:, None]) if lowest else estimate
         errors[name] = relative.reshape(values.shape) * scale
         if name == "peak_pressure":
             errors[name] = errors[name] + scale * edge_peaks
@@ -154,23 +159,25 @@ def _greatest_of_last(passes: FloatArray, errors: FloatArray) -> FloatArray:
     errors : ndarray, shape (points, columns)
     """
     root, begin = np.sqrt(passes), np.searchsorted(passes, passes / BACK, side="right")
-    found = errors.copy()
+    greatest = errors.copy()
     for place in range(1, len(passes)):
         last = slice(begin[place], place + 1)
-        found[place] = (root[last, None] * errors[last]).max(axis=0) / root[place]
-    return found
+        greatest[place] = (root[last, None] * errors[last]).max(axis=0) / root[place]
+    return greatest
 
 
 def _interpolated(at: FloatArray, points: FloatArray, columns: FloatArray) -> FloatArray:
     """Return columns of values at points, by a power law where they are positive."""
-    found = []
+    interpolated = []
     for values in columns.T:
         if (values > 0.0).all():
-            found.append(np.exp(np.interp(at, points, np.log(values))))
+            interpolated.append(np.exp(np.interp(at, points, np.log(values))))
         elif (values[1:] > 0.0).all() and values[0] == 0.0 and len(values) > 1:
-            # what is worn: a power law from the first step on
+            # depth or volume: zero at the start, and a power law from the first step on
             logs = np.interp(at, points[1:], np.log(values[1:]))
-            found.append(np.where(at < points[1], np.interp(at, points, values), np.exp(logs)))
+            interpolated.append(
+                np.where(at < points[1], np.interp(at, points, values), np.exp(logs))
+            )
         else:
-            found.append(np.interp(at, points, values))
-    return np.column_stack(found)
+            interpolated.append(np.interp(at, points, values))
+    return np.column_stack(interpolated)

@@ -17,7 +17,8 @@ from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import advanced_terms
 from wearsim.types import BoolArray, FloatArray, IntArray
 
-_MARGIN = 1e-6, 1e-7  # passes, and part of the passes done, by which a state may miss a boundary
+#: passes, and part of the passes done, by which a state may miss the start or end of a pause
+_MARGIN = 1e-6, 1e-7
 _SHORTEST = 1.0  # passes; during a shorter pause the mean load over a step is sufficient
 
 
@@ -124,10 +125,10 @@ def step_or_rest(
 
 def without_load(problem: WearProblem, passes: FloatArray) -> BoolArray:
     """Return whether there is no load at this instant; parameters and result as of `at_rest`."""
-    found = np.zeros(len(passes), dtype=np.bool_)
+    unloaded = np.zeros(len(passes), dtype=np.bool_)
     for place, (pauses, done) in enumerate(zip(problem.pauses, passes.tolist(), strict=False)):
-        found[place] = done <= _end_of_pause(pauses, done) + _margin(done)
-    return found
+        unloaded[place] = done <= _end_of_pause(pauses, done) + _margin(done)
+    return unloaded
 
 
 def opened(
@@ -144,12 +145,12 @@ def opened(
         In the problem's order.
     loads : ndarray, shape (stations, contacts, realisations)
     """
-    found = without_load(problem, passes)
-    if not found.any():
+    unloaded = without_load(problem, passes)
+    if not unloaded.any():
         return contacts, loads
-    numbers: IntArray = np.flatnonzero(np.broadcast_to(found, loads.shape))
-    some = contacts.at(numbers)
-    given = {n: column for n, column in vars(some).items() if n != "y" and column is not None}
-    zeros = {n: np.zeros_like(column) for n, column in given.items()}
-    empty = ContactBatchSolution(some.y, **zeros)
-    return contacts.with_others(numbers, empty), np.where(found, 0.0, loads)
+    numbers: IntArray = np.flatnonzero(np.broadcast_to(unloaded, loads.shape))
+    affected = contacts.at(numbers)
+    columns = {n: column for n, column in vars(affected).items() if n != "y" and column is not None}
+    zeros = {n: np.zeros_like(column) for n, column in columns.items()}
+    empty = ContactBatchSolution(affected.y, **zeros)
+    return contacts.with_others(numbers, empty), np.where(unloaded, 0.0, loads)

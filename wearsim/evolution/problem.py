@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import cycle
@@ -17,7 +17,6 @@ from wearsim.evolution.quantities import (
     Kinematics,
     Varying,
     is_every,
-    mean_along,
     sum_along,
     sum_in_order,
     values_between,
@@ -272,8 +271,7 @@ class WearProblem:
             "friction": self.inputs.friction,
         }
         if self.free:
-            cam, torque = self.kinematics.cam, self.inputs.bearing_torque
-            columns |= cam.free_rolling(self.inputs) if cam else {"bearing_torque": torque}
+            columns |= self.kinematics.track.free_rolling(self.inputs)
         filled: dict[str, Any] = {
             n: own_array(np.broadcast_to(c, self.shape)).ravel() for n, c in columns.items()
         }
@@ -294,9 +292,7 @@ class WearProblem:
     @cached_property
     def stiffness(self) -> FloatArray:
         """Loss of load per descent, shape (realisations,), or (stations, 1, 1) of a cam [N/m]."""
-        if self.kinematics.cam is not None:
-            return self.kinematics.cam.stiffness
-        return np.array([load.stiffness for load in self.loads])
+        return self.kinematics.track.springs(np.array([load.stiffness for load in self.loads]))
 
     @cached_property
     def constant_load(self) -> FloatArray | None:
@@ -307,13 +303,11 @@ class WearProblem:
     @cached_property
     def has_spring(self) -> bool:
         """Whether a load falls as its roller descends."""
-        cam = self.kinematics.cam
-        return bool(self.stiffness.any()) or (cam is not None and cam.inertia.size > 0)
+        return bool(self.stiffness.any()) or self.kinematics.track.inertia.size > 0
 
     def feedback(self, displacement: FloatArray) -> FloatArray:
         """Return the decrease of the loads by displacements of the rollers, (S, C, N) [N]."""
-        cam, force = self.kinematics.cam, self.stiffness * displacement
-        return force if cam is None else force + cam.inertia_force(displacement)
+        return self.kinematics.track.with_inertia(self.stiffness * displacement, displacement)
 
     @cached_property
     def pauses(self) -> list[FloatArray]:
@@ -344,8 +338,7 @@ class WearProblem:
 
     def at_stations(self, force: FloatArray) -> FloatArray:
         """Return the normal force at the stations under a load of each realisation, as `force`."""
-        cam = self.kinematics.cam
-        return force if cam is None else force * cam.load_factor + cam.load_rest
+        return self.kinematics.track.normal_force(force)
 
     def at_time(self, start: FloatArray, stop: FloatArray) -> WearProblem:
         """Return the problem with every process at its mean between two times [s]."""
@@ -432,8 +425,7 @@ class WearProblem:
 
         None if wear is not linear in the dissipation.
         """
-        stations = () if self.kinematics.cam is None else (self.shape[0], 1)
-        shape, found = (*stations, len(self.laws)), {}
+        shape, found = (*self.kinematics.track.axes, len(self.laws)), {}
         speeds = np.broadcast_to(self.kinematics.speed, shape).ravel().tolist()
         for body in BODIES:
             each = zip(cycle(self.laws), speeds, strict=False)
@@ -494,7 +486,7 @@ class WearProblem:
         physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
         return np.asarray(self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0])
 
-    def mean_over_turn(self, values: FloatArray) -> FloatArray:
-        """Return the mean over the stations weighted by their time, first axis of length one."""
-        cam = self.kinematics.cam
-        return mean_along(values, axis=0) if cam is None else cam.mean_over_turn(values)
+    @cached_property
+    def mean_over_turn(self) -> Callable[[FloatArray], FloatArray]:
+        """Mean of values over the stations weighted by their time, first axis of length one."""
+        return self.kinematics.track.mean_over_turn

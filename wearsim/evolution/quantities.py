@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -104,6 +104,75 @@ class Varying:
 
 
 @dataclass(frozen=True)
+class OneStation:
+    """The station of a cylinder, with the methods that `CamStations` has for those of a cam.
+
+    Parameters
+    ----------
+    longitudinal_curvature : float
+        Relative curvature along rolling [1/m].
+    rolling_speed, track_radius : float
+        Rolling velocity V [m/s], and radius of the cylinder [m].
+    """
+
+    longitudinal_curvature: float
+    rolling_speed: float
+    track_radius: float
+    #: as of `CamStations`
+    load_factor: ClassVar[float] = 1.0
+    pressure_angle: ClassVar[float] = 0.0
+    inertia: ClassVar[FloatArray] = np.zeros((0, 0))
+    skids: ClassVar[FloatArray] = np.zeros((0, 2))
+    angles: ClassVar[None] = None
+    panels: ClassVar[None] = None
+    relocated: ClassVar[None] = None
+    recorded: ClassVar[None] = None
+    axes: ClassVar[tuple[int, ...]] = ()
+
+    def at_unworn(self, values: FloatArray) -> FloatArray:
+        """Return the values."""
+        return values
+
+    def greatest(self, values: FloatArray) -> Extreme:
+        """Return the value of the station, without an angle."""
+        value = self.greatest_value(values)
+        unknown = np.full(value.shape, np.nan)
+        return Extreme(value, unknown, unknown, unknown)
+
+    def greatest_value(self, values: FloatArray) -> FloatArray:
+        """Return the value of the station, the greatest along the first axis."""
+        return np.asarray(values.max(axis=0))
+
+    def mean_over_turn(self, values: FloatArray) -> FloatArray:
+        """Return the value of the station; the first axis is kept."""
+        return mean_along(values, axis=0)
+
+    def normal_force(self, load: FloatArray) -> FloatArray:
+        """Return the normal force under a load [N]."""
+        return load
+
+    def springs(self, stiffness: FloatArray) -> FloatArray:
+        """Return the loss of load per descent from those of the loads, (realisations,) [N/m]."""
+        return stiffness
+
+    def with_inertia(self, force: FloatArray, _displacement: FloatArray) -> FloatArray:
+        """Return the decrease of the loads by springs, as there is no other [N]."""
+        return force
+
+    def free_rolling(self, inputs: ContactInputs) -> dict[str, FloatArray]:
+        """Return the torque of free rollers [N m]."""
+        return {"bearing_torque": inputs.bearing_torque}
+
+    def over_radius(self, depth: FloatArray) -> FloatArray:
+        """Return depths over the radius of curvature of the surface."""
+        return np.asarray(depth / self.track_radius)
+
+    def matches(self, other: Track) -> bool:
+        """Return whether tests on both tracks can be joined."""
+        return self == other
+
+
+@dataclass(frozen=True)
 class CamStations:
     """Quantities that differ between the stations of a cam.
 
@@ -172,20 +241,38 @@ class CamStations:
     recorded: FloatArray | None = None
 
     @property
+    def axes(self) -> tuple[int, ...]:
+        """Leading axes of values of the stations."""
+        return len(self.angle), 1
+
+    @property
+    def angles(self) -> FloatArray:
+        """Angles of the stations [rad], shape (stations,)."""
+        return self.angle[:, 0, 0]
+
+    @property
+    def track_radius(self) -> FloatArray:
+        """Radius of the track whose volume each station represents, (stations, 1, 1) [m].
+
+        The mean over the stations is the volume worn off the cam.
+        """
+        return len(self.length) * self.length / (2.0 * np.pi)
+
+    @property
     def along(self) -> CamStations:
         """All stations along the angle."""
         return self.whole or self
 
     def at_unworn(self, values: FloatArray) -> FloatArray:
         """Return values of the stations, first axis, at all stations of the unworn cam."""
-        found = values[self.places]
-        return found if self.recorded is None else np.tensordot(self.recorded, found, axes=1)
+        along = values[self.places]
+        return along if self.recorded is None else np.tensordot(self.recorded, along, axes=1)
 
     def greatest(self, values: FloatArray) -> Extreme:
         """Return the greatest value over the angle, of values of the stations, first axis.
 
-        It is that of the interpolation between the stations, as the exported surface of the cam;
-        at given angles without panels it is the greatest of the values.
+        The interpolation between the stations is that of the exported surface of the cam. Without
+        panels, at given angles, the greatest of the values is returned.
         """
         if self.panels is not None:
             return greatest(self.panels, values[self.places])
@@ -226,26 +313,43 @@ class CamStations:
             "longitudinal": np.where(skids, self.skid, inputs.longitudinal),
         }
 
-    def inertia_force(self, displacement: FloatArray) -> FloatArray | float:
-        """Return the decrease of the loads through the inertia by displacements [N]."""
+    def normal_force(self, load: FloatArray) -> FloatArray:
+        """Return the normal force at the stations under a load of each realisation [N]."""
+        return load * self.load_factor + self.load_rest
+
+    def springs(self, _stiffness: FloatArray) -> FloatArray:
+        """Return the loss of load per descent, shape (stations, 1, 1) [N/m]."""
+        return self.stiffness
+
+    def with_inertia(self, force: FloatArray, displacement: FloatArray) -> FloatArray:
+        """Return the decrease of the loads by springs, and through inertia by displacements [N]."""
         if not self.inertia.size or not np.ndim(displacement):
-            return 0.0
-        return np.tensordot(self.inertia, displacement, axes=1)
+            return force + 0.0
+        return force + np.tensordot(self.inertia, displacement, axes=1)
+
+    def over_radius(self, depth: FloatArray) -> FloatArray:
+        """Return depths, shape (stations, ..., strips), over the radius of curvature."""
+        return np.asarray(depth * self.surface_curvature[..., None])
 
     def mean_over_turn(self, values: FloatArray) -> FloatArray:
         """Return the mean weighted by the time at the stations, first axis of length one."""
         share = self.time_share.reshape(-1, *(1,) * (values.ndim - 1))
         return sum_in_order(share * values, axis=0)[None]
 
-    def matches(self, other: CamStations) -> bool:
-        """Return whether tests with both stations can be joined: they stay at the same angles."""
+    def matches(self, other: Track) -> bool:
+        """Return whether tests at these and at other stations can be joined.
+
+        Both must stay at the same angles, and have no feedback by inertia.
+        """
+        if isinstance(other, OneStation):
+            return False
         fixed = self.relocated is None and other.relocated is None
         return (
             fixed
             and self.inertia.size == other.inertia.size == 0
             and all(
-                np.array_equal(getattr(one, name), getattr(two, name))
-                for one, two in ((self, other), (self.along, other.along))
+                np.array_equal(getattr(first, name), getattr(second, name))
+                for first, second in ((self, other), (self.along, other.along))
                 for name in ("angle", "segment", "time_share", "length", "places")
             )
         )
@@ -254,14 +358,17 @@ class CamStations:
     def joined(cls, stations: Sequence[CamStations]) -> CamStations:
         """Return the stations of several tests, of which each `matches` the first."""
         first, differing = stations[0], dict[str, Any]()
-        others = {"whole", "panels", "relocated", "moved_skids", "recorded"}
-        names = [item.name for item in fields(first) if item.name not in others]
+        excluded = {"whole", "panels", "relocated", "moved_skids", "recorded"}
+        names = [item.name for item in fields(first) if item.name not in excluded]
         for name in names:
-            values = [getattr(one, name) for one in stations]
-            if not all(np.array_equal(one, values[0], equal_nan=True) for one in values[1:]):
+            values = [getattr(test, name) for test in stations]
+            if not all(np.array_equal(v, values[0], equal_nan=True) for v in values[1:]):
                 differing[name] = np.concatenate(values, axis=2)
-        whole = [one.whole for one in stations if one.whole is not None]
+        whole = [test.whole for test in stations if test.whole is not None]
         return replace(first, **differing, whole=cls.joined(whole) if whole else None)
+
+
+Track: TypeAlias = OneStation | CamStations
 
 
 @dataclass(frozen=True)
@@ -286,9 +393,21 @@ class Kinematics:
     multiplicity: FloatArray
     cam: CamStations | None = None
 
+    @cached_property
+    def track(self) -> Track:
+        """Stations of the cam, or the one of the cylinder."""
+        curvature = 1.0 / self.cylinder_radius + 1.0 / self.roller_radius
+        return self.cam or OneStation(curvature, self.rolling_speed, self.cylinder_radius)
+
     def at(self, realisations: IntArray) -> Kinematics:
         """Return the kinematics of some realisations, by number and in that order."""
         return self if self.cam is None else replace(self, cam=self.cam.at(realisations))
+
+    @classmethod
+    def joined(cls, each: Sequence[Kinematics]) -> Kinematics:
+        """Return the kinematics of several tests, whose tracks match."""
+        cams = [one.cam for one in each if one.cam is not None]
+        return replace(each[0], cam=CamStations.joined(cams)) if cams else each[0]
 
     @cached_property
     def physical_rollers(self) -> float:
@@ -303,29 +422,17 @@ class Kinematics:
     @cached_property
     def longitudinal_curvature(self) -> FloatArray | float:
         """Relative curvature along rolling; of a cam at every station, (stations, 1, 1) [1/m]."""
-        if self.cam is not None:
-            return self.cam.longitudinal_curvature
-        return 1.0 / self.cylinder_radius + 1.0 / self.roller_radius
-
-    @cached_property
-    def surface_curvature(self) -> FloatArray | float:
-        """Curvature of the cylinder, or of a cam at every station, (stations, 1, 1) [1/m]."""
-        return 1.0 / self.cylinder_radius if self.cam is None else self.cam.surface_curvature
+        return self.track.longitudinal_curvature
 
     @cached_property
     def speed(self) -> FloatArray | float:
         """Rolling velocity; of a cam at every station, (stations, 1, 1) [m/s]."""
-        return self.rolling_speed if self.cam is None else self.cam.rolling_speed
+        return self.track.rolling_speed
 
     @cached_property
     def track_radius(self) -> FloatArray | float:
-        """Radius of the track whose volume each station represents [m].
-
-        The mean over the stations is the volume worn off a cam; shape (stations, 1, 1).
-        """
-        if self.cam is None:
-            return self.cylinder_radius
-        return len(self.cam.length) * self.cam.length / (2.0 * np.pi)
+        """Radius of the track whose volume each station represents, as `speed` [m]."""
+        return self.track.track_radius
 
     @cached_property
     def roller_share(self) -> FloatArray | float:
@@ -336,43 +443,12 @@ class Kinematics:
         return self.track_radius / self.roller_radius / self.physical_rollers
 
 
-def width(y: FloatArray, worn: FloatArray, threshold: float) -> FloatArray:
-    """Return the extent of grooves, shape (..., strips), deeper than `threshold`, (...) [m].
-
-    The crossing is interpolated linearly between strips, so that the width grows continuously.
-    """
-    rows, last = worn.reshape(-1, len(y)), len(y) - 1
-    above = rows > threshold
-    ends = above.argmax(axis=1), last - above[:, ::-1].argmax(axis=1)
-    left, right = (
-        _crossing(y, rows, threshold, inner, np.minimum(np.maximum(inner + side, 0), last))
-        for inner, side in zip(ends, (-1, 1), strict=True)
-    )
-    return np.where(above.any(axis=1), right - left, 0.0).reshape(worn.shape[:-1])
-
-
-def _crossing(
-    y: FloatArray, rows: FloatArray, threshold: float, inner: IntArray, outer: IntArray
-) -> FloatArray:
-    """Return where the depths of each row fall to a threshold between two strips [m]."""
-    row = np.arange(len(rows))
-    high, low = rows[row, inner], rows[row, outer]
-    part = (high - threshold) / np.where(high > low, high - low, np.inf)
-    return np.asarray(y[inner] + part * (y[outer] - y[inner]))
-
-
 def worn_volume(worn: FloatArray, spacing: float, radius: FloatArray | float) -> FloatArray:
     """Return the worn volume of a body of revolution, 2 pi R times the worn area [m^3].
 
     First order in depth over radius: the volume for which Archard's wear law holds exactly.
     """
     return np.asarray(2.0 * np.pi * radius * worn.sum(axis=-1) * spacing)
-
-
-def centroid(y: FloatArray, worn: FloatArray) -> float:
-    """Return the axial position of the worn area's centroid [m], or 0 without wear."""
-    total = worn.sum()
-    return float(np.dot(y, worn) / total) if total > 0.0 else 0.0
 
 
 def oscillation(line_load: FloatArray) -> float:
@@ -398,8 +474,8 @@ def values_between(
     values: Sequence[Callable[[float, float], float]], start: FloatArray, stop: FloatArray
 ) -> FloatArray:
     """Return ``values[v](start[v], stop[v])`` for each realisation v."""
-    each = zip(values, start.tolist(), stop.tolist(), strict=True)
-    return np.array([value(first, last) for value, first, last in each])
+    spans = zip(values, start.tolist(), stop.tolist(), strict=True)
+    return np.array([value(first, last) for value, first, last in spans])
 
 
 def sum_along(values: FloatArray, axis: int) -> FloatArray:
@@ -414,22 +490,6 @@ def mean_along(values: FloatArray, axis: int) -> FloatArray:
     """
     count = values.shape[axis]
     return values if count == 1 else np.expand_dims(sum_in_order(values, axis) / count, axis)
-
-
-def greatest_between(values: FloatArray) -> FloatArray:
-    """Return the greatest values between strips, the last axis, by parabolas.
-
-    They go through the greatest strip and its neighbours.
-    """
-    rows = values.reshape(-1, values.shape[-1])
-    each, place, last = np.arange(len(rows)), rows.argmax(axis=1), rows.shape[1] - 1
-    top, inner = rows[each, place], (place > 0) & (place < last)
-    before, after = rows[each, place - inner], rows[each, place + inner]
-    inner &= np.isfinite(before) & np.isfinite(after)  # a gap is infinite beyond a roller's end
-    before, after = np.where(inner, before, top), np.where(inner, after, top)
-    curvature = 2.0 * top - before - after
-    rise = np.square(after - before) / (8.0 * np.where(curvature > 0.0, curvature, np.inf))
-    return np.asarray((top + rise).reshape(values.shape[:-1]))
 
 
 def sum_in_order(values: FloatArray, axis: int) -> FloatArray:

@@ -31,8 +31,8 @@ SMALL = 0.05  # of the greatest normal force, which smaller ones are compared wi
 
 def located(problem: WearProblem, state: WearState) -> WearProblem:
     """Return the problem at the stations of a state, from that of the unworn cam."""
-    cam = problem.kinematics.cam
-    if cam is None or cam.relocated is None or state.skid_loads is None:
+    cam = problem.kinematics.track
+    if cam.relocated is None or state.skid_loads is None:
         return problem
     changes = state.skid_loads[0, :, 0]
     return _at_stations(problem, cam.relocated(changes)) if changes.any() else problem
@@ -55,8 +55,8 @@ def relocated(problem: WearProblem, state: WearState) -> tuple[WearProblem, Wear
     state : WearState
         Without past points if the stations have moved.
     """
-    cam = problem.kinematics.cam
-    if cam is None or cam.relocated is None or cam.panels is None or not problem.has_spring:
+    cam = problem.kinematics.track
+    if cam.relocated is None or cam.panels is None or not problem.has_spring:
         return problem, state
     assert cam.moved_skids is not None
     change, last = _changes(problem, state, cam), state.skid_loads
@@ -89,28 +89,28 @@ def _changes(problem: WearProblem, state: WearState, cam: CamStations) -> FloatA
     return -cam.at_unworn(problem.per_roller(feedback).mean(axis=1))
 
 
-def _skids_differ(skids: FloatArray, others: FloatArray) -> bool:
-    """Return whether the roller rolls by one set of skids and slides by the other.
+def _skids_differ(present: FloatArray, moved: FloatArray) -> bool:
+    """Return whether the roller rolls according to one set of skids and slides by the other.
 
     Parameters
     ----------
-    skids, others : ndarray, shape (skids, 2)
+    present, moved : ndarray, shape (skids, 2)
         First and last angle of each range in which the roller skids [rad]. Ranges up to `MOVED`
         are not compared.
     """
-    angles = np.unique(np.concatenate([skids.ravel(), others.ravel()]))
+    angles = np.unique(np.concatenate([present.ravel(), moved.ravel()]))
     middles = 0.5 * (angles[:-1] + angles[1:])
-    slides, slides_by_others = (
+    slides, slides_by_moved = (
         ((ranges[:, :1] <= middles) & (middles <= ranges[:, 1:])).any(axis=0)
-        for ranges in (skids, others)
+        for ranges in (present, moved)
     )
-    return bool((np.diff(angles)[slides != slides_by_others] > MOVED).any())
+    return bool((np.diff(angles)[slides != slides_by_moved] > MOVED).any())
 
 
 def _at_stations(problem: WearProblem, cam: CamStations) -> WearProblem:
     """Return the problem at other stations of its cam."""
     moved = replace(problem, kinematics=replace(problem.kinematics, cam=cam))
-    if any(one.by_angle for one in problem.growth):
+    if any(growth.by_angle for growth in problem.growth):
         return with_surfaces(moved)
     flat_gap = np.broadcast_to(problem.flat_gap[:1], (len(cam.angle), *problem.flat_gap.shape[1:]))
     return replace(moved, flat_gap=flat_gap)
@@ -135,7 +135,7 @@ def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamSta
     )
     depth = moved_depth(state.cylinder_depth[old.places], old.along, new.along)
     damage, points = _moved_damage(state, old, new)
-    found = state.replaced(
+    at_new = state.replaced(
         damage=damage,
         damage_points=points,
         cylinder_depth=depth,
@@ -149,8 +149,8 @@ def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamSta
             for name, part in state.auxiliary.items()
         },
     )
-    contacts, _ = solve_at_record(problem, found, on_profile=False, cold=True)
-    return found.replaced(contacts=contacts)
+    contacts, _ = solve_at_record(problem, at_new, on_profile=False, cold=True)
+    return at_new.replaced(contacts=contacts)
 
 
 def _moved_errors(
@@ -194,15 +194,15 @@ def moved_depth(depth: FloatArray, old: CamStations, new: CamStations) -> FloatA
     assert old.panels is not None
     assert new.panels is not None
     matrix, old_part, new_part = moved_stations(old.panels, new.panels)
-    found = np.maximum(np.tensordot(matrix, depth, axes=1), 0.0)
-    lengths = [one.length.reshape(-1, *(1,) * (depth.ndim - 1)) for one in (old, new)]
+    new_depth = np.maximum(np.tensordot(matrix, depth, axes=1), 0.0)
+    lengths = [stations.length.reshape(-1, *(1,) * (depth.ndim - 1)) for stations in (old, new)]
     for part in np.unique(new_part[new_part >= 0]):
         before, after = old_part == part, new_part == part
-        worn = (lengths[0][before] * depth[before]).sum(axis=0)
-        now = (lengths[1][after] * found[after]).sum(axis=0)
-        scaled = now > 0.5 * worn
-        factor = np.where(scaled, worn / np.where(now > 0.0, now, 1.0), 0.0)
+        kept_volume = (lengths[0][before] * depth[before]).sum(axis=0)
+        volume = (lengths[1][after] * new_depth[after]).sum(axis=0)
+        scaled = volume > 0.5 * kept_volume
+        factor = np.where(scaled, kept_volume / np.where(volume > 0.0, volume, 1.0), 0.0)
         # at the edge of the groove all depth may lie between two stations
-        added = np.where(scaled, 0.0, worn / lengths[1][after].sum())
-        found[after] = found[after] * factor + added
-    return found
+        added = np.where(scaled, 0.0, kept_volume / lengths[1][after].sum())
+        new_depth[after] = new_depth[after] * factor + added
+    return new_depth

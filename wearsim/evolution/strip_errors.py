@@ -3,17 +3,18 @@
 A test is repeated on strips of twice the width, with a greater tolerance of its steps: the error
 accumulates in it as in the test, which contacts solved on coarse strips at a few times do not show.
 The error estimate is the difference of the two tests times a safety factor. Profiles are compared
-at the middles of the coarse strips, and greatest depths of the test with the deepest points between
-coarse strips: averages over strips, and the deepest strips, differ by their width alone. The
-depth between the deepest strips of the test, by a parabola, is part of the error of its depth. The
-difference of the means over strips from the depths in their middles is part of the error of the
-profile, most of it at the edges of a groove.
+at the middles of the coarse strips, and the greatest depth of the test with that of the coarse test
+interpolated between its strips, since averages over strips and the depth of the deepest strip
+depend on the width of strips even in equal profiles. The rise of a parabola through the deepest
+strips of the test above these is part of the error of its depth. The difference of the means over
+strips from the depths in their middles is part of the error of the profile; it is greatest at the
+edges of a groove.
 
 A difference is three times the error of the test where that is proportional to the square of the
 width of the strips, as in a groove at full slip. Where slip is partial it is equal to the error:
 most wear is then at the edges of the contact, where a strip is inside or outside as a whole. The
 rate of wear then depends on the strips, and the difference of the volumes over that of the profiles
-shows how far slip is partial. In a fresh contact, too, strips enter one by one.
+measures how far slip is partial. In a fresh contact, too, strips enter the contact one by one.
 """
 
 from __future__ import annotations
@@ -21,37 +22,38 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import groupby
 from typing import TypeAlias
 
 import numpy as np
 
-from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import Advance, Evolution
-from wearsim.evolution.observables import greatest
+from wearsim.evolution.observables import greatest, greatest_between
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import greatest_between
+from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import elastic_approaches
 from wearsim.evolution.strips import coarse_problem
 from wearsim.types import FloatArray, Grid
 
-LOOSER = 20.0  # tolerance of the coarse test over that of the test
+LOOSER = 12.0  # tolerance of the coarse test over that of the test
 LOOSEST = 0.1  # greatest tolerance of a coarse test
 # safety factors on the differences of depth, volume and profile where the rate of wear does not
 # depend on the strips, where it does, and before wear: later, wear reduces errors of the shape
 COVER, PARTIAL_COVER, FRESH_COVER = (
     np.array(factors)[:, None] for factors in ((0.3, 0.5, 0.9), (0.8, 1.1, 1.3), (1.6, 1.8, 1.8))
 )
-OF_PROFILE = 0.1  # estimates of depth and volume over that of the profile, all relative, at least
+OF_PROFILE = 0.1  # least relative errors of depth and volume over that of the profile
 # difference of the mean over a strip from the depth in its middle, over that of a parabola, at the
 # edge of a groove within a strip: from 1 to 4 by the angle at which the depth begins
 IN_MIDDLE = 2.0
 BACK = 2.0  # ratio of passes over which an error that crosses zero is remembered
-COARSE_TOLERANCE = 1e-5  # of the iterations of a step
 
 #: Function that returns observables of a state by name, with the realisations last.
 Observe: TypeAlias = Callable[[WearProblem, WearState], Mapping[str, FloatArray]]
+#: Problem of some tests, their numbers and passes, and the depths as `WearState.stacked` [m].
+Worn: TypeAlias = tuple[WearProblem, list[int], list[float], FloatArray]
 
 
 @dataclass
@@ -82,28 +84,30 @@ class Course:
     observed: list[dict[str, FloatArray]] = field(default_factory=list)
 
 
-def sizes_of(problem: WearProblem, state: WearState, between: bool = False) -> FloatArray:
+def sizes_of(problem: WearProblem, depths: FloatArray, between: bool = False) -> FloatArray:
     """Return greatest depth of cylinder and rollers [m] and volume [m^3], (3, realisations).
 
     Parameters
     ----------
     problem : WearProblem
-    state : WearState
+    depths : ndarray, shape (stations + rollers, realisations, strips)
+        As `WearState.stacked` [m].
     between : bool
         Whether the greatest depths are those of parabolas through the deepest strips and their
         neighbours, instead of those of strips.
     """
     top = greatest_between if between else partial(np.max, axis=-1)
-    tops, stations = top(state.stacked), state.cylinder_depth.shape[0]
+    tops, stations = top(depths), problem.shape[0]
+    volumes = problem.volume_weights[1][:, None] * depths.sum(axis=-1)
     cylinder, rollers = greatest(problem, tops[:stations]), tops[stations:].max(axis=0)
-    return np.array([cylinder, rollers, volume_of(problem, state.depths)])
+    return np.array([cylinder, rollers, sum_in_order(volumes, axis=0)])
 
 
 def _means_below_points(depths: FloatArray) -> float:
     """Return how much the mean over the deepest strip is below the depth in its middle, at most.
 
-    Strips that were joined, or that an edge has crossed, hold means. That of a parabola is a 24th
-    of the second difference below its vertex.
+    Strips that were joined, or that the edge of a contact has crossed, hold mean depths. The mean
+    of a parabola over a strip is below its vertex by a 24th of the second difference.
     """
     second = 2.0 * depths[:, 1:-1] - depths[:, :-2] - depths[:, 2:]
     at_deepest = np.where(depths[:, 1:-1] == depths.max(), second, 0.0)
@@ -111,34 +115,44 @@ def _means_below_points(depths: FloatArray) -> float:
 
 
 def _means_and_middles(depths: FloatArray) -> float:
-    """Return how far means over strips are from the depths in their middles, over the depths.
+    """Return the difference of means over strips from the depths in their middles, relative.
 
-    Both are Euclidean norms, see `IN_MIDDLE`.
+    It is the ratio of the Euclidean norms of the difference and of the depths, see `IN_MIDDLE`.
     """
     second = float(np.linalg.norm(np.diff(depths, 2, axis=-1)))
     return IN_MIDDLE * second / 24.0 / float(np.linalg.norm(depths))
 
 
-def profiles_of(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the depths of all bodies, shape (bodies, realisations, strips) [m]."""
-    cam, cylinder = problem.kinematics.cam, state.cylinder_depth[:, 0]
-    if cam is not None:
-        cylinder = cam.at_unworn(cylinder)
-    return np.concatenate([cylinder, state.roller_depth[0]])
+def add_step(courses: Sequence[Course], advance: Advance) -> None:
+    """Add a step of some tests to their courses, which are numbered as the tests."""
+    add_steps(courses, [worn_by(advance)])
 
 
-def add_step(courses: Sequence[Course], advance: Advance, between: bool = False) -> None:
-    """Add a step of some tests to their courses, which are numbered as the tests.
+def worn_by(advance: Advance) -> Worn:
+    """Return problem, numbers and passes of tests after a step, and depths of all bodies."""
+    end = advance.end
+    return advance.problem, advance.numbers.tolist(), end.passes.tolist(), end.stacked
 
-    `between` is that of `sizes_of`.
+
+def add_steps(courses: Sequence[Course], steps: Sequence[Worn], between: bool = False) -> None:
+    """Add steps of some tests to their courses; `between` is that of `sizes_of`.
+
+    Those of one problem, as of a single test, are taken together.
     """
-    problem, end = advance.problem, advance.end
-    sizes, profiles = sizes_of(problem, end, between), profiles_of(problem, end)
-    for place, number in enumerate(advance.numbers.tolist()):
-        course = courses[number]
-        course.passes.append(float(end.passes[place]))
-        course.sizes.append(sizes[:, place])
-        course.profiles, course.grid = profiles[:, place], problem.grid
+    for _, group in groupby(steps, key=lambda step: id(step[0])):
+        of_problem = list(group)
+        problem, numbers, _, last = of_problem[-1]  # all have the same numbers
+        depths = np.concatenate([stacked for *_, stacked in of_problem], axis=1)
+        sizes = iter(sizes_of(problem, depths, between).T)
+        for _, numbers, passes, _ in of_problem:
+            for number, done in zip(numbers, passes, strict=True):
+                courses[number].passes.append(done)
+                courses[number].sizes.append(next(sizes))
+        stations = problem.shape[0]
+        cylinder = problem.kinematics.track.at_unworn(last[:stations])
+        profiles = np.concatenate([cylinder, last[stations:]])
+        for place, number in enumerate(numbers):
+            courses[number].profiles, courses[number].grid = profiles[:, place], problem.grid
 
 
 def add_observed(
@@ -146,8 +160,8 @@ def add_observed(
 ) -> None:
     """Add the observables of some tests, realisations last, to their courses by number."""
     for place, number in enumerate(numbers):
-        one = {name: np.asarray(values[..., place]) for name, values in observed.items()}
-        courses[number].observed.append(one)
+        of_test = {name: np.asarray(values[..., place]) for name, values in observed.items()}
+        courses[number].observed.append(of_test)
 
 
 def coarse_courses(
@@ -163,9 +177,9 @@ def coarse_courses(
     Parameters
     ----------
     problem : WearProblem
-        Of the tests, on the strips with which they start.
+        Problem of the tests, on the strips with which they start.
     stepper : Stepper
-        With the greater tolerance.
+        Stepper with the greater tolerance.
     stop : float
         Passes at the end of the tests.
     needed : ndarray, shape (realisations,)
@@ -185,8 +199,9 @@ def coarse_courses(
         tests = Evolution(coarse, state, stepper, stop, max_steps, lambda _: np.inf)
         if observe is not None:
             add_observed(courses, range(len(courses)), observe(coarse, state))
+        steps: list[Worn] = []
         for advance in tests:
-            add_step(courses, advance, between=True)
+            steps.append(worn_by(advance))
             if observe is not None:
                 numbers = advance.numbers.tolist()
                 add_observed(courses, numbers, observe(advance.problem, advance.end))
@@ -196,13 +211,14 @@ def coarse_courses(
                 for place in np.flatnonzero(done).tolist():
                     courses[advance.numbers[place]].approach = float(approaches[place])
                 tests.end(advance.numbers[done].tolist())
+        add_steps(courses, steps, between=True)
     except Exception:  # a test fails for its own reasons, and the others are repeated without it
         if len(needed) == 1:
             return [None]
-        each = (np.array([number]) for number in range(len(needed)))
+        single_tests = (np.array([number]) for number in range(len(needed)))
         parts = (
             coarse_courses(problem.at(n), stepper, stop, needed[n], max_steps, observe)
-            for n in each
+            for n in single_tests
         )
         return [course for part in parts for course in part]
     return [None if n in tests.failures else course for n, course in enumerate(courses)]
@@ -233,20 +249,19 @@ def strip_errors(
     if coarse is None:
         return np.full((3, len(passes)), np.nan)
     steps, last = np.array(coarse.passes), float(passes[-1])
-    there = np.append(steps[steps < last], last)
+    common = np.append(steps[steps < last], last)  # passes at which the tests are compared
     with np.errstate(divide="ignore", invalid="ignore"):
-        logs = [
-            np.interp(np.log(there), np.log(points), np.log(size))
-            for points, both in ((steps, np.array(coarse.sizes).T), (passes, sizes))
-            for size in both
-        ]
-        ratio = np.abs(np.expm1(np.array(logs[:3]) - np.array(logs[3:])))
+        coarse_logs, logs = (
+            np.array([np.interp(np.log(common), np.log(points), np.log(size)) for size in rows])
+            for points, rows in ((steps, np.array(coarse.sizes).T), (passes, sizes))
+        )
+        ratio = np.abs(np.expm1(coarse_logs - logs))
     ratio = np.where(np.isfinite(ratio), ratio, 0.0)
     # the error at a point is the greatest of the last steps, as it may cross zero
-    recent = (there[None, :] > there[:, None] / BACK) & (there[None, :] <= there[:, None])
-    decay = np.sqrt(there[None, :] / there[:, None])
+    recent = (common[None, :] > common[:, None] / BACK) & (common[None, :] <= common[:, None])
+    decay = np.sqrt(common[None, :] / common[:, None])
     relative = (np.where(recent, decay, 0.0)[None] * ratio[:, None, :]).max(axis=2)
-    part = np.array([np.interp(passes, there, one) for one in relative])
+    part = np.array([np.interp(passes, common, row) for row in relative])
     depth = np.maximum(part[0] * sizes[0], part[1] * sizes[1])
     of_profile = _profile_error(coarse, end) if steps[-1] == last else 0.0
     profile = np.full(len(passes), of_profile)
@@ -257,17 +272,19 @@ def strip_errors(
     deepest = np.maximum(sizes[0], sizes[1])
     fresh = coarse.approach / (coarse.approach + 3.0 * deepest) if coarse.approach > 0.0 else 0.0
     cover = COVER + (PARTIAL_COVER - COVER) * partial_slip
-    found = (cover + (FRESH_COVER - cover) * fresh) * np.array([depth, part[2] * sizes[2], profile])
+    cover = cover + (FRESH_COVER - cover) * fresh
+    errors = cover * np.array([depth, part[2] * sizes[2], profile])
     # profiles are compared at the end alone, where their difference may cross zero too
-    found[2] = np.maximum(found[2], found[0] / np.where(deepest > 0.0, deepest, np.inf))
-    # the differences of depth and volume may be small by chance, that of one strip more often
+    errors[2] = np.maximum(errors[2], errors[0] / np.where(deepest > 0.0, deepest, np.inf))
+    # the differences of depth and volume may be small by chance, that of the depth of a single
+    # strip more often
     least = OF_PROFILE * np.array([deepest, partial_slip * sizes[2]])
-    found[:2] = np.maximum(found[:2], least * found[2])
+    errors[:2] = np.maximum(errors[:2], least * errors[2])
     if end.profiles is not None and end.profiles.any():
         top = greatest_between(end.profiles).max() + _means_below_points(end.profiles)
-        found[0] += deepest * (top / end.profiles.max() - 1.0)
-        found[2] = np.hypot(found[2], _means_and_middles(end.profiles))
-    return np.asarray(found)
+        errors[0] += deepest * (top / end.profiles.max() - 1.0)
+        errors[2] = np.hypot(errors[2], _means_and_middles(end.profiles))
+    return np.asarray(errors)
 
 
 def _profile_error(coarse: Course, end: Course) -> float:
@@ -284,10 +301,12 @@ def _at_points(depths: FloatArray, grid: Grid, y: FloatArray) -> FloatArray:
     place = (y - grid.y[0]) / grid.spacing
     first = np.clip(np.floor(place).astype(np.int64) - 1, 0, max(grid.strips - 4, 0))
     nodes = np.arange(min(4, grid.strips))
-    found = np.zeros((*depths.shape[:-1], len(y)))
+    interpolated = np.zeros((*depths.shape[:-1], len(y)))
     for node in nodes:
-        others = nodes[nodes != node]
-        weight = np.prod((place[:, None] - first[:, None] - others) / (node - others), axis=1)
-        found += weight * depths[..., first + node]
+        other_nodes = nodes[nodes != node]
+        weight = np.prod(
+            (place[:, None] - first[:, None] - other_nodes) / (node - other_nodes), axis=1
+        )
+        interpolated += weight * depths[..., first + node]
     inside = (place >= -0.5) & (place <= grid.strips - 0.5)
-    return np.asarray(np.where(inside, found, 0.0))
+    return np.asarray(np.where(inside, interpolated, 0.0))

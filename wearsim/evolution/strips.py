@@ -24,8 +24,8 @@ from wearsim.types import FloatArray, Grid
 
 WIDER = 1.5  # width after growing over that before
 JOINED = 3  # strips joined to one; an odd number keeps symmetric strips symmetric
-LEAST_LOADED = 24  # strips of each contact after joining, as of a fresh contact
-MOST_OF_ALL = 1601  # strips above which they are joined although a contact has fewer
+LEAST_LOADED = 24  # least number of strips of each contact after joining, as of a fresh contact
+MOST_OF_ALL = 1601  # number of strips above which they are joined even if a contact has fewer
 _ALIGNED = 1e-9  # part of a strip by which edges that coincide may differ
 
 
@@ -88,8 +88,8 @@ def next_grids(
 ) -> list[Grid | None]:
     """Return the wider strips of each realisation that needs them, else None.
 
-    Strips grow if a contact is loaded close to the outer ones, or has reached them in a step from
-    the state: `outgrown`, places of the realisations.
+    Strips grow if a contact is loaded close to the outer strips. They also grow for the
+    realisations at the places `outgrown`, whose contacts reach these in a step from the state.
     """
     realisations, strips = state.passes.size, problem.grid.strips
     free, load = problem.free_strips, state.contacts.line_load
@@ -101,16 +101,15 @@ def next_grids(
         return [None] * realisations
     loaded = (load > 0.0).reshape(-1, realisations, strips)
     counts = loaded.sum(axis=2).min(axis=0).tolist()
-    found = []
+    grids = []
     for v, (growth, width, count) in enumerate(zip(problem.growth, free, counts, strict=True)):
         near = v in outgrown or loaded[:, v, :width].any() or loaded[:, v, -width:].any()
-        outer = width and near
-        found.append(_next(problem.grid, growth, count) if outer else None)
-    return found
+        grids.append(_next(problem.grid, growth, count) if width and near else None)
+    return grids
 
 
 def _next(grid: Grid, growth: Growth, loaded: int) -> Grid | None:
-    """Return the strips that follow, None after the last; `loaded` are those of a contact."""
+    """Return the next wider strips, or None after the last; `loaded` strips carry each contact."""
     last = growth.last
     if last is not None and same_strips(grid, last):
         return None
@@ -144,9 +143,8 @@ def on_grid(problem: WearProblem, grid: Grid) -> WearProblem:
 
 def with_surfaces(problem: WearProblem) -> WearProblem:
     """Return a problem with the surfaces of the unworn bodies on its strips, at its stations."""
-    cam, grid = problem.kinematics.cam, problem.grid
-    angles = None if cam is None else cam.angle[:, 0, 0]
-    parts = [one.surfaces(grid, angles) for one in problem.growth]
+    grid, angles = problem.grid, problem.kinematics.track.angles
+    parts = [growth.surfaces(grid, angles) for growth in problem.growth]
     gap = np.concatenate([part.gap for part in parts], axis=2)
     stations, shared = 1 if angles is None else len(angles), problem.from_apex.shape[1] == 1
 
@@ -167,12 +165,12 @@ def coarse_problem(problem: WearProblem) -> WearProblem:
     """Return a problem on strips of twice the width."""
     growth = tuple(
         replace(
-            one,
-            most=math.ceil(0.5 * one.most),
-            last=one.last and one.coarse(one.last),
-            least_loaded=math.ceil(0.5 * one.least_loaded),
+            fine,
+            most=math.ceil(0.5 * fine.most),
+            last=fine.last and fine.coarse(fine.last),
+            least_loaded=math.ceil(0.5 * fine.least_loaded),
         )
-        for one in problem.growth
+        for fine in problem.growth
     )
     return replace(on_grid(problem, problem.growth[0].coarse(problem.grid)), growth=growth)
 
@@ -201,8 +199,8 @@ def averaged(values: FloatArray, old: Grid, new: Grid) -> FloatArray:
     weights = shares(old, new) * (old.spacing / new.spacing)
     rows = values.reshape(-1, old.strips)
     # row by row, so that the round-off does not depend on the number of rows
-    found = [(weights * row).sum(axis=-1) for row in rows]
-    return np.array(found).reshape(*values.shape[:-1], new.strips)
+    averages = [(weights * row).sum(axis=-1) for row in rows]
+    return np.array(averages).reshape(*values.shape[:-1], new.strips)
 
 
 def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearState:
@@ -250,8 +248,8 @@ def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearStat
 def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[str, FloatArray]:
     """Return the fields of a state about the edges of contacts on the strips of a problem.
 
-    On added strips the surfaces are apart by the change of the gap beyond the old outer ones, and
-    come closer as there.
+    On added strips the separation of the surfaces is that of the old outer strip plus the increase
+    of the gap beyond it, and it decreases at the same rate.
     """
     new, gap = problem.grid, problem.nominal_gap
     assert state.part is not None
@@ -282,9 +280,9 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
 
 def _auxiliary(problem: WearProblem, state: WearState, old: Grid) -> dict[str, WearState]:
     """Return the auxiliary solutions of a state on the strips of a problem."""
-    found = {}
-    for name, part in state.auxiliary.items():
+    solutions = {}
+    for name, solution in state.auxiliary.items():
         halved = name == "half_quadrature_solution"
-        own = half_quadrature(problem, state)[0] if halved else problem
-        found[name] = state_on_grid(own, part, old)
-    return found
+        solution_problem = half_quadrature(problem, state)[0] if halved else problem
+        solutions[name] = state_on_grid(solution_problem, solution, old)
+    return solutions

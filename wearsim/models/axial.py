@@ -34,7 +34,7 @@ from wearsim.units import LENGTH
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
 
-_SINGULAR = 1e-12  # of 1 - (2 y/l)^2 at the ends of Lundberg's profile
+_SINGULAR = 1e-12  # least value of 1 - (2 y/l)^2, at the ends of Lundberg's profile
 _LUNDBERG = "Lundberg, G., Forschung auf dem Gebiete des Ingenieurwesens 10 (1939) 201-211"
 _GOHAR = "Johns, P. M., Gohar, R., Tribology International 14 (1981) 131-136"
 _FUJIWARA = "Fujiwara, H., Kawase, T., NTN Technical Review 75 (2007) 140-148"
@@ -188,7 +188,7 @@ class Logarithmic(AxialProfile):
     def drop(self, s: FloatArray) -> FloatArray:
         """Return the drop of the profile; beyond its ends that of the ends [m]."""
         part = np.clip((np.abs(s) - self._start) / self._crowned, 0.0, 1.0)
-        # near the middle 1 - (...) is rounded, log1p is not
+        # near the middle, log1p keeps digits that 1 - (...) would lose
         return np.asarray(
             -self.scale * np.log1p(-np.minimum(self._part * part**2, 1.0 - _SINGULAR))
         )

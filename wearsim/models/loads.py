@@ -26,7 +26,7 @@ from wearsim.quantities import (
 from wearsim.types import FloatArray
 from wearsim.units import FORCE, TORQUE, TORSIONAL_STIFFNESS
 
-GAP = 10.0  # usual intervals between samples
+GAP = 10.0  # interval between samples above which it is a gap, over the usual interval
 FEWEST_SAMPLES = 10  # with fewer, a file is a schedule without a usual interval
 ZERO_DRIFT = 0.01  # part of the greatest load by which a log may be below zero in a pause
 _PAPER = ("Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",)

@@ -56,9 +56,9 @@ LIFT_NAMES = (
     ),
     *("rollenhub", "schwenkwinkel", "hebelwinkel"),
 )
-_FLOOR = 6.0  # standard deviations of the noise, below which a jump is not seen
+_FLOOR = 6.0  # standard deviations of the noise below which a jump is ignored
 _BLUNT = 0.05  # part of the greatest slope by which noise may hide a corner
-_WIDEST = math.radians(2.0)  # of the spacing of means of a noisy table
+_WIDEST = math.radians(2.0)  # greatest distance of means of a noisy table
 _NORTON = ("Norton, Cam Design and Manufacturing Handbook (2009)", "VDI 2143")
 
 
@@ -113,11 +113,11 @@ class Sinusoidal(MotionLaw):
         """Return lift and derivatives by the angle, shape (3, points)."""
         place = np.asarray(angle) / self._angle
         pieces = np.searchsorted(self._starts, place, side="right") - 1
-        found = np.empty((3, len(place)))
+        lift = np.empty((3, len(place)))
         for number in range(len(self._pieces)):
             chosen = pieces == number
-            found[:, chosen] = self._piece(number, place[chosen])
-        return found * (self._scale / self._angle ** np.arange(3.0))[:, None]
+            lift[:, chosen] = self._piece(number, place[chosen])
+        return lift * (self._scale / self._angle ** np.arange(3.0))[:, None]
 
 
 class ConstantVelocityOptions(Options):
@@ -311,10 +311,10 @@ def read_lift(text: str, path: str, unit: str) -> tuple[FloatArray, FloatArray]:
 
 
 def _isolated(values: FloatArray, size: FloatArray) -> IntArray:
-    """Return the places of values that exceed sizes, and those around them several times."""
+    """Return the places of values that exceed sizes, and five times the values around them."""
     values = np.abs(values)
     around = np.full_like(values, np.inf)
-    reach = 3  # a corner between two points shows in both
+    reach = 3  # a corner between two points changes the values at both
     for place in range(reach, len(values) - reach):
         sides = values[place - reach : place - reach + 2], values[place + reach - 1 :][:2]
         around[place] = max(side.max() for side in sides)

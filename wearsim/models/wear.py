@@ -33,7 +33,7 @@ class BodyWear(Options):
     """Wear factor of one body.
 
     A specific wear rate k of a handbook is a volume per load and sliding distance. In the test in
-    which it was measured the work per distance was friction times load: K/H = k/mu.
+    which it was measured, the work per distance was friction times load, so that K/H = k/mu.
     """
 
     k_over_h: NonNegativeWearFactor | None = Field(
@@ -67,8 +67,8 @@ class BodyWear(Options):
         if not (known and 0.0 < friction < np.inf):
             what = "measured_friction is not a coefficient of friction"
             raise QuantityError(what, as_written(friction), "a number above 0")
-        others = {key: value for key, value in raw.items() if key not in given}
-        return {**others, "k_over_h": f"{rate / friction!r} 1/Pa"}
+        unchanged = {key: value for key, value in raw.items() if key not in given}
+        return {**unchanged, "k_over_h": f"{rate / friction!r} 1/Pa"}
 
     @field_validator("k_over_h")
     @classmethod

@@ -49,7 +49,7 @@ class AxialGap:
         curvature = sum(1.0 / radius for radius in radii if radius is not None)
         return 1.0 / curvature
 
-    @property
+    @cached_property
     def is_crowned(self) -> bool:
         """Whether the gap is a parabola, as contact models for ellipses need it."""
         return self.crown_radius is not None and math.isfinite(self.crown_radius)
@@ -68,7 +68,7 @@ class AxialGap:
         drop = self._cylinder.drop(np.clip(y, -half, half))
         return np.where(np.abs(y) > half, self._greatest, drop)
 
-    @property
+    @cached_property
     def has_crowned_cylinder(self) -> bool:
         """Whether the cylinder is not straight."""
         return self._cylinder.crown_radius != math.inf

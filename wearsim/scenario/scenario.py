@@ -11,6 +11,7 @@ from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.plugins import Options
 from wearsim.profiles import split_name
 from wearsim.scenario.axial_gap import AxialGap
@@ -30,6 +31,7 @@ from wearsim.scenario.tables.plain import (
     SamplingTable,
 )
 from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, WearChoice
+from wearsim.types import Material
 
 Drawn: TypeAlias = float | tuple[float, ...]
 
@@ -258,7 +260,7 @@ class Scenario:
         file = Path(self.file)
         return (file, *(file.parent / split_name(name)[0] for name in self.files))
 
-    @property
+    @cached_property
     def sha256(self) -> str:
         """SHA-256 digest of the text and of every file's path and content."""
         digest = hashlib.sha256()
@@ -268,28 +270,38 @@ class Scenario:
             digest.update(data)
         return digest.hexdigest()
 
-    @property
+    @cached_property
     def has_length(self) -> bool:
         """Whether a duration or a number of passes or turns is given."""
         operation = self.operation
         return bool(operation.passes or operation.turns or operation.duration)
 
     @cached_property
+    def materials(self) -> tuple[Material, Material]:
+        """Materials of cylinder and roller."""
+        return self.cylinder.material, self.roller.material
+
+    @cached_property
+    def pair(self) -> ElasticPair:
+        """Combined elastic constants of cylinder and roller."""
+        return combine(*self.materials)
+
+    @cached_property
     def axial_gap(self) -> AxialGap:
         """Gap of roller and cylinder along the axis, without start profiles."""
         return axial_gap(self.roller, self.cylinder)
 
-    @property
+    @cached_property
     def rolling_speed(self) -> float:
         """Rolling velocity V, the surface speed of the cylinder or the base circle [m/s]."""
         return self.operation.speed * self.cylinder.radius
 
-    @property
+    @cached_property
     def pass_rate(self) -> float:
         """Roller passes per unit of time, all rollers together [1/s]."""
         return self.operation.rollers * self.operation.speed / math.tau
 
-    @property
+    @cached_property
     def total_passes(self) -> int:
         """Number of roller passes of the test, at least one; raises as `require_run`."""
         if self.operation.passes is not None:
@@ -300,7 +312,7 @@ class Scenario:
             raise ScenarioError(self.file, [_NO_LENGTH])
         return max(1, round(self.pass_rate * self.operation.duration))
 
-    @property
+    @cached_property
     def total_time(self) -> float:
         """Simulated time of all roller passes [s]; raises as `require_run`."""
         return self.total_passes / self.pass_rate

@@ -13,7 +13,6 @@ from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.observables import present_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.toml import apply_overrides
@@ -33,6 +32,7 @@ from wearsim.studies.run.grid import contact_grid, wider_grid
 from wearsim.studies.run.in_progress import RunInProgress
 from wearsim.studies.run.inputs import load_range
 from wearsim.studies.run.recorder import Event, Stepped
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray, Grid
 
 _INDICATING = ("slender", "hertz")  # models whose solution gives the indicators, in this order
@@ -192,7 +192,7 @@ def _hindrance(scenario: Scenario, choice: ContactChoice, states: list[_State], 
 
 def _coupling(scenario: Scenario) -> str:
     """Return why no error can be estimated for these materials, or an empty string."""
-    pair = combine(scenario.cylinder.material, scenario.roller.material)
+    pair = scenario.pair
     if abs(pair.dundurs) <= DUNDURS_LIMIT:
         return ""
     return f"different materials (Dundurs' constant {pair.dundurs:.3g}) are not calibrated"
@@ -245,10 +245,10 @@ def _looked_at(scenario: Scenario, test: bool) -> tuple[list[_State], str]:
 
 def _single(scout: Scenario) -> _State:
     """Return the contact of the first roller at the start of the load."""
-    force = load_range(scout, scout.load.build(), 0.0)[0]
-    grid = contact_grid(scout, force)
+    setup, force = Setup(scout), load_range(scout, 0.0)[0]
+    grid = contact_grid(setup, force)
     state = _unworn(scout, grid)
-    if not state.indicators and (wider := wider_grid(scout, grid, force)):
+    if not state.indicators and (wider := wider_grid(setup, grid, force)):
         state = _unworn(scout, wider)
     return state
 

@@ -7,7 +7,6 @@ from typing import Any
 
 from wearsim.csv_tables import column_names
 from wearsim.evolution.problem import WearProblem
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import Load
 from wearsim.scenario import Cylinder, RandomInput, Scenario, described_model
 from wearsim.scenario.tables.axial import described_form
@@ -20,8 +19,8 @@ from wearsim.studies.plausibility import plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw, units_of
 from wearsim.studies.run.grid import start_of_run
-from wearsim.studies.run.groove import hardest_patch
 from wearsim.studies.run.inputs import load_file, load_range
+from wearsim.studies.run.setup import Setup
 
 Data = dict[str, Any]
 
@@ -56,12 +55,12 @@ def dry_run(scenario: Scenario) -> Data:
     'slender'
     """
     is_run = scenario.has_length and scenario.wear is not None
-    scenario, load = with_chosen_model(scenario, is_run), scenario.load.build()
-    low, high = load_range(scenario, load, scenario.total_time if is_run else 0.0)
+    scenario = with_chosen_model(scenario, is_run)
+    load, means = scenario.load.build(), Setup(scenario)
+    low, high = load_range(scenario, scenario.total_time if is_run else 0.0)
     roller, cylinder = scenario.roller, scenario.cylinder
     crowned = roller.axial_profile.form == "crown"
-    pair = combine(cylinder.material, roller.material)
-    patch, patch_load = hardest_patch(scenario, high)
+    patch, patch_load = means.hardest_patch(high)
     random = {key for item in scenario.random for key in item.keys}
     fixed_load = {} if "load.normal_force" in random else {"least_N": low, "greatest_N": high}
     data: Data = {
@@ -84,8 +83,8 @@ def dry_run(scenario: Scenario) -> Data:
         },
         "cam": _cam(scenario),
         "profile": profile_data(cylinder, scenario.files),
-        "contact_modulus_Pa": pair.contact_modulus,
-        "shear_modulus_Pa": pair.shear_modulus,
+        "contact_modulus_Pa": scenario.pair.contact_modulus,
+        "shear_modulus_Pa": scenario.pair.shear_modulus,
         "rolling_speed_m_per_s": scenario.rolling_speed,
         "load": {
             "kind": scenario.load.kind.removesuffix("-arm"),  # as the scenario names it
@@ -118,14 +117,14 @@ def dry_run(scenario: Scenario) -> Data:
             "realisation": table.realisation,
             "correlation": table.correlation,
         }
-    warnings = plausibility_warnings(scenario)
+    warnings = plausibility_warnings(means)
     if is_run:
-        draws = draw(scenario)
-        problem, _, stepper = assemble_problem(draws, start_of_run(scenario, draws))
+        setup = draw(scenario)
+        problem, _, stepper = assemble_problem(setup, start_of_run(scenario, setup))
         data["test"] = _test(scenario, problem, stepper)
         if scenario.fatigue is not None:
             data["pitting_without_wear"] = unworn_data(scenario, problem)
-        data["forecast"], further = forecast_data(draws, problem, stepper)
+        data["forecast"], further = forecast_data(setup.scenario, problem, stepper)
         warnings += further
     else:
         data["strips"] = study_contact(scenario).grid.strips

@@ -22,7 +22,6 @@ from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
 from wearsim.studies.forecast import WearForecast
-from wearsim.studies.run.draws import Draws
 from wearsim.studies.schedule import RecordSchedule
 
 DEEP = 1e-3  # m, a depth of which `check` warns
@@ -75,14 +74,14 @@ class Effort:
 
 
 def forecast_data(
-    draws: Draws, problem: WearProblem, stepper: str
+    scenario: Scenario, problem: WearProblem, stepper: str
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the forecast of a run in SI units, and warnings.
 
     Parameters
     ----------
-    draws : Draws
-        The scenario, with the values of its random inputs.
+    scenario : Scenario
+        With the values of its random inputs.
     problem : WearProblem
     stepper : str
         Name of the stepper.
@@ -92,10 +91,9 @@ def forecast_data(
     SolverError
         If the contacts of the unworn bodies or of the predicted groove have no solution.
     """
-    scenario = draws.scenario
     passes = float(scenario.total_passes)
     with failures_explained(scenario):
-        forecast = WearForecast(draws, problem)
+        forecast = WearForecast(scenario, problem)
     wear = forecast.at(passes)
     failure = forecast.failure
     if failure and failure.cause == "skid" and forecast.passes_solved < _CERTAIN * passes:
@@ -154,7 +152,7 @@ def _check_strips(forecast: WearForecast, passes: float) -> None:
             late, error = middle, failure
         else:
             early = middle
-    raise explained(error, forecast.draws.scenario, late, forecast=True)
+    raise explained(error, forecast.scenario, late, forecast=True)
 
 
 def _warnings(
@@ -208,8 +206,8 @@ def restarts_of(problem: WearProblem, depth: float) -> float:
     depth : float
         Worn depth of both bodies at the end [m].
     """
-    cam = problem.kinematics.cam
-    if cam is None or cam.relocated is None:
+    cam = problem.kinematics.track
+    if cam.relocated is None:
         return 0.0
     force = np.abs(problem.at_stations(preload_of(problem)).ravel())
     force = np.maximum(force, SMALL * force.max())

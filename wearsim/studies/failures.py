@@ -10,7 +10,7 @@ from wearsim.errors import SolverError, StepError
 from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.scenario import Scenario
 from wearsim.studies.plausibility import greatest_load
-from wearsim.studies.run.groove import widest_patch
+from wearsim.studies.run.setup import Setup
 from wearsim.units import in_engineers_unit
 
 DEEPEST = 0.1  # worn depth over the radius of the roller, up to which the surfaces are shallow
@@ -122,7 +122,7 @@ def _edge(error: SolverError, scenario: Scenario) -> tuple[str, str]:
 
 def _too_fine(error: SolverError, scenario: Scenario) -> tuple[str, str]:
     choice = scenario.contact
-    patch = widest_patch(scenario, greatest_load(scenario, scenario.load.build()))
+    patch = Setup(scenario).widest_patch(greatest_load(scenario))
     size = f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm"
     if patch.a > patch.b:
         what = (
@@ -154,7 +154,7 @@ def _skid(error: SolverError, scenario: Scenario) -> tuple[str, str]:
     creepage, friction = scenario.creepage, scenario.friction.coefficient
     load, carried = error.state["normal_force"], error.state["carried"]
     reason, remedies = "", []
-    start = greatest_load(scenario, scenario.load.build())
+    start = greatest_load(scenario)
     if scenario.cam is None and load < 0.99 * start:
         reason = f"; the load has fallen from {start:.4g} N"
     if any(scenario.per_roller(creepage.yaw)):

@@ -30,11 +30,10 @@ from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.loads import fresh_approach, with_feedback
 from wearsim.evolution.steppers.single_step import solve_loaded, solve_present
 from wearsim.evolution.strips import on_grid
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import ContactModelSpec, registry
+from wearsim.scenario import Scenario
 from wearsim.studies.fatigue.forecast import damage_after, places_across, rates_across
 from wearsim.studies.run.assemble import PARABOLA, prepared_model
-from wearsim.studies.run.draws import Draws
 from wearsim.types import FloatArray, Grid
 
 STRIPS = 61  # over the width in contact of one groove
@@ -59,8 +58,8 @@ class WearForecast:
 
     Parameters
     ----------
-    draws : Draws
-        The scenario, with the values of its random inputs.
+    scenario : Scenario
+        With the values of its random inputs.
     problem : WearProblem
         The problem of the run, on its strips.
 
@@ -82,8 +81,8 @@ class WearForecast:
         If the contacts of the unworn bodies have no solution on the strips of the run.
     """
 
-    def __init__(self, draws: Draws, problem: WearProblem) -> None:
-        self.draws, self._scout = draws, draws.scenario
+    def __init__(self, scenario: Scenario, problem: WearProblem) -> None:
+        self.scenario = self._scout = scenario
         choice = self._scout.contact
         seconds = math.nan
         if choice.spec.reference:
@@ -177,8 +176,7 @@ class WearForecast:
 
     def stable_steps(self, passes: float, part: float) -> float:
         """Return the number of explicit steps that each wear a part of q/(pi E*) at most."""
-        bodies = self.draws.scenario.cylinder.material, self.draws.scenario.roller.material
-        modulus = combine(*bodies).contact_modulus
+        modulus = self._scout.pair.contact_modulus
         load = float(self._fresh.contacts.line_load.max())
         rate = (self._rates[0]["cylinder"] + self._rates[0]["roller"]).max()
         return float(passes * rate / (part * load / (np.pi * modulus)))
@@ -256,7 +254,7 @@ class WearForecast:
         strips = int(min(STRIPS * (high - low) / (2.0 * _MARGIN * half), MOST_STRIPS))
         grid = grid or Grid.spanning(float(low), float(high), strips)
         problem = on_grid(self.problem, grid)
-        if scenario is not self.draws.scenario:
+        if scenario is not self.scenario:
             problem = replace(problem, model=prepared_model(scenario, grid))
         worn = np.maximum(depth - problem.nominal_gap + problem.nominal_least_gap[..., None], 0.0)
         rollers = np.zeros((1, problem.rollers, *worn.shape[2:]))
@@ -274,7 +272,7 @@ class WearForecast:
 
     def _rates_on(self, problem: WearProblem, state: WearState, depth: float) -> Rates:
         """Return rates per roller pass of the contacts on grooves of a depth, by station."""
-        start, stop = np.zeros(1), np.array([self.draws.scenario.total_time])
+        start, stop = np.zeros(1), np.array([self.scenario.total_time])
         here = problem.at_time(start, stop)
         force = here.mean_force(start, stop)
 

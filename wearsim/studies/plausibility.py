@@ -7,10 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.models.loads import FollowerLoad, gap_text
-from wearsim.plugins import Load
 from wearsim.scenario import RandomInput, Scenario
+from wearsim.scenario.tables.fatigue import FatigueChoice
 from wearsim.studies.cam.checks import cam_warnings, skids_of
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.roller_ends import (
@@ -19,8 +18,8 @@ from wearsim.studies.roller_ends import (
     edge_in_contact,
     strips_of_roller,
 )
-from wearsim.studies.run.groove import hardest_patch, widest_patch
 from wearsim.studies.run.inputs import load_file
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 
 # peak pressure over yield stress in shear, beyond which a surface never shakes down; with a
@@ -44,14 +43,14 @@ def range_90(item: RandomInput) -> list[tuple[float, float]]:
     return [(low, high)]
 
 
-def plausibility_warnings(scenario: Scenario) -> list[str]:
+def plausibility_warnings(setup: Setup) -> list[str]:
     """Return warnings of implausible pressures, creepages, friction, logs and contact widths.
 
     Also of an automatically chosen contact model, if its error may exceed the tolerance.
 
     Parameters
     ----------
-    scenario : Scenario
+    setup : Setup
         Of a run or of a single contact.
 
     Returns
@@ -59,21 +58,22 @@ def plausibility_warnings(scenario: Scenario) -> list[str]:
     list of str
         Each begins with a different name of what is implausible, and a colon.
     """
-    load = scenario.load.build()
+    scenario, force = setup.scenario, greatest_load(setup.scenario)
+    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
     return [
-        *_of_pressure(scenario, load),
-        *(fatigue_warnings(scenario, load) if scenario.fatigue is not None else ()),
-        *_of_slip(scenario),
-        *_of_width(scenario, load),
-        *_of_shape(scenario, load),
-        *_of_log(scenario, load),
+        *(_of_pressure(setup, force, friction) if force > 0.0 else ()),
+        *_of_slip(scenario, friction),
+        *_of_width(setup, force),
+        *(_of_shape(setup, force) if force > 0.0 else ()),
+        *_of_log(scenario),
         *_of_cam(scenario),
         *_of_model(scenario),
     ]
 
 
-def greatest_load(scenario: Scenario, load: Load) -> float:
+def greatest_load(scenario: Scenario) -> float:
     """Return the greatest load of the test, or of the start of a single contact [N]."""
+    load = scenario.load.build()
     if isinstance(load, FollowerLoad):
         return turn_of(scenario).normal_range[1]
     return load.extremes(0.0, scenario.total_time if scenario.has_length else 0.0)[1]
@@ -88,14 +88,10 @@ def _greatest(scenario: Scenario, key: str, value: float | tuple[float, ...]) ->
     return float(np.abs(value).max())
 
 
-def _of_pressure(scenario: Scenario, load: Load) -> Iterator[str]:
-    force = greatest_load(scenario, load)
-    if force <= 0.0:
-        return
-    patch, force = hardest_patch(scenario, force)
+def _of_pressure(setup: Setup, load: float, friction: float) -> Iterator[str]:
+    scenario, (patch, force) = setup.scenario, setup.hardest_patch(load)
     pressure = patch.peak_pressure
     text = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
-    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
     other = "cylinder" if scenario.cam is None else "cam"
     for name, body in (("roller", scenario.roller), (other, scenario.cylinder)):
         strength, hardness = body.material.yield_stress, body.material.hardness
@@ -109,32 +105,21 @@ def _of_pressure(scenario: Scenario, load: Load) -> Iterator[str]:
                 f"{name}.material: {text} exceeds {what} of {limit / 1e6:.4g} MPa;"
                 " the model is elastic"
             )
-    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
-    if pressure > ELASTIC_PART * modulus:
+    if pressure > ELASTIC_PART * scenario.pair.contact_modulus:
         file = load_file(scenario)
         remedy = f"is the unit of the load in {file[1]} right?" if file else "is the load right?"
         yield (
             f"load: {text} exceeds {ELASTIC_PART:.0%} of the contact modulus, more than hardened"
             f" steel bears; {remedy} A thousandth of it gives {pressure / 1e7:.4g} MPa"
         )
+    if scenario.fatigue is not None:
+        yield from _of_fatigue(scenario.fatigue, pressure, friction, text)
 
 
-def fatigue_warnings(scenario: Scenario, load: Load) -> Iterator[str]:
-    """Yield warnings of friction by which the surface yields first, and of unfit constants.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        With fatigue.
-    load : Load
-    """
-    choice, force = scenario.fatigue, greatest_load(scenario, load)
-    if choice is None or force <= 0.0:
-        return
-    patch, force = hardest_patch(scenario, force)
-    pressure = patch.peak_pressure
-    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
-    at = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
+def _of_fatigue(
+    choice: FatigueChoice, pressure: float, friction: float, text: str
+) -> Iterator[str]:
+    """Yield warnings of friction by which the surface yields first, and of unfit constants."""
     if friction > SURFACE_YIELDS:
         yield (
             f"fatigue, friction: with a coefficient of {friction:.3g}, above {SURFACE_YIELDS:g}, a"
@@ -144,12 +129,12 @@ def fatigue_warnings(scenario: Scenario, load: Load) -> Iterator[str]:
         valid = law.valid_pressure
         if valid is not None and not valid[0] <= pressure <= valid[1]:
             yield (
-                f"fatigue.{body_name}: {at} is outside the {valid[0] / 1e6:.4g} to"
+                f"fatigue.{body_name}: {text} is outside the {valid[0] / 1e6:.4g} to"
                 f" {valid[1] / 1e6:.4g} MPa for which the constants hold ({law.source})"
             )
 
 
-def _of_slip(scenario: Scenario) -> Iterator[str]:
+def _of_slip(scenario: Scenario, friction: float) -> Iterator[str]:
     creepage = scenario.creepage
     for key in ("longitudinal", "yaw"):
         value = getattr(creepage, key)
@@ -159,20 +144,19 @@ def _of_slip(scenario: Scenario) -> Iterator[str]:
                 f"creepage.{key}: a creepage of {size:.3g} exceeds {GREATEST_CREEPAGE:.0%}; it is"
                 " assumed to be small, and 0.1 % is written 0.001"
             )
-    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
     if friction > GREATEST_FRICTION:
         yield f"friction.coefficient: {friction:.3g} exceeds {GREATEST_FRICTION:g}"
 
 
-def _of_width(scenario: Scenario, load: Load) -> Iterator[str]:
-    force, radius = greatest_load(scenario, load), scenario.roller.radius
+def _of_width(setup: Setup, force: float) -> Iterator[str]:
+    scenario = setup.scenario
     if scenario.roller.width is not None:
-        yield from _of_edge(scenario, force)
+        yield from _of_edge(setup, force)
     if scenario.contact.width or scenario.roller.width or force <= 0.0:
         return
-    half_width = widest_patch(scenario, force).b
+    half_width = setup.widest_patch(force).b
     crown = scenario.roller.crown_radius
-    if half_width > WIDEST * radius:
+    if half_width > WIDEST * scenario.roller.radius:
         form = "" if math.isnan(crown) else f" of {crown * 1e3:.4g} mm"
         key = "axial_profile" if math.isnan(crown) else "crown_radius"
         yield (
@@ -181,12 +165,9 @@ def _of_width(scenario: Scenario, load: Load) -> Iterator[str]:
         )
 
 
-def _of_shape(scenario: Scenario, load: Load) -> Iterator[str]:
-    force = greatest_load(scenario, load)
-    if scenario.contact.model != "slender" or force <= 0.0:
-        return
-    patch = widest_patch(scenario, force)
-    if patch.a > patch.b:
+def _of_shape(setup: Setup, force: float) -> Iterator[str]:
+    patch = setup.widest_patch(force)
+    if setup.scenario.contact.model == "slender" and patch.a > patch.b:
         yield (
             f"contact.model: the unworn contact, {2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm along"
             " and across rolling, is longer than wide, and 'slender' assumes the opposite;"
@@ -194,12 +175,13 @@ def _of_shape(scenario: Scenario, load: Load) -> Iterator[str]:
         )
 
 
-def _of_edge(scenario: Scenario, force: float) -> Iterator[str]:
+def _of_edge(setup: Setup, force: float) -> Iterator[str]:
+    scenario = setup.scenario
     roller, choice = scenario.roller, scenario.contact
     width, edge = roller.width or 0.0, edge_in_contact(scenario, force)
     strips = choice.strips or strips_of_roller(scenario, 0, force)
     spacing = (choice.width / strips) if choice.width else width / (strips - 2 * STRIPS_BEYOND)
-    if edge >= LEAST_PER_EDGE * spacing or widest_patch(scenario, force).b < 0.5 * width:
+    if edge >= LEAST_PER_EDGE * spacing or setup.widest_patch(force).b < 0.5 * width:
         return
     key = "edge_radius" if roller.edge_radius else "chamfer" if roller.chamfer else "width"
     shape = f"the edge is in contact over about {edge * 1e3:.2g} mm" if edge else "a sharp edge"
@@ -216,8 +198,8 @@ def _of_cam(scenario: Scenario) -> list[str]:
     return cam_warnings(turn, skids_of(turn))
 
 
-def _of_log(scenario: Scenario, load: Load) -> Iterator[str]:
-    gaps: FloatArray = load.gaps
+def _of_log(scenario: Scenario) -> Iterator[str]:
+    gaps: FloatArray = scenario.load.build().gaps
     file = load_file(scenario)
     if file and len(gaps):
         how = getattr(scenario.load.options, "gaps", "interpolate")

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario
 from wearsim.types import Grid
 
@@ -60,7 +59,7 @@ def edge_in_contact(scenario: Scenario, load: float) -> float:
     is about twelve times q/(pi E*).
     """
     roller = scenario.roller
-    modulus = combine(scenario.cylinder.material, roller.material).contact_modulus
+    modulus = scenario.pair.contact_modulus
     approach = 12.0 * load / (roller.width or math.inf) / (math.pi * modulus)
     if roller.edge_radius:
         return min(roller.edge_radius, math.sqrt(2.0 * roller.edge_radius * approach))

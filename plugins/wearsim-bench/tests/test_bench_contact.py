@@ -19,7 +19,7 @@ from wearsim.models.contact import slender
 from wearsim.models.tangential.strip_theory import TangentialOptions
 from wearsim.plugins import ContactModelSpec, manager, registry
 from wearsim.studies.run.draws import draw
-from wearsim.studies.run.grid import fresh_patch, strips_of_run
+from wearsim.studies.run.grid import strips_of_run
 from wearsim_bench.contact.accuracy import choose_model, errors_of, random_case_errors, solved
 from wearsim_bench.contact.cases import elliptic_cases, worn_cases
 from wearsim_bench.contact.methods import (
@@ -200,7 +200,8 @@ def test_warm_start_with_another_result_is_a_failure(monkeypatch):
 
 def test_defaults_are_the_strips_of_a_run_and_a_contact(topic):
     scenario = load_scenario(SCENARIOS / "rig-450min.toml")
-    of_run = fresh_patch(scenario, 300.0).b / strips_of_run(draw(scenario)).spacing
+    setup = draw(scenario)
+    of_run = setup.fresh_patch(300.0).b / strips_of_run(setup).spacing
     for group in GROUPS[:2]:
         default = [item for item in topic.of(group) if item.default]
         assert {item.method for item in default} == {"slender, strip"}

@@ -9,6 +9,7 @@ from wearsim.scenario import parse_scenario
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.plausibility import plausibility_warnings
+from wearsim.studies.run.setup import Setup
 
 AUTO = {"contact.model": "auto"}
 ROUND = {"roller.crown_radius": "0.2 mm"}  # b/a of 0.05
@@ -70,10 +71,10 @@ def test_exact_theory_above_the_tolerance_warns(changes, own):
     once = with_chosen_model(scenario, test=False)
     assert once.contact.options.mx == 200
     assert "exact theory on its finest elements" in once.notes[-1]
-    (warning,) = plausibility_warnings(once)
+    (warning,) = plausibility_warnings(Setup(once))
     assert warning.startswith(f"contact model: the error of P_l(y) by 'halfspace, mx 200' {own}")
     again = parse_scenario(once.text, once.file, once.files.__getitem__)
-    assert plausibility_warnings(again) == [warning]
+    assert plausibility_warnings(Setup(again)) == [warning]
 
 
 def test_estimate_holds_during_a_run():

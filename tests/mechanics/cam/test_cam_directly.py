@@ -11,7 +11,15 @@ import pytest
 from cams import MM, random_follower, rise_and_return, segment
 from numpy.polynomial import chebyshev
 
-from wearsim.mechanics.cam import Follower, Motion, Panel, Stations, greatest, integral_error
+from wearsim.mechanics.cam import (
+    Follower,
+    Motion,
+    Panel,
+    Stations,
+    greatest,
+    integral_error,
+    tangent_cam,
+)
 from wearsim.mechanics.cam.outline import angles_by_chord, angles_by_number
 from wearsim.mechanics.cam.stations import lobatto
 
@@ -169,3 +177,13 @@ def test_panels_end_at_the_breaks_of_a_motion_law() -> None:
     motion = Motion((replace(part, breaks=(1.0, 2.5)),))
     found = [[panel.start, panel.stop] for panel in motion.panels]
     assert np.array(found) == pytest.approx(np.array([[0.0, 1.0], [1.0, 2.5], [2.5, math.tau]]))
+
+
+@pytest.mark.parametrize(("base", "nose", "distance"), [(20.0, 5.0, 10.0), (5.0, 20.0, 15.0)])
+def test_nose_without_a_common_tangent_is_refused(
+    base: float, nose: float, distance: float
+) -> None:
+    with pytest.raises(ValueError, match="the nose is within the base circle"):
+        tangent_cam(base, nose, distance)
+    with pytest.raises(ValueError, match="the nose is within the base circle"):
+        tangent_cam(distance + nose, nose, distance)

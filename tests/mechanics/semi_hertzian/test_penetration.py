@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from wearsim.mechanics.semi_hertzian.penetration import (
+    contact_levels,
     contact_places,
     displacement_at,
     first_contacts,
@@ -63,3 +64,25 @@ def test_displacement_is_linear_between_the_strips() -> None:
         assert found == pytest.approx(at(strip), rel=1e-12)
     found = displacement_at(2.3, depth, spacing, curvature, table)
     assert found == pytest.approx(0.7 * at(2) + 0.3 * at(3), rel=1e-12)
+
+
+@pytest.mark.parametrize("local", [False, True])
+def test_level_is_the_lowest_of_all_first_contacts_beyond_their_ridges(local: bool) -> None:
+    gap = np.array([4.0, 1.0, 1.0, 3.0, 2.5, 6.0, 2.0, 4.8, 7.0])
+    reach, rigid = np.linspace(0.3, 0.7, 9), 5.0
+    places, (level, slope) = np.zeros((9, 2), np.int64), np.zeros((2, 9))
+    count = first_contacts(gap, places)
+    contact_levels(gap, places, count, reach, local, rigid, level, slope)
+    for i in range(9):
+        known, change = rigid, 1.0
+        for first, last in places[:count]:
+            bottom = gap[first]
+            # the ridge up to the strip, from the nearer side of the minimum
+            between = gap[last:i] if i >= last else gap[i + 1 : first + 1]
+            if first < i < last or bottom >= rigid or max(between, default=0.0) >= rigid:
+                continue
+            here = reach[i] if local else 0.5 * (reach[first] + reach[last])
+            low, ridge = bottom + here * (rigid - bottom), max(between, default=bottom)
+            if max(low, ridge) < known:
+                known, change = max(low, ridge), here if low >= ridge else 0.0
+        assert (level[i], slope[i]) == pytest.approx((known, change)), i

@@ -183,7 +183,7 @@ def test_growth_of_the_loads_is_a_logarithm() -> None:
         _fill_growth(0, 1, 3, loads, growth, size)
         known = np.zeros(size)
         known[2 * REACH + 1 : 2 * REACH + 4] = np.log([part, 0.99, 1.0])
-        assert growth == pytest.approx(known, abs=1e-10)
+        assert growth == pytest.approx(known, abs=1e-12)
 
 
 def test_number_of_failed_sets_of_contacts_is_returned() -> None:

@@ -9,13 +9,22 @@ from scipy.optimize import brentq
 from wearsim.mechanics.numerics.lu import solve_factored
 from wearsim.mechanics.slender.body_wear import add_depths
 from wearsim.mechanics.slender.half_length import fill_log_scales, find_factors, new_half_lengths
-from wearsim.mechanics.slender.influence import curvature_table, influence_table, no_table
+from wearsim.mechanics.slender.influence import (
+    curvature_table,
+    influence_table,
+    no_table,
+    read_value,
+)
+from wearsim.mechanics.slender.newton import CAUTIOUS, GAP_TOLERANCE, add_penetrated
 from wearsim.mechanics.slender.newton_step import (
     NewtonState,
     add_approach,
     add_displacement,
     add_missing_load,
+    complete_surface,
+    correct_residual,
     fill_jacobian,
+    fill_separation,
     new_newton_state,
     number_strips,
     predict_surface,
@@ -186,3 +195,111 @@ def test_wear_of_shared_bodies_opens_all_their_gaps() -> None:
             for contact, side in zip(*np.nonzero(bodies == body), strict=True):
                 expected += shared[contact, side] * line_load[contact]
         np.testing.assert_allclose(surface[k], expected, rtol=1e-12)
+
+
+def full_displacement(contact: Contact, line_load: np.ndarray) -> np.ndarray:
+    """Return the displacement of all strips, one loaded strip after the other [m]."""
+    total = np.zeros(STRIPS)
+    for j in np.flatnonzero(line_load[0]):
+        for i in range(STRIPS):
+            value = read_value(contact.table, contact.lengths.log_ratio[0, j], abs(i - j))
+            total[i] += UNIT * line_load[0, j] * value
+    return total
+
+
+@pytest.mark.parametrize("reach", [(5, 11), (2, 11), (5, 14), (0, 12)])
+def test_strips_that_may_be_penetrated_get_their_whole_surface(reach: tuple[int, int]) -> None:
+    contact, line_load, state = Contact("local"), np.zeros((1, STRIPS)), new_newton_state(1, STRIPS)
+    line_load[0, [6, 8]] = 3e4, 2e4
+    number_strips(0, line_load, 1, state)
+    find_factors(0, line_load, False, contact.lengths)
+    assert (state.left[0], state.right[0]) == (5, 10)
+    places = np.arange(STRIPS)
+    gap = np.where((places >= reach[0]) & (places < reach[1]), 1e-7 * places, 1e-3)
+    gap[4] = gap[11] = 1e-3  # deep strips between those that may be penetrated
+    followed = (places >= 5) & (places < 10)
+    whole = full_displacement(contact, line_load)
+    state.surface[0] = gap + np.where(followed, whole, 0.0)
+    found = complete_surface(0, 1e-4, contact.table, UNIT, line_load, contact.lengths, state)
+    near = np.flatnonzero((gap < 1e-4) & ~followed)
+    first, end = min([5, *near]), max([9, *near]) + 1
+    assert found == (first, end)
+    known = gap + np.where((places >= first) & (places < end), whole, 0.0)
+    np.testing.assert_allclose(state.surface[0], known, rtol=1e-12)
+
+
+def test_residual_is_corrected_by_the_own_load_of_each_strip() -> None:
+    contact, line_load, state = Contact("local"), loaded(), new_newton_state(1, STRIPS)
+    number_strips(0, line_load, 1, state)
+    find_factors(0, line_load, False, contact.lengths)
+    size, inside = int(state.size[0]), np.flatnonzero(line_load[0])
+    state.step[0, :size] = line_load[0, inside] * np.linspace(-0.2, 0.3, size)
+    state.step[0, 2] = 5.0 * line_load[0, inside[2]]  # far too great to be corrected
+    state.diagonal[0, :size], state.missing[0, :size] = 2e-12, 1e-6
+    correct_residual(0, contact.table, UNIT, line_load, contact.lengths, state)
+    for row, j in enumerate(inside):
+        old, step, tau = line_load[0, j], state.step[0, row], contact.lengths.log_ratio[0, j]
+        known = 1e-6
+        if row != 2:
+            after = (old + step) * read_value(contact.table, tau + 0.5 * np.log1p(step / old), 0)
+            known -= UNIT * (after - old * read_value(contact.table, tau, 0)) - 2e-12 * step
+        assert state.missing[0, row] == pytest.approx(known, rel=1e-9)
+
+
+def test_cautious_steps_reduce_loads_before_strips_leave() -> None:
+    state, line_load = new_newton_state(1, STRIPS), np.zeros((1, STRIPS))
+    line_load[0, 3:8] = 10.0, 1e-6, 8.0, 6.0, 4.0
+    before = line_load.copy()
+    number_strips(0, line_load, 1, state)
+    state.fresh[0] = False
+    state.step[0, :5] = 0.5, -1.0, -8.0, -7.0, 0.0
+    change, left = update_loads(line_load, state, True)
+    # by a tenth at a time; a load far below the peak is removed
+    assert line_load[0, 3:8].tolist() == pytest.approx([10.5, 0.0, 0.8, 0.6, 4.0])
+    np.testing.assert_allclose(state.change, line_load - before)
+    assert (change, left, state.fresh[0]) == (pytest.approx(0.72), True, True)
+    state.fresh[0] = False
+    number_strips(0, line_load, 1, state)
+    state.step[0, :4] = 0.1
+    assert update_loads(line_load, state, False) == (pytest.approx(0.1 / 10.5), False)
+    assert not state.fresh[0]
+    state.step[0, 0] = np.nan
+    assert update_loads(line_load, state, False)[0] == np.inf
+
+
+def test_separation_is_that_of_the_deformed_surfaces() -> None:
+    state, line_load = new_newton_state(1, STRIPS), np.zeros((1, STRIPS))
+    line_load[0, 6:9] = 1.0
+    number_strips(0, line_load, 2, state)
+    gap = 1e-6 * (np.arange(STRIPS)[None] - 7.0) ** 2
+    state.surface[0], separation = gap[0] + 3e-6, np.full((1, STRIPS), -1.0)
+    state.surface[0, 11:] = state.surface[0, :4] = np.nan  # not followed
+    fill_separation(0, gap, 4.5e-6, line_load, state, separation)
+    known = np.maximum(gap[0] + 3e-6 - 4.5e-6, 0.0)
+    known[6:9] = 0.0
+    np.testing.assert_allclose(separation[0], known, atol=1e-20)
+
+
+def test_penetrated_strips_start_with_a_tenth_of_their_spring() -> None:
+    state, approach = new_newton_state(1, STRIPS), np.array([5e-6])
+    for iteration, chosen in ((1, [2, 3, 9]), (CAUTIOUS + 1, [9])):
+        line_load = np.zeros((1, STRIPS))
+        line_load[0, 5:8] = 1e4
+        number_strips(0, line_load, STRIPS, state)
+        state.surface[0] = 6e-6
+        state.surface[0, [2, 3, 9, 5]] = 4e-6, 4.5e-6, 3e-6, 1e-6
+        state.fresh[0] = False
+        assert add_penetrated(0, 1, 12, iteration, UNIT, state, approach, line_load)
+        known = np.zeros(STRIPS)
+        known[5:8] = 1e4
+        known[chosen] = 0.1 * (5e-6 - state.surface[0, chosen]) / UNIT
+        np.testing.assert_allclose(line_load[0], known)
+        assert state.fresh[0]
+    state.surface[0, [2, 3, 9]] = 5e-6 * (1.0 - 0.5 * GAP_TOLERANCE)
+    assert not add_penetrated(0, 1, 12, 1, UNIT, state, approach, line_load)
+    state.surface[0, 13] = 0.0  # its surface is not complete
+    assert not add_penetrated(0, 1, 12, 1, UNIT, state, approach, line_load)
+    # from the fortieth iteration on the tolerance is ten times as great
+    state.surface[0, 2] = 5e-6 * (1.0 - 5.0 * GAP_TOLERANCE)
+    assert add_penetrated(0, 1, 12, 39, UNIT, state, approach, line_load.copy())
+    assert not add_penetrated(0, 1, 12, 40, UNIT, state, approach, line_load)

@@ -164,3 +164,16 @@ def test_strip_without_creepage_adheres_and_without_friction_slides():
     assert strip_force(A, Q, 0.0, STEEPNESS, 1e-3, 1e-3, 1.0, *MODULI) == (0.0, 0.0, 0.0, 0.0)
     slight = strip_force(A, Q, 1e-9, STEEPNESS, 1e-3, 0.0, 0.0, *MODULI)
     assert slight == pytest.approx((-1e-9 * Q, 0.0, 0.0, 0.0), rel=1e-9)
+
+
+@pytest.mark.parametrize("psi", [0.0, 0.4, -0.7])
+@pytest.mark.parametrize(("d_x", "d_y"), [(0.3, -0.2), (-0.1, 0.5), (0.0, 0.4)])
+def test_traction_at_the_end_of_adhesion_is_on_the_bound(psi: float, d_x: float, d_y: float):
+    motion = scaled(d_x, d_y, psi)
+    state = carter.strip_state(A, MU * STEEPNESS, *motion, *MODULI)
+    assert (d_x / state.t) ** 2 + (d_y / state.t + psi) ** 2 == pytest.approx(1.0, rel=1e-12)
+    assert (state.e_x, state.e_y) == pytest.approx((d_x / state.t, d_y / state.t + psi))
+    size = np.hypot(*motion[:2])
+    assert (state.u_x, state.u_y) == pytest.approx((motion[0] / size, motion[1] / size))
+    assert state.psi == pytest.approx(psi)
+    assert (state.turned, state.scrubbed) == (0.0, 0.0)

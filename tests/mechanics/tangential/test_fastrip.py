@@ -209,6 +209,7 @@ def test_fields_integrate_to_the_sums(creepage):
 
 def test_strips_without_adhesion_by_spin_are_solved_by_fastsim():
     ellipse = Ellipse(1e-3, 5e-4, 20.0)
+    found = ellipse.rows()  # first, so that no memory holds what is expected
     share = 1.0 / ellipse.flexibility
     expected = march(
         ellipse.half_length,
@@ -219,7 +220,7 @@ def test_strips_without_adhesion_by_spin_are_solved_by_fastsim():
         20.0 * share,
         50,
     )
-    assert ellipse.rows() == pytest.approx(expected, rel=1e-12)
+    assert found == pytest.approx(expected, rel=1e-12)
     assert not ellipse.fields().any()
 
 

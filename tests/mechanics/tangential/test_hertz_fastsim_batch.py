@@ -24,6 +24,7 @@ from wearsim.mechanics.hertz.patches import (
 from wearsim.mechanics.tangential.hertz_fastsim_batch import (
     ALWAYS,
     EXACT,
+    GIVEN,
     LINE_LIMIT,
     NEVER,
     NO_LIMIT,
@@ -283,3 +284,6 @@ def test_single_flexibility_is_that_of_the_creepages_and_the_spin():
     length = one_flexibility(*three, 2e-5, 0.0, 0.3 * math.sqrt(a * b))
     # without slip the traction grows from the leading edge, by the creepage over the flexibility
     assert found.force_x[0] == pytest.approx(-2e-5 / length * 8.0 / 3.0 * a * a * b, rel=2e-2)
+    assert found.adhesion_fraction[0] == pytest.approx(1.0, rel=1e-2)
+    failed, _, patches = solve(theory(kalker=GIVEN), inputs, row, GAPS[1:2])
+    assert (failed, patches.status[0]) == (0, NO_LIMIT)  # coefficients of zero

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from wearsim.mechanics.tangential.strip_interaction import (
+    _add_group,
     coupling_length,
     effective_moduli,
     equivalent_ratio,
@@ -75,3 +76,18 @@ def test_induced_slip_conserves_the_total_power(forces, length):
     assert abs(passed.sum()) <= 1e-12 * np.abs(passed).sum() + 1e-30
     turned = induced(force_x[::-1].copy(), force_y[::-1].copy(), 1.0, length)
     np.testing.assert_allclose(turned[:, ::-1], -found, rtol=1e-9, atol=1e-13 * np.abs(found).max())
+
+
+def test_group_of_exponentials_is_a_sum_over_pairs():
+    rng = np.random.default_rng(1)
+    x, y = rng.standard_normal((2, 6))
+    found = np.zeros((2, 6))
+    _add_group(x, y, 1, 4, 0.3, 2.0, *found)
+    decays = 0.3 ** (0.25 ** np.arange(4))
+    weights = 2.0 / 16.0 ** np.arange(4)
+    known = np.zeros((2, 6))
+    for i in range(1, 5):
+        for j in range(1, 5):
+            total = weights @ decays ** abs(i - j)
+            known[:, i] += np.sign(j - i) * total * np.array([y[j], x[j]])
+    assert found == pytest.approx(known, rel=1e-12)

@@ -113,6 +113,8 @@ def test_groove_has_both_flanks_as_closed_curves() -> None:
     assert min(depth.max() for depth in depths) > 0.0
     # where the roller touches one flank, the other one does not wear
     assert all((depth == 0.0).any() for depth in depths)
+    # in the animation both outlines of a flank have the same points
+    assert result.view.animation().frame(0).marks
 
 
 @pytest.mark.parametrize("spline", [False, True])

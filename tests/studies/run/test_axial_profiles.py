@@ -16,7 +16,7 @@ from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.tables.axial import described_form, pair_of
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
-from wearsim.studies.run.groove import fresh_patch
+from wearsim.studies.run.setup import Setup
 
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
 LOAD, LENGTH = 5000.0, 10e-3
@@ -215,7 +215,7 @@ def test_estimated_patch_is_near_the_contact():
     form = {"k1": 1.5, "k2": 0.6, "drop": "40 um"}
     for force in (300.0, 1000.0, 5000.0):
         scenario = line(**form).changed({"load.normal_force": f"{force} N"})
-        patch, solution = fresh_patch(scenario, force), wearsim.solve_contact(scenario)
+        patch, solution = Setup(scenario).fresh_patch(force), wearsim.solve_contact(scenario)
         width = np.ptp(solution.y[solution.line_load > 0.0])
         assert 2.0 * patch.b == pytest.approx(width, rel=0.15)
         assert patch.peak_pressure == pytest.approx(solution.peak_pressure, rel=0.1)

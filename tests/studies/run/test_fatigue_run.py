@@ -16,6 +16,7 @@ from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.dry_run import dry_run
 from wearsim.studies.dry_run_table import plan
 from wearsim.studies.plausibility import plausibility_warnings
+from wearsim.studies.run.setup import Setup
 
 FATIGUE: dict[str, object] = {"fatigue": {"slope": 1.125, "cylinder": PITTING, "roller": PITTING}}
 COARSE: dict[str, object] = {"evolution.tolerance": 0.01, "evolution.strip_error": False}
@@ -180,8 +181,9 @@ def test_stress_below_a_line_contact():
     ],
 )
 def test_warnings_of_fatigue(changes, warning):
-    assert not plausibility_warnings(short(**FATIGUE))
-    assert any(warning in text for text in plausibility_warnings(short(**FATIGUE, **changes)))
+    assert not plausibility_warnings(Setup(short(**FATIGUE)))
+    warned = plausibility_warnings(Setup(short(**FATIGUE, **changes)))
+    assert any(warning in text for text in warned)
 
 
 def test_mistakes_of_the_table_name_key_and_remedy():

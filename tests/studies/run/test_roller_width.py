@@ -16,6 +16,7 @@ from wearsim.studies.dissipation.monte_carlo import dissipation
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run import run as studies
+from wearsim.studies.run.setup import Setup
 
 FLAT = {"roller__crown_radius": "1e9 mm", "roller__width": "10 mm"}
 WIDTH, LOAD, RADIUS = 10e-3, 300.0, 1.0 / (1.0 / 0.02 + 1.0 / 0.025)
@@ -142,9 +143,9 @@ def test_models_that_fit_a_parabola_are_refused(model: str) -> None:
 
 
 def test_unresolved_edge_gives_a_warning() -> None:
-    warned = [*plausibility_warnings(short(**FLAT))]
+    warned = [*plausibility_warnings(Setup(short(**FLAT)))]
     assert any("roller.width: a sharp edge" in text for text in warned)
-    warned = [*plausibility_warnings(short(**FLAT, roller__edge_radius="0.5 mm"))]
+    warned = [*plausibility_warnings(Setup(short(**FLAT, roller__edge_radius="0.5 mm")))]
     assert any("edge_radius: the edge is in contact over about 0.032 mm" in t for t in warned)
     for quiet in (
         {"roller__edge_radius": "4.9 mm", "contact__strips": 401},
@@ -153,7 +154,7 @@ def test_unresolved_edge_gives_a_warning() -> None:
         settings = {**FLAT, **quiet}
         if "roller__width" in quiet:
             settings.pop("roller__crown_radius")
-        assert not [t for t in plausibility_warnings(short(**settings)) if "roller." in t]
+        assert not [t for t in plausibility_warnings(Setup(short(**settings))) if "roller." in t]
 
 
 @pytest.mark.parametrize(

@@ -218,7 +218,7 @@ def test_fewest_specimens_of_several_survivals_have_the_mean_confidence() -> Non
         ]
         assert count == next(n for n, c in enumerate(chances, failures + 1) if c <= 0.1)
     assert specimens(0.5, np.array([0.5])) == 1  # one of two survives, exactly the confidence
-    assert specimens(0.75, np.array([0.5])) == 2
+    assert [specimens(c, np.array([0.5])) for c in (0.75, 0.875)] == [2, 3]
 
 
 def test_curve_of_a_known_factor_is_its_distribution() -> None:
@@ -232,6 +232,7 @@ def test_curve_of_a_known_factor_is_its_distribution() -> None:
         assert drawn.failed(np.full(1, log))[0] == pytest.approx(known, abs=1e-4)
         assert drawn.log_quantile(known)[0] == pytest.approx(log, abs=1e-3)
     assert np.isnan(drawn.failed(np.full(1, 1.2))).all()
+    assert np.isfinite(drawn.failed(np.log(np.full(1, 3.0)))).all()
     assert np.isnan(drawn.log_quantile(0.999)).all()
     never = drawn_lives(FactorMixture(np.array([math.inf]), SCORE, exact=True), None)
     assert never.failed(np.zeros(1))[0] == pytest.approx(0.0, abs=1e-9)

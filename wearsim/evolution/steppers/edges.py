@@ -93,10 +93,9 @@ def unresolved(state: WearState) -> BoolArray:
 def most(state: WearState) -> IntArray:
     """Return the greatest order of steps of each test, shape (realisations,)."""
     assert state.order is not None
-    greatest = np.full_like(state.order, MAX_ORDER)
-    if state.separation is not None:
-        greatest[~unresolved(state)] = EDGE_ORDER
-    return greatest
+    if state.separation is None:
+        return np.full(state.order.shape, MAX_ORDER)
+    return np.where(unresolved(state), MAX_ORDER, EDGE_ORDER)
 
 
 def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:

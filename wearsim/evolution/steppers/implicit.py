@@ -37,7 +37,7 @@ from wearsim.evolution.steppers.single_step import (
 )
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, first_differences, next_steps
-from wearsim.mechanics.numerics.step_errors import COVER, KEEP, SHARE, assess_step
+from wearsim.mechanics.numerics.step_errors import COVER, KEEP, OF_VOLUME, SHARE, assess_step
 from wearsim.types import FloatArray, IntArray
 
 DOUBLED_SHARE = 0.9  # part of the tolerance that a step may add to the profiles, by step doubling
@@ -218,12 +218,15 @@ class ImplicitStepper(StepDoublingStepper):
         cover : sequence of float
             Safety factors that the errors of volume and profile of the state contain.
         """
-        volumes, fixed = volumes_of(problem, state.stacked), state.irreducible
+        (low, high), fixed = ADDED_UP, state.irreducible
+        # `assess_step` makes the error of the profile at least this part of that of the volume
+        if state.profile_error.max() < OF_VOLUME[1] * low * self.tolerance:
+            return np.ones(len(state.passes))
+        volumes = volumes_of(problem, state.stacked)
         grown, worn = state.passes / stop, np.where(volumes > 0.0, volumes, np.inf)
         of_volume = (state.volume_error - fixed[1]) / cover[0] / worn * grown**VOLUME_EXPONENT
         of_profile = (state.profile_error - fixed[2]) / cover[1] * grown**DEPTH_EXPONENT
         worst = np.maximum(of_volume, np.where(volumes > 0.0, of_profile, 0.0))
-        low, high = ADDED_UP
         left: FloatArray = (high - worst / self.tolerance) / (high - low)
         return np.minimum(np.maximum(left, LEAST_AIM), 1.0)
 

@@ -105,14 +105,16 @@ class HertzFastsim(HertzModel):
     def __init__(
         self, options: HertzFastsimOptions, grid: Grid, materials: tuple[Material, Material]
     ) -> None:
-        given = options.kalker_coefficients
+        coefficients = options.kalker_coefficients
         theory = FastsimTheory(
             bound=options.bound,
             mx=options.mx,
             kalker=options.kalker,
             coefficients=None
-            if given is None
-            else CreepageCoefficients(given.c11, given.c22, given.c23, math.nan),
+            if coefficients is None
+            else CreepageCoefficients(
+                coefficients.c11, coefficients.c22, coefficients.c23, math.nan
+            ),
             flexibility=options.flexibility,
         )
         super().__init__(theory, grid, materials, options.patch)
@@ -257,10 +259,10 @@ class HertzFastsim(HertzModel):
         )
 
     def _check_shapes(self, batch: ContactBatch) -> None:
-        strips, given = self._grid.strips, batch.friction.shape[1:]
-        if given not in {(), (strips,), (self.theory.mx, strips)}:
+        strips, shape = self._grid.strips, batch.friction.shape[1:]
+        if shape not in {(), (strips,), (self.theory.mx, strips)}:
             raise ValueError(
-                f"friction has the shape {given} per contact, expected (), (strips,) = "
+                f"friction has the shape {shape} per contact, expected (), (strips,) = "
                 f"({strips},) or (mx, strips) = ({self.theory.mx}, {strips}); take it at"
                 " `friction_points`"
             )

@@ -1,4 +1,4 @@
-"""Normal problems of slender contacts, those that wear no common body apart."""
+"""Normal problems of slender contacts, coupled where contacts wear common bodies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray]
 
 @lru_cache(maxsize=64)
 def _coupled_contacts(members: bytes, contacts: int) -> list[tuple[IntArray, IntArray | None]]:
-    """Return the contacts that shared bodies couple, those with equal bodies in one array.
+    """Return the systems of contacts that shared bodies couple, equal systems in one array.
 
     Parameters
     ----------
@@ -31,8 +31,8 @@ def _coupled_contacts(members: bytes, contacts: int) -> list[tuple[IntArray, Int
     Returns
     -------
     list of (numbers, bodies)
-        Numbers of the contacts, shape (systems, contacts of each), and the shared bodies of those
-        of one system, counted from 0; None for a contact that shares none.
+        Numbers of the contacts, shape (systems, contacts of each), and the shared bodies of the
+        contacts of one system, counted from 0; None for a contact that shares none.
     """
     bodies, label = np.frombuffer(members, np.int64).reshape(contacts, 2), np.arange(contacts)
     touching = [(bodies == body).any(axis=1) for body in range(bodies.max() + 1)]
@@ -44,13 +44,13 @@ def _coupled_contacts(members: bytes, contacts: int) -> list[tuple[IntArray, Int
             break
     systems: dict[tuple[int, bytes], tuple[list[IntArray], IntArray | None]] = {}
     for number in np.unique(label):
-        own = np.flatnonzero(label == number)
-        part = bodies[own]
+        coupled = np.flatnonzero(label == number)
+        part = bodies[coupled]
         shared = part != NO_BODY
         part[shared] = np.unique(part[shared], return_inverse=True)[1]
-        some = part if shared.any() else None
-        systems.setdefault((len(own), part.tobytes()), ([], some))[0].append(own)
-    return [(np.stack(numbers), some) for numbers, some in systems.values()]
+        shared_bodies = part if shared.any() else None
+        systems.setdefault((len(coupled), part.tobytes()), ([], shared_bodies))[0].append(coupled)
+    return [(np.stack(numbers), shared_bodies) for numbers, shared_bodies in systems.values()]
 
 
 class NormalContacts(NamedTuple):
@@ -118,7 +118,7 @@ class NormalContacts(NamedTuple):
     def solve(self, wear: SharedWear | FloatArray | None, constants: Constants) -> int:
         """Solve all sets in place, and return the number of contacts that fail, see `failed`.
 
-        Contacts that wear no common body are solved apart.
+        Contacts that wear no common body are solved separately.
 
         Parameters
         ----------
@@ -127,30 +127,32 @@ class NormalContacts(NamedTuple):
         constants : Constants
         """
         if not isinstance(wear, SharedWear):
-            own = np.zeros(self.gap.shape) if wear is None else wear
-            return self._solve(own.reshape(self.gap.shape), None, None, constants)
+            compliance = np.zeros(self.gap.shape) if wear is None else wear
+            return self._solve(compliance.reshape(self.gap.shape), None, None, constants)
         failed, (sets, contacts) = 0, self.gap.shape[:2]
-        for numbers, own, members, shared in wear.groups:
+        for numbers, compliance, members, shared in wear.groups:
             for coupled, bodies in _coupled_contacts(members.tobytes(), contacts):
                 chosen, size = coupled.ravel(), coupled.shape[1]
                 whole = len(numbers) == sets and np.array_equal(chosen, np.arange(contacts))
                 places = numbers[:, None], chosen
                 taken = self if whole else NormalContacts._make(array[places] for array in self)
-                apart = NormalContacts._make(a.reshape(-1, size, *a.shape[2:]) for a in taken)
-                softness = own if whole else own[:, chosen]
+                systems = NormalContacts._make(a.reshape(-1, size, *a.shape[2:]) for a in taken)
+                softness = compliance if whole else compliance[:, chosen]
                 worn = None
                 if bodies is not None:
                     worn = (shared if whole else shared[:, chosen]).reshape(
                         -1, size, *shared.shape[2:]
                     )
-                failed += apart._solve(softness.reshape(apart.gap.shape), bodies, worn, constants)
+                failed += systems._solve(
+                    softness.reshape(systems.gap.shape), bodies, worn, constants
+                )
                 for array, solved in () if whole else zip(self, taken, strict=True):
                     array[places] = solved
         return failed
 
     def _solve(
         self,
-        own: FloatArray,
+        compliance: FloatArray,
         members: IntArray | None,
         shared: FloatArray | None,
         constants: Constants,
@@ -162,7 +164,7 @@ class NormalContacts(NamedTuple):
         status, iterations = np.zeros((2, self.gap.shape[0]), np.int64)
         failed = kernels.solve_slender(
             self.gap,
-            kernel_input(own),
+            kernel_input(compliance),
             members,
             None if shared is None else kernel_input(shared),
             self.loads,

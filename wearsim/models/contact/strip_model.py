@@ -39,7 +39,7 @@ from wearsim.types import (
     OperatingPoint,
 )
 
-_WIDTH = 1.2  # of the grid, over that of the Hertzian patch
+_WIDTH = 1.2  # width of the grid over that of the Hertzian patch
 _STRIPS = 121
 Variant = Literal["kik-piotrowski", "ayasse-chollet", "analyn"]
 _VARIANTS: dict[Variant, int] = {

@@ -36,7 +36,7 @@ def strip_tractions(
         [W/m].
     sums : ndarray, shape (6, contacts)
     torque : ndarray, shape (contacts,)
-        Of the longitudinal tractions on the rollers [N m]; zero without their rolling radii.
+        Torques of the longitudinal tractions on the rollers [N m]; zero without rolling radii.
     """
     contacts, variation, radius = line_load.shape[0], batch.variation, batch.rolling_radius
     dissipation, none = np.empty(line_load.shape), np.empty((contacts, 0))

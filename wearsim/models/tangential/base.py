@@ -173,7 +173,7 @@ def _free_creepage(
 
     variation = local_slip(strips, point, 0.0).longitudinal
     full_slip = float(friction.max() * strips.half_length.max()) * strips.longitudinal_curvature
-    others = float(np.abs(variation).max()) + 100.0 * abs(point.creepage.lateral)
+    added_creepage = float(np.abs(variation).max()) + 100.0 * abs(point.creepage.lateral)
     state = {"line_load": strips.line_load, "half_length": strips.half_length}
     creepage = balanced_creepage(
         torque_of,
@@ -181,7 +181,7 @@ def _free_creepage(
         np.zeros(1),
         np.zeros(1),
         np.array([full_slip / pair.creep_factor]),
-        np.array([others]),
+        np.array([added_creepage]),
         lambda _: {"normal_force": point.normal_force, **state},
     )
     return float(creepage[0])

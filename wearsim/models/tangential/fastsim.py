@@ -214,7 +214,7 @@ class FastsimTheory(TangentialTheory):
             mean and the standard deviation of the power by less than 1e-4 of them, and a single
             power by 0.2 % rms, at most 2.5 %.
         """
-        given = self.coefficients
+        coefficients = self.coefficients
         chosen = batches.TABLE if self.kalker == "table" else batches.LINE_LIMIT
         return batches.Theory(
             shear_modulus=pair.shear_modulus,
@@ -224,8 +224,10 @@ class FastsimTheory(TangentialTheory):
             element_sum=dissipation == "element-sum",
             points=self.mx,
             single=self.single,
-            kalker=chosen if given is None else batches.GIVEN,
-            given=np.zeros(3) if given is None else np.array([given.c11, given.c22, given.c23]),
+            kalker=chosen if coefficients is None else batches.GIVEN,
+            given=np.zeros(3)
+            if coefficients is None
+            else np.array([coefficients.c11, coefficients.c22, coefficients.c23]),
             tables=(spline(0), spline(1), spline(2)),
         )
 

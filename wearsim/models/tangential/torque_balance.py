@@ -23,7 +23,7 @@ def balanced_creepage(
     given: FloatArray,
     first: FloatArray,
     full_slip: FloatArray,
-    others: FloatArray,
+    added_creepage: FloatArray,
     state_of: Callable[[int], Mapping[str, Any]],
 ) -> FloatArray:
     """Return the mean longitudinal creepages at which the tractions balance the bearing torques.
@@ -37,9 +37,9 @@ def balanced_creepage(
         Torques needed [N m]; not a number for a roller that skids at its given creepage.
     given, first : ndarray, shape (contacts,)
         Creepages of the rollers that skid, and first guesses of the others.
-    full_slip, others : ndarray, shape (contacts,)
-        Order of the creepage of full slip, and the magnitude of what adds to the creepage: its
-        variation, and the lateral creepage.
+    full_slip, added_creepage : ndarray, shape (contacts,)
+        Order of magnitude of the creepage of full slip, and of the creepages that add to the mean
+        longitudinal one: its variation, and the lateral creepage.
     state_of : callable
         Load and state of a contact by number, for the error: "normal_force" and further values.
 
@@ -50,8 +50,8 @@ def balanced_creepage(
 
     Notes
     -----
-    A secant method from the guess; where it does not converge, a bracket of gross sliding. Each
-    root is independent of the other contacts.
+    The roots are found by a secant method from the guess and, where that does not converge, within
+    a bracket between both directions of gross sliding. Each is independent of the other contacts.
     """
     rolls = np.isfinite(bearing_torque)
     needed = np.where(rolls, bearing_torque, 0.0)
@@ -62,7 +62,7 @@ def balanced_creepage(
     creepage, converged = secant_roots(excess, first, full_slip)
     if converged.all():
         return creepage
-    reach = _SLIDING * full_slip + others + np.abs(given)
+    reach = _SLIDING * full_slip + added_creepage + np.abs(given)
     low, high = excess(-reach), excess(reach)
     lost = np.flatnonzero(~converged & rolls & ((low >= 0.0) | (high <= 0.0)))
     if len(lost):
@@ -103,24 +103,21 @@ def with_balanced_creepage(
     """
     if batch.bearing_torque is None or batch.rolling_radius is None:
         raise ValueError("a bearing torque needs the rolling radius of each strip")
-    first = np.zeros(len(batch))
-    if guess is not None:
-        first = np.nan_to_num(guess.longitudinal_creepage)
-
+    guesses = np.zeros(len(batch)) if guess is None else guess.longitudinal_creepage
     friction = batch.friction.reshape(len(batch), -1).max(axis=1)
     full_slip = friction * half_length.max(axis=1) * batch.longitudinal_curvature
-    others = 100.0 * np.abs(batch.lateral)
+    added_creepage = 100.0 * np.abs(batch.lateral)
     if batch.variation is not None:
-        others = others + np.abs(batch.variation).max(axis=1)
+        added_creepage = added_creepage + np.abs(batch.variation).max(axis=1)
     else:
-        others = others + np.abs(batch.spin) * np.abs(grid.y).max()
+        added_creepage = added_creepage + np.abs(batch.spin) * np.abs(grid.y).max()
     creepage = balanced_creepage(
         lambda creepage: torque_of(batch.replaced(longitudinal=creepage)),
         batch.bearing_torque,
         batch.longitudinal,
-        first,
+        np.nan_to_num(guesses),
         full_slip / pair.creep_factor,
-        others,
+        added_creepage,
         lambda k: {
             "normal_force": float(batch.normal_force[k]),
             "line_load": line_load[k],

@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, cast
 
 from pydantic import Field
@@ -160,7 +161,11 @@ class LoadChoice:
     terms: tuple[TermChoice, ...] = ()
 
     def build(self) -> Load:
-        """Return a new load, without its terms."""
+        """Return the load, without its terms; it is made once."""
+        return self._load
+
+    @cached_property
+    def _load(self) -> Load:
         return cast("Load", registry().get(LoadSpec, self.kind).factory(self.options))
 
 

@@ -81,9 +81,7 @@ def falls_of_lift(problem: WearProblem, state: WearState) -> FloatArray:
 
     It is the mean over the rollers.
     """
-    cam = problem.kinematics.cam
-    assert cam is not None
-    return -cam.at_unworn(lift_errors(problem, state).mean(axis=1))
+    return -problem.kinematics.track.at_unworn(lift_errors(problem, state).mean(axis=1))
 
 
 def size_of(surface: str, profiles: FloatArray) -> FloatArray:

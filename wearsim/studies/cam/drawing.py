@@ -22,8 +22,8 @@ from wearsim.report.panels import (
 )
 from wearsim.report.surfaces import CHORD, Sampling
 from wearsim.report.text import shown
-from wearsim.studies.cam.surface import worn_surface
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.surface import worn_outlines
+from wearsim.studies.cam.turn import CamTurn, unchecked_turn_of
 from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray
 
@@ -109,7 +109,7 @@ def turning(result: Result) -> Animation:
 
     The roller follows the magnified lift error, and is drawn with its magnified depth.
     """
-    turn = CamTurn(result.scenario)
+    turn = unchecked_turn_of(result.scenario)
     follower, stations = turn.cam.follower, turn.stations
     worn_roller = float(np.max(result.roller_depth[-1]))
     factor = factor_for(turn, max(float(np.max(result.depth[-1])), worn_roller))
@@ -118,11 +118,8 @@ def turning(result: Result) -> Animation:
     errors = stations.values_at_angles(curve, theta)
     lifts = turn.at_angles(theta).kinematics.lift
     moved = lifts + factor * errors / follower.lever
-    places = [c.x + 1j * c.y for c in worn_surface(result, Sampling(20.0 * CHORD)).curves]
-    outlines = [
-        (unworn, unworn + factor * (worn - unworn))
-        for unworn, worn in zip(places[::2], places[1::2], strict=True)
-    ]
+    places = worn_outlines(result, Sampling(20.0 * CHORD))
+    outlines = [(unworn, unworn + factor * (worn - unworn)) for unworn, worn in places]
     starts = turn.cam.motion.starts[:-1]
     edges = surface_points(follower, turn.at_angles(starts).kinematics, starts)[1]
     rays = edges[0] + 1j * edges[1]

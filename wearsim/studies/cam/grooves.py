@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wearsim.studies.cam.observables import CURVE_ANGLES
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import unchecked_turn_of
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -30,7 +30,10 @@ def grooves_at(result: Result, angle: float | None = None) -> tuple[FloatArray, 
     if angle is None:
         place = int(depth[-1].max(axis=1).argmax())
         return depth[:, place], float(result.raw.static["station_angle"][place])
-    stations, turned = CamTurn(result.scenario).stations, np.array([np.mod(angle, 2.0 * np.pi)])
+    stations, turned = (
+        unchecked_turn_of(result.scenario).stations,
+        np.array([np.mod(angle, 2.0 * np.pi)]),
+    )
     rows = stations.values_at_angles(depth.transpose(1, 0, 2), turned)[0]
     return np.maximum(rows, 0.0), float(angle)
 
@@ -44,7 +47,7 @@ def along_angle(result: Result) -> tuple[FloatArray, FloatArray]:
         Greatest depth across the track, and change of the lift by wear, which is the mean over the
         rollers [m].
     """
-    records, stations = result.raw.records, CamTurn(result.scenario).stations
+    records, stations = result.raw.records, unchecked_turn_of(result.scenario).stations
     deepest = np.asarray(records["cylinder_depth_profile"])[:, :, 0].max(axis=-1).T
     curves = np.asarray(records["lift_error_curve"])[..., 0].mean(axis=-1).T
     depth = np.maximum(stations.values_at_angles(deepest, CURVE_ANGLES), 0.0)
@@ -58,7 +61,7 @@ def with_angles(dataset: xarray.Dataset, result: Result) -> xarray.Dataset:
         "depth_along_angle": (depth, "m", "greatest depth across the track"),
         "lift_error_along_angle": (lift_error, "m", "change of the lift by wear"),
     }
-    follower = CamTurn(result.scenario).cam.follower
+    follower = unchecked_turn_of(result.scenario).cam.follower
     if follower.swings:
         angle = lift_error / follower.lever
         texts["arm_error_along_angle"] = angle, "rad", "change of the angle of the arm by wear"

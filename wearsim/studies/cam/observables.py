@@ -22,10 +22,9 @@ CURVE_ANGLES = np.linspace(0.0, 2.0 * np.pi, 361)  # rad, of the lift error of a
 
 def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
     """Return the observables of a cam after a step; none of a cylinder."""
-    cam = problem.kinematics.cam
-    if cam is None:
-        return {}
     at_extremes = extremes(problem, state)
+    if not at_extremes:
+        return {}
     least, greatest = at_extremes["least_wear"], at_extremes["greatest_wear"]
     return {
         "turns": state.passes / problem.kinematics.physical_rollers,
@@ -53,13 +52,12 @@ def cam_observables(
     row : mapping of str to ndarray
         Observables of the run, `cam_history` among them.
     """
-    cam = problem.kinematics.cam
-    if cam is None:
+    if "lift_error" not in row:
         return {}
-    first = row["peak_pressure"].argmax(axis=0)[None]
+    errors, first = lift_errors(problem, state), row["peak_pressure"].argmax(axis=0)[None]
     return {
         "lift_error": row["lift_error"].max(axis=0),
-        "lift_error_angle": cam.greatest(np.abs(lift_errors(problem, state)).max(axis=1)).angle,
+        "lift_error_angle": problem.kinematics.track.greatest(np.abs(errors).max(axis=1)).angle,
         "depth_angle": row["depth_angle"],
         "peak_pressure_angle": np.take_along_axis(row["peak_pressure_angle"], first, axis=0)[0],
     }
@@ -79,11 +77,9 @@ def lift_curves(
     stations : sequence of Stations
         Stations of each realisation.
     """
-    cam = problem.kinematics.cam
-    assert cam is not None
-    errors = lift_errors(problem, state)
-    roller = peak_to_peak(cam, errors).argmax(axis=0)
-    curves = cam.at_unworn(errors)
+    track, errors = problem.kinematics.track, lift_errors(problem, state)
+    roller = peak_to_peak(track, errors).argmax(axis=0)
+    curves = track.at_unworn(errors)
     return [
         stations_of_test.values_at_angles(curves[:, roller[place], place], CURVE_ANGLES)
         for place, stations_of_test in enumerate(stations)
@@ -101,11 +97,9 @@ def at_every_station(problem: WearProblem, values: FloatArray) -> FloatArray:
 
     They are not negative where they have been interpolated to its stations.
     """
-    cam = problem.kinematics.cam
-    if cam is None:
-        return values
-    at_stations = cam.at_unworn(values)
-    return at_stations if cam.recorded is None else np.maximum(at_stations, 0.0)
+    track = problem.kinematics.track
+    at_stations = track.at_unworn(values)
+    return at_stations if track.recorded is None else np.maximum(at_stations, 0.0)
 
 
 def station_columns(problem: WearProblem) -> dict[str, FloatArray]:

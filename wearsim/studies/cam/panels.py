@@ -41,7 +41,7 @@ from wearsim.studies.cam.drawing import (
 from wearsim.studies.cam.grooves import grooves_at
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.study import CamStudy, peak_pressures
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import CamTurn, unchecked_turn_of
 from wearsim.studies.fatigue.panels import pitting_panel
 from wearsim.studies.fatigue.view import with_source_lines
 from wearsim.studies.run.panels import (
@@ -53,6 +53,7 @@ from wearsim.studies.run.panels import (
     record_texts,
 )
 from wearsim.studies.run.result import Result
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 
 DEG = PER_SI["deg"]
@@ -83,7 +84,7 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
         Line(angle, kinematics.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
         Line(angle, kinematics.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
     ]
-    pressures = peak_pressures(turn.scenario, fine)
+    pressures = peak_pressures(Setup(turn.scenario), fine)
     load: list[Mark] = [
         Line(angle, fine.normal_force),
         dots(point.angle, point.normal_force, "."),
@@ -214,7 +215,7 @@ def shape_panel(turn: CamTurn) -> Panel:
 
 def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of the run of a cam; measured profiles lie over the deepest groove."""
-    turn = CamTurn(result.scenario)
+    turn = unchecked_turn_of(result.scenario)
     stations = turn.stations
     worn = np.asarray(result.raw.records["cylinder_depth_profile"])[:, :, 0]
     panels = {

@@ -15,7 +15,6 @@ from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.mechanics.cam import Panel, extreme
 from wearsim.mechanics.film import minimum_film
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.results.viewed import Viewed
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.automatic import with_chosen_model
@@ -30,7 +29,7 @@ from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import CamTurn, turn_of
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid
-from wearsim.studies.run.groove import patches_at
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 
 _MOST_TEETH = 12  # greatest denominator of a ratio at which the same points of the roller meet
@@ -153,8 +152,9 @@ def study_cam(
     else:
         chosen = np.asarray(angles, dtype=np.float64)
         point = turn.at_angles(chosen)
-    patches = patches_at(scenario, point)
-    problem = _fresh_problem(scenario, turn, chosen)
+    setup = Setup(scenario)
+    patches = setup.patches_at(point)
+    problem = _fresh_problem(setup, chosen)
     contacts = problem.model.solve(unworn_contacts(problem))
     if problem.kinematics.cam is not None:
         contacts = contacts.at(problem.kinematics.cam.places)
@@ -184,7 +184,7 @@ def study_cam(
         turn.integral("load"),
         steepest,
         extreme(panels, turn.radius),
-        extreme(panels, lambda p, x: peak_pressures(scenario, turn.at(p, x))),
+        extreme(panels, lambda p, x: peak_pressures(setup, turn.at(p, x))),
         1.0 / sharpest if sharpest > 0.0 else None,
         harmonic_limit(turn, harmonic_depth(turn)),
         _jump_speed(turn),
@@ -197,13 +197,14 @@ def study_cam(
     )
 
 
-def peak_pressures(scenario: Scenario, point: Point) -> FloatArray:
+def peak_pressures(setup: Setup, point: Point) -> FloatArray:
     """Return the peak pressure of the fresh contact after Hertz, shape (points,) [Pa]."""
-    return np.array([patch.peak_pressure for patch in patches_at(scenario, point)])
+    return np.array([patch.peak_pressure for patch in setup.patches_at(point)])
 
 
-def _fresh_problem(scenario: Scenario, turn: CamTurn, angles: FloatArray | None) -> WearProblem:
-    grid = contact_grid(scenario, turn.normal_range[1])
+def _fresh_problem(setup: Setup, angles: FloatArray | None) -> WearProblem:
+    scenario = setup.scenario
+    grid = contact_grid(setup, turn_of(scenario).normal_range[1])
     return build_problem(scenario, prepared_model(scenario, grid), grid, {}, angles=angles)
 
 
@@ -217,7 +218,7 @@ def _film(turn: CamTurn, point: Point) -> FloatArray | None:
         point.normal_force,
         point.kinematics.relative_curvature,
         _across(scenario, point),
-        combine(scenario.cylinder.material, scenario.roller.material).contact_modulus,
+        scenario.pair.contact_modulus,
         lubricant.viscosity,
         lubricant.pressure_viscosity,
     )
@@ -228,7 +229,7 @@ def _across(scenario: Scenario, point: Point) -> float:
     gap = scenario.axial_gap
     if gap.is_crowned:
         return 1.0 / gap.radius_at(0.0)
-    return 1.0 / max(gap.radius_at(patch.b) for patch in patches_at(scenario, point))
+    return 1.0 / max(gap.radius_at(patch.b) for patch in Setup(scenario).patches_at(point))
 
 
 def _jump_speed(turn: CamTurn) -> float | None:

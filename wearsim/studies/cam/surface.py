@@ -17,7 +17,7 @@ from wearsim.mechanics.cam.outline import Points
 from wearsim.mechanics.cam.stations import interpolation
 from wearsim.report.surfaces import Curve, Sampling, Surface
 from wearsim.report.view import Column
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import CamTurn, unchecked_turn_of
 from wearsim.studies.run.result import Result
 from wearsim.types import BoolArray, FloatArray
 
@@ -34,14 +34,30 @@ def worn_surface(result: Result, sampling: Sampling) -> Surface:
         Run of a cam.
     sampling : Sampling
     """
-    turn = CamTurn(result.scenario)
+    return _worn(result, sampling).surface(sampling)
+
+
+def worn_outlines(result: Result, sampling: Sampling) -> list[tuple[FloatArray, FloatArray]]:
+    """Return the outlines of all flanks of a cam, unworn and worn at the same angles, x + i y [m].
+
+    Parameters
+    ----------
+    result : Result
+        Run of a cam.
+    sampling : Sampling
+    """
+    return [(points[0], points[1]) for *_, points in _worn(result, sampling).flanks(sampling)]
+
+
+def _worn(result: Result, sampling: Sampling) -> _Outlines:
+    turn = unchecked_turn_of(result.scenario)
     depth = np.asarray(result.raw.history["station_depth"])[-1, :, 0]
     if sampling.position is not None:
         profiles = np.asarray(result.raw.records["cylinder_depth_profile"])[-1, :, 0]
         depth = np.array(
             [np.interp(sampling.position, result.y, profile, 0.0, 0.0) for profile in profiles]
         )
-    return _Outlines(turn, turn.stations, depth).surface(sampling)
+    return _Outlines(turn, turn.stations, depth)
 
 
 def unworn_surface(turn: CamTurn, sampling: Sampling) -> Surface:
@@ -67,12 +83,8 @@ class _Outlines:
 
     def surface(self, sampling: Sampling) -> Surface:
         """Return the closed curves of all flanks."""
-        flanks = (False, True) if self.turn.cam.groove else (False,)
         curves, tables, away = list[Curve](), [], 0.0
-        for inner in flanks:
-            flank = ("inner flank" if inner else "outer flank") if len(flanks) > 1 else ""
-            parts = list(self._parts(inner))
-            angle, points = _points(parts, _angles(parts, sampling))
+        for flank, parts, angle, points in self.flanks(sampling):
             away = max(away, _away(parts, angle, points))
             for name, places in zip(("unworn", "worn"), points, strict=False):
                 label = f"{flank}, {name}" if flank else name
@@ -81,6 +93,16 @@ class _Outlines:
                 curves.append(Curve(label, places[kept].real, places[kept].imag))
             tables.append((flank, angle, points))
         return Surface(self.turn.scenario.title, curves, _columns(tables), away)
+
+    def flanks(
+        self, sampling: Sampling
+    ) -> Iterator[tuple[str, list[tuple[Points, float, float]], FloatArray, FloatArray]]:
+        """Yield name, parts, angles and points of each flank, the points as of `_points`."""
+        flanks = (False, True) if self.turn.cam.groove else (False,)
+        for inner in flanks:
+            flank = ("inner flank" if inner else "outer flank") if len(flanks) > 1 else ""
+            parts = list(self._parts(inner))
+            yield flank, parts, *_points(parts, _angles(parts, sampling))
 
     def _parts(self, inner: bool) -> Iterator[tuple[Points, float, float]]:
         """Yield the points of each panel at its angles, first unworn, then worn."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -23,7 +23,7 @@ from wearsim.mechanics.cam import (
 )
 from wearsim.models.loads import FollowerLoad
 from wearsim.scenario import Scenario
-from wearsim.scenario.tables.cam import Cam
+from wearsim.studies.cam.path import path_of
 from wearsim.studies.cam.point import Point
 from wearsim.types import BoolArray, FloatArray
 
@@ -32,7 +32,6 @@ SHARP = 2.0  # radius of the pitch curve over the roller's, below which the cont
 PART_OF_TOLERANCE = 0.25  # for the stations
 LEAST_LOAD = 1e-4  # of the greatest, where the flank of a groove changes
 _FINE = 1e-10  # tolerance of integrals over a turn
-MOST_KNOWN = 1000  # sets of angles of a cam at which the motion of the roller is kept
 
 
 class CamTurn:
@@ -54,13 +53,13 @@ class CamTurn:
             what = "is needed for the kinematics of a cam"
             raise ScenarioError(scenario.file, [Mistake("cam", "", what, "none", "a table [cam]")])
         self.scenario, self.cam = scenario, scenario.cam
-        self._path = _path_of(self.cam)
-        self._integrals: dict[str, float] = {}
+        self._path = path_of(self.cam)
         self.speed = scenario.operation.speed
         load = scenario.load.build()
         self.load = load if isinstance(load, FollowerLoad) else None
         self._constant = 0.0 if self.load else float(load.force(np.zeros(1))[0])
         self._worn: tuple[Stations, FloatArray] | None = None
+        self._inner: dict[Panel, bool] = {}
 
     def worn(self, change: FloatArray) -> CamTurn:
         """Return the turn with the friction on the roller of a worn cam.
@@ -137,8 +136,11 @@ class CamTurn:
         """Return whether the roller touches the inner flank of a groove in a panel."""
         if self.load is None or not self.cam.groove:
             return False
-        middle = np.array([0.5 * (panel.start + panel.stop)])
-        return bool(self._effort_in(panel, middle)[0] < 0.0)
+        known = self._inner.get(panel)
+        if known is None:
+            middle = np.array([0.5 * (panel.start + panel.stop)])
+            known = self._inner[panel] = bool(self._effort_in(panel, middle)[0] < 0.0)
+        return known
 
     @cached_property
     def _greatest_effort(self) -> float:
@@ -266,19 +268,37 @@ class CamTurn:
     def normal_range(self) -> tuple[float, float]:
         """Least and greatest normal force of the turn [N]."""
         greatest, _ = extreme(self.panels, lambda p, x: self.at(p, x).normal_force)
-        least, _ = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
-        return -least, greatest
+        return self._least_force[0], greatest
+
+    @cached_property
+    def _least_force(self) -> tuple[float, float]:
+        """Least normal force [N] and its angle [rad]."""
+        least, theta = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
+        return -least, theta
+
+    @property
+    def _sides(self) -> tuple[tuple[Panel, bool], ...]:
+        """Panels and whether the roller touches the inner flank, which decide its motion."""
+        return tuple((panel, self.is_inner(panel)) for panel in self.panels)
 
     @cached_property
     def curvatures(self) -> tuple[float, float]:
         """Least and greatest relative curvature along rolling [1/m]."""
-        greatest, _ = extreme(self.panels, lambda p, x: self.rolling(p, x).relative_curvature)
-        least, _ = extreme(self.panels, lambda p, x: -self.rolling(p, x).relative_curvature)
+        greatest, _ = self._extreme("curvature", lambda p, x: self.rolling(p, x).relative_curvature)
+        least, _ = self._extreme("-curvature", lambda p, x: -self.rolling(p, x).relative_curvature)
         return -least, greatest
+
+    def _extreme(
+        self, name: str, values: Callable[[Panel, FloatArray], FloatArray]
+    ) -> tuple[float, float]:
+        """Return the greatest of values of the motion alone, by name, and its angle [rad]."""
+        return self._path.once((name, *self._sides), lambda: extreme(self.panels, values))
 
     @cached_property
     def greatest_demand(self) -> float:
         """Greatest traction of a rolling free roller, over the limit of friction; at most 1."""
+        if not self.free:
+            return 0.0
 
         def demand(panel: Panel, theta: FloatArray) -> FloatArray:
             torque = np.abs(self.torque(self.at(panel, theta)))
@@ -338,9 +358,9 @@ class CamTurn:
 
     def integral(self, quantity: str) -> float:
         """Return the integral of a quantity over the turn: "travel" or "load" (N ds)."""
-        if quantity not in self._integrals:
-            self._integrals[quantity] = self._integral(quantity)
-        return self._integrals[quantity]
+        if quantity == "load":
+            return self._integral(quantity)
+        return self._path.once((quantity, *self._sides), lambda: self._integral(quantity))
 
     def _integral(self, quantity: str) -> float:
         def values(panel: Panel, theta: FloatArray) -> FloatArray:
@@ -353,6 +373,20 @@ class CamTurn:
         return float(
             sum(fine.weight[i : i + n] @ values(p, fine.angle[i : i + n]) for p, n, i in parts)
         )
+
+    @property
+    def mean_radius(self) -> float:
+        """Radius of the cylinder on which a roller would roll as far in a turn [m]."""
+        return self.integral("travel") / math.tau
+
+    def loads_and_curvatures(self, load: float) -> list[tuple[float, float]]:
+        """Return normal forces [N] and relative curvatures [1/m] at the stations of a run.
+
+        The forces are those of the cam, whatever the load of a roller on a cylinder.
+        """
+        point = self.at_stations(self.stations)
+        curvatures = point.kinematics.relative_curvature.tolist()
+        return list(zip(point.normal_force.tolist(), curvatures, strict=True))
 
     def at_stations(self, stations: Stations) -> Point:
         """Return the state at stations, at both sides of a boundary between segments."""
@@ -379,7 +413,7 @@ class CamTurn:
         """
         mistakes = []
         radius = self.scenario.roller.radius
-        sharpest, theta = extreme(self.panels, self._undercut)
+        sharpest, theta = self._extreme("undercut", self._undercut)
         if sharpest >= 1.0 - 1e-9:
             flank = "inner flank" if self.at_angles(np.array([theta])).inner[0] else "cam"
             got = f"{1e3 * radius / sharpest:.4g} mm at {self.place(theta)}"
@@ -390,9 +424,9 @@ class CamTurn:
             expected += " a smaller roller or a gentler motion"
             mistakes.append(Mistake("cam", "base_radius", what, got, expected))
         mistakes += self._reach_mistakes()
-        least, theta = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
-        if -least <= 0.0 and not self.cam.groove:
-            got = f"{-least:.4g} N at {self.place(theta)}"
+        least, theta = self._least_force
+        if least <= 0.0 and not self.cam.groove:
+            got = f"{least:.4g} N at {self.place(theta)}"
             what = "the follower jumps, since the normal force falls to zero or below"
             expected = (
                 "more than 0 N, by a greater preload or stiffness, or a smaller speed or mass"
@@ -413,12 +447,12 @@ class CamTurn:
         pivot of an arm from the cam [m].
         """
         radius, margins = self.scenario.roller.radius, {}
-        sharpest, _ = extreme(self.panels, self._undercut)
+        sharpest, _ = self._extreme("undercut", self._undercut)
         margins["undercut_margin"] = radius / sharpest - radius if sharpest > 0.0 else math.inf
         if not self.cam.groove:
             margins["least_normal_force"] = self.normal_range[0]
         if self.cam.follower.swings and not self.cam.groove:
-            greatest, _ = extreme(self.panels, self.radius)
+            greatest, _ = self._extreme("radius", self.radius)
             margins["pivot_margin"] = self.cam.follower.centre_distance - greatest
         return margins
 
@@ -427,7 +461,7 @@ class CamTurn:
         follower = self.cam.follower
         if not follower.swings or self.cam.groove:
             return []
-        greatest, theta = extreme(self.panels, self.radius)
+        greatest, theta = self._extreme("radius", self.radius)
         if greatest < follower.centre_distance:
             return []
         got = f"{1e3 * greatest:.6g} mm at {self.place(theta)}"
@@ -454,34 +488,13 @@ class CamTurn:
         return f"{degrees:.4g} deg, {motion.segment_label(number)}"
 
 
-class _Path:
-    """Motion of the roller of a cam, computed once for the turns of all loads.
-
-    Parameters
-    ----------
-    cam : Cam
-    """
-
-    def __init__(self, cam: Cam) -> None:
-        self._cam = cam
-        self._known: dict[tuple[int, bool, bytes], RollerKinematics] = {}
-
-    def at(self, segment: int, theta: FloatArray, inner: bool) -> RollerKinematics:
-        """Return the motion at angles within a segment [rad], on the inner flank of a groove."""
-        key = segment, inner, theta.tobytes()
-        kinematics = self._known.get(key)
-        if kinematics is None:
-            lift = self._cam.motion.lift_in(segment, theta)
-            kinematics = self._cam.follower.kinematics(lift, inner)
-            if len(self._known) < MOST_KNOWN:
-                self._known[key] = kinematics
-        return kinematics
-
-
-_path_of = lru_cache(maxsize=4)(_Path)
+@lru_cache(maxsize=16)
+def unchecked_turn_of(scenario: Scenario) -> CamTurn:
+    """Return the turn of a scenario's cam, which its roller need not be able to follow."""
+    return CamTurn(scenario)
 
 
 @lru_cache(maxsize=16)
 def turn_of(scenario: Scenario) -> CamTurn:
     """Return the turn of a scenario's cam; errors as `CamTurn.checked`."""
-    return CamTurn(scenario).checked()
+    return unchecked_turn_of(scenario).checked()

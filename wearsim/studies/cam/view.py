@@ -14,9 +14,10 @@ from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import harmonic_depth
 from wearsim.studies.cam.study import CamStudy, peak_pressures
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import unchecked_turn_of
 from wearsim.studies.fatigue.unworn import lives_at, stresses_below
 from wearsim.studies.fatigue.view import source_rows, with_sources
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -316,9 +317,9 @@ def _without_rounding(values: FloatArray) -> list[float]:
 
 def loads(scenario: Scenario) -> Rows:
     """Return speed, force, torque and pressure of a cam before wear."""
-    turn = CamTurn(scenario)
+    turn, setup = unchecked_turn_of(scenario), Setup(scenario)
     least, greatest = turn.normal_range
-    pressure, theta = extreme(turn.panels, lambda p, x: peak_pressures(scenario, turn.at(p, x)))
+    pressure, theta = extreme(turn.panels, lambda p, x: peak_pressures(setup, turn.at(p, x)))
     torque, _ = extreme(turn.panels, lambda p, x: np.abs(turn.at(p, x).drive_torque))
     return [
         Row("speed", turn.speed, "rpm"),

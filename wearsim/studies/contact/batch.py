@@ -27,13 +27,14 @@ from wearsim.studies.contact.single import study_contact
 from wearsim.studies.failures import explained
 from wearsim.studies.run.assemble import build_problem, prepared_model, surfaces
 from wearsim.studies.run.draws import Drawer, units_of
-from wearsim.studies.run.grid import contact_positions, realisation_grid, wider_grid
+from wearsim.studies.run.grid import realisation_grid, wider_grid
 from wearsim.studies.run.inputs import (
     FIELDS,
     contact_inputs,
     contact_values,
     load_range,
 )
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.sobol import Stream
 
@@ -203,17 +204,17 @@ class Realisations:
             what = "has many contacts, and this study solves one"
             remedy = "wearsim cam for its contacts, or wearsim ensemble"
             raise ScenarioError(scenario.file, [Mistake("cam", "", what, None, remedy)])
-        mean_load = load_range(scenario, scenario.load.build(), 0.0)[0]
+        mean_load, setup = load_range(scenario, 0.0)[0], Setup(scenario)
         self._once, field, self.notes = acting_inputs(scenario)
         drawer = Drawer(self._once, scenario.sampling.plan, count)
         self.values, self.units = drawer.columns(0, count), units_of(self._once)
         drawn = self._drawn(slice(None))
         self.loads = np.full(count, mean_load) + drawn.get("normal_force_offset", 0.0)
-        centres = contact_positions(scenario, contact_inputs(scenario, [0], drawn))
-        self.grid = realisation_grid(scenario, mean_load, self.loads, centres)
+        centres = setup.positions_of(contact_inputs(scenario, [0], drawn))
+        self.grid = realisation_grid(setup, mean_load, self.loads, centres)
         if scenario.cylinder.profile is not None and _is_wider_than_profile(scenario):
             shift = float(np.ptp(centres))
-            self.grid = wider_grid(scenario, self.grid, float(self.loads.max()), shift) or self.grid
+            self.grid = wider_grid(setup, self.grid, float(self.loads.max()), shift) or self.grid
         self.model = prepared_model(scenario, self.grid)
         self._field = LocalFriction(scenario, self.model, field) if field is not None else None
         self.friction_points = 0 if self._field is None else self._checked_points(self._field)

@@ -28,6 +28,7 @@ from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid, wider_grid
 from wearsim.studies.run.inputs import load_range
+from wearsim.studies.run.setup import Setup
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -163,13 +164,13 @@ def study_contact(
             raise TypeError(f"profile must be a Profile or the path of a file, got a {kind}")
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
     scenario = with_chosen_model(scenario, test=False)
-    force = load_range(scenario, scenario.load.build(), 0.0)[0]
-    grid, notes = contact_grid(scenario, force), scenario.notes
+    setup, force = Setup(scenario), load_range(scenario, 0.0)[0]
+    grid, notes = contact_grid(setup, force), scenario.notes
     model, gap, curvature, point = _contact(scenario, grid)
     try:
         solution = model.solve_one(gap, curvature, point)
     except ContactError as error:
-        wider = wider_grid(scenario, grid, force)
+        wider = wider_grid(setup, grid, force)
         if wider is None:
             raise explained(error, scenario) from error.__cause__
         model, gap, curvature, point = _contact(scenario, wider)
@@ -182,7 +183,7 @@ def study_contact(
         notes = (*notes, f"contact of the cam at {theta:.4g} deg; wearsim cam solves all stations")
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
     errors: tuple[float | None, float | None] = (None, None)
-    seconds, warnings = None, plausibility_warnings(scenario)
+    seconds, warnings = None, plausibility_warnings(setup)
     if with_error:
         errors = _grid_errors(scenario, grid, solution)
         if errors[1] is not None and errors[1] > GRID_DEPENDENT:
@@ -227,7 +228,7 @@ def _reference(
     scenario: Scenario, against: str, grid: Grid, solution: ContactSolution
 ) -> ContactReference:
     """Return the contact by a reference model; strips that it extends beyond are continued."""
-    materials, failure = (scenario.cylinder.material, scenario.roller.material), None
+    materials, failure = scenario.materials, None
     for beyond in (0, math.ceil(_BEYOND * grid.strips)):
         margin = beyond * grid.spacing
         edges = grid.edges[0] - margin, grid.edges[1] + margin

@@ -29,10 +29,7 @@ from wearsim.studies.ensemble.designs import (
 from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
 from wearsim.studies.ensemble.file.data import EnsembleData
 from wearsim.studies.ensemble.file.schema import (
-    ALL_OBSERVABLES,
-    CAM_OBSERVABLES,
-    FATIGUE_OBSERVABLES,
-    OBSERVABLES,
+    observables_of,
 )
 from wearsim.studies.ensemble.file.writer import EnsembleFile
 from wearsim.studies.ensemble.realisation import RealisationRunner, control_of, profile_axis
@@ -223,11 +220,9 @@ def parse_target(text: str, scenario: Scenario | None = None) -> Target:
         If it cannot be read, or names no observable of an ensemble.
     """
     target = Target.parse(text)
-    known = {**ALL_OBSERVABLES}
+    known = observables_of()
     if scenario is not None:
-        cam, fatigue = scenario.cam is not None, scenario.fatigue is not None
-        known = {**OBSERVABLES, **(CAM_OBSERVABLES if cam else {})}
-        known |= FATIGUE_OBSERVABLES if fatigue else {}
+        known = observables_of(cam=bool(scenario.cam), fatigue=bool(scenario.fatigue))
     if target.observable not in known:
         raise ValueError(
             f"'{text}' names '{target.observable}', which is not an observable, expected one of"

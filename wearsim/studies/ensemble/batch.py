@@ -14,7 +14,7 @@ from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.observables import depth_error_by_stations, volume_error_by_stations
 from wearsim.evolution.observed_errors import observed_errors, relative_crown_radius
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
+from wearsim.evolution.quantities import ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
@@ -32,8 +32,8 @@ from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.fatigue.observables import fatigue_curves
 from wearsim.studies.run.assemble import coarse_stepper
-from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import history_row
+from wearsim.studies.run.setup import Setup
 from wearsim.studies.schedule import Due, RecordSchedule, due_records, states_at
 from wearsim.types import FloatArray, Grid, IntArray
 
@@ -66,8 +66,6 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
     stations of a cam have the same angles.
     """
     first, second = one.kinematics, other.kinematics
-    if (first.cam is None) != (second.cam is None):
-        return False
     arrays = [(getattr(one, name), getattr(other, name)) for name in _ARRAYS]
     varying = [[(item.name, item.rollers) for item in problem.varying] for problem in (one, other)]
     return (
@@ -78,7 +76,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
         and np.array_equal(first.multiplicity, second.multiplicity)
         and all(a is b if a is None or b is None else np.array_equal(a, b) for a, b in arrays)
         and all(getattr(first, name) == getattr(second, name) for name in _RADII)
-        and (first.cam is None or second.cam is None or first.cam.matches(second.cam))
+        and first.track.matches(second.track)
         and varying[0] == varying[1]
         and (one.constant_load is None) == (other.constant_load is None)
         and [item.most for item in one.growth] == [item.most for item in other.growth]
@@ -91,11 +89,7 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
         np.concatenate([getattr(problem.inputs, item.name) for problem in problems], axis=1)
         for item in fields(ContactInputs)
     )
-    kinematics = problems[0].kinematics
-    cams = [problem.kinematics.cam for problem in problems]
-    if kinematics.cam is not None:
-        joined = CamStations.joined([cam for cam in cams if cam is not None])
-        kinematics = replace(kinematics, cam=joined)
+    kinematics = problems[0].kinematics.joined([problem.kinematics for problem in problems])
     return replace(
         problems[0],
         kinematics=kinematics,
@@ -120,26 +114,31 @@ class RealisationRun:
     number : int
     drawn : mapping of str to float or ndarray
         Values of the random inputs by the scenario's key [SI].
-    draws : Draws
+    setup : Setup
     problem : WearProblem
     stepper : Stepper
     """
 
     number: int
     drawn: Mapping[str, float | FloatArray]
-    draws: Draws
+    setup: Setup
     problem: WearProblem
     stepper: Stepper
 
     @property
+    def scenario(self) -> Scenario:
+        """Scenario with the drawn values."""
+        return self.setup.scenario
+
+    @property
     def stop(self) -> float:
         """Passes at the end of the test."""
-        return float(self.draws.scenario.total_passes)
+        return float(self.scenario.total_passes)
 
     @property
     def schedule(self) -> RecordSchedule:
         """Schedule of the records."""
-        return RecordSchedule.of(self.draws.scenario, self.stop)
+        return RecordSchedule.of(self.scenario, self.stop)
 
     @property
     def can_be_batched(self) -> bool:
@@ -151,7 +150,7 @@ class RealisationRun:
         settings = [
             (run.stop, run.schedule, scenario.outputs.width_threshold, scenario.evolution)
             for run in (self, other)
-            for scenario in (run.draws.scenario,)
+            for scenario in (run.scenario,)
         ]
         return settings[0] == settings[1] and compatible(self.problem, other.problem)
 
@@ -283,7 +282,7 @@ def observe(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]
 def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]:
     """Step through tests together; an error outside of steps and records ends all of them."""
     stepper, stop, schedule = runs[0].stepper, runs[0].stop, runs[0].schedule
-    scenario, problem = runs[0].draws.scenario, joined_problem([run.problem for run in runs])
+    scenario, problem = runs[0].scenario, joined_problem([run.problem for run in runs])
     threshold, steps = scenario.outputs.width_threshold, scenario.evolution.max_steps
     state = fresh_state(problem)
     tests = Evolution(problem, state, stepper, stop, steps, schedule.next_record)
@@ -307,7 +306,7 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         going = [number not in deep for number in advance.numbers.tolist()]
         over = np.flatnonzero((end.passes >= stop) & going)
         numbers = advance.numbers[over].tolist()
-        scenarios = [runs[number].draws.scenario for number in numbers]
+        scenarios = [runs[number].scenario for number in numbers]
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
         for place, number, curve in zip(over.tolist(), numbers, curves, strict=True):
             chosen, grid = np.array([place]), advance.problem.grid
@@ -344,7 +343,7 @@ def add_strip_errors(
         By number the added errors of depth [m], volume [m^3] and profile, shape (3,), and those
         of the observables by steps and strips at the end; none where they are not estimated.
     """
-    stepper = coarse_stepper(runs[0].draws, problem)
+    stepper = coarse_stepper(runs[0].setup, problem)
     ended = [
         number
         for number, course in enumerate(courses)
@@ -352,7 +351,7 @@ def add_strip_errors(
     ]
     if stepper is None or not ended:
         return {}
-    places, steps = np.array(ended), runs[0].draws.scenario.evolution.max_steps
+    places, steps = np.array(ended), runs[0].scenario.evolution.max_steps
     needed = np.array([courses[number].passes[-1] for number in ended])
     added: dict[int, tuple[FloatArray, dict[str, FloatArray]]] = {}
     coarse = coarse_courses(problem.at(places), stepper, runs[0].stop, needed, steps, observe)

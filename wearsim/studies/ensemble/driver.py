@@ -22,6 +22,7 @@ from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.execution.processes import Executor
 from wearsim.studies.plausibility import plausibility_warnings
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
@@ -125,7 +126,7 @@ def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bo
         ),
     )
     texts = [text for applies, text in warnings if applies]
-    return [*plausibility_warnings(result.scenario), *texts]
+    return [*plausibility_warnings(Setup(result.scenario)), *texts]
 
 
 class EnsembleWork:

@@ -45,7 +45,7 @@ from wearsim.report.text import (
     too_few,
 )
 from wearsim.studies.cam.panels import ANGLE, segment_marks
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import unchecked_turn_of
 from wearsim.studies.ensemble.file.data import Effect
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.fatigue.panels import DAMAGE
@@ -225,15 +225,16 @@ def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
 
 def _damage(result: EnsembleResult) -> Panel:
     """Return the damage at the end: of a cam along its angle, of a cylinder across the track."""
-    name = "damage_curve" if result.raw.cam else "cylinder_damage_profile"
-    band = result.band(name)
-    curves = result.kept_values(name)
-    body = "cam" if result.raw.cam else "cylinder"
+    of_cylinder = "cylinder", "cylinder_damage_profile"
+    body, name = ("cam", "damage_curve") if result.raw.cam else of_cylinder
+    band, curves = result.band(name), result.kept_values(name)
     mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
     text = (
         f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests."
     )
-    x = ANGLE if result.raw.cam else Axis(Y, "mm", limits=worn_limits(band.y, curves.max(axis=0)))
+    x = ANGLE
+    if body == "cylinder":
+        x = Axis(Y, "mm", limits=worn_limits(band.y, curves.max(axis=0)))
     marks = _curves(band.y, curves, band.mean)
     return Panel(f"Damage of the {body} at the end", x, DAMAGE, marks, text)
 
@@ -250,7 +251,7 @@ def _lift_error(result: EnsembleResult) -> Panel:
         "Lift error at the end",
         ANGLE,
         Axis("difference from its mean", "um"),
-        [*marks, *segment_marks(CamTurn(result.scenario).cam.motion, names=False)],
+        [*marks, *segment_marks(unchecked_turn_of(result.scenario).cam.motion, names=False)],
         f"Change of the lift by wear. Peak to peak it is {mean} in the mean of"
         f" {count(result.count)} tests.",
     )

@@ -26,7 +26,7 @@ from wearsim.studies.kernels import kernels_of
 from wearsim.studies.roller_ends import ends_roller
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
-from wearsim.studies.run.grid import extent_of, lattice, shared_strips, start_of, strips_of_run
+from wearsim.studies.run.grid import lattice, shared_strips, start_of, strips_of_run
 from wearsim.types import FloatArray, Grid
 
 if TYPE_CHECKING:
@@ -181,10 +181,9 @@ def profile_axis(scenario: Scenario) -> Grid:
     drawer, reach, error = Drawer(scenario, "monte-carlo"), [], None
     for number in range(AXIS_REALISATIONS if scenario.random else 1):
         try:
-            draws = drawer.draw(number)
-            extent = extent_of(draws)
-            strips_of_run(draws, extent)
-            reach.append(abs(extent.centre) + extent.final)
+            setup = drawer.draw(number)
+            strips_of_run(setup)
+            reach.append(abs(setup.centre) + setup.final)
         except WearsimError as failure:
             error = error or failure
     if not reach:
@@ -298,11 +297,11 @@ class RealisationRunner:
 
     def prepare(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
         """Return the run of a realisation, and add the values of its random inputs to `drawn`."""
-        draws = self.drawer.draw(number, *sources(self.plan, self.drawer.groups, number))
-        drawn.update({**draws.values, **draws.time_means})
-        grid = start_of(draws, self.start)
-        problem, stepper, _ = assemble_problem(draws, grid, self._model)
-        return RealisationRun(number, drawn, draws, problem, stepper)
+        setup = self.drawer.draw(number, *sources(self.plan, self.drawer.groups, number))
+        drawn.update({**setup.values, **setup.time_means})
+        grid = start_of(setup, self.start)
+        problem, stepper, _ = assemble_problem(setup, grid, self._model)
+        return RealisationRun(number, drawn, setup, problem, stepper)
 
     def compile_kernels(self) -> None:
         """Compile the kernels in this process if the cache lacks any, by one step of a test.
@@ -314,7 +313,7 @@ class RealisationRunner:
             return
         with suppress(Exception):  # an error of the realisation is reported when it is run
             run = self.prepare(0, {})
-            state, steps = fresh_state(run.problem), run.draws.scenario.evolution.max_steps
+            state, steps = fresh_state(run.problem), run.scenario.evolution.max_steps
             next_record = run.schedule.next_record
             test = Evolution(run.problem, state, run.stepper, run.stop, steps, next_record)
             next(iter(test), None)
@@ -323,7 +322,7 @@ class RealisationRunner:
         """Return the contact model prepared for strips, shared by realisations if possible."""
         if grid is not self.start:
             return prepared_model(scenario, grid)
-        key = scenario.contact, (scenario.cylinder.material, scenario.roller.material)
+        key = scenario.contact, scenario.materials
         if key not in self._prepared:
             self._prepared = {key: prepared_model(scenario, grid)}
         return self._prepared[key]
@@ -332,7 +331,7 @@ class RealisationRunner:
         """Return the outcome of a realisation with its observations, or the error of its test."""
         drawn = dict(run.drawn)
         if isinstance(observations, SolverError):
-            observations = explained(observations, run.draws.scenario)
+            observations = explained(observations, run.scenario)
         if isinstance(observations, Exception):
             return Outcome(number=run.number, values=drawn, error=failure_text(observations))
         rows, scalars = observations.rows, dict(observations.scalars)
@@ -349,7 +348,7 @@ class RealisationRunner:
         if unusable:
             return Outcome(number=run.number, values=drawn, error=unusable[0])
         if self.plan == "control-variate":
-            columns = {key: value[None] for key, value in run.draws.values.items()}
+            columns = {key: value[None] for key, value in run.setup.values.items()}
             scalars["control"] = float(closed_form_depths(self.scenario, columns, 1)[0])
         curves = dict(observations.curves)
         if not same_strips(observations.grid, self.grid):

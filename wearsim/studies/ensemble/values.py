@@ -13,12 +13,10 @@ from wearsim.errors import unknown_name
 from wearsim.results.content import StudyResult
 from wearsim.studies.ensemble.file.data import EnsembleData
 from wearsim.studies.ensemble.file.schema import (
-    CAM_OBSERVABLES,
     DONE,
-    FATIGUE_OBSERVABLES,
     KEPT,
-    OBSERVABLES,
     kept_profiles,
+    observables_of,
 )
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design
@@ -69,8 +67,7 @@ class EnsembleValues(StudyResult[EnsembleData]):
     @property
     def observables(self) -> tuple[str, ...]:
         """Names of the observables."""
-        of_cams = CAM_OBSERVABLES if self.raw.cam else ()
-        return (*OBSERVABLES, *of_cams, *(FATIGUE_OBSERVABLES if self.raw.fatigue else ()))
+        return tuple(observables_of(cam=self.raw.cam, fatigue=self.raw.fatigue))
 
     @property
     def y(self) -> FloatArray:

@@ -9,7 +9,6 @@ import numpy as np
 from wearsim.evolution.fatigue import effective_damage, greatest_damages
 from wearsim.evolution.state import fresh_state
 from wearsim.mechanics.fatigue import ORTHOGONAL, greatest_von_mises
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.report.text import shown
 from wearsim.types import FloatArray
 
@@ -35,7 +34,7 @@ def lives_at(scenario: Scenario, pressure: FloatArray) -> FloatArray | None:
     choice = scenario.fatigue
     if choice is None or "cylinder" not in choice.laws:
         return None
-    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    modulus = scenario.pair.contact_modulus
     damage = choice.laws["cylinder"].build(modulus).damage_per_pass(np.asarray(pressure))
     return np.where(damage > 0.0, 1.0 / np.where(damage > 0.0, damage, 1.0), np.inf)
 

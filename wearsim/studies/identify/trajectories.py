@@ -24,8 +24,9 @@ from wearsim.studies.cam.cam_wear import LIFT, CamView, Wanted, falls_of_lift, s
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, joined_problem
 from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
-from wearsim.studies.run.draws import Drawer, Draws
-from wearsim.studies.run.grid import Extent, extent_of, lattice, strips_of_run
+from wearsim.studies.run.draws import Drawer
+from wearsim.studies.run.grid import lattice, strips_of_run
+from wearsim.studies.run.setup import Setup
 from wearsim.studies.schedule import RecordSchedule, due_records, states_at
 from wearsim.studies.start.heights import start_height
 from wearsim.types import FloatArray, Grid, IntArray
@@ -217,7 +218,7 @@ class Grower:
         self.reasons = time_dependence(self.scenario, shared)
         chosen = draws or (DRAWS_OF_MANY if self.reasons else DRAWS)
         self.count = chosen if self.drawer.groups else 1
-        self.draws: list[Draws] = [self.drawer.draw(number) for number in range(self.count)]
+        self.draws: list[Setup] = [self.drawer.draw(number) for number in range(self.count)]
         self._report = on_progress or (lambda done, total: None)
         self._grid: Grid | None = None
         self._angles = angles or {}
@@ -369,7 +370,7 @@ class Grower:
         table = self.scenario.operation.model_copy(
             update={"passes": max(1, round(passes[-1])), "duration": None}
         )
-        ready: list[Draws] = []
+        ready: list[Setup] = []
         evolution = self.scenario.evolution
         if self.count > _FEW and evolution.tolerance < TOLERANCE:
             evolution = evolution.model_copy(update={"tolerance": TOLERANCE})
@@ -381,12 +382,9 @@ class Grower:
             scenario = replace(scenario, operation=table, evolution=evolution)
             ready.append(replace(draws, scenario=scenario))
         last = {number: place for place, (number, _) in enumerate(tests)}  # of the greatest wear
-        extents = [extent_of(ready[place]) for place in last.values()]
-        grids = [
-            strips_of_run(ready[place], extent)
-            for place, extent in zip(last.values(), extents, strict=True)
-        ]
-        self._grid = grid = _covering(grids, extents)
+        setups = [ready[place] for place in last.values()]
+        grids = [strips_of_run(setup) for setup in setups]
+        self._grid = grid = _covering(grids, setups)
         model = prepared_model(self.scenario, grid)
 
         def models(scenario: Scenario, strips: Grid) -> ContactModel:
@@ -418,12 +416,12 @@ class Grower:
         return kept, [results[n] for n, (draw, _) in enumerate(tests) if draw not in lost]
 
 
-def _covering(grids: Sequence[Grid], extents: Sequence[Extent]) -> Grid:
+def _covering(grids: Sequence[Grid], setups: Sequence[Setup]) -> Grid:
     """Return strips of the median width that cover others and the predicted grooves."""
     low = min(grid.edges[0] for grid in grids)
     high = max(grid.edges[1] for grid in grids)
     middle, spacing = 0.5 * (low + high), float(np.median([grid.spacing for grid in grids]))
-    half = max(abs(extent.centre - middle) + extent.final for extent in extents)
+    half = max(abs(setup.centre - middle) + setup.final for setup in setups)
     extent = Grid.spanning(middle - 0.5 * spacing, middle + 0.5 * spacing, 1)
     return lattice(extent, max(half, 0.5 * (high - low)))
 
@@ -445,7 +443,7 @@ def _step(
         runs = [group[place] for place in places]
         stepper, stop = runs[0].stepper, schedule.passes[-1]
         problem = joined_problem([run.problem for run in runs])
-        steps = runs[0].draws.scenario.evolution.max_steps
+        steps = runs[0].scenario.evolution.max_steps
         for run in runs:
             results[run.number].clear()
         tests = Evolution(problem, fresh_state(problem), stepper, stop, steps, schedule.next_record)

@@ -104,7 +104,7 @@ class _Group:
     """Tests that are stepped together."""
 
     def __init__(self, runs: Sequence[RealisationRun], limits: Sequence[Limit]) -> None:
-        scenario = runs[0].draws.scenario
+        scenario = runs[0].scenario
         self.runs, self.limits, self.stepper = runs, limits, runs[0].stepper
         self.threshold, self.stop = scenario.outputs.width_threshold, runs[0].stop
         self.problem = joined_problem([run.problem for run in runs])
@@ -134,7 +134,7 @@ class _Group:
             chosen = np.array([number])
             self._finish(number, self.problem.at(chosen), self.state.at(chosen), life)
         self.evolution.end(at_once.tolist())
-        with_courses = self.runs[0].draws.scenario.evolution.strip_error
+        with_courses = self.runs[0].scenario.evolution.strip_error
         courses = [Course() for _ in self.tests]
         add_observed(courses, range(len(courses)), self._by_limit(start))
         for advance in self.evolution:
@@ -214,7 +214,7 @@ class _Group:
 
     def _end_deep(self, advance: Advance) -> None:
         """End tests that become too deep before they reach a limit."""
-        scenario = self.runs[0].draws.scenario
+        scenario = self.runs[0].scenario
         deep = too_deep_tests(advance, scenario, _LIMITS)
         for place, number in enumerate(advance.numbers.tolist()):
             if number in deep and self.tests[number].outcome is None:
@@ -251,7 +251,7 @@ class _Group:
                 low, high = self._crossing_of(test, 1.0 - error, passes), math.inf
                 test.level = 1.0 + error
             life = {"life": passes, "life_low": low, "life_high": high}
-            scenario, deepest = self.runs[number].draws.scenario, float(depths[place])
+            scenario, deepest = self.runs[number].scenario, float(depths[place])
             failure = too_deep_failure(scenario, deepest, passes, _LIMITS)
             self._finish(number, problem.at(chosen), state.at(chosen), life, failure)
 
@@ -346,7 +346,7 @@ class _Group:
             "limit_angle": self._angle(test.limit, problem, state),
         }
         curves: dict[str, FloatArray]
-        (curves,) = curves_at_end(problem, state, [self.runs[number].draws.scenario])
+        (curves,) = curves_at_end(problem, state, [self.runs[number].scenario])
         if problem.fatigue:
             scalars["damage_per_pass"] = self.first_damage[number]
             scalars["course_end"] = float(state.passes[0])
@@ -355,9 +355,8 @@ class _Group:
         test.outcome = LifeRun(rows, scalars, curves, problem.grid, failure)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:
-        """Return the angle of a cam at which the limited quantity is greatest [rad]."""
-        cam = problem.kinematics.cam
-        if cam is None or limit < 0:
+        """Return the angle of a cam at which the limited quantity is greatest [rad], or nan."""
+        if limit < 0:
             return math.nan
         if self.limits[limit].quantity == "peak pressure":
             values = peak_pressures(problem, state).max(axis=1)
@@ -365,7 +364,7 @@ class _Group:
             values = np.abs(lift_errors(problem, state)).max(axis=1)
         else:
             values = state.cylinder_depth[:, 0].max(axis=-1)
-        return float(cam.greatest(values).angle[0])
+        return float(problem.kinematics.track.greatest(values).angle[0])
 
     def _ratios(self, problem: WearProblem, state: WearState) -> FloatArray:
         return ratios(self.limits, self.stepper, problem, state)

@@ -30,7 +30,7 @@ from wearsim.report.panels import (
 from wearsim.report.text import count, shown
 from wearsim.report.view import Overview, Row, Rows
 from wearsim.studies.cam.panels import ANGLE, shape_panel
-from wearsim.studies.cam.turn import CamTurn
+from wearsim.studies.cam.turn import unchecked_turn_of
 from wearsim.studies.cam.view import CAM_EXCLUDED, loads
 from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
 from wearsim.studies.fatigue.panels import incidence_panel
@@ -357,7 +357,7 @@ def life_overview(result: LifeResult, lives: Mapping[str, Rows], no_effects: str
         excluded.remove(NO_FATIGUE)
     main = life_sheet(result).first if scenario.cam is None else None
     if scenario.cam is not None:
-        groups["Loads"], main = loads(scenario), shape_panel(CamTurn(scenario))
+        groups["Loads"], main = loads(scenario), shape_panel(unchecked_turn_of(scenario))
         excluded += CAM_EXCLUDED
     if result.count:
         shares = (result.first_limits.get(name, 0.0) for name in scenario.limit.given)

@@ -23,16 +23,14 @@ from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
 from wearsim.evolution.strip_errors import LOOSER, LOOSEST
 from wearsim.evolution.strips import Surfaces
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.stations import cam_stations
 from wearsim.studies.cam.turn import turn_of
-from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import growth_of, strips_of_run
-from wearsim.studies.run.groove import predicted_half_width
 from wearsim.studies.run.inputs import contact_inputs
-from wearsim.studies.run.nodes import MAX_NODES, minimum_nodes, redrawing, with_nodes
+from wearsim.studies.run.nodes import MAX_NODES, PassQuadrature, minimum_nodes, redrawing
+from wearsim.studies.run.setup import Setup
 from wearsim.studies.start.heights import roller_height, roller_profile, start_height
 from wearsim.types import FloatArray, Grid
 from wearsim.units import in_engineers_unit
@@ -71,7 +69,7 @@ def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> st
     return name
 
 
-def _check_spring(draws: Draws) -> None:
+def _check_spring(setup: Setup) -> None:
     """Refuse a spring that unloads the roller with a model that fits one parabola to the gap.
 
     The fit jumps where a strip leaves the patch. A stiff spring turns that into a jump of the load,
@@ -83,12 +81,12 @@ def _check_spring(draws: Draws) -> None:
         If the groove at a constant load would be many times as deep as the spring's travel N/k,
         after which the load has vanished: by then the load falls as exp(-(2/3) (d k/N)^(3/2)).
     """
-    scenario = draws.scenario
+    scenario = setup.scenario
     model, stiffness = scenario.contact.model, getattr(scenario.load.options, "stiffness", 0.0)
     load = getattr(scenario.load.options, "normal_force", 0.0)
     if model not in ONE_PARABOLA or not stiffness * load or scenario.creepage.drive == "free":
         return
-    half = predicted_half_width(draws, load, full_slip=False)
+    half = setup.half_width(load, full_slip=False)
     ratio = half**2 / (2.0 * scenario.axial_gap.radius_at(half)) * stiffness / load
     if ratio > UNLOADED:
         what = f"unloads the roller, whose load cannot be followed by contact.model = '{model}'"
@@ -121,18 +119,18 @@ def build_stepper(scenario: Scenario, name: str) -> Stepper:
     return PerPassStepper()
 
 
-def coarse_stepper(draws: Draws, problem: WearProblem) -> Stepper | None:
+def coarse_stepper(setup: Setup, problem: WearProblem) -> Stepper | None:
     """Return the stepper of the test on coarse strips, None where its error is not estimated.
 
     The test of single passes has inputs drawn at every pass, and no other test has the same.
     """
-    evolution = draws.scenario.evolution
-    if not evolution.strip_error or (draws.passes and evolution.stepper == "per-pass"):
+    evolution = setup.scenario.evolution
+    if not evolution.strip_error or (setup.passes and evolution.stepper == "per-pass"):
         return None
-    free = replace(draws.scenario, evolution=evolution.model_copy(update={"stepper": "auto"}))
+    free = replace(setup.scenario, evolution=evolution.model_copy(update={"stepper": "auto"}))
     tolerance = min(LOOSER * evolution.tolerance, LOOSEST)
     if chosen_stepper(free, problem.model, problem.contacts_each) == "implicit":
-        return ImplicitStepper(tolerance, by_doubling=_by_doubling(draws.scenario))
+        return ImplicitStepper(tolerance, by_doubling=_by_doubling(setup.scenario))
     return StabilisedStepper(tolerance)
 
 
@@ -145,11 +143,11 @@ def _by_doubling(scenario: Scenario) -> bool:
     return getattr(scenario.contact.options, "tangential", None) == "fastsim"
 
 
-def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
+def merged_rollers(setup: Setup) -> tuple[list[int], FloatArray]:
     """Return the first roller of each group of identical ones, and the sizes of the groups."""
-    scenario = draws.scenario
+    scenario = setup.scenario
     creepage, count = scenario.creepage, scenario.operation.rollers
-    if draws.rollers or any(len(item.rollers) < count for item in draws.varying):
+    if setup.rollers or any(len(item.rollers) < count for item in setup.varying):
         return list(range(count)), np.ones(count)
     settings = scenario.roller.offset, creepage.yaw, creepage.tilt
     columns: list[Sequence[object]] = [scenario.per_roller(value) for value in settings]
@@ -160,13 +158,13 @@ def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
 
 
 def assemble_problem(
-    draws: Draws, grid: Grid | None = None, models: ModelBuilder | None = None
+    setup: Setup, grid: Grid | None = None, models: ModelBuilder | None = None
 ) -> tuple[WearProblem, Stepper, str]:
     """Return the problem of a run, its stepper and the stepper's name.
 
     Parameters
     ----------
-    draws : Draws
+    setup : Setup
         The scenario, with the values of its random inputs.
     grid : Grid, optional
         Strips of an earlier part of the run, or those that realisations share, instead of the
@@ -181,27 +179,27 @@ def assemble_problem(
     CapabilityError
         If the contact model does not support the scenario.
     """
-    scenario = draws.scenario
-    grid = grid if grid is not None else strips_of_run(draws)
+    scenario = setup.scenario
+    grid = grid if grid is not None else strips_of_run(setup)
     build = models or prepared_model
     chosen = build(scenario, grid)
-    first, multiplicity = merged_rollers(draws)
-    several = len(first) > 1 or draws.passes or scenario.cam
+    first, multiplicity = merged_rollers(setup)
+    several = len(first) > 1 or setup.passes or scenario.cam
     name = chosen_stepper(scenario, chosen, 2 if several else 1)
-    _check_spring(draws)
+    _check_spring(setup)
     if name == "per-pass" and getattr(scenario.load.options, "feedback", "") == "inertia":
         what = 'follows single turns, without feedback = "inertia"'
         remedy = 'feedback = "static", or another stepper'
         mistake = Mistake("evolution", "stepper", what, "per-pass", remedy)
         raise ScenarioError(scenario.file, [mistake])
     stepper = build_stepper(scenario, name)
-    if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
+    if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not setup.passes):
         raise ScenarioError(
             scenario.file,
             [Mistake("evolution", "nodes", "has no meaning without an expectation over passes")],
         )
     place = {number: k for k, number in enumerate(first)}
-    drawn = {name: values[first][:, None] for name, values in draws.rollers.items()}
+    drawn = {name: values[first][:, None] for name, values in setup.rollers.items()}
     problem = replace(
         build_problem(
             scenario,
@@ -215,7 +213,7 @@ def assemble_problem(
         fatigue=_fatigue(scenario),
         varying=tuple(
             replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
-            for item in draws.varying
+            for item in setup.varying
         ),
     )
     offsets = contact_inputs(scenario, first, drawn)["offset"]
@@ -223,18 +221,18 @@ def assemble_problem(
     problem = replace(
         problem,
         growth=growth_of(
-            draws, grid, partial(build, scenario), partial(surfaces, scenario, first, offsets)
+            setup, grid, partial(build, scenario), partial(surfaces, scenario, first, offsets)
         ),
     )
-    if draws.passes and stepper.pass_by_pass and scenario.fatigue is not None:
+    if setup.passes and stepper.pass_by_pass and scenario.fatigue is not None:
         what = "cannot follow damage by inputs drawn at every pass, which no contact represents"
         mistake = Mistake("evolution", "stepper", what, "per-pass", "another stepper")
         raise ScenarioError(scenario.file, [mistake])
-    if draws.passes and stepper.pass_by_pass:
-        nodes = with_nodes(problem, scenario, draws.passes, minimum_nodes(draws.passes))
-        stepper = PerPassStepper(redrawing(scenario, draws.passes), nodes)
-    elif draws.passes:
-        problem = with_converged_nodes(problem, draws)
+    if setup.passes and stepper.pass_by_pass:
+        nodes = PassQuadrature(problem, setup).with_nodes(minimum_nodes(setup.passes))
+        stepper = PerPassStepper(redrawing(scenario, setup.passes), nodes)
+    elif setup.passes:
+        problem = with_converged_nodes(problem, setup)
     return problem, stepper, name
 
 
@@ -243,7 +241,7 @@ def _fatigue(scenario: Scenario) -> Fatigue | None:
     choice = scenario.fatigue
     if choice is None:
         return None
-    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    modulus = scenario.pair.contact_modulus
     laws = {body: law.build(modulus) for body, law in choice.laws.items()}
     return Fatigue(laws, choice.slope, choice.probability, choice.reference_area, choice.remove)
 
@@ -256,8 +254,8 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
     CapabilityError
         If the model does not support the scenario's creepage or its creep factor.
     """
-    creepage, materials = scenario.creepage, (scenario.cylinder.material, scenario.roller.material)
-    model, factor = scenario.contact.build(grid, materials), scenario.friction.creep_factor
+    creepage, factor = scenario.creepage, scenario.friction.creep_factor
+    model = scenario.contact.build(grid, scenario.materials)
     needs = {
         "creep_factor": (f"friction.creep_factor = {factor:g}", factor != 1.0),
         "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
@@ -284,16 +282,17 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
     return model if factor == 1.0 else model.with_creep_factor(factor)
 
 
-def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
+def with_converged_nodes(problem: WearProblem, setup: Setup) -> WearProblem:
     """Return the problem with quadrature nodes for the inputs that are drawn at every pass.
 
     Unless the scenario gives their number, they are doubled until the initial wear has converged to
     half the tolerance, as has the known part of its error, or `MAX_NODES` are reached.
     """
-    evolution = draws.scenario.evolution
-    count, single_pass = evolution.nodes or minimum_nodes(draws.passes), np.ones(1)
+    evolution = setup.scenario.evolution
+    count, single_pass = evolution.nodes or minimum_nodes(setup.passes), np.ones(1)
+    quadrature = PassQuadrature(problem, setup)
     while True:
-        refined = with_nodes(problem, draws.scenario, draws.passes, count)
+        refined = quadrature.with_nodes(count)
         if evolution.nodes or 2 * count > MAX_NODES:
             return refined
         fresh = fresh_state(refined)
@@ -340,10 +339,14 @@ def build_problem(
     """
     creepage, roller, cylinder = scenario.creepage, scenario.roller, scenario.cylinder
     count, values = len(rollers), contact_inputs(scenario, rollers, drawn)
-    cam = None
-    if scenario.cam is not None:
-        cam = cam_stations(turn_of(scenario), angles)
-    at = None if cam is None else cam.angle[:, 0, 0]
+    kinematics = Kinematics(
+        cylinder_radius=cylinder.radius,
+        roller_radius=roller.radius,
+        rolling_speed=scenario.rolling_speed,
+        multiplicity=np.ones(count) if multiplicity is None else multiplicity,
+        cam=cam_stations(turn_of(scenario), angles) if scenario.cam else None,
+    )
+    at = kinematics.track.angles
     unworn = surfaces(scenario, rollers, values.pop("offset"), grid, at)
     tolerance = np.clip(ITERATION_FRACTION * scenario.evolution.tolerance, *ITERATION_RANGE)
     return WearProblem(
@@ -352,15 +355,9 @@ def build_problem(
         laws=(),
         loads=(scenario.load.build(),),
         terms={term.name: term.build() for term in scenario.load.terms},
-        kinematics=Kinematics(
-            cylinder_radius=cylinder.radius,
-            roller_radius=roller.radius,
-            rolling_speed=scenario.rolling_speed,
-            multiplicity=np.ones(count) if multiplicity is None else multiplicity,
-            cam=cam,
-        ),
+        kinematics=kinematics,
         flat_gap=np.broadcast_to(
-            unworn.gap, (1 if cam is None else len(cam.angle), count, realisations, grid.strips)
+            unworn.gap, (1 if at is None else len(at), count, realisations, grid.strips)
         ),
         from_apex=unworn.from_apex,
         roller_drop=unworn.roller_drop,

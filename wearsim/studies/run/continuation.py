@@ -138,8 +138,10 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
         if limit.value > most:
             remedy = f"at most {shown}, {what}, or evolution.allow_deep = true"
             raise _refusal(scenario, limit, "is beyond the validity of the contact models", remedy)
-    draws = draw(scenario)
-    forecast = WearForecast(draws, assemble_problem(draws, start_of_run(scenario, draws))[0])
+    setup = draw(scenario)
+    forecast = WearForecast(
+        setup.scenario, assemble_problem(setup, start_of_run(scenario, setup))[0]
+    )
     test, name = float(scenario.total_passes), limit.variable
     name = {"worn_volume": "volume", "descent": "clearance"}.get(name, name)
     fresh, end = forecast.at(1.0), forecast.at(test)

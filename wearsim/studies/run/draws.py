@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,10 +12,11 @@ import numpy as np
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.quantities import Varying
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
-from wearsim.plugins import JointDistribution, Process
+from wearsim.plugins import Process
 from wearsim.scenario import RandomInput, Scenario, realise, require_run
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.run.inputs import OFFSET, TILT, YAW, contact_values, origin
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.sampler import BELOW_ONE, REPLICATES, PlanName, Sampler
 from wearsim.uq.sampling.sobol import Stream
@@ -23,97 +24,9 @@ from wearsim.uq.sampling.sobol import Stream
 LISTED = {OFFSET, YAW, TILT}  # a scenario may give one per roller
 LONGEST_PATH = 5_000_000  # samples of a process
 BLOCK = 4096  # realisations that are drawn at once
-_MIDPOINTS = np.linspace(0.5, 63.5, 64) / 64.0  # probabilities to average over a distribution
-RARE = 1e-7  # fraction of the passes that may exceed the range of the strips
 
 
-@dataclass(frozen=True)
-class Draws:
-    """One realisation of a scenario's random inputs.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario with the values drawn for the whole test; other random inputs at their mean.
-    rollers : mapping of str to ndarray, shape (rollers,)
-        Values drawn for each roller that a scenario cannot hold, by field of `ContactInputs`.
-    varying : tuple of Varying
-        Processes; their rollers are the scenario's.
-    passes : tuple of RandomInput
-        Inputs that are drawn at every pass or turn.
-    values : mapping of str to ndarray, shape () or (rollers,)
-        All values drawn for the test and for its rollers, by the scenario's key [SI].
-    time_means : mapping of str to ndarray, shape () or (rollers,)
-        Means over the test of the processes, by the scenario's key [SI].
-    """
-
-    scenario: Scenario
-    rollers: Mapping[str, FloatArray]
-    varying: tuple[Varying, ...]
-    passes: tuple[RandomInput, ...]
-    values: Mapping[str, FloatArray]
-    time_means: Mapping[str, FloatArray]
-
-    def greatest_mean(self, name: str, mean: float) -> float:
-        """Return the greatest mean absolute value of an input of a contact over the whole test.
-
-        Inputs that change sign cause wear with either sign, so that their absolute value counts.
-
-        Parameters
-        ----------
-        name : str
-            Field of `ContactInputs`.
-        mean : float
-            The value where the input is not random, which is also the mean over the passes.
-        """
-        sizes = [abs(float(value)) for value in (mean, *self.rollers.get(name, ()))]
-        time = self.scenario.total_time
-        for item in self.varying:
-            if item.name == name:
-                (path,) = item.paths
-                signed = _changes_sign(path.value)
-                path_mean = np.abs(path.value).mean() if signed else path.mean(0.0, time)
-                sizes.append(abs(float(path_mean)))
-        for random in self.passes:
-            if len(random.keys) == 1 and CONTACT_FIELDS[random.keys[0]] == name:
-                values = random.scalar.quantile(_MIDPOINTS)
-                sizes += [float(np.abs(values).mean())] * _changes_sign(values)
-        return max(sizes)
-
-    def range_of(self, name: str) -> tuple[float, float]:
-        """Return the approximate range of the drawn values of an input of a contact, and of 0.
-
-        Parameters
-        ----------
-        name : str
-            Field of `ContactInputs`.
-        """
-        paths = [item.paths[0].value for item in self.varying if item.name == name]
-        limits = [
-            limits
-            for random in self.passes
-            for key, limits in zip(random.keys, _ranges(random), strict=True)
-            if CONTACT_FIELDS[key] == name
-        ]
-        values = [0.0, *self.rollers.get(name, ()), *(end for pair in limits for end in pair)]
-        values += [float(end) for path in paths for end in (path.min(), path.max())]
-        return min(values), max(values)
-
-
-def _changes_sign(values: FloatArray) -> bool:
-    return bool(values.min() < 0.0 < values.max())
-
-
-def _ranges(item: RandomInput) -> list[list[float]]:
-    """Return the range of each value that an input sets, without the mean of a load."""
-    if isinstance(item.distribution, JointDistribution):
-        return [[-reach, reach] for reach in item.distribution.reach]
-    low, high = item.scalar.quantile(np.array([RARE, 1.0 - RARE]))
-    mean = origin(item.name, item.mean[0])
-    return [[float(low) - mean, float(high) - mean]]
-
-
-def draw(scenario: Scenario) -> Draws:
+def draw(scenario: Scenario) -> Setup:
     """Draw the random inputs of the realisation that is selected in a scenario.
 
     Parameters
@@ -122,7 +35,7 @@ def draw(scenario: Scenario) -> Draws:
 
     Returns
     -------
-    Draws
+    Setup
 
     Raises
     ------
@@ -236,7 +149,7 @@ class Drawer:
         realisation: int,
         sources: Mapping[str, int] | None = None,
         passes: int | None = None,
-    ) -> Draws:
+    ) -> Setup:
         """Return the draws of one realisation.
 
         Parameters
@@ -249,7 +162,7 @@ class Drawer:
 
         Returns
         -------
-        Draws
+        Setup
 
         Raises
         ------
@@ -257,8 +170,10 @@ class Drawer:
             If a value is out of its bounds, or the path of a process would be too long.
         """
         number = realisation if passes is None else passes
-        table = self.scenario.sampling.model_copy(update={"realisation": number})
-        scenario = replace(self.scenario, sampling=table)
+        scenario, table = self.scenario, self.scenario.sampling
+        if number != table.realisation:
+            table = table.model_copy(update={"realisation": number})
+            scenario = replace(scenario, sampling=table)
         numbers = dict.fromkeys((item.name for item in scenario.random), realisation)
         numbers |= sources or {}
         columns = {n: self.columns(n, 1) for n in sorted({numbers[i.name] for i in self.items})}
@@ -275,7 +190,7 @@ class Drawer:
         listed.update(self._fixed)
         unlisted = {key: array for key, array in values.items() if key not in listed}
         paths = {item: _paths(scenario, item, numbers[item.name]) for item in self._processes}
-        return Draws(
+        return Setup(
             scenario=realise(scenario, listed) if listed else scenario,
             rollers=contact_values(self.items, unlisted),
             varying=tuple(path for of_input in paths.values() for path in of_input),

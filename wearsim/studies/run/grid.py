@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.strips import JOINED, LEAST_LOADED, Growth, Surfaces, same_strips
-from wearsim.mechanics.hertz.ellipse import HertzContact
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
-from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.roller_ends import (
     STRIPS_BEYOND,
     ends_roller,
     roller_grid,
     strips_of_roller,
 )
-from wearsim.studies.run.draws import Draws
-from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
-from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
-from wearsim.studies.start.heights import start_extent
+from wearsim.studies.run.inputs import OFFSET, TILT
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray, Grid
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
@@ -49,56 +44,13 @@ _MARGIN = 1e-9  # of a patch, against rounding at the outer edges
 _ROUNDING = 1e-12
 
 
-def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> FloatArray:
-    """Return the contact positions on an unworn cylinder [m].
-
-    Parameters
-    ----------
-    scenario : Scenario
-    inputs : mapping of str to ndarray
-        Among them offset [m] and tilt [rad], see `contact_inputs`.
-    """
-    apexes = scenario.axial_gap.apexes(inputs["offset"])
-    if not scenario.creepage.tilt_shifts_contact:
-        return apexes
-    return np.asarray(apexes + tilt_shift(scenario, inputs["tilt"]))
-
-
-def tilt_shift(scenario: Scenario, tilt: FloatArray | tuple[float, ...]) -> FloatArray:
-    """Return the distance by which tilt moves the contact of unworn bodies [m].
-
-    Parameters
-    ----------
-    scenario : Scenario
-    tilt : ndarray
-        [rad].
-    """
-    gap, half = scenario.axial_gap, 0.0
-    if not gap.is_crowned:
-        half = widest_patch(scenario, load_range(scenario, scenario.load.build(), 0.0)[1]).b
-    return gap.shift(np.asarray(tilt, dtype=np.float64), half)
-
-
-def _greatest_shift(draws: Draws) -> float:
-    """Return the greatest distance by which the drawn tilt moves contacts [m]."""
-    return float(np.abs(tilt_shift(draws.scenario, draws.range_of("tilt"))).max())
-
-
-def contact_centre(scenario: Scenario, rollers: Sequence[int]) -> float:
-    """Return the middle of the strips [m]: the scenario's, or between the rollers' contacts."""
-    if scenario.contact.centre is not None:
-        return scenario.contact.centre
-    positions = contact_positions(scenario, contact_inputs(scenario, rollers))
-    return 0.5 * float(positions.min() + positions.max())
-
-
-def contact_grid(scenario: Scenario, load: float) -> Grid:
+def contact_grid(setup: Setup, load: float) -> Grid:
     """Return the strips of the first roller's contact under `load` [N].
 
     The scenario gives them, the whole width of the profile, or the choice of the model.
     """
-    choice, profile = scenario.contact, start_extent(scenario)
-    centre, half_width = contact_centre(scenario, [0]), widest_patch(scenario, load).b
+    scenario, profile = setup.scenario, setup.start_extent
+    choice, centre, half_width = scenario.contact, setup.first_centre, setup.widest_patch(load).b
     if choice.width is None and profile is not None:
         return profile_grid(profile.low, profile.high, half_width, choice.strips)
     half = 1.2 * half_width
@@ -107,25 +59,24 @@ def contact_grid(scenario: Scenario, load: float) -> Grid:
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
         return roller_grid(scenario, choice.strips or strips_of_roller(scenario, default, load))
     if choice.width is None and choice.strips is None:
-        grid = suggested_grid(scenario, load)
+        grid = suggested_grid(setup, load)
         if grid is not None:
             return Grid(grid.y + centre, grid.spacing)
     width = choice.width if choice.width is not None else 2.4 * half_width
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or default)
 
 
-def suggested_grid(scenario: Scenario, load: float) -> Grid | None:
+def suggested_grid(setup: Setup, load: float) -> Grid | None:
     """Return the strips that the contact model suggests under `load` [N], if any."""
-    choice = scenario.contact
+    scenario, choice = setup.scenario, setup.scenario.contact
     if choice.spec.suggest_grid is None:
         return None
     curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
-    materials = scenario.cylinder.material, scenario.roller.material
     gap = scenario.axial_gap
-    across = 1.0 / gap.radius_at(0.0 if gap.is_crowned else fresh_patch(scenario, load).b)
+    across = 1.0 / gap.radius_at(0.0 if gap.is_crowned else setup.fresh_patch(load).b)
     if across == 0.0:
         return None
-    return choice.spec.suggest_grid(choice.options, across, curvature, load, materials)
+    return choice.spec.suggest_grid(choice.options, across, curvature, load, scenario.materials)
 
 
 def profile_grid(start: float, stop: float, half_width: float, strips: int | None) -> Grid:
@@ -145,12 +96,12 @@ def profile_grid(start: float, stop: float, half_width: float, strips: int | Non
     return Grid.spanning(start, stop, chosen)
 
 
-def wider_grid(scenario: Scenario, grid: Grid, load: float, shift: float = 0.0) -> Grid | None:
+def wider_grid(setup: Setup, grid: Grid, load: float, shift: float = 0.0) -> Grid | None:
     """Return the strips of a profile and further ones for a groove as wide as the profile is deep.
 
     Parameters
     ----------
-    scenario : Scenario
+    setup : Setup
     grid : Grid
         Strips of the profile.
     load : float
@@ -163,12 +114,12 @@ def wider_grid(scenario: Scenario, grid: Grid, load: float, shift: float = 0.0) 
     Grid or None
         None if the scenario sets a width, has no profile, or the groove is not wider than it.
     """
-    profile = start_extent(scenario)
+    scenario, profile = setup.scenario, setup.start_extent
     if scenario.contact.width is not None or profile is None:
         return None
     groove = float(scenario.axial_gap.half_width(profile.relief))  # of a conformal roller
-    half = 1.1 * groove + 1.3 * fresh_patch(scenario, load).b + shift
-    centre = contact_centre(scenario, [0])
+    half = 1.1 * groove + 1.3 * setup.fresh_patch(load).b + shift
+    centre = setup.first_centre
     lacking = max(grid.edges[0] - centre + half, centre + half - grid.edges[1])
     added = math.ceil(lacking / grid.spacing)
     if added <= 0:
@@ -204,48 +155,7 @@ def strips_per_half_width(half_width: float, tolerance: float, groove: float = 0
     return float(np.clip(per_half_width, FEWEST_PER_HALF_WIDTH, STRIPS_PER_HALF_WIDTH))
 
 
-class Extent(NamedTuple):
-    """Extent of the contacts and of the final groove of a run.
-
-    Parameters
-    ----------
-    patch : HertzContact
-        Widest patch of the unworn bodies.
-    centre : float
-        Middle of the contacts [m].
-    shift, fresh, final : float
-        Distance from the middle of the contacts' middles, of the edges of the contacts of the
-        unworn bodies, and of those of the groove predicted for full slip, the last two with a
-        margin [m].
-    load : float
-        Greatest load [N].
-    """
-
-    patch: HertzContact
-    centre: float
-    shift: float
-    fresh: float
-    final: float
-    load: float
-
-
-def extent_of(draws: Draws) -> Extent:
-    """Return the extent of the contacts of a run."""
-    scenario = draws.scenario
-    load = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
-    load += draws.range_of("normal_force_offset")[1]
-    patch, rollers = widest_patch(scenario, load), range(scenario.operation.rollers)
-    centre = contact_centre(scenario, rollers)
-    positions = contact_positions(scenario, contact_inputs(scenario, rollers))
-    shift = float(np.abs(positions - centre).max())
-    if scenario.creepage.tilt_shifts_contact:
-        shift += _greatest_shift(draws)
-    fresh = shift + 1.3 * patch.b
-    final = fresh + 1.1 * predicted_half_width(draws, load)
-    return Extent(patch, centre, shift, fresh, final, load)
-
-
-def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
+def strips_of_run(setup: Setup) -> Grid:
     """Return the strips with which a run starts, for its random inputs.
 
     They resolve the contact of the unworn bodies and cover it, and the final groove as far as it is
@@ -256,8 +166,8 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
     ScenarioError
         If the contact does not fit on the strips that the scenario defines.
     """
-    scenario, choice = draws.scenario, draws.scenario.contact
-    patch, centre, shift, fresh, half, load = extent or extent_of(draws)
+    scenario, choice = setup.scenario, setup.scenario.contact
+    patch, centre, fresh, half = setup.patch, setup.centre, setup.fresh, setup.final
     tolerance, size = scenario.evolution.tolerance, patch.b
     if not scenario.axial_gap.is_crowned:  # loads fall to zero over the ends of the patch
         size *= PART_OF_FORM
@@ -267,12 +177,12 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
             least = max(least, STRIPS_OF_FORM)
         inside = not ends_roller(scenario, centre - fresh, centre + fresh)
         if choice.strips or not inside or least < STRIPS_AT_START:
-            return roller_grid(scenario, choice.strips or strips_of_roller(scenario, least, load))
+            strips = strips_of_roller(scenario, least, setup.greatest_load)
+            return roller_grid(scenario, choice.strips or strips)
     width = choice.width if choice.width is not None else 2.0 * half
-    many = scenario.cam is not None and turn_of(scenario).varies
-    resolved = 0.0
+    many, resolved = setup.turn.varies, 0.0
     if many:
-        resolved = predicted_half_width(draws, load, full_slip=False)
+        resolved = setup.half_width(setup.greatest_load, full_slip=False)
         depth = scenario.limit.depth or math.inf
         resolved = min(resolved, float(scenario.axial_gap.half_width(depth)))
     if choice.width is None:  # strips grow from here
@@ -282,7 +192,7 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
             per_half_width, at_start = LEAST_CHOSEN, choice.strips
         width = min(width, max(2.0 * fresh, size / per_half_width * at_start))
     strips = choice.strips or strips_over(width, size, tolerance, resolved)
-    if width < 2.0 * (shift + patch.b):
+    if width < 2.0 * (setup.shift + patch.b):
         raise ScenarioError(
             scenario.file,
             [
@@ -291,7 +201,7 @@ def strips_of_run(draws: Draws, extent: Extent | None = None) -> Grid:
                     "width",
                     "the initial contact does not fit",
                     f"{width * 1e3:.4g} mm",
-                    f"at least {2e3 * (shift + patch.b):.4g} mm",
+                    f"at least {2e3 * (setup.shift + patch.b):.4g} mm",
                 )
             ],
         )
@@ -304,14 +214,14 @@ def shared_strips(scenario: Scenario) -> Grid:
     They are those with every input that is drawn for a test at its mean, wider by its scatter.
     """
     redrawn = tuple(item for item in scenario.random if item.is_redrawn)
-    grid = strips_of_run(Draws(scenario, {}, (), redrawn, {}, {}))
+    grid = strips_of_run(Setup(scenario, passes=redrawn))
     fixed = scenario.contact.width is not None or scenario.contact.strips is not None
     if fixed or not scenario.random or ends_roller(scenario, *grid.edges):
         return grid
     ranged = (item for item in scenario.random if item.role in DRAWN)
     tilting = tuple(item for item in ranged if CONTACT_FIELDS.keys() >= set(item.keys))
-    drawn = Draws(scenario, {}, (), tilting, {}, {})
-    tilts = float(np.ptp(tilt_shift(scenario, drawn.range_of("tilt"))))
+    drawn = Setup(scenario, passes=tilting)
+    tilts = float(np.ptp(drawn.tilt_shift(drawn.range_of("tilt"))))
     wider = 0.5 * (1.25 * grid.strips * grid.spacing + tilts)
     return lattice(grid, wider)
 
@@ -329,30 +239,29 @@ def lattice(grid: Grid, half: float) -> Grid:
     return Grid.spanning(middle - 0.5 * strips * spacing, middle + 0.5 * strips * spacing, strips)
 
 
-def start_of(draws: Draws, shared: Grid) -> Grid:
+def start_of(setup: Setup, shared: Grid) -> Grid:
     """Return the strips with which a realisation starts: the shared ones if its contacts fit.
 
     They must cover the contacts of the unworn bodies, and resolve them nearly as well as its own.
     """
-    scenario, extent = draws.scenario, extent_of(draws)
-    strips = strips_of_run(draws, extent)
+    scenario, strips = setup.scenario, strips_of_run(setup)
     if scenario.contact.width is not None or ends_roller(scenario, *strips.edges):
         return shared if same_strips(strips, shared) else strips
-    reach = abs(extent.centre - 0.5 * (shared.edges[0] + shared.edges[1])) + extent.fresh
+    reach = abs(setup.centre - 0.5 * (shared.edges[0] + shared.edges[1])) + setup.fresh
     covers = 2.0 * reach <= shared.strips * shared.spacing
     resolves = scenario.contact.strips or shared.spacing <= COARSER * strips.spacing
     return shared if covers and resolves else strips
 
 
-def start_of_run(scenario: Scenario, draws: Draws) -> Grid:
+def start_of_run(scenario: Scenario, setup: Setup) -> Grid:
     """Return the strips with which the run of a scenario starts, for its realisation."""
     if not scenario.random:
-        return strips_of_run(draws)
-    return start_of(draws, shared_strips(scenario))
+        return strips_of_run(setup)
+    return start_of(setup, shared_strips(scenario))
 
 
 def growth_of(
-    draws: Draws,
+    setup: Setup,
     grid: Grid,
     model: Callable[[Grid], ContactModel],
     surfaces: Callable[[Grid, FloatArray | None], Surfaces],
@@ -361,7 +270,7 @@ def growth_of(
 
     Parameters
     ----------
-    draws : Draws
+    setup : Setup
     grid : Grid
         The present strips.
     model, surfaces : callable
@@ -372,21 +281,19 @@ def growth_of(
     ScenarioError
         If the load is not defined for the whole test.
     """
-    scenario, choice, load = draws.scenario, draws.scenario.contact, draws.scenario.load.build()
+    scenario, choice = setup.scenario, setup.scenario.contact
     start = scenario.cylinder.start_surface
     by_angle = start is not None and start.varies
-    greatest = load_range(scenario, load, scenario.total_time)[1]  # raises beyond a log
-    greatest += draws.range_of("normal_force_offset")[1]
+    greatest = setup.greatest_load  # raises beyond a log
     coarse = partial(coarse_grid, scenario)
     if choice.width is not None or ends_roller(scenario, *grid.edges):
         return (Growth(model, surfaces, coarse, 0, by_angle=by_angle),)
-    many = scenario.cam is not None and turn_of(scenario).varies
+    many = setup.turn.varies
     most = choice.strips or (STRIPS_OF_MANY_CONTACTS if many else STRIPS_BEFORE_JOINING)
     last, margin = None, 0.0
-    if draws.varying or draws.passes or not load.constant:
-        margin = 0.5 * widest_patch(scenario, greatest).b
-    if scenario.creepage.tilt_shifts_contact:
-        margin += _greatest_shift(draws)
+    if setup.varying or setup.passes or not scenario.load.build().constant:
+        margin = 0.5 * setup.patch.b
+    margin += setup.drawn_shift
     if scenario.roller.width is not None:
         last = roller_grid(scenario, strips_of_roller(scenario, STRIPS_AT_START, greatest))
     least = LEAST_LOADED if choice.strips is None else FEWEST_PER_HALF_WIDTH
@@ -403,9 +310,7 @@ def coarse_grid(scenario: Scenario, grid: Grid) -> Grid:
     return Grid.spanning(middle - half, middle + half, strips)
 
 
-def realisation_grid(
-    scenario: Scenario, load: float, loads: FloatArray, centres: FloatArray
-) -> Grid:
+def realisation_grid(setup: Setup, load: float, loads: FloatArray, centres: FloatArray) -> Grid:
     """Return strips that cover the contacts of all realisations.
 
     The strips of the contact with every input at its mean are those that the model suggests, and
@@ -413,7 +318,7 @@ def realisation_grid(
 
     Parameters
     ----------
-    scenario : Scenario
+    setup : Setup
     load : float
         Load with every input at its mean [N].
     loads : ndarray, shape (realisations,)
@@ -430,9 +335,10 @@ def realisation_grid(
     ScenarioError
         If the strips that the scenario defines do not cover all contacts, or too many are needed.
     """
-    choice, mean_b = scenario.contact, fresh_patch(scenario, load).b
+    scenario, mean_b = setup.scenario, setup.fresh_patch(load).b
+    choice = scenario.contact
     half_widths = mean_b * np.cbrt(np.maximum(loads, 0.0) / load)
-    centre = contact_centre(scenario, [0])
+    centre = setup.first_centre
     away = np.abs(centres - centre)
     if choice.width is not None:
         needed = 2.0 * float((away + half_widths).max())
@@ -449,14 +355,14 @@ def realisation_grid(
                     )
                 ],
             )
-    if choice.width is not None or start_extent(scenario) is not None:
-        return contact_grid(scenario, load)
+    if choice.width is not None or setup.start_extent is not None:
+        return contact_grid(setup, load)
     half = 1.2 * float((away + half_widths).max())
     if ends_roller(scenario, centre - half, centre + half):
         strips = choice.strips or strips_of_roller(scenario, 121, load)
         shifted = any(OFFSET in item.keys for item in scenario.random)
         return roller_grid(scenario, strips, float(away.max()) if shifted else 0.0)
-    grid = suggested_grid(scenario, load)
+    grid = suggested_grid(setup, load)
     if grid is None:
         grid = Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
     margin = 0.5 * grid.spacing * grid.strips / mean_b  # 1 where the strips end with the patch

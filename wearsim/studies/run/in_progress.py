@@ -36,7 +36,7 @@ from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, coarse_stepper
 from wearsim.studies.run.continuation import earlier_warnings
-from wearsim.studies.run.draws import Draws, units_of
+from wearsim.studies.run.draws import units_of
 from wearsim.studies.run.grid import start_of_run
 from wearsim.studies.run.recorder import (
     Checkpointed,
@@ -49,6 +49,7 @@ from wearsim.studies.run.recorder import (
     Warned,
 )
 from wearsim.studies.run.result import Result, RunData
+from wearsim.studies.run.setup import Setup
 from wearsim.studies.schedule import RecordSchedule
 from wearsim.studies.start.heights import start_height
 from wearsim.types import FloatArray, Grid
@@ -71,7 +72,7 @@ class RunInProgress:
     def __init__(
         self,
         scenario: Scenario,
-        draws: Draws,
+        setup: Setup,
         path: Path | None,
         storage: Storage,
         on_event: Watcher | None,
@@ -81,11 +82,11 @@ class RunInProgress:
         limit: Limit | None = None,
     ) -> None:
         self.limit, self.reached = limit, False
-        self.start = grid = start_of_run(scenario, draws)
+        self.start = grid = start_of_run(scenario, setup)
         if data is not None:
             grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
-        self.scenario, self.draws, self.path, self.storage = scenario, draws, path, storage
-        self.problem, self.stepper, self.stepper_name = assemble_problem(draws, grid)
+        self.scenario, self.setup, self.path, self.storage = scenario, setup, path, storage
+        self.problem, self.stepper, self.stepper_name = assemble_problem(setup, grid)
         self.on_event: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
@@ -93,7 +94,7 @@ class RunInProgress:
         units = units_of(scenario)
         self.drawn: dict[str, dict[str, object]] = {
             key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
-            for key, value in draws.values.items()
+            for key, value in setup.values.items()
         }
         self.warnings: list[str] = [] if data is None else earlier_warnings(data)
         self.created = (
@@ -112,7 +113,8 @@ class RunInProgress:
             None if data is None else data.records,
         )
         if data is None:
-            for text in plausibility_warnings(scenario):
+            means = setup if setup.scenario is scenario else Setup(scenario)
+            for text in plausibility_warnings(means):
                 self.warn(text)
             self._write()
             self._last_write = 0.0  # it has imported the library that writes
@@ -163,11 +165,11 @@ class RunInProgress:
         return Result(self.data(finished=True), self.path)
 
     def extended(
-        self, scenario: Scenario, draws: Draws, data: RunData, state: WearState
+        self, scenario: Scenario, setup: Setup, data: RunData, state: WearState
     ) -> RunInProgress:
         """Return the same run with a longer test."""
         settings = self.path, self.storage, self.on_event, self.stop_requested
-        return RunInProgress(scenario, draws, *settings, data, state, self.limit)
+        return RunInProgress(scenario, setup, *settings, data, state, self.limit)
 
     def end_before_limit(self, reason: str) -> Result:
         """Return the result of a run that does not reach its limit, with a warning."""
@@ -179,12 +181,12 @@ class RunInProgress:
     def _estimate_strip_errors(self) -> None:
         """Estimate the errors due to the strips by the same test on coarse ones."""
         problem = self.present
-        stepper = coarse_stepper(self.draws, problem)
+        stepper = coarse_stepper(self.setup, problem)
         if stepper is None or self._passes == 0.0:
             return
         first = self.problem
         if not same_strips(first.grid, self.start):
-            first = assemble_problem(self.draws, self.start)[0]
+            first = assemble_problem(self.setup, self.start)[0]
         column, count = self.recorder.column, problem.kinematics.multiplicity
         passes, rollers = column("passes"), column("roller_worn_volume")[..., 0] @ count
         sizes = [
@@ -312,7 +314,7 @@ class RunInProgress:
 
     def _check_depth(self) -> None:
         """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
-        depth = max(float(worn.max()) for worn in self.recorder.state.depths)
+        depth = float(self.recorder.state.stacked.max())
         less = f"the limit {self.limit.text}" if self.limit else ""
         resuming = "; with the option allow_deep, resume continues" if self.path else ""
         if failure := too_deep_failure(self.scenario, depth, self._passes, less, resuming):
@@ -330,7 +332,7 @@ class RunInProgress:
         due = start == 0.0 or any(start < part * self.stop <= self._passes for part in (0.5, 1.0))
         if not due or REFERENCE not in registry().names(ContactModelSpec):
             return
-        materials = self.scenario.cylinder.material, self.scenario.roller.material
+        materials = self.scenario.materials
         problem = self.present
         batch = present_batch(problem, state)
         tolerance, grid = choice.auto.tolerance, problem.grid

@@ -8,7 +8,6 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.models.loads import FollowerLoad
-from wearsim.plugins import Load
 from wearsim.quantities import InputFile
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
@@ -81,7 +80,7 @@ def contact_inputs(
     return {**columns, **(drawn or {})}
 
 
-def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, float]:
+def load_range(scenario: Scenario, stop: float) -> tuple[float, float]:
     """Return the least and greatest load up to `stop` [s], before any feedback [N].
 
     Raises
@@ -89,6 +88,7 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
     ScenarioError
         If the load is not defined for the whole time, or is not positive outside of pauses.
     """
+    load = scenario.load.build()
     if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
         got = f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min"
         expected = f"0 to {stop / 60.0:.6g} min: a longer log or a shorter operation.duration"

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property
 
 import numpy as np
 
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, Redraw
 from wearsim.scenario import RandomInput, Scenario
-from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.inputs import contact_values
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.sampler import GaussianCopula, Sampler
 from wearsim.uq.sampling.sobol import Stream
@@ -70,76 +70,79 @@ def minimum_nodes(items: Sequence[RandomInput]) -> int:
     return 8 if sum(item.dimension for item in items) == 1 else 64
 
 
-def with_nodes(
-    problem: WearProblem, scenario: Scenario, items: Sequence[RandomInput], count: int
-) -> WearProblem:
-    """Return the problem with `count` contacts for each roller, a quadrature over its passes.
+class PassQuadrature:
+    """Quadrature over the inputs that are drawn at every pass.
 
     The nodes are scrambled Sobol points. Their weights are the nearest to equal ones that integrate
     exactly the wear of the unworn bodies by Carter's theory of partial slip, and its moments in the
     tilt. The quadrature error is then that of the difference between the wear and these functions.
-    One part of it is found from other functions whose exact means are known, see `_other_wear`.
+    One part of it is found from other functions whose exact means are known, see `_functions`.
 
     Parameters
     ----------
     problem : WearProblem
         With one contact for each roller.
-    scenario : Scenario
-        Scenario with seed and correlations.
-    items : sequence of RandomInput
-        Inputs that are drawn at every pass.
-    count : int
-        Nodes of each roller, a multiple of 4.
+    setup : Setup
+        With the inputs that are drawn at every pass.
     """
-    names = [(item.name, item.dimension) for item in items]
-    per_turn = any(item.persistence == "per-turn" for item in items)
-    sampler, copula = Sampler(scenario.seed, names, "sobol"), _copula(scenario, items)
-    rollers = np.arange(problem.rollers, dtype=np.int64)
 
-    def inputs_of(points: int) -> ContactInputs:
-        uniforms = copula.correlate(sampler.uniforms(0, points))
-        return _with_values(problem.inputs.at(np.repeat(rollers, points)), items, uniforms)
+    def __init__(self, problem: WearProblem, setup: Setup) -> None:
+        self.problem, self.setup, items = problem, setup, setup.passes
+        names = [(item.name, item.dimension) for item in items]
+        self._sampler = Sampler(setup.scenario.seed, names, "sobol")
+        self._copula = _copula(setup.scenario, items)
+        (load,) = problem.loads
+        # the load is 0 in a pause
+        self._force = float(load.force(np.zeros(1))[0]) or float(problem.greatest_load[0])
+        self._full_slip = _full_slip_creepage(problem, setup, abs(self._force))
 
-    (load,) = problem.loads
-    force = float(load.force(np.zeros(1))[0]) or float(problem.greatest_load[0])  # 0 in a pause
-    full_slip = _full_slip_creepage(problem, scenario, abs(force))
-    inputs, reference = inputs_of(count), inputs_of(REFERENCE_POINTS)
-    weights, error = [], 0.0
-    for number in range(problem.rollers):
-        points, others = (
-            slice(number * points, (number + 1) * points) for points in (count, REFERENCE_POINTS)
+    def _inputs(self, count: int) -> ContactInputs:
+        uniforms = self._copula.correlate(self._sampler.uniforms(0, count))
+        rollers = np.repeat(np.arange(self.problem.rollers), count)
+        return _with_values(self.problem.inputs.at(rollers), self.setup.passes, uniforms)
+
+    def _values(self, inputs: ContactInputs, count: int) -> list[tuple[FloatArray, FloatArray]]:
+        """Return the values of `_functions` at the points of each roller."""
+        parts = (slice(r * count, (r + 1) * count) for r in range(self.problem.rollers))
+        return [_functions(inputs, part, self._force, self._full_slip) for part in parts]
+
+    @cached_property
+    def _means(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Exact means of these functions for each roller."""
+        values = self._values(self._inputs(REFERENCE_POINTS), REFERENCE_POINTS)
+        return [(wear.mean(axis=1), others.mean(axis=1)) for wear, others in values]
+
+    def with_nodes(self, count: int) -> WearProblem:
+        """Return the problem with `count` contacts for each roller, a multiple of 4."""
+        inputs, weights, error = self._inputs(count), [], 0.0
+        for (wear, others), (means, exact) in zip(
+            self._values(inputs, count), self._means, strict=True
+        ):
+            # both halves of the points are quadratures too
+            halves = wear[:, : count // 2], wear[:, count // 2 :]
+            weight = np.concatenate([0.5 * _calibrated(half, means) for half in halves])
+            weights.append(weight)
+            calibrated, seen = others @ weight, exact > 0.0
+            error = max(error, float(np.abs(calibrated[seen] / exact[seen] - 1.0).max(initial=0.0)))
+        per_turn = any(item.persistence == "per-turn" for item in self.setup.passes)
+        return replace(
+            self.problem,
+            inputs=inputs,
+            roller=np.repeat(np.arange(self.problem.rollers, dtype=np.int64), count),
+            weight=np.concatenate(weights),
+            quadrature_error=error,
+            passes_per_draw=float(max(per_turn * self.setup.scenario.operation.rollers, 1)),
         )
-        functions = partial(_wear_functions, force=force, full_slip=full_slip)
-        values, means = functions(inputs, points), functions(reference, others).mean(axis=1)
-        # both halves of the points are quadratures too
-        halves = values[:, : count // 2], values[:, count // 2 :]
-        weight = np.concatenate([0.5 * _calibrated(half, means) for half in halves])
-        weights.append(weight)
-        functions = partial(_other_wear, force=force, full_slip=full_slip)
-        exact = functions(reference, others).mean(axis=1)
-        calibrated = functions(inputs, points) @ weight
-        seen = exact > 0.0
-        error = max(error, float(np.abs(calibrated[seen] / exact[seen] - 1.0).max(initial=0.0)))
-    return replace(
-        problem,
-        inputs=inputs,
-        roller=np.repeat(rollers, count),
-        weight=np.concatenate(weights),
-        quadrature_error=error,
-        passes_per_draw=float(max(per_turn * scenario.operation.rollers, 1)),
-    )
 
 
-def _full_slip_creepage(problem: WearProblem, scenario: Scenario, force: float) -> float:
+def _full_slip_creepage(problem: WearProblem, setup: Setup, force: float) -> float:
     """Return the creepage of full slip over friction, in the middle of the unworn bodies' contact.
 
     By Carter's theory it is the half-length times the curvature along rolling; of a cam, the mean
     over the stations.
     """
     curvatures = np.maximum(np.ravel(problem.kinematics.longitudinal_curvature), 1e-3)
-    half_lengths = [
-        curvature * fresh_patch(scenario, force, curvature).a for curvature in curvatures
-    ]
+    half_lengths = [curvature * setup.fresh_patch(force, curvature).a for curvature in curvatures]
     return float(np.mean(half_lengths))
 
 
@@ -160,25 +163,23 @@ def _wear(inputs: ContactInputs, part: slice, force: float, full_slip: float) ->
     return np.asarray(load * friction * slip * ((saturation * (2.0 - saturation)) @ _SHARES))
 
 
-def _other_wear(inputs: ContactInputs, part: slice, force: float, full_slip: float) -> FloatArray:
-    """Return wear that the weights do not integrate exactly, shape (functions, draws).
-
-    It is that in the middle of a Hertz contact, where the line load is proportional to the power
-    2/3 of the load, and that with other creepages of full slip, as on a groove.
-    """
-    load = np.maximum(force + inputs.normal_force_offset[part, 0], 1e-9 * force)
-    middle = _wear(inputs, part, force, full_slip) / np.cbrt(load / force)
-    others = [_wear(inputs, part, force, full_slip / factor) for factor in _OTHERS]
-    return np.array([middle, *others])
-
-
-def _wear_functions(
+def _functions(
     inputs: ContactInputs, part: slice, force: float, full_slip: float
-) -> FloatArray:
-    """Return functions of the inputs that approximate wear, shape (functions, draws)."""
+) -> tuple[FloatArray, FloatArray]:
+    """Return functions of the inputs that approximate wear, shape (functions, draws).
+
+    The first ones are integrated exactly by the weights, the others are not: wear in the middle of
+    a Hertz contact, where the line load is proportional to the power 2/3 of the load, and that with
+    other creepages of full slip, as on a groove.
+    """
     wear, tilt = _wear(inputs, part, force, full_slip), inputs.tilt[part, 0]
+    load = np.maximum(force + inputs.normal_force_offset[part, 0], 1e-9 * force)
+    others = [_wear(inputs, part, force, full_slip / factor) for factor in _OTHERS]
     ones = np.ones_like(tilt)
-    return np.array([ones, wear, wear * tilt, wear * tilt**2, tilt, tilt**2, wear * tilt**3])
+    return (
+        np.array([ones, wear, wear * tilt, wear * tilt**2, tilt, tilt**2, wear * tilt**3]),
+        np.array([wear / np.cbrt(load / force), *others]),
+    )
 
 
 def _calibrated(values: FloatArray, means: FloatArray) -> FloatArray:

@@ -203,9 +203,9 @@ def _carries_loads(stepper: Stepper, problem: WearProblem, state: WearState) -> 
     """Return whether nothing is solved for the observables: the end of a step at constant load."""
     constant = problem.constant_load is not None and not problem.varying
     plain = not (problem.terms or problem.pauses or problem.has_nodes)
-    cam = problem.kinematics.cam
+    track = problem.kinematics.track
     # the round-off of products of matrices depends on the number of realisations
-    plain &= cam is None or (cam.recorded is None and not cam.inertia.size)
+    plain &= track.recorded is None and not track.inertia.size
     return constant and plain and state.past_spans is not None and not stepper.pass_by_pass
 
 

@@ -178,10 +178,10 @@ def resume(
     at_end = not data.until and scenario.total_passes == float(state.passes[0])
     if data.finished and (reached or (at_end and limit is None)):
         return Result(data, path)
-    draws, data = draw(scenario), without_limit_rows(data, state)
+    setup, data = draw(scenario), without_limit_rows(data, state)
     with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
         return _run_to_limit(
-            RunInProgress(scenario, draws, path, storage, watch, stop_requested, data, state, limit)
+            RunInProgress(scenario, setup, path, storage, watch, stop_requested, data, state, limit)
         )
 
 
@@ -204,8 +204,8 @@ def _run_to_limit(run: RunInProgress) -> Result:
         else:
             try:
                 scenario = stored_scenario(data, 2.0 * data.total_passes)
-                draws = draw(scenario)
-                longer = run.extended(scenario, draws, data, state)
+                setup = draw(scenario)
+                longer = run.extended(scenario, setup, data, state)
             except ScenarioError as error:
                 reason = "it cannot be extended: " + "; ".join(map(str, error.mistakes))
         if reason:

@@ -80,10 +80,6 @@ class TwoLevels(Distribution):
             float(weighted_quantiles(values, self.weight, half)[0]) for values in (self.m, self.t)
         )
 
-    def with_weight(self, weight: FloatArray) -> TwoLevels:
-        """Return the distribution with other weights, shape (rows,)."""
-        return TwoLevels(self.m, self.t, weight, self.specimens, self.contained)
-
     def quantile(self, probability: FloatArray) -> FloatArray:
         """Return the quantiles, shape as `probability`."""
         from scipy.special import ndtri  # noqa: PLC0415  (slow to import, and rarely needed)

@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from wearsim.types import BoolArray, FloatArray
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval
+from wearsim.uq.estimation.intervals import Interval, t_interval
 from wearsim.uq.survival.distributions import FactorMixture
 
 Family: TypeAlias = Literal["log-normal", "Weibull"]
@@ -355,8 +355,3 @@ def fit_mixture(family: Family, lives: FactorMixture) -> IntegratedFit | None:
     return IntegratedFit(
         family, fit.mu, fit.sigma, value, bread @ meat @ bread, degrees, float(difference)
     )
-
-
-def fitted_quantile(fit: LifeFit | None, probability: float) -> Interval:
-    """Return a quantile of a fit with its interval; unknown without a fit."""
-    return UNKNOWN if fit is None else fit.interval(probability)

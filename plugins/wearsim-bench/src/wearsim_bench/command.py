@@ -169,8 +169,8 @@ def bench(
                 if topic == TopicName.stated_errors:
                     measure = partial(measure, **study)
                 elif topic == TopicName.random:
-                    own = {key: study[key] for key in study if key != "references"}
-                    measure = partial(measure, **own)
+                    without_references = {key: study[key] for key in study if key != "references"}
+                    measure = partial(measure, **without_references)
                 measured = measure(effort, on_progress)
             results.topic(measured)
         passed = not hard or _run_hard_cases(effort, results, quiet)
@@ -204,7 +204,7 @@ def _check_paths(folder: Path, paths: list[Path]) -> None:
 
 
 def _topics_against(topics: list[TopicName] | None, against: str) -> list[TopicName]:
-    """Return the topic that a reference model serves; refuse others and a missing model."""
+    """Return the topic that a reference model serves; refuse other topics and a missing model."""
     from wearsim.errors import PluginError
     from wearsim.studies.contact.comparison import reference_spec
 
@@ -212,10 +212,10 @@ def _topics_against(topics: list[TopicName] | None, against: str) -> list[TopicN
         reference_spec(against)
     except PluginError as error:
         raise typer.BadParameter(str(error), param_hint="--against") from error
-    others = [name.value for name in topics or () if name != TopicName.contact]
-    if others:
+    refused = [name.value for name in topics or () if name != TopicName.contact]
+    if refused:
         raise typer.BadParameter(
-            f"{others[0]} has no contacts with exact solutions; omit --against, or name contact",
+            f"{refused[0]} has no contacts with exact solutions; omit --against, or name contact",
             param_hint="--against",
         )
     return [TopicName.contact]

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from wearsim.scenario import Scenario
-from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.inputs import LOAD, LONGITUDINAL, TILT, YAW
+from wearsim.studies.run.setup import Setup
 from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.estimation.moments import summarise
 from wearsim_chevalier2005 import paper
@@ -22,7 +22,7 @@ def contact_rows(results: Reproduction) -> list[Row]:
     """Return the rows of size and speed of the contact, and of its traction bound."""
     part, load = "contact", results.mean.point.normal_force
     problems = {"": results.mean_scenario, ", printed radii": results.printed_scenario}
-    patches = {name: fresh_patch(problem, load) for name, problem in problems.items()}
+    patches = {name: Setup(problem).fresh_patch(load) for name, problem in problems.items()}
     halved, literal = patches[""], patches[", printed radii"]
     diameters = f"with {_radii(results.mean_scenario)}: the radii of the paper are diameters"
     bound = 2.0 * load / (math.pi * halved.a * halved.b)
@@ -121,8 +121,17 @@ def _multipliers(
         (printed.l0, printed.l1, printed.l2), distribution.multipliers, units, why, strict=True
     )
     return [
-        Row("inputs", f"lambda{power} of {what}", own, value, printed.place, here, None, reason)
-        for power, (value, here, own, reason) in enumerate(values)
+        Row(
+            "inputs",
+            f"lambda{power} of {what}",
+            multiplier_unit,
+            value,
+            printed.place,
+            computed,
+            None,
+            reason,
+        )
+        for power, (value, computed, multiplier_unit, reason) in enumerate(values)
     ]
 
 

@@ -29,11 +29,11 @@ def mean_rows(results: Reproduction) -> list[Row]:
     for variant in VARIANTS:
         printed = paper.ALIGNED_MEAN_POWER if variant.aligned else paper.MEAN_POWER
         power = results.spread[variant].summaries["power"]
-        which = "no lateral creepage and spin" if variant.aligned else "all inputs random"
+        inputs = "no lateral creepage and spin" if variant.aligned else "all inputs random"
         title = _TITLES[variant.white, variant.element_sum]
         rows.append(
             printed_row(
-                f"mean of P_d, {which}",
+                f"mean of P_d, {inputs}",
                 title,
                 "W",
                 printed,

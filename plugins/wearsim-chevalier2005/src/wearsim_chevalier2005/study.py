@@ -16,8 +16,8 @@ from wearsim.studies.contact.batch import LocalFriction
 from wearsim.studies.contact.single import ContactStudy, study_contact
 from wearsim.studies.dissipation.monte_carlo import dissipation
 from wearsim.studies.dissipation.result import DissipationResult
-from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.inputs import FRICTION, LONGITUDINAL, TILT, YAW
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import paper
 
@@ -176,7 +176,7 @@ def white_friction(scenario: Scenario) -> dict[str, object]:
 def _with_white_friction(scenario: Scenario) -> ContactStudy:
     """Return the mean problem with one realisation of white friction."""
     study = study_contact(scenario)
-    materials = scenario.cylinder.material, scenario.roller.material
+    materials = scenario.materials
     model = scenario.contact.build(study.grid, materials)
     curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
     batch = ContactBatch.of(study.gap[None], curvature, [study.point])
@@ -210,7 +210,7 @@ def max_power(scenario: Scenario, result: DissipationResult) -> FloatArray:
     load, drawn = result.values("normal_force"), result.inputs
     spin = drawn[TILT] / scenario.roller.radius
     reference = float(load.mean())
-    patch = fresh_patch(scenario, reference)
+    patch = Setup(scenario).fresh_patch(reference)
     axes = (patch.a**2 + patch.b**2) * np.cbrt(load / reference) ** 2  # a, b as N^(1/3)
     slip = np.sqrt(drawn[LONGITUDINAL] ** 2 + drawn[YAW] ** 2 + spin**2 * axes / 5.0)
     limit: FloatArray = drawn[FRICTION] * load * scenario.rolling_speed * slip

@@ -74,7 +74,9 @@ class ReproductionView(View):
             [_ends(value) for value in (row.here, np.nan if row.paper is None else row.paper)]
             for row in self.compared
         ]
-        ends = [(here[0], here[-1], printed[0], printed[-1]) for here, printed in numbers]
+        ends = [
+            (computed[0], computed[-1], printed[0], printed[-1]) for computed, printed in numbers
+        ]
         names = ("here_low", "here_high", "printed_low", "printed_high")
         columns = [
             (name, "SI", values) for name, values in zip(names, np.array(ends).T, strict=True)

@@ -13,23 +13,23 @@ from wearsim.report import Panel, Recording, Text, panels_of, record
 from wearsim_explore.design import Design
 
 Stage: TypeAlias = Literal["first", "final", "lives", "report"]
-#: what the first answer takes: the greatest tolerance there is, and no second test on wider strips
+#: changes for a first answer: the greatest allowed tolerance, and no second test on wider strips
 COARSE: dict[str, Any] = {"evolution.tolerance": 0.1, "evolution.strip_error": False}
 FIRST_TESTS, MOST_TESTS = 16, 1024  # of a study of lives
 _NUMBER = re.compile(
     r"(-?[\d,]*\.?\d+(?:e[+-]?\d+)?)(?: ± \S+)? ?([^\d\[,;]*(?:\^\d)?)(?: ± \S+ ?\2)?(?:\[.*\])?"
 )
-_EVERY = 2  # frames of an animation that are left out between those shown, plus one
+_EVERY = 2  # every second frame of an animation is shown
 
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be computed.
+    """A computation that a page asks for.
 
     Parameters
     ----------
     session : str
-        Who asks.
+        Name of the session that asks.
     number : int
         Number of the state of the design in its session.
     stage : {"first", "final", "lives", "report"}
@@ -67,7 +67,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class FieldMistake:
-    """A mistake of the scenario: table and key, empty for others, and the text of `check`."""
+    """A mistake of the scenario: table and key, empty if it has none, and the text of `check`."""
 
     table: str
     key: str
@@ -90,14 +90,14 @@ class Answer:
     Parameters
     ----------
     title, question, basis : str
-        Of the view.
+        Texts of the view.
     rows : tuple of Quantity
     remarks : tuple of str
     panels : mapping of str to Drawn
     steps : tuple of str
         Texts of the time slider.
     mistakes : tuple of FieldMistake
-        Mistakes; there is nothing else then.
+        Mistakes; all other fields are then empty.
     tests : int
         Tests of a study of lives that are done.
     is_last : bool
@@ -129,7 +129,7 @@ def answer(
     stop_requested: Callable[[], bool],
     on_progress: Callable[[int], None] = lambda _: None,
 ) -> Answer:
-    """Return the answer to a request; mistakes of the scenario are an answer too.
+    """Return the answer to a request; mistakes of the scenario are returned as an answer.
 
     Parameters
     ----------
@@ -155,11 +155,10 @@ def answer(
     except wearsim.Interrupted:
         raise
     except wearsim.ScenarioError as error:
-        found = [FieldMistake(one.table, one.key, str(one)) for one in error.mistakes]
-        return Answer(mistakes=tuple(found))
-    except wearsim.WearsimError as error:
-        return Answer(mistakes=(FieldMistake("", "", str(error)),))
-    except (ValueError, TypeError) as error:  # arguments that the scenario does not allow
+        mistakes = [FieldMistake(item.table, item.key, str(item)) for item in error.mistakes]
+        return Answer(mistakes=tuple(mistakes))
+    # the last two are those of arguments that the scenario does not allow
+    except (wearsim.WearsimError, ValueError, TypeError) as error:
         return Answer(mistakes=(FieldMistake("", "", str(error)),))
 
 
@@ -184,17 +183,16 @@ def _test(request: Request, stop_requested: Callable[[], bool]) -> Answer:
         panels |= {f"{prefix}{name}": Drawn(panel, record(panel)) for name, panel in shown.items()}
     if (moving := main.animation()) is not None:
         numbers = range(0, moving.count, _EVERY)
-        shown_now = numbers[request.frame % len(numbers) :][:1] if coarse else numbers
-        frames = [record(_without_text(moving.frame(number))) for number in shown_now]
-        panel = _without_text(moving.frame(shown_now[0]))
+        first = numbers[request.frame % len(numbers)] if coarse else numbers[0]
+        frames = [] if coarse else [record(_without_text(moving.frame(n))) for n in numbers]
+        panel = _without_text(moving.frame(first))
         panel = replace(panel, title="Turning cam", caption=panel.title)
-        frames = [] if coarse else frames
         panels = {"turning": Drawn(panel, record(panel), tuple(frames)), **panels}
     return _answer(views, panels, steps)
 
 
 def _coarser(design: Design) -> dict[str, object] | None:
-    """Return what a first answer changes, if the tolerance is a smaller one without a mistake."""
+    """Return the changes for a first answer; None if the tolerance is not below that of these."""
     table = design.tables.get("evolution", {})
     tolerance = table.get("tolerance", 0.0) if isinstance(table, dict) else None
     is_smaller = isinstance(tolerance, float) and 0.0 <= tolerance < COARSE["evolution.tolerance"]
@@ -202,7 +200,7 @@ def _coarser(design: Design) -> dict[str, object] | None:
 
 
 def _without_text(panel: Panel) -> Panel:
-    """Return a panel without texts, which do not move."""
+    """Return a panel without texts, which an animation does not move."""
     return replace(panel, marks=[mark for mark in panel.marks if not isinstance(mark, Text)])
 
 
@@ -242,14 +240,14 @@ def _lives(
         "stop_requested": stop_requested,
         "on_progress": lambda progress: on_progress(progress.done),
     }
-    others = [item for item in scenario.random if not item.name.startswith("wear.")]
+    other_inputs = [item for item in scenario.random if not item.name.startswith("wear.")]
     result: wearsim.EnsembleResult
     if request.tests == 0:
-        if len(others) == len(scenario.random):
+        if len(other_inputs) == len(scenario.random):
             return Answer(tests=0)  # the wear factor does not scatter
-        if others:
+        if other_inputs:
             remark = "Only the wear factor scatters here; the other random inputs have their means."
-            scenario = _with_means(request.design, others)
+            scenario = _with_means(request.design, other_inputs)
         result = wearsim.life(scenario, 1, **options)
     elif path.exists():
         result = wearsim.resume_ensemble(path, **options)  # the tests that were stopped
@@ -261,12 +259,12 @@ def _lives(
     drawn = {f"life {name}": Drawn(panel, record(panel)) for name, panel in shown.items()}
     done = _answer([result.view], drawn, ())
     remarks = (remark, *done.remarks) if remark else done.remarks
-    last = not others or request.tests >= MOST_TESTS
-    return replace(done, remarks=remarks, tests=result.count if others else 1, is_last=last)
+    last = not other_inputs or request.tests >= MOST_TESTS
+    return replace(done, remarks=remarks, tests=result.count if other_inputs else 1, is_last=last)
 
 
 def _with_means(design: Design, inputs: Sequence[Any]) -> wearsim.Scenario:
-    """Return the scenario with random inputs at their means; joint ones are left out."""
+    """Return the scenario with random inputs at their means, without those drawn jointly."""
     for item in inputs:
         value: object = None
         if len(item.mean) == 1:

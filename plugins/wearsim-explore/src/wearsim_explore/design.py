@@ -67,7 +67,7 @@ class Design:
             name = ".".join(parts[:whole])
             overrides[name] = value if whole == len(parts) else _value_at(tables, name)
         nested = [
-            name for name in overrides if any(name.startswith(f"{other}.") for other in overrides)
+            name for name in overrides if any(name.startswith(f"{table}.") for table in overrides)
         ]
         return {name: value for name, value in overrides.items() if name not in nested}
 
@@ -91,8 +91,8 @@ class Design:
         """
         text, overrides = self.text, {**self.overrides, **(further or {})}
         # a value that is new to the file may exclude another one, which overrides then remove
-        given = all(_value_at(_parsed(self.text), key) is not None for key in self.overrides)
-        if given and not comments:
+        all_in_file = all(_value_at(_parsed(self.text), key) is not None for key in self.overrides)
+        if all_in_file and not comments:
             tables = deepcopy(self.tables)
             for key, value in (further or {}).items():
                 _set(tables, key, value)

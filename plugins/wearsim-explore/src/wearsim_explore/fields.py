@@ -13,7 +13,7 @@ Kind: TypeAlias = Literal["number", "integer", "quantity", "choice", "flag", "fi
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*?)\s*$")
 _UNIT = re.compile(r"(?:[A-Za-zµμ°]|1 ?/)[\w^*/().°µμ -]{0,30}")
 _SPAN = 4.0  # the slider of a value reaches from a quarter of it to four times
-_STEPS = 200  # of a slider
+_STEPS = 200  # steps of a slider
 _OF_CAMS = ("cam", "follower", "lubricant")
 _FILE = "load.csv"  # the example that the schema gives for a file
 
@@ -52,7 +52,7 @@ class Field:
     unit : str
         Unit of a quantity.
     default : str
-        What holds without a value.
+        Value that is used where the key is missing.
     choices : tuple of str
     slider : Slider, optional
     """
@@ -125,11 +125,11 @@ def _walk(
     if "anyOf" in part:
         chosen, discriminator, names = _alternative(definitions, part["anyOf"], value)
         if discriminator:
-            now = value.get(discriminator) if isinstance(value, dict) else None
+            choice = value.get(discriminator) if isinstance(value, dict) else None
             default = str(chosen["properties"][discriminator].get("default", ""))
             description = chosen["properties"][discriminator].get("description", "")
             key = _dotted((*path, discriminator))
-            yield Field(key, "choice", description, now, default=default, choices=tuple(names))
+            yield Field(key, "choice", description, choice, default=default, choices=tuple(names))
         part = {**{k: v for k, v in part.items() if k != "anyOf"}, **chosen}
         if "description" in chosen and "properties" not in chosen:
             part["description"] = chosen["description"]
@@ -151,7 +151,7 @@ def _walk(
 
 
 def _resolved(definitions: Mapping[str, Any], part: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a part of the schema without a reference; its description is the nearer one."""
+    """Return a part of the schema with its reference resolved; its own keys take precedence."""
     if "$ref" not in part:
         return dict(part)
     named = definitions[part["$ref"].rpartition("/")[2]]
@@ -162,30 +162,29 @@ def _alternative(
     definitions: Mapping[str, Any], parts: Sequence[Mapping[str, Any]], value: Any
 ) -> tuple[dict[str, Any], str, list[str]]:
     """Return the alternative that a value has, the key that chooses it, and all choices."""
-    options: list[dict[str, Any]] = []
-    for part in parts:
-        options += _options(definitions, part)
+    options = [option for part in parts for option in _options(definitions, part)]
     tables = [option for option in options if "properties" in option]
     pairs = ((_name(option), option) for option in tables)
     named = {name: option for name, option in pairs if name is not None}
     if isinstance(value, dict) or len(tables) == len(options):
         keys = {key for key, _ in named}
         discriminator = next(iter(keys)) if keys else ""
-        now = value.get(discriminator) if isinstance(value, dict) else None
-        chosen = named.get((discriminator, str(now))) or next(
-            (one for one in tables if _is_default(one, discriminator)), tables[0]
+        choice = value.get(discriminator) if isinstance(value, dict) else None
+        chosen = named.get((discriminator, str(choice))) or next(
+            (table for table in tables if _is_default(table, discriminator)), tables[0]
         )
         return chosen, discriminator, [name for _, name in named]
     if isinstance(value, list):
-        return next((one for one in options if one.get("type") == "array"), options[0]), "", []
-    return next(one for one in options if "properties" not in one), "", []
+        arrays = (option for option in options if option.get("type") == "array")
+        return next(arrays, options[0]), "", []
+    return next(option for option in options if "properties" not in option), "", []
 
 
 def _options(definitions: Mapping[str, Any], part: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return an alternative, or those within it."""
+    """Return an alternative, or all alternatives within it."""
     resolved = _resolved(definitions, part)
-    inner = [item for one in resolved.get("anyOf", ()) for item in _options(definitions, one)]
-    return inner or [resolved]
+    nested = resolved.get("anyOf", ())
+    return [option for inner in nested for option in _options(definitions, inner)] or [resolved]
 
 
 def _name(option: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -222,17 +221,17 @@ def _leaf(path: Path, part: Mapping[str, Any], value: Any) -> Field:
     has_unit = isinstance(value, str) and number is not None and bool(_UNIT.fullmatch(number[2]))
     if "pattern" in part or (has_unit and of_table):
         unit = number[2] if number else (example[2] if example else "")
-        now = float(number[1]) if number else None
-        # a pattern that a negative number does not match says that there is none
+        present = float(number[1]) if number else None
+        # a pattern that negative numbers do not match excludes them
         signed = re.match(part.get("pattern", ""), f"-1 {unit}") is not None
-        slider = slider_of(part, now, float(example[1]) if example else 1.0, signed=signed)
+        slider = slider_of(part, present, float(example[1]) if example else 1.0, signed=signed)
         text = number[1] if number else written
         return Field(key, "quantity", description, text, unit, shown, slider=slider)
     if types & {"number", "integer"} or (isinstance(value, int | float) and "const" in part):
         whole = types == {"integer"}
         known = value if isinstance(value, int | float) else default
-        now = float(known) if isinstance(known, int | float) else None
-        slider = slider_of(part, now, 1.0, whole=whole)
+        present = float(known) if isinstance(known, int | float) else None
+        slider = slider_of(part, present, 1.0, whole=whole)
         kind: Kind = "integer" if whole else "number"
         return Field(key, kind, description, written, default=shown, slider=slider)
     kind = "file" if _FILE in examples else "text"

@@ -1,4 +1,4 @@
-"""One page: a document of Bokeh that shows a session, and what is done on it."""
+"""One page: a Bokeh document that shows a session and performs the actions of its user."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _KEPT = 1000  # server times that are kept
 
 
 class Exchange(DataModel):
-    """What the page asks, and what it is to show; both are JSON."""
+    """Requests of the page and replies to it, both as JSON."""
 
     request = String(default="")
     reply = String(default="")
@@ -49,7 +49,7 @@ class Page:
     Parameters
     ----------
     document : Document
-        It is filled.
+        Document that is filled.
     design : Design
         The scenario of the file.
     schema : mapping
@@ -124,10 +124,10 @@ class Page:
             self._timer.cancel()
 
     def end(self) -> None:
-        """Say that the server ends, since a websocket of a notebook may stay open."""
+        """Tell the page that the server ends, since a websocket of a notebook may stay open."""
         self._reply(ended=True)
 
-    # what is asked on the page
+    # actions of the user
 
     def _on_request(self, _: str, __: str, new: str) -> None:
         try:
@@ -137,7 +137,7 @@ class Page:
             self._reply(message=f"refused: {type(error).__name__}: {error}")
 
     def act(self, action: str, **values: Any) -> None:
-        """Do what is asked on the page.
+        """Perform an action of the user.
 
         Parameters
         ----------
@@ -145,7 +145,7 @@ class Page:
             "change", "release", "undo", "reset", "restore", "pin", "unpin", "save", "report" or
             "show".
         **values
-            What belongs to it.
+            Values of the action.
 
         Raises
         ------
@@ -223,7 +223,7 @@ class Page:
         else:
             self._reply(message=f"saved: {path}")
 
-    # what is computed
+    # computations
 
     def _ask(self, stage: Stage) -> None:
         session = self.session
@@ -246,7 +246,7 @@ class Page:
         """
         if request.stage == "report":
             if isinstance(content, Answer):
-                texts = [one.text for one in content.mistakes]
+                texts = [mistake.text for mistake in content.mistakes]
                 self._reply(page=content.page, message="\n".join(texts))
             return
         if isinstance(content, int):
@@ -263,8 +263,7 @@ class Page:
         self._reply()
         if request.stage == "first" and request.number in self._received:
             self.server_times.append(time.perf_counter() - self._received[request.number])
-            later = {n: then for n, then in self._received.items() if n > request.number}
-            self._received = later
+            self._received = {n: at for n, at in self._received.items() if n > request.number}
         self.finals += request.stage == "final"
         if request.number == self.session.number and not content.mistakes:
             self._follow(request, content)
@@ -284,7 +283,7 @@ class Page:
             self._reply(progress=request.tests)
 
     def _refine_at_rest(self) -> None:
-        """Refine the first answer as soon as the hand rests."""
+        """Refine the first answer after a time without changes."""
         if self._timer is not None:
             self._timer.cancel()
         if self._answered == self.session.number and self._stage == "first":
@@ -296,7 +295,7 @@ class Page:
         if self._answered == self.session.number:
             self._ask("final")
 
-    # what is shown
+    # display
 
     def _show_panels(self) -> None:
         """Show the panels of the session in the slots; the next reply has their columns."""
@@ -326,20 +325,20 @@ class Page:
         self._slots[place].children = [drawn.figure]
 
     def _fields_now(self) -> str:
-        """Return what changes of the fields beside the values that were typed."""
+        """Return the properties of the fields that a change may alter, apart from their values."""
         fields = self.session.fields_of(self.session.design)
-        return json.dumps([(one.key, one.kind, one.unit, one.choices) for one in fields])
+        return json.dumps([(item.key, item.kind, item.unit, item.choices) for item in fields])
 
     def _reply(self, *, fields: bool = False, **further: Any) -> None:
         session = self.session
-        beside, others = session.beside_fields()
+        beside, other_mistakes = session.beside_fields()
         content: dict[str, Any] = {
             "count": next(self._replies),
             "seen": self._seen,
             "number": session.number,
             "stage": self._stage,
             "mistakes": beside,
-            "others": others,
+            "others": other_mistakes,
             "undo": session.can_undo,
             "pins": [pin.name for pin in session.pins],
             "differences": session.differences(),
@@ -367,7 +366,7 @@ class Page:
             self._fields = self._fields_now()
             shown = session.fields_of(session.design)
             content["fields"] = [
-                {**asdict(one), "table": one.table, "label": one.label} for one in shown
+                {**asdict(item), "table": item.table, "label": item.label} for item in shown
             ]
             content["files"] = sorted(
                 path.name for path in session.design.file.parent.iterdir() if path.is_file()

@@ -62,7 +62,7 @@ class Pool:
         self._go_on()
 
     def outdate(self, session: str, number: int) -> None:
-        """Stop what a session has in flight for older states of its design."""
+        """Stop the computations of a session for older states of its design."""
         slow = self.schedules["slow"]
         waiting = slow.waiting.get(session)
         if waiting is not None and waiting.number != number:
@@ -71,7 +71,7 @@ class Pool:
         self._go_on()
 
     def forget(self, session: str) -> None:
-        """Stop everything of a session that has ended."""
+        """Stop all computations of a session that has ended."""
         self.listeners.pop(session, None)
         for schedule in self.schedules.values():
             schedule.forget(session)

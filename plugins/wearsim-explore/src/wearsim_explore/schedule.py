@@ -1,4 +1,4 @@
-"""Order of computations: of each session at most one in flight, and only the newest waiting."""
+"""Order of computations: of each session at most one running, and only the newest one waiting."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ _PATIENCE = 2.0  # s; a first answer that takes longer is stopped for a newer on
 class Schedule:
     """Computations that share some workers.
 
-    A request replaces the one that its session has waiting. A first answer goes before refined
-    ones, and stops one of another session if all workers are busy; that is computed later.
+    A request replaces the waiting one of its session. First answers are computed before refined
+    ones. If all workers are busy, a first answer stops a refined one of another session, which is
+    computed again later.
 
     Parameters
     ----------
@@ -44,12 +45,12 @@ class Schedule:
     _outdated: set[int] = field(default_factory=set)
 
     def ask(self, request: Request) -> None:
-        """Let a request wait, instead of an older one of its session."""
+        """Add a waiting request, in place of an older one of its session."""
         self.waiting[request.session] = request
         self.outdate(request.session, request.number)
 
     def outdate(self, session: str, number: int) -> None:
-        """Mark what a session has in flight as outdated by a newer state of its design."""
+        """Mark the running computation of a session as outdated by a newer state of its design."""
         for worker, running in self.running.items():
             if running.session == session and running.number != number:
                 slow = self.clock() - self._started[worker] > _PATIENCE
@@ -62,11 +63,11 @@ class Schedule:
         self._outdated |= {w for w, request in self.running.items() if request.session == session}
 
     def drop(self, session: str) -> None:
-        """Remove what a session has waiting."""
+        """Remove the waiting request of a session."""
         self.waiting.pop(session, None)
 
     def to_start(self) -> list[tuple[int, Request]]:
-        """Return requests with the workers that now compute them."""
+        """Return workers with the requests that they compute from now on."""
         started = []
         for worker in range(self.workers):
             if worker in self.running or not (request := self._next()):
@@ -78,7 +79,7 @@ class Schedule:
         return started
 
     def to_stop(self) -> list[int]:
-        """Return workers that are now to be asked to stop."""
+        """Return the workers to ask to stop, each once."""
         stop = set(self._outdated)
         request = self._next()
         if request and request.stage == "first" and not (self.stopping | stop):

@@ -49,8 +49,8 @@ class _Token(AuthProvider):
             # Bokeh opens a websocket only with a session that it has signed for a page
             if handler.request.path.endswith("/ws"):
                 return "page"
-            given = handler.get_query_argument("token", "")
-            return "page" if hmac.compare_digest(given.encode(), self._token.encode()) else None
+            token = handler.get_query_argument("token", "")
+            return "page" if hmac.compare_digest(token.encode(), self._token.encode()) else None
 
         return user
 
@@ -230,10 +230,10 @@ def _free_port(host: str, port: int) -> int:
     import socket  # noqa: PLC0415
 
     kind = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(kind) as tried:
-        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        tried.bind((host, port))
-        return int(tried.getsockname()[1])
+    with socket.socket(kind) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((host, port))
+        return int(probe.getsockname()[1])
 
 
 def explore(scenario: Any) -> Exploration:

@@ -17,7 +17,7 @@ _ENTRY = re.compile(r"(.*?)(?: \(entry (\d+)\))?$")
 _GREYS = ("#6b6b6b", "#8a5a00", "#5a3d8a", "#00695c")  # of pinned designs
 _DASHES = ("--", ":", "-.", "--")
 MOST_PINS = len(_GREYS)
-_LEAST_WIDTH = 1.0  # of a line that is the content of a panel
+_LEAST_WIDTH = 1.0  # least width of a line that is a curve, not an axis or a boundary
 
 
 @dataclass(frozen=True)
@@ -63,14 +63,14 @@ class Session:
 
     def __post_init__(self) -> None:
         file = fields_of(self.schema, replace(self.design, changes={}).tables)
-        self._start = {one.key: one for one in file}
+        self._start = {item.key: item for item in file}
         self._last: tuple[Design | None, list[Field]] = (None, [])  # design and its fields
 
     def fields_of(self, design: Design) -> list[Field]:
         """Return the fields of a design; ranges of sliders lie around the values of the file."""
         if self._last[0] is not design:
-            now = fields_of(self.schema, design.tables)
-            self._last = design, [_with_range(one, self._start.get(one.key)) for one in now]
+            fields = fields_of(self.schema, design.tables)
+            self._last = design, [_with_range(item, self._start.get(item.key)) for item in fields]
         return self._last[1]
 
     @property
@@ -98,7 +98,7 @@ class Session:
             If there is no such field.
         """
         known = self._last[1] if slides and self._last[1] else self.fields_of(self.design)
-        item = next((one for one in known if one.key == key), None)
+        item = next((item for item in known if item.key == key), None)
         if item is None:
             raise KeyError(key)
         if begins or key != self._last_key:
@@ -113,7 +113,7 @@ class Session:
         """Remove the options of the former choice, which the new one does not have."""
         table = key.rpartition(".")[0]
         fields = self.fields_of(self.design)
-        known = [one.key for one in fields if one.key.startswith(f"{table}.")]
+        known = [item.key for item in fields if item.key.startswith(f"{table}.")]
         if key in known and len(known) > 1 and key.rpartition(".")[2] in _NAMING:
             for name in unknown_keys(self.design, table, known):
                 self.design = self.design.with_change(name, None)
@@ -142,7 +142,7 @@ class Session:
 
     def pin(self, name: str = "") -> None:
         """Keep the present design for comparison, up to `MOST_PINS` of them."""
-        answers = tuple(one for one in (self.test, self.lives) if one is not None)
+        answers = tuple(answer for answer in (self.test, self.lives) if answer is not None)
         if answers and len(self.pins) < MOST_PINS:
             taken = {pin.name for pin in self.pins}
             names = (chr(ord("A") + number) for number in range(26))
@@ -155,7 +155,7 @@ class Session:
         del self.pins[place]
 
     def receive(self, answer: Answer, *, lives: bool) -> None:
-        """Take an answer; mistakes leave the last good one."""
+        """Store an answer; one with mistakes does not replace the last one without."""
         if answer.mistakes:
             self.mistakes = answer.mistakes
         elif lives:
@@ -170,27 +170,27 @@ class Session:
         for answer in (self.test, self.lives):
             for name, drawn in (answer.drawn if answer else {}).items():
                 pinned = [
-                    (pin.name, other.drawn[name].panel)
+                    (pin.name, pinned_answer.drawn[name].panel)
                     for pin in self.pins
-                    for other in pin.answers
-                    if name in other.drawn
+                    for pinned_answer in pin.answers
+                    if name in pinned_answer.drawn
                 ]
                 panel = drawn.panel if drawn.frames else with_pinned(drawn.panel, pinned)
                 shown[name] = drawn if panel is drawn.panel else panel
         return shown
 
     def beside_fields(self) -> tuple[dict[str, str], list[str]]:
-        """Return the mistakes by the field that they stand beside, and all others."""
-        keys = [one.key for one in self.fields_of(self.design)] if self.mistakes else []
+        """Return the mistakes by the key of their field, and the mistakes of no shown field."""
+        keys = [item.key for item in self.fields_of(self.design)] if self.mistakes else []
         beside: dict[str, str] = {}
-        others = []
-        for one in self.mistakes:
-            key = key_of(one, keys)
+        other_mistakes = []
+        for mistake in self.mistakes:
+            key = key_of(mistake, keys)
             if key:
-                beside[key] = "\n".join(filter(None, (beside.get(key), one.text)))
+                beside[key] = "\n".join(filter(None, (beside.get(key), mistake.text)))
             else:
-                others.append(one.text)
-        return beside, others
+                other_mistakes.append(mistake.text)
+        return beside, other_mistakes
 
     def differences(self) -> tuple[list[str], list[list[str]]]:
         """Return heads and rows of the table that compares the design with pinned ones."""
@@ -200,12 +200,12 @@ class Session:
         designs = [self.design, *(pin.design for pin in self.pins)]
         keys = dict.fromkeys(key for design in designs for key in design.changes)
         values = [
-            {one.key: f"{one.value or one.default} {one.unit}".strip() for one in of}
-            for of in map(self.fields_of, designs)
+            {item.key: f"{item.value or item.default} {item.unit}".strip() for item in fields}
+            for fields in map(self.fields_of, designs)
         ]
-        rows = [[key, *(of.get(key, "") or "none" for of in values)] for key in keys]
-        now = [row for one in (self.test, self.lives) if one for row in one.rows]
-        for row in now:
+        rows = [[key, *(texts.get(key, "") or "none" for texts in values)] for key in keys]
+        present = [row for answer in (self.test, self.lives) if answer for row in answer.rows]
+        for row in present:
             cells = [_compared(_row_of(pin, row.label), row) for pin in self.pins]
             rows.append([row.label, row.text, *cells])
         return heads, rows
@@ -215,7 +215,7 @@ class Session:
         return json.dumps(dict(self.design.changes), ensure_ascii=False)
 
 
-#: keys that choose which others there are
+#: keys whose value determines which other keys a table has
 _NAMING = ("kind", "law", "model", "distribution")
 
 
@@ -269,13 +269,17 @@ def with_pinned(panel: Panel, pinned: Sequence[tuple[str, Panel]]) -> Panel:
         Names and panels of the other designs.
     """
     below: list[Any] = []
-    for number, (name, other) in enumerate(pinned):
-        if other.x.unit != panel.x.unit or other.x.log != panel.x.log or other.y.log != panel.y.log:
+    for number, (name, pinned_panel) in enumerate(pinned):
+        if (
+            pinned_panel.x.unit != panel.x.unit
+            or pinned_panel.x.log != panel.x.log
+            or pinned_panel.y.log != panel.y.log
+        ):
             continue
         style: dict[str, Any] = {"colour": _GREYS[number % len(_GREYS)], "width": 1.0}
         style["dash"] = _DASHES[number % len(_DASHES)]
         label = f"pinned {name}"
-        for mark in other.marks:
+        for mark in pinned_panel.marks:
             if isinstance(mark, Records):
                 line = Line(mark.x, mark.y[-1], label=label, **style)
             elif isinstance(mark, Line) and _is_content(mark) and not mark.right:
@@ -302,11 +306,11 @@ def _row_of(pin: Pin, label: str) -> Quantity | None:
     return next((row for row in rows if row.label == label), None)
 
 
-def _compared(pinned: Quantity | None, now: Quantity) -> str:
+def _compared(pinned: Quantity | None, present: Quantity) -> str:
     """Return the text of a pinned row, with how much the present one differs from it."""
     if pinned is None:
         return ""
-    before, after = pinned.number, now.number
+    before, after = pinned.number, present.number
     if before and after and before[0] and before[1] == after[1]:
         return f"{pinned.text} (now {100.0 * (after[0] / before[0] - 1.0):+.1f} %)"
     return pinned.text

@@ -1,4 +1,4 @@
-"""Process that computes answers: requests come on its standard input, answers go to the output.
+"""Process that reads requests from its standard input and writes answers to its standard output.
 
 It ends when its standard input is closed, and then removes the folder that is its argument, so that
 nothing is left of a server that was killed.
@@ -37,7 +37,7 @@ def main() -> None:
     """Compute answers until the standard input is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the server, which closes the input
     output = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what libraries print is no answer
+    os.dup2(2, 1)  # text printed by libraries must not mix with answers
     if "--slow" in sys.argv:
         os.nice(10)
     requests: Queue[Any] = Queue()

@@ -20,9 +20,10 @@ from wearsim_halfspace.tangential import (
 
 FEWEST = 16  # rows or columns of a grid that is started from a coarser one
 LOOSE = 1e-4  # tolerance on coarser grids
-#: Of the difference of two grids, added in an extrapolation: that of the orders 1.08 and 2.
+#: Part of the difference of two grids that is added in an extrapolation, by the order of elements;
+#: the observed orders of convergence are 1.08 and 2.
 FURTHER = {1: 0.9, 2: 1.0 / 3.0}
-#: Where the rigid slip is taken, in elements ahead of the middle, for elements of each order.
+#: Distance ahead of the middle at which the rigid slip is taken, in elements, by their order.
 AHEAD = {1: 1.0 / 6.0, 2: 0.5}
 
 
@@ -47,11 +48,11 @@ class Problem:
     rigid_slip : ndarray, shape (2, rows, columns)
         Rigid slip of body 1 on body 2 per distance rolled, at the middle of the elements.
     spin : float
-        [1/m].
+        Spin [1/m].
     x, y : ndarray, shapes (columns,) and (rows,)
         Positions of the elements about the centre of the spin moment [m].
     order : int
-        Of the elements along rolling: 1 as in CONTACT, or 2 by positions within elements.
+        Order of the elements along rolling: 1 as in CONTACT, or 2 by positions within elements.
     difference : float
         K of different bodies, see `Elements`. The opening of the gap by traction is part of `gap`.
     creep_factor : float
@@ -166,7 +167,8 @@ class Solution(NamedTuple):
     def extrapolated(self) -> Work:
         """Return forces and power extrapolated from this grid and the coarser one.
 
-        The rows are not: where single elements enter adhesion, they vary irregularly.
+        The powers of the rows are not extrapolated, since they vary irregularly where single
+        elements enter adhesion.
         """
         fine = self.work()
         if self.coarser is None:
@@ -205,7 +207,7 @@ def solve(
     normal : NormalSolution
         Solution of its normal problem.
     tolerance : float
-        Of the tractions, see `solve_tangential`.
+        Tolerance of the tractions, see `solve_tangential`.
     below : bool
         Whether this is a coarser grid itself.
 
@@ -228,21 +230,21 @@ def solve(
         # the first coarser grid has the same rows, for the extrapolation
         coarse, loose = problem.coarser(across=below), max(LOOSE, tolerance)
         pressure = halved(normal.pressure, (0, 1) if below else (1,))
-        found = solve_normal(
+        coarse_normal = solve_normal(
             coarse.elements, coarse.gap, coarse.force, pressure, loose, coarse.compliance
         )
-        coarser = solve(coarse, found, loose, below=True)
+        coarser = solve(coarse, coarse_normal, loose, below=True)
         rows, columns = finest
         start = doubled(coarser.rolling.traction, 2, columns)
-        turn = doubled(_turn(coarser.rolling, found.pressure), 1, columns)
+        turn = doubled(_turn(coarser.rolling, coarse_normal.pressure), 1, columns)
         if below:
             start, turn = doubled(start, 1, rows), doubled(turn, 0, rows)
-    given = bound, slip, tolerance, start
+    arguments = bound, slip, tolerance, start
     if problem.order == 2:
         within = Within(*edges(normal), turn)
-        rolling = solve_rolling(problem.elements.rolling_averaged, *given, within)
+        rolling = solve_rolling(problem.elements.rolling_averaged, *arguments, within)
     else:
-        rolling = solve_tangential(problem.elements.rolling, *given)
+        rolling = solve_tangential(problem.elements.rolling, *arguments)
     return Solution(problem, normal, rolling, coarser)
 
 
@@ -268,7 +270,7 @@ def edges(normal: NormalSolution) -> tuple[FloatArray, FloatArray]:
     last = np.argmax(touches[rows], axis=1)
     ahead, behind = np.zeros((2, *touches.shape)), np.zeros(touches.shape)
     near, far = _increases(normal.separation, rows, first, 1)
-    # only the nearest where the grid ends
+    # where the grid ends, the ratio of the nearest element alone is used
     ahead[:, rows, first] = np.where(far > 0.0, 2.0 * near, near), -far
     near, _ = _increases(normal.separation, rows, last, -1)
     root = np.sqrt(np.maximum(0.63 - near, 0.0067))
@@ -285,9 +287,9 @@ def _increases(
     and over that to the third one, and zero where the grid ends before these.
     """
     places = np.clip(ends[:, None] + step * np.arange(4), 0, separation.shape[1] - 1)
-    found = np.maximum(np.diff(separation[rows[:, None], places], axis=1), 0.0)
-    nearest, others = found[:, :1], found[:, 1:]
-    ratio = np.divide(nearest, others, out=np.zeros_like(others), where=others > nearest)
+    increases = np.maximum(np.diff(separation[rows[:, None], places], axis=1), 0.0)
+    nearest, farther = increases[:, :1], increases[:, 1:]
+    ratio = np.divide(nearest, farther, out=np.zeros_like(farther), where=farther > nearest)
     return ratio[:, 0], ratio[:, 1]
 
 
@@ -301,9 +303,9 @@ def _turn(rolling: TangentialSolution, pressure: FloatArray) -> FloatArray:
     sine = ahead[0] * behind[1] - ahead[1] * behind[0]
     cosine = (ahead * behind).sum(axis=0)
     smooth = slides[:, 1:] & slides[:, :-1] & (cosine > 0.0)
-    found = np.zeros_like(pressure)
-    found[:, 1:] = np.where(smooth, 0.25 * np.arctan2(sine, cosine), 0.0)
-    return found
+    turn = np.zeros_like(pressure)
+    turn[:, 1:] = np.where(smooth, 0.25 * np.arctan2(sine, cosine), 0.0)
+    return turn
 
 
 def halved(field: FloatArray, axes: tuple[int, ...]) -> FloatArray:
@@ -315,7 +317,7 @@ def halved(field: FloatArray, axes: tuple[int, ...]) -> FloatArray:
     for axis in axes:
         fine = np.moveaxis(field, axis, 0)
         if len(fine) % 2:
-            # continued along a straight line
+            # extrapolated linearly beyond both ends
             ends = 2.0 * fine[:1] - fine[1:2], 2.0 * fine[-1:] - fine[-2:-1]
             wider = np.concatenate([ends[0], fine, ends[1]])
             means = 0.25 * (wider[:-2:2] + wider[2::2]) + 0.5 * fine[::2]
@@ -331,11 +333,11 @@ def doubled(field: FloatArray, axis: int, length: int) -> FloatArray:
     The arrangement is that of `halved`; `length` is the number of elements along the axis.
     """
     means = np.moveaxis(field, axis, 0)
-    found = np.empty((length, *means.shape[1:]))
+    fine = np.empty((length, *means.shape[1:]))
     if length % 2:
-        found[::2] = means
-        found[1::2] = 0.5 * (means[:-1] + means[1:])
+        fine[::2] = means
+        fine[1::2] = 0.5 * (means[:-1] + means[1:])
     else:
-        found[::2] = 0.75 * means + 0.25 * np.concatenate([means[:1], means[:-1]])
-        found[1::2] = 0.75 * means + 0.25 * np.concatenate([means[1:], means[-1:]])
-    return np.moveaxis(found, 0, axis)
+        fine[::2] = 0.75 * means + 0.25 * np.concatenate([means[:1], means[:-1]])
+        fine[1::2] = 0.75 * means + 0.25 * np.concatenate([means[1:], means[-1:]])
+    return np.moveaxis(fine, 0, axis)

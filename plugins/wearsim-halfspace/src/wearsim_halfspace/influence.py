@@ -58,13 +58,13 @@ def _mean_along(columns: int, rows: int, dx: float, dy: float) -> FloatArray:
     return np.asarray(np.diff(np.diff(corners, axis=0), n=2, axis=1) / dx)
 
 
-def inner(one: FloatArray, other: FloatArray) -> float:
+def inner(first: FloatArray, second: FloatArray) -> float:
     """Return the sum of the products of two fields.
 
     Libraries of linear algebra start threads for fields of this size, and wait for them where
     another process is busy; this takes one thread.
     """
-    return float(np.einsum("i,i->", one.ravel(), other.ravel()))
+    return float(np.einsum("i,i->", first.ravel(), second.ravel()))
 
 
 class Convolution:
@@ -73,14 +73,14 @@ class Convolution:
     Parameters
     ----------
     coefficients : ndarray, shape (kernels, 2 rows - 1, 2 columns - 1)
-        For all distances of two elements, zero in the middle.
+        Influence coefficients for all distances of two elements, with distance zero in the middle.
 
     Attributes
     ----------
     middle : ndarray, shape (kernels, 2 columns - 1)
         Coefficients of elements in one row.
     quarter : ndarray, shape (rows, columns)
-        Those of the first kernel for distances that are not negative.
+        Coefficients of the first kernel for distances that are not negative.
     """
 
     def __init__(self, coefficients: FloatArray) -> None:
@@ -113,18 +113,18 @@ class Convolution:
         return self._back(np.asarray(parts.sum(axis=0)))
 
     def of_vector(self, field: FloatArray) -> FloatArray:
-        """Return that of a vector field, shape (2, rows, columns), with the kernels xx, yy, xy."""
+        """Return the convolution of a vector field (2, rows, columns), kernels xx, yy and xy."""
         transform = self._forward(field)
         xx, yy, xy = self._transforms
         along, across = transform
-        found = np.empty_like(transform)
-        np.multiply(xx, along, out=found[0])
-        np.multiply(yy, across, out=found[1])
+        convolved = np.empty_like(transform)
+        np.multiply(xx, along, out=convolved[0])
+        np.multiply(yy, across, out=convolved[1])
         across *= xy
         along *= xy
-        found[0] += across
-        found[1] += along
-        return self._back(found)
+        convolved[0] += across
+        convolved[1] += along
+        return self._back(convolved)
 
     def _forward(self, field: FloatArray) -> FloatArray:
         # the rows of the padding are not transformed
@@ -149,7 +149,8 @@ class Elements:
     dx, dy : float
         Sizes of an element [m].
     shear_modulus, poisson_ratio : float
-        Of both bodies combined: 1/G = (1/G_1 + 1/G_2)/2, nu/G = (nu_1/G_1 + nu_2/G_2)/2.
+        Constants of both bodies combined: 1/G = (1/G_1 + 1/G_2)/2,
+        nu/G = (nu_1/G_1 + nu_2/G_2)/2.
     difference : float
         K = G/4 ((1 - 2 nu_1)/G_1 - (1 - 2 nu_2)/G_2), zero for quasi-identical bodies.
     creep_factor : float
@@ -191,8 +192,8 @@ class Elements:
 
         It is the decrease of the displacement along x over one element.
         """
-        found = self._displacements()
-        return Convolution((found[..., 1:-1] - found[..., 2:]) / self.dx)
+        displacements = self._displacements()
+        return Convolution((displacements[..., 1:-1] - displacements[..., 2:]) / self.dx)
 
     @cached_property
     def rolling_averaged(self) -> Convolution:
@@ -202,8 +203,10 @@ class Elements:
         change from one element to the next, add a longitudinal slip that decreases slowly.
         """
         rows, columns = self._integrals.shape[1:]
-        found = self._displacements(_mean_along(columns, rows, self.dx, self.dy) * self._scale)
-        return Convolution((found[..., 1:-1] - found[..., 2:]) / self.dx)
+        displacements = self._displacements(
+            _mean_along(columns, rows, self.dx, self.dy) * self._scale
+        )
+        return Convolution((displacements[..., 1:-1] - displacements[..., 2:]) / self.dx)
 
     @cached_property
     def opening(self) -> Convolution:
@@ -216,14 +219,14 @@ class Elements:
 
         It is applied by `Convolution.each`.
         """
-        found = self._coupling()
-        return Convolution((found[..., 2:] - found[..., 1:-1]) / self.dx)
+        gap = self._coupling()
+        return Convolution((gap[..., 2:] - gap[..., 1:-1]) / self.dx)
 
     @cached_property
     def pressed_in_middle(self) -> Convolution:
         """`pressed` in the middle of elements [1/Pa]."""
-        found = self._coupling()
-        return Convolution((found[..., 2:] - found[..., :-2]) / (2.0 * self.dx))
+        gap = self._coupling()
+        return Convolution((gap[..., 2:] - gap[..., :-2]) / (2.0 * self.dx))
 
     def _coupling(self) -> FloatArray:
         """Return the kernels x and y of the gap opened by traction [m/Pa].
@@ -231,22 +234,22 @@ class Elements:
         Those of the displacement by pressure have the opposite sign.
         """
         shape = self.columns + 1, self.rows, self.dx, self.dy
-        found = _mirrored(self._difference * _odd_integrals(*shape))
-        found[0, :, : self.columns] *= -1.0  # odd along
-        found[1, : self.rows - 1] *= -1.0  # odd across
-        return found
+        kernels = _mirrored(self._difference * _odd_integrals(*shape))
+        kernels[0, :, : self.columns] *= -1.0  # odd along
+        kernels[1, : self.rows - 1] *= -1.0  # odd across
+        return kernels
 
     def _displacements(self, mixed: FloatArray | None = None) -> FloatArray:
         """Return displacements by traction, kernels xx, yy and xy (Cerruti) [m/Pa]."""
         along, across, middle = self._integrals / self._creep_factor
         mixed = middle if mixed is None else mixed / self._creep_factor
         every = (1.0 - self._poisson_ratio) * (along + across)
-        found = _mirrored(np.stack([every + self._poisson_ratio * along,
+        kernels = _mirrored(np.stack([every + self._poisson_ratio * along,
                                     every + self._poisson_ratio * across,
                                     self._poisson_ratio * mixed]))  # fmt: skip
-        found[2, :, : self.columns] *= -1.0  # odd along and across
-        found[2, : self.rows - 1] *= -1.0
-        return found
+        kernels[2, :, : self.columns] *= -1.0  # odd along and across
+        kernels[2, : self.rows - 1] *= -1.0
+        return kernels
 
 
 def _mirrored(quarter: FloatArray) -> FloatArray:

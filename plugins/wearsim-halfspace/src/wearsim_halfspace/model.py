@@ -34,10 +34,11 @@ MARGIN = 0.05  # columns ahead of and behind the longest strip, over those acros
 FEWEST = 0.8  # elements across the longest strip, relative to the requested number
 SPARE = 3  # rows and columns around the contact
 COARSER = 4  # elements across an element of the second coarser grid
-FREE_GRIDS, MAX_GRIDS = 3, 12  # tried until elements and solution agree; at most
-MAX_COUPLED = 50  # solutions of the normal and the tangential problem in turn
-COUPLED = 10.0  # change of the pressure at which these end, over the tolerance
-ALTERNATING = 3e-4  # the same where it does not decrease, as a row alternates between states
+#: number of grids for which the length of elements must agree with the solution, and of all grids
+FREE_GRIDS, MAX_GRIDS = 3, 12
+MAX_COUPLED = 50  # iterations that solve the normal and the tangential problem in turn
+COUPLED = 10.0  # change of the pressure at which this iteration ends, over the tolerance
+ALTERNATING = 3e-4  # change at which it ends if a row alternates between two states
 
 Elements_ = Annotated[int, ws.Field(ge=8, le=400)]
 
@@ -160,10 +161,10 @@ class Halfspace(ws.SingleContactModel):
         density *= shares[:, None]
 
         def sampled(values: FloatArray) -> FloatArray:
-            found = np.zeros((points_along, len(length)))
+            samples = np.zeros((points_along, len(length)))
             rows = np.arange(patch.strips.stop - patch.strips.start)
-            found[:, patch.strips] = values[rows, place[:, patch.strips]]
-            return np.where(length > 0.0, found, 0.0)
+            samples[:, patch.strips] = values[rows, place[:, patch.strips]]
+            return np.where(length > 0.0, samples, 0.0)
 
         return ContactFields(
             x=x,
@@ -187,8 +188,14 @@ class Halfspace(ws.SingleContactModel):
     ) -> Patch:
         """Return the solution of the normal problem on elements that suit the contact."""
         force, creepage = point.normal_force, point.creepage
-        given = (force, point.rolling_speed, creepage.longitudinal, creepage.lateral, creepage.spin)
-        finite = np.isfinite([*given, np.sum(point.friction)]).all() and np.isfinite(gap).all()
+        inputs = (
+            force,
+            point.rolling_speed,
+            creepage.longitudinal,
+            creepage.lateral,
+            creepage.spin,
+        )
+        finite = np.isfinite([*inputs, np.sum(point.friction)]).all() and np.isfinite(gap).all()
         if creepage.variation is not None:
             finite = finite and np.isfinite(creepage.variation).all()
         if not (finite and force > 0.0 and np.min(point.friction) >= 0.0):
@@ -201,7 +208,7 @@ class Halfspace(ws.SingleContactModel):
         load, half_length = self._estimate(gap, longitudinal_curvature, force, compliance)
         for number in range(MAX_GRIDS):
             strips, x = self._elements(load, half_length)
-            near = (load, half_length) if warm is None else (warm.line_load, warm.half_length)
+            guess = (load, half_length) if warm is None else (warm.line_load, warm.half_length)
             problem = Problem(
                 dx=self._length(half_length),
                 dy=self.grid.spacing,
@@ -223,7 +230,7 @@ class Halfspace(ws.SingleContactModel):
                 problem.elements,
                 problem.gap,
                 force,
-                elliptic_pressure(near[0][strips], near[1][strips], x),
+                elliptic_pressure(guess[0][strips], guess[1][strips], x),
                 self.options.tolerance,
                 problem.compliance,
             )
@@ -246,16 +253,16 @@ class Halfspace(ws.SingleContactModel):
         self, point: OperatingPoint, half_length: FloatArray, strips: slice, x: FloatArray
     ) -> FloatArray:
         """Return the friction coefficient of each element."""
-        given = np.asarray(point.friction, dtype=np.float64)
-        if given.ndim < 2:
-            rows = np.broadcast_to(given, half_length.shape)[strips]
+        friction = np.asarray(point.friction, dtype=np.float64)
+        if friction.ndim < 2:
+            rows = np.broadcast_to(friction, half_length.shape)[strips]
             return np.repeat(rows[:, None], len(x), axis=1)
-        if given.shape != (self.options.mx, len(half_length)):
+        if friction.shape != (self.options.mx, len(half_length)):
             raise ValueError(
-                f"friction has the shape {given.shape}, expected (mx, strips) ="
+                f"friction has the shape {friction.shape}, expected (mx, strips) ="
                 f" {(self.options.mx, len(half_length))}; take it at `friction_points`"
             )
-        if point.friction_carried and np.ptp(given, axis=0).any():
+        if point.friction_carried and np.ptp(friction, axis=0).any():
             raise ws.CapabilityError(
                 "friction that is carried through the contact is not steady; contact.model ="
                 " 'halfspace' solves steady rolling: give friction that is fixed to the contact"
@@ -267,7 +274,7 @@ class Halfspace(ws.SingleContactModel):
                 np.interp(x, length * places, values[::-1])
                 if length > 0.0
                 else values.mean() + 0.0 * x
-                for length, values in zip(half_length[strips], given.T[strips], strict=True)
+                for length, values in zip(half_length[strips], friction.T[strips], strict=True)
             ]
         )
 
@@ -280,13 +287,15 @@ class Halfspace(ws.SingleContactModel):
         for _ in range(4):
             # approach of a line contact of finite width, over its line load
             soft = (2.0 * np.log(2.0 * slenderness) + 1.0) / (np.pi * self.contact_modulus)
-            each = soft + compliance
-            low, high = 0.0, force * float(np.max(each)) / spacing
+            total_compliance = soft + compliance
+            low, high = 0.0, force * float(np.max(total_compliance)) / spacing
             for _ in range(60):
                 approach = 0.5 * (low + high)
-                carried = float((np.maximum(approach - depth, 0.0) / each).sum()) * spacing
+                carried = (
+                    float((np.maximum(approach - depth, 0.0) / total_compliance).sum()) * spacing
+                )
                 low, high = (approach, high) if carried < force else (low, approach)
-            load = np.maximum(high - depth, 0.0) / each
+            load = np.maximum(high - depth, 0.0) / total_compliance
             half_length = np.sqrt(4.0 * load / (np.pi * self.contact_modulus * curvature))
             width = 0.5 * spacing * np.count_nonzero(load)
             slenderness = max(width / float(half_length.max()), 1.0)

@@ -10,8 +10,8 @@ from wearsim.plugins import ContactError
 from wearsim.types import FloatArray
 from wearsim_halfspace.influence import Convolution, Elements, inner
 
-MAX_ITERATIONS = 5000  # far more than usual: where wear gives way far more than the bodies
-LEAST = 1e-3  # eigenvalue, relative to the influence of an element on itself
+MAX_ITERATIONS = 5000  # many are needed only where wear is far more compliant than the bodies
+LEAST = 1e-3  # least eigenvalue, relative to the influence of an element on itself
 
 
 class NormalSolution(NamedTuple):
@@ -65,10 +65,10 @@ def solve_normal(
     smoothed = _ApproximateInverse(convolve)
 
     def opened(pressure: FloatArray) -> FloatArray:
-        found = convolve(pressure)
+        opening = convolve(pressure)
         if wear_compliance is not None:
-            found += (wear_compliance * pressure.sum(axis=1) * elements.dx)[:, None]
-        return found
+            opening += (wear_compliance * pressure.sum(axis=1) * elements.dx)[:, None]
+        return opening
 
     pressure = start * (force / (start.sum() * area))
     inside = pressure > 0.0
@@ -79,27 +79,29 @@ def solve_normal(
         if unit is None:  # after a change of the contact
             unit = smoothed(inside) * inside
             total = float(unit.sum())
-        each = smoothed(closed * inside) * inside
-        approach = -float(each.sum()) / total
+        preconditioned = smoothed(closed * inside) * inside
+        approach = -float(preconditioned.sum()) / total
         residual = closed + approach
         overlap = (residual > 0.0) & ~inside
         if overlap.any():
             inside |= overlap
             unit = smoothed(inside) * inside
             total = float(unit.sum())
-            each = smoothed(closed * inside) * inside
-            approach, last = -float(each.sum()) / total, None
+            preconditioned = smoothed(closed * inside) * inside
+            approach, last = -float(preconditioned.sum()) / total, None
             residual = closed + approach
         residual *= inside
-        each += approach * unit
-        new = inner(each, residual)
+        preconditioned += approach * unit
+        new = inner(preconditioned, residual)
         if last is None:
-            direction = each
+            direction = preconditioned
         else:
-            factor = max((new - inner(each, last)) / product, 0.0)
+            factor = max((new - inner(preconditioned, last)) / product, 0.0)
             direction *= inside
             # directions carry no force
-            direction = each + factor * (direction - (float(direction.sum()) / total) * unit)
+            direction = preconditioned + factor * (
+                direction - (float(direction.sum()) / total) * unit
+            )
         along = opened(direction)
         curvature = inner(direction, along)
         # no direction is left if a single element is in contact
@@ -143,5 +145,5 @@ class _ApproximateInverse:
 
     def __call__(self, field: FloatArray) -> FloatArray:
         transform = self._inverse * self._fft.rfft2(field, s=self._shape)
-        found = self._fft.irfft2(transform, s=self._shape)
-        return np.asarray(found[: field.shape[0], : field.shape[1]])
+        preconditioned = self._fft.irfft2(transform, s=self._shape)
+        return np.asarray(preconditioned[: field.shape[0], : field.shape[1]])

@@ -26,11 +26,11 @@ def difference(materials: Sequence[Material]) -> float:
     K = G/4 ((1 - 2 nu_1)/G_1 - (1 - 2 nu_2)/G_2) (Kalker 1990, section 1.7). Dundurs' second
     constant is K/(1 - nu) in size.
     """
-    one, other = (
+    first, second = (
         (1.0 + m.poisson_ratio) * (1.0 - 2.0 * m.poisson_ratio) / m.youngs_modulus
         for m in materials
     )
-    return 0.5 * combined(materials)[0] * (one - other)
+    return 0.5 * combined(materials)[0] * (first - second)
 
 
 def half_width(along: float, across: float, force: float, modulus: float) -> float:
@@ -59,8 +59,8 @@ def half_width(along: float, across: float, force: float, modulus: float) -> flo
         return float(elliprd(0.0, square, 1.0)), float(elliprd(0.0, 1.0, square))
 
     def excess(logarithm: float) -> float:
-        one, other = integrals(logarithm)
-        return float(np.log(one / other) - np.log(along / across))
+        share_along, share_across = integrals(logarithm)
+        return float(np.log(share_along / share_across) - np.log(along / across))
 
     logarithm = float(brentq(excess, -12.0, 12.0))
     # A = p0 a b/(2 E*) times the integral of ds/((a^2 + s) sqrt((a^2 + s)(b^2 + s) s))
@@ -82,7 +82,7 @@ def half_lengths(pressure: FloatArray, x: FloatArray) -> FloatArray:
     The square of the pressure is linear near an edge; its zero is extrapolated from the two
     outermost elements of both ends.
     """
-    found, dx = np.zeros(len(pressure)), float(x[1] - x[0])
+    lengths, dx = np.zeros(len(pressure)), float(x[1] - x[0])
     for row, values in enumerate(pressure):
         touching = np.flatnonzero(values > 0.0)
         if len(touching) == 0:
@@ -91,5 +91,5 @@ def half_lengths(pressure: FloatArray, x: FloatArray) -> FloatArray:
         for outer, inner in ((touching[0], touching[0] + 1), (touching[-1], touching[-1] - 1)):
             square, rise = values[outer] ** 2, values[inner] ** 2 - values[outer] ** 2
             ends += 0.5 * dx * (min(square / rise, 1.0) if rise > 0.0 else 0.5)
-        found[row] = ends
-    return found
+        lengths[row] = ends
+    return lengths

@@ -14,9 +14,10 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim_halfspace.influence import Convolution, inner
 
 MAX_ITERATIONS = 60  # of Newton's method
-MOST_PRODUCTS = 80  # in the solution of a linear system
-REUSED_UP_TO = 8  # products for which the preconditioner is kept
-FIRST_RATE, SLOWER, PATIENCE = 0.3, 0.3, 15  # rate r, its ratio, and iterations between changes
+MOST_PRODUCTS = 80  # matrix-vector products in the solution of a linear system
+REUSED_UP_TO = 8  # products of a solution up to which its preconditioner is used again
+#: first rate r over its scale, ratio of a rate to the one before, and iterations with each rate
+FIRST_RATE, SLOWER, PATIENCE = 0.3, 0.3, 15
 TINY = 1e-300  # against division by zero
 LOOSEST, TIGHTEST = 0.1, 1e-4  # relative residual of the linear systems
 
@@ -40,7 +41,7 @@ class Within:
     ----------
     entry : ndarray, shape (2, rows, columns)
         Factors of the slip one and two elements ahead, whose sum is the slip of the first element
-        of a row in adhesion; zero elsewhere. Particles are outside for a part of the way.
+        of a row in adhesion; zero elsewhere. Particles touch for a part of this element only.
     exit : ndarray, shape (rows, columns)
         Slip of the elements that particles leave last, over that of the elements behind them.
         It does not hold for elements that slide, see `solve_rolling`.
@@ -54,15 +55,15 @@ class Within:
 
     def __call__(self, slip: FloatArray) -> FloatArray:
         """Return the slip that Coulomb's law opposes to the traction of each element."""
-        rows, first, (one, two) = self._first
-        slip[:, rows, first] -= one * slip[:, rows, first + 1] + two * slip[:, rows, first + 2]
-        rows, last, one = self._last
-        slip[:, rows, last] -= one * slip[:, rows, last - 1]
+        rows, first, (near, far) = self._first
+        slip[:, rows, first] -= near * slip[:, rows, first + 1] + far * slip[:, rows, first + 2]
+        rows, last, ratio = self._last
+        slip[:, rows, last] -= ratio * slip[:, rows, last - 1]
         cosine, sine = self._rotation
-        found = cosine * slip
-        found[0] -= sine * slip[1]
-        found[1] += sine * slip[0]
-        return np.asarray(found)
+        rotated = cosine * slip
+        rotated[0] -= sine * slip[1]
+        rotated[1] += sine * slip[0]
+        return np.asarray(rotated)
 
     @cached_property
     def _first(self) -> tuple[IntArray, IntArray, FloatArray]:
@@ -123,40 +124,40 @@ def solve_tangential(
        DOI 10.1016/0045-7825(91)90022-X.
     """
     of_row = kernel.middle[:2]  # influence within a row of both components
-    own = float(of_row[:, kernel.columns - 1].max())  # of an element on itself
-    touches, most = bound > 0.0, float(bound.max())
+    self_influence = float(of_row[:, kernel.columns - 1].max())  # of an element on itself
+    touches, greatest_bound = bound > 0.0, float(bound.max())
     if start is None:
         start = -rigid_slip / np.maximum(np.hypot(*rigid_slip), TINY) * bound
     opposed = _unchanged if within is None else within
     traction, preconditioner, products = _projected(start, bound), None, 0
     for iteration in range(MAX_ITERATIONS):
         # a smaller rate keeps tractions from changing their direction back and forth
-        rate = FIRST_RATE * SLOWER ** (iteration // PATIENCE) / own
+        rate = FIRST_RATE * SLOWER ** (iteration // PATIENCE) / self_influence
         slip = rigid_slip + kernel.of_vector(traction)
         trial = traction - rate * opposed(slip.copy())
         size = np.maximum(np.hypot(*trial), TINY)
         sticks = (size <= bound) & touches
         unit, part = trial / size, np.where(sticks, 1.0, bound / size)
         residual = part * trial - traction
-        error = float(np.abs(residual).max()) / most
+        error = float(np.abs(residual).max()) / greatest_bound
         if error <= tolerance:
             return TangentialSolution(traction, np.where(sticks, 0.0, slip), sticks)
         if preconditioner is None or products > REUSED_UP_TO or iteration % PATIENCE == 0:
-            # the components of a row are decoupled, and the rows are
+            # the preconditioner neglects the coupling of components and of rows
             diagonal = np.where(sticks, 1.0, part * (1.0 - unit**2))
             preconditioner = _Rows(diagonal, rate * of_row)
         removed = np.where(sticks, 0.0, part)
 
         def product(
-            given: FloatArray,
+            vector: FloatArray,
             rate: float = rate,
             unit: FloatArray = unit,
             part: FloatArray = part,
             removed: FloatArray = removed,
         ) -> FloatArray:
-            change = given - rate * opposed(kernel.of_vector(given))
+            change = vector - rate * opposed(kernel.of_vector(vector))
             along = removed * (unit * change).sum(axis=0)
-            return np.asarray(given - part * change + unit * along)
+            return np.asarray(vector - part * change + unit * along)
 
         change, products = _gmres(
             product, preconditioner, residual, max(min(LOOSEST, error), TIGHTEST)
@@ -192,15 +193,15 @@ def solve_rolling(
     ContactError
         If Newton's method does not converge.
     """
-    applied, left = np.zeros_like(within.exit), within.exit
+    applied, exits = np.zeros_like(within.exit), within.exit
     while True:
-        found = solve_tangential(
+        solution = solve_tangential(
             kernel, bound, rigid_slip, tolerance, start, replace(within, exit=applied)
         )
-        left = np.where(found.sticks, left, 0.0)
-        if np.array_equal(left, applied):
-            return found
-        applied, start = left, found.traction
+        exits = np.where(solution.sticks, exits, 0.0)
+        if np.array_equal(exits, applied):
+            return solution
+        applied, start = exits, solution.traction
 
 
 def _unchanged(slip: FloatArray) -> FloatArray:
@@ -239,11 +240,11 @@ class _Rows:
         self._solve = rows.solve
 
     def __call__(self, field: FloatArray) -> FloatArray:
-        given = field[:, self._touching].astype(np.float32)
-        self._solve(self._factors, given, *self._ends)
-        found = field.copy()
-        found[:, self._touching] = given
-        return found
+        rows = field[:, self._touching].astype(np.float32)
+        self._solve(self._factors, rows, *self._ends)
+        solution = field.copy()
+        solution[:, self._touching] = rows
+        return solution
 
 
 def _gmres(
@@ -263,22 +264,22 @@ def _gmres(
     hessenberg = np.zeros((MOST_PRODUCTS + 1, MOST_PRODUCTS))
     # vector normal to the columns of the Hessenberg matrix; its length gives the residual
     normal = np.zeros(MOST_PRODUCTS + 1)
-    normal[0], tried = 1.0, []
+    normal[0], directions = 1.0, []
     for count in range(1, MOST_PRODUCTS + 1):
-        tried.append(preconditioner(basis[count - 1].reshape(right.shape)))
-        new, known = product(tried[-1]).ravel(), basis[:count]
-        for _ in range(2):  # once more, against rounding
+        directions.append(preconditioner(basis[count - 1].reshape(right.shape)))
+        new, known = product(directions[-1]).ravel(), basis[:count]
+        for _ in range(2):  # orthogonalised twice, against round-off
             # in one thread, see `inner`
             parts = np.einsum("ij,j->i", known, new)
             new -= np.einsum("i,ij->j", parts, known)
             hessenberg[:count, count - 1] += parts
-        rest = float(np.sqrt(inner(new, new)))
-        hessenberg[count, count - 1] = rest
-        normal[count] = -float(normal[:count] @ hessenberg[:count, count - 1]) / max(rest, TINY)
-        basis[count] = new / max(rest, TINY)
+        norm = float(np.sqrt(inner(new, new)))
+        hessenberg[count, count - 1] = norm
+        normal[count] = -float(normal[:count] @ hessenberg[:count, count - 1]) / max(norm, TINY)
+        basis[count] = new / max(norm, TINY)
         if tolerance * float(np.linalg.norm(normal)) >= 1.0:
             break
     right_side = np.zeros(count + 1)
     right_side[0] = length
     weights = np.linalg.lstsq(hessenberg[: count + 1, :count], right_side, rcond=None)[0]
-    return np.einsum("i,i...->...", weights, np.stack(tried)), count
+    return np.einsum("i,i...->...", weights, np.stack(directions)), count

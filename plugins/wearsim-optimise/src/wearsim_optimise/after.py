@@ -1,4 +1,4 @@
-"""What follows the optimum: its sensitivity, active constraints, tolerances and confirmation."""
+"""Sensitivity, active constraints, tolerances and confirmation of an optimum."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from wearsim_optimise.designs import Design, Designs
 from wearsim_optimise.variables import overrides
 
-STEP = 0.02  # of the range of a variable, for derivatives
+STEP = 0.02  # step of the derivatives, over the range of a variable
 ACTIVE = 0.01  # slack over the limit below which a constraint is active
 _CORNERS = 3  # variables up to which all corners of the tolerances are evaluated
 
@@ -34,22 +34,22 @@ def sensitivity(designs: Designs, best: Design) -> list[dict[str, Any]]:
             moved[number] = min(max(moved[number] + side * STEP, 0.0), 1.0)
             ends.append(moved if moved[number] != place[number] else None)
         pairs.append((number, ends))
-    wanted = [end for _, ends in pairs for end in ends if end is not None]
-    found = iter(designs.at(wanted, "sensitivity"))
+    places = [end for _, ends in pairs for end in ends if end is not None]
+    evaluated = iter(designs.at(places, "sensitivity"))
     rows = []
     for number, ends in pairs:
-        low, high = (best if end is None else next(found) for end in ends)
+        low, high = (best if end is None else next(evaluated) for end in ends)
         variable = designs.variables[number]
-        apart = designs.places(high)[number] - designs.places(low)[number]
-        if not (low.is_evaluated and high.is_evaluated and apart > 0.0):
-            low, high, apart = _one_sided(designs, best, low, high, number)
-        known = apart > 0.0
+        distance = designs.places(high)[number] - designs.places(low)[number]
+        if not (low.is_evaluated and high.is_evaluated and distance > 0.0):
+            low, high, distance = _one_sided(designs, best, low, high, number)
+        known = distance > 0.0
         ratio = high.numbers[number] / low.numbers[number] if known and low.numbers[number] else 0.0
         rows.append(
             {
                 "variable": variable.name,
-                "loss": (high.loss - low.loss) / apart if known else math.nan,
-                "slacks": ((high.slacks - low.slacks) / apart).tolist() if known else [],
+                "loss": (high.loss - low.loss) / distance if known else math.nan,
+                "slacks": ((high.slacks - low.slacks) / distance).tolist() if known else [],
                 "low": low.numbers[number],
                 "high": high.numbers[number],
                 # change of the objective, in per cent, where the variable grows by 1 %
@@ -66,9 +66,9 @@ def _one_sided(
 ) -> tuple[Design, Design, float]:
     """Return the side that could be evaluated, with the optimum."""
     for pair in ((low, best), (best, high)):
-        apart = designs.places(pair[1])[number] - designs.places(pair[0])[number]
-        if pair[0].is_evaluated and pair[1].is_evaluated and apart > 0.0:
-            return (*pair, float(apart))
+        distance = designs.places(pair[1])[number] - designs.places(pair[0])[number]
+        if pair[0].is_evaluated and pair[1].is_evaluated and distance > 0.0:
+            return (*pair, float(distance))
     return best, best, 0.0
 
 
@@ -107,15 +107,15 @@ def active_constraints(
         losses = np.array([by_name[v.name]["loss"] for v in known])
         if np.isfinite(matrix).all() and np.isfinite(losses).all():
             multipliers, _ = nnls(matrix, losses)
-    found = []
+    constraints = []
     for name, multiplier in zip(names, multipliers.tolist(), strict=True):
         is_bound = name not in goals.slack_names
         relaxed = 0.01 * (_per_part(known, name) if is_bound else 1.0)
         gain = math.nan
         if math.isfinite(multiplier):
             gain = math.expm1(_sign(designs) * multiplier * relaxed)
-        found.append({"constraint": name, "multiplier": multiplier, "gain": gain})
-    return found
+        constraints.append({"constraint": name, "multiplier": multiplier, "gain": gain})
+    return constraints
 
 
 def _per_part(known: Sequence[Any], name: str) -> float:
@@ -156,19 +156,22 @@ def tolerances(designs: Designs, best: Design, given: Mapping[str, float]) -> di
         for place, sign in zip(moved, row, strict=True):
             numbers[place] += sign * given[names[place]]
         neighbours.append(tuple(numbers))
-    found = designs.with_numbers(neighbours, "tolerance")
-    known = [design for design in found if design.is_evaluated]
-    worst = max(known, key=lambda design: design.loss, default=None)
+    tried = designs.with_numbers(neighbours, "tolerance")
+    evaluated = [design for design in tried if design.is_evaluated]
+    worst = max(evaluated, key=lambda design: design.loss, default=None)
     violated = {}
     for number, name in enumerate(goals.slack_names):
-        beyond = [design for design in known if design.slacks[number] < 0.0]
-        if beyond:
-            least = min(beyond, key=lambda design: float(design.slacks[number]))
-            violated[name] = {"design": least.number, "beyond": -float(least.slacks[number])}
+        violating = [design for design in evaluated if design.slacks[number] < 0.0]
+        if violating:
+            most_violating = min(violating, key=lambda design: float(design.slacks[number]))
+            violated[name] = {
+                "design": most_violating.number,
+                "beyond": -float(most_violating.slacks[number]),
+            }
     return {
         "tolerances": dict(given),
-        "neighbours": len(found),
-        "failed": len(found) - len(known),
+        "neighbours": len(tried),
+        "failed": len(tried) - len(evaluated),
         "worst": None if worst is None else worst.number,
         "part": None if worst is None else worst.values[main] / best.values[main],
         "violated": violated,
@@ -198,8 +201,8 @@ def confirmation(designs: Designs, first: Design, best: Design) -> list[dict[str
         pair = [overrides(designs.variables, design.numbers) for design in (best, first)]
         job = {"overrides": pair[0], "other": pair[1], "name": name}
         (design,) = designs.evaluate([job], [best.numbers], "confirmation")
-        found = design.outcome.get("gain") or {"why": design.outcome["reason"]}
-        rows.append({"name": name, **gain, **found})
+        ratio_or_reason = design.outcome.get("gain") or {"why": design.outcome["reason"]}
+        rows.append({"name": name, **gain, **ratio_or_reason})
     return rows
 
 

@@ -40,7 +40,7 @@ from wearsim_optimise.variables import (
 
 Watcher = Callable[[int, int, str], object]
 METHODS = ("auto", "cobyqa", "evolution")
-_BASE, _PER_VARIABLE = 10, 15  # designs of a search by default
+_BASE, _PER_VARIABLE = 10, 15  # default number of designs of a search, and more per variable
 _PRELOAD = "wearsim_optimise.evaluation numba scipy.special"
 
 
@@ -129,14 +129,14 @@ def optimise(
     Examples
     --------
     >>> import wearsim
-    >>> found = wearsim.optimise(
+    >>> result = wearsim.optimise(
     ...     "rig.toml",
     ...     ["roller.crown_radius=300mm:900mm"],
     ...     minimise="contact.power",
     ...     subject_to=["peak_pressure < 650 MPa"],
     ...     scheduler="serial",
     ... )
-    >>> found.best.is_feasible
+    >>> result.best.is_feasible
     True
     """
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
@@ -222,7 +222,7 @@ def _given(value: int | None, default: int | None) -> int | None:
 
 
 def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
-    """Return what is asked for as plain data; raises a ValueError for what cannot be read."""
+    """Return the request as plain data; raise a ValueError for arguments that cannot be read."""
     variables = [parse_variable(text) for text in given["vary"]]
     if not variables:
         raise ValueError("nothing is varied; name a variable, such as cam.base_radius=35mm:60mm")
@@ -243,10 +243,9 @@ def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
         raise ValueError("a second choice goes with one objective, not with a front of two")
     if given["method"] not in METHODS:
         raise ValueError(f"'{given['method']}' is no method, expected one of {', '.join(METHODS)}")
-    least = 3
     evaluations = given["evaluations"] or _BASE + _PER_VARIABLE * len(variables)
     for name, value, lowest in (
-        ("evaluations", evaluations, least),
+        ("evaluations", evaluations, 3),
         ("starts", given["starts"], 1),
         ("realisations", given["realisations"], 1),
     ):
@@ -269,7 +268,7 @@ def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
 
 def _tolerances(texts: Sequence[str], variables: Sequence[Variable]) -> dict[str, float]:
     """Return tolerances in the units of the variables, by name."""
-    found = {}
+    tolerances = {}
     known = {v.name: v for v in variables if v.kind == "continuous"}
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
@@ -289,8 +288,8 @@ def _tolerances(texts: Sequence[str], variables: Sequence[Variable]) -> dict[str
             raise ValueError(f"'{text}': {error}") from error
         if not number > 0.0:
             raise ValueError(f"'{text}': a tolerance must be above zero")
-        found[name] = number
-    return found
+        tolerances[name] = number
+    return tolerances
 
 
 class _Study:
@@ -308,7 +307,7 @@ class _Study:
         stop_requested: Callable[[], bool] | None,
     ) -> None:
         self.scenario, self.data, self.path = scenario, data, path
-        self._hands = workers, scheduler
+        self._workers, self._scheduler = workers, scheduler
         self._watch, self._notice, self._stop = watch, on_notice, stop_requested
         self._started, self._before = time.monotonic(), data.wall_seconds
         self._designs: Designs | None = None
@@ -325,12 +324,11 @@ class _Study:
         )
 
     def finish(self) -> OptimisationResult:
-        """Compute what is left; return the result."""
-        workers, scheduler = self._hands
+        """Compute the remaining designs and return the result."""
         plan, request = self.plan, self.data.request
         with executor(
-            scheduler,
-            workers,
+            self._scheduler,
+            self._workers,
             on_notice=self._notice,
             stop_requested=self._stop,
             preload=_PRELOAD,
@@ -351,11 +349,11 @@ class _Study:
 
                 def neighbours(design: Design) -> None:
                     rows = sensitivity(designs, design)
-                    near = tolerances(designs, design, request["tolerances"])
-                    around[design.number] = rows, near
+                    robustness = tolerances(designs, design, request["tolerances"])
+                    around[design.number] = rows, robustness
 
                 best, converged = optimum(designs, plan, neighbours)
-                rows, near = around.get(best.number, ([], None))
+                rows, robustness = around.get(best.number, ([], None))
                 active = active_constraints(designs, best, rows)
                 gains = confirmation(designs, designs.all[0], best) if request["confirm"] else []
             except Interrupted as error:
@@ -368,7 +366,7 @@ class _Study:
             sensitivity=rows,
             active=active,
             gains=gains,
-            robustness=near,
+            robustness=robustness,
             converged=converged,
             warnings=self._warnings(designs, converged=converged),
         )

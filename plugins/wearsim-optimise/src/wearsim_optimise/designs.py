@@ -1,4 +1,4 @@
-"""Designs that are evaluated: asked for in rounds, kept in order, and found again after a kill."""
+"""Designs of an optimisation: evaluated in rounds, kept in order, and read again after a kill."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Design:
     key : str
         Text that identifies it.
     loss, slacks
-        For the search; the loss is not a number if the objective is not known.
+        Numbers for the search; the loss is NaN if the objective is not known.
     """
 
     number: int
@@ -57,8 +57,8 @@ class Design:
     @property
     def values(self) -> Mapping[str, float]:
         """Quantities that are asked for, in SI."""
-        found: Mapping[str, float] = self.outcome["values"]
-        return found
+        values: Mapping[str, float] = self.outcome["values"]
+        return values
 
     @property
     def is_evaluated(self) -> bool:
@@ -149,7 +149,7 @@ class Designs:
         )
 
     def use(self, goals: Goals) -> None:
-        """Use goals, whose limits before wear spare runs, for all designs."""
+        """Apply goals to all designs; designs that violate limits before wear are not run."""
         self.goals = goals
         cheap = [c for c in goals.constraints if goals.named[c.name]["verb"] in CHEAP]
         self.limits = {item.name: (item.sign, goals.limit(item)) for item in cheap}
@@ -182,15 +182,15 @@ class Designs:
         missing = [n for n in missing if keys.index(keys[n]) == n]
         if missing:
             self._run([jobs[n] for n in missing], [keys[n] for n in missing])
-        found = []
+        designs = []
         for key, chosen in zip(keys, numbers, strict=True):
             if key not in self._by_key:
                 self._by_key[key] = len(self.all)
                 outcome = self.known[key]
                 design = Design(len(self.all) + 1, tuple(chosen), purpose, outcome, key)
                 self.all.append(with_goals(design, self.goals))
-            found.append(self.all[self._by_key[key]])
-        return found
+            designs.append(self.all[self._by_key[key]])
+        return designs
 
     def _run(self, jobs: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> None:
         if self._stop is not None and self._stop():
@@ -220,8 +220,9 @@ class Designs:
 def completed(designs: Designs, chosen: Design, loss: Callable[[Design], float]) -> Answer:
     """Return loss and slacks of a design, those that are not known from similar designs.
 
-    A design that violates a limit before wear by far is not run, and one that fails has no values:
-    a smooth interpolation of the others stands for them, so that the search keeps its models.
+    A design that violates a limit before wear by far is not run, and one that fails has no values.
+    Values interpolated smoothly from the evaluated designs replace them, so that the models of the
+    search remain valid.
 
     Parameters
     ----------
@@ -230,20 +231,20 @@ def completed(designs: Designs, chosen: Design, loss: Callable[[Design], float])
     loss : callable
         Loss of a design; not a number where it is not known.
     """
-    wanted = np.concatenate([[loss(chosen)], chosen.slacks])
-    missing = ~np.isfinite(wanted)
+    values = np.concatenate([[loss(chosen)], chosen.slacks])
+    missing = ~np.isfinite(values)
     if missing.any():
-        others = [design for design in designs.evaluated if math.isfinite(loss(design))]
-        if others:
+        evaluated = [design for design in designs.evaluated if math.isfinite(loss(design))]
+        if evaluated:
             place = designs.places(chosen)
-            places = np.array([designs.places(design) for design in others])
-            rows = np.array([np.concatenate([[loss(d)], d.slacks]) for d in others])
-            wanted[missing] = _interpolated(places, rows[:, missing], place)
-            if chosen.status == "failed":  # nothing is known of it: away from there
-                wanted[0] = max(float(rows[:, 0].max()), wanted[0]) + 0.1
-        wanted[~np.isfinite(wanted)] = 1.0
-    slacks = wanted[1:]
-    return Answer(float(wanted[0]), slacks - TIGHTER if len(slacks) else slacks)
+            places = np.array([designs.places(design) for design in evaluated])
+            rows = np.array([np.concatenate([[loss(d)], d.slacks]) for d in evaluated])
+            values[missing] = _interpolated(places, rows[:, missing], place)
+            if chosen.status == "failed":  # a great loss leads the search away from it
+                values[0] = max(float(rows[:, 0].max()), values[0]) + 0.1
+        values[~np.isfinite(values)] = 1.0
+    slacks = values[1:]
+    return Answer(float(values[0]), slacks - TIGHTER if len(slacks) else slacks)
 
 
 def _interpolated(places: Vector, rows: Vector, place: Vector) -> Vector:

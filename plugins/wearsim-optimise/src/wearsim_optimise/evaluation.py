@@ -68,10 +68,10 @@ class Studies:
             If the study cannot be made.
         """
         if verb not in self._answers:
-            found = getattr(self, verb)
-            if getattr(found, "count", 1) == 0:
-                raise WearsimError(next(iter(found.errors.values()), "no realisation is completed"))
-            self._answers[verb] = found.view.answers()
+            study = getattr(self, verb)
+            if getattr(study, "count", 1) == 0:
+                raise WearsimError(next(iter(study.errors.values()), "no realisation is completed"))
+            self._answers[verb] = study.view.answers()
         return self._answers[verb]
 
     @cached_property
@@ -131,8 +131,10 @@ class Studies:
                 answer = answers[plain]
                 return {"verb": verb, "name": plain, "unit": answer.unit, "label": answer.label}
             known += [f"{verb}.{key}" for key in answers]
-        near = difflib.get_close_matches(name, [*known, *(k.split(".", 1)[1] for k in known)], n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else ""
+        similar = difflib.get_close_matches(
+            name, [*known, *(k.split(".", 1)[1] for k in known)], n=1
+        )
+        hint = f"; did you mean '{similar[0]}'?" if similar else ""
         raise UnknownQuantityError(
             f"no quantity is named '{name}'{hint} (known: {', '.join(known)}; lives: life.b10)"
         )
@@ -227,8 +229,8 @@ class Evaluation:
         """Return whether a limit before wear is violated by far."""
         for name, (sign, limit) in self.limits.items():
             if name in values:
-                beyond = values[name] - limit if sign == "<" else limit - values[name]
-                if beyond > FAR * (abs(limit) or 1.0):
+                excess = values[name] - limit if sign == "<" else limit - values[name]
+                if excess > FAR * (abs(limit) or 1.0):
                     return True
         return False
 
@@ -243,8 +245,8 @@ class Evaluation:
         low = high = ratio
         if named["verb"] == "life":
             share = float(_LIFE.search(name)[1])  # type: ignore[index]
-            found = pair[0].life.compare(pair[1].life, share).b10_ratio
-            ratio, low, high = found.value, found.low, found.high
+            interval = pair[0].life.compare(pair[1].life, share).b10_ratio
+            ratio, low, high = interval.value, interval.low, interval.high
         elif named["verb"] == "ensemble":
             low, high = _bootstrap(pair, named["name"])
         return {"values": values, "ratio": ratio, "low": low, "high": high}

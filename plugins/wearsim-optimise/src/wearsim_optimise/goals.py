@@ -1,4 +1,4 @@
-"""What is looked for: objectives, constraints and their numbers for the search."""
+"""Objectives and constraints of an optimisation, and their values on the scales of the search."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from wearsim.plugins import QuantityError, kind_of, quantity
 from wearsim.report.text import PER_SI, shown
 
 _CONSTRAINT = re.compile(r"\s*([A-Za-z][\w.%+-]*)\s*(<=?|>=?)\s*(.+?)\s*")
-TIGHTER = 1e-4  # of a limit, by which the search stays within it
-_SMALL = 1e-3  # of the first value, below which an objective is not on a logarithmic scale
-ONE_PERCENT = math.log(1.01)  # of the objective, within which `then` chooses
+TIGHTER = 1e-4  # margin within each limit that the search keeps, over the limit
+_SMALL = 1e-3  # part of the first value below which the scale of an objective is linear
+ONE_PERCENT = math.log(1.01)  # difference of the loss within which `then` selects
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def parse_constraint(text: str) -> Constraint:
     Raises
     ------
     ValueError
-        If it is none.
+        If the text is not a constraint.
     """
     match = _CONSTRAINT.fullmatch(text)
     if match is None:
@@ -125,17 +125,17 @@ class Goals:
     def slacks(self, values: Mapping[str, float], margins: Mapping[str, float]) -> list[float]:
         """Return how far a design is within each constraint, over its limit; not below zero.
 
-        The margins of a cam follow those that are given. A value that is not known is not a number.
+        The margins of a cam follow the given constraints. The slack of an unknown value is NaN.
         """
-        found = []
+        slacks = []
         for constraint in self.constraints:
             limit, value = self.limit(constraint), values.get(constraint.name, math.nan)
             side = 1.0 if constraint.sign == "<" else -1.0
-            found.append(side * (limit - value) / (abs(limit) or 1.0))
+            slacks.append(side * (limit - value) / (abs(limit) or 1.0))
         for name in self.margin_names:
             scale, value = abs(self.first[f"margin {name}"]) or 1.0, margins.get(name, math.nan)
-            found.append(min(value / scale, 1e3))
-        return found
+            slacks.append(min(value / scale, 1e3))
+        return slacks
 
     @property
     def margin_names(self) -> list[str]:

@@ -108,14 +108,14 @@ def _some_design(designs: Designs, plan: Plan, first: Design) -> Design:
 
 def _nearest_to_feasible(designs: Designs, tried: Sequence[Design]) -> str:
     """Return which margin of a cam is least violated, and where, in words."""
-    found = [
+    margins = [
         (min(design.outcome["margins"].values()), design)
         for design in tried
         if design.outcome["margins"]
     ]
-    if not found:
+    if not margins:
         return ""
-    best = max(found, key=lambda item: item[0])[1]
+    best = max(margins, key=lambda item: item[0])[1]
     return f"nearest to a feasible one is {described(designs, best)}: "
 
 
@@ -141,19 +141,19 @@ def _scattered(dimensions: int, count: int, seed: int) -> list[Vector]:
 def starts_of(designs: Designs, plan: Plan, first: Design) -> list[Design]:
     """Return the designs from which the search starts, the first one included.
 
-    Others are spread between the bounds; those that no cam or limit before wear allows are left
-    out as far as there are others.
+    The others are spread between the bounds; those with the least violation of the limits before
+    wear and of the margins of a cam are taken.
     """
-    wanted = plan.starts - 1
-    if not wanted:
+    count = plan.starts - 1
+    if not count:
         return [first]
-    places = _scattered(len(designs.variables), 4 * wanted, plan.seed)
+    places = _scattered(len(designs.variables), 4 * count, plan.seed)
     if designs.limits or (designs.goals and designs.goals.margin_names):
-        before = designs.at(places, "feasibility", before_wear=True)
-        beyond = [_known_violation(design) for design in before]
-        order = sorted(range(len(places)), key=lambda n: (beyond[n], n))
+        before_wear = designs.at(places, "feasibility", before_wear=True)
+        violations = [_known_violation(design) for design in before_wear]
+        order = sorted(range(len(places)), key=lambda n: (violations[n], n))
         places = [places[n] for n in order]
-    return [first, *designs.at(places[:wanted], "start")]
+    return [first, *designs.at(places[:count], "start")]
 
 
 def _known_violation(design: Design) -> float:
@@ -163,12 +163,21 @@ def _known_violation(design: Design) -> float:
 
 
 @dataclass(eq=False)
-class Way:
-    """A search with the designs that it has asked for, and how they are rated for it."""
+class LocalSearch:
+    """A search from one start.
 
-    search: Search
+    Parameters
+    ----------
+    solver : Search
+    rated : callable
+        Returns loss and slacks of a design for this search.
+    designs : list of Design
+        Its start, and the designs that the solver has asked for.
+    """
+
+    solver: Search
     rated: Callable[[Design], Answer]
-    found: list[Design]
+    designs: list[Design]
 
 
 class Runner:
@@ -206,59 +215,58 @@ class Runner:
         def rated(design: Design) -> Answer:
             return completed(self.designs, design, loss)
 
-        def narrowed(ways: list[Way]) -> list[Way]:
-            if len(ways) == 1 or self.designs.runs < half:
-                return ways
-            ranks = [min(_rank(design, loss) for design in way.found) for way in ways]
-            return [ways[ranks.index(min(ranks))]]
+        def best(searches: list[LocalSearch]) -> LocalSearch:
+            return min(searches, key=lambda search: min(_rank(d, loss) for d in search.designs))
 
-        ways = [self.way(start, rated, radius) for start in starts]
-        left = self.run(ways, budget, purpose, narrowed)
-        ranks = [min(_rank(design, loss) for design in way.found) for way in ways]
-        return ways[ranks.index(min(ranks))] not in left
+        def narrowed(searches: list[LocalSearch]) -> list[LocalSearch]:
+            return searches if self.designs.runs < half else [best(searches)]
 
-    def way(
+        searches = [self.local_search(start, rated, radius) for start in starts]
+        unfinished = self.run(searches, budget, purpose, narrowed)
+        return best(searches) not in unfinished
+
+    def local_search(
         self,
         start: Design,
         rated: Callable[[Design], Answer],
         radius: float = RADIUS,
         further: int = 0,
-    ) -> Way:
+    ) -> LocalSearch:
         """Return a search by COBYQA from a design, with further slacks than the constraints."""
         places = self.designs.places(start)
         fixed = [variable.kind != "continuous" for variable in self.designs.variables]
-        search = Cobyqa(places, len(start.slacks) + further, radius, fixed)
-        return Way(search, rated, [start])
+        solver = Cobyqa(places, len(start.slacks) + further, radius, fixed)
+        return LocalSearch(solver, rated, [start])
 
     def run(
         self,
-        ways: list[Way],
+        searches: list[LocalSearch],
         budget: int,
         purpose: str,
-        narrowed: Callable[[list[Way]], list[Way]] = lambda ways: ways,
-    ) -> list[Way]:
+        narrowed: Callable[[list[LocalSearch]], list[LocalSearch]] = lambda searches: searches,
+    ) -> list[LocalSearch]:
         """Evaluate designs of several searches round by round until they or the budget end.
 
         Returns the searches that the budget has ended.
         """
-        while ways and self.left(budget):
-            ways = narrowed(ways)
-            most = max((budget - self.designs.runs) // len(ways), 1)
-            ways = self._round(ways, purpose, most)
-        return ways
+        while searches and self.left(budget):
+            searches = narrowed(searches)
+            most = max((budget - self.designs.runs) // len(searches), 1)
+            searches = self._round(searches, purpose, most)
+        return searches
 
-    def _round(self, ways: list[Way], purpose: str, most: int) -> list[Way]:
+    def _round(self, searches: list[LocalSearch], purpose: str, most: int) -> list[LocalSearch]:
         """Evaluate the next designs of each search; return the searches that have not ended."""
-        asked = [(way, way.search.ask()[:most]) for way in ways]
-        places = [place for _, more in asked for place in more]
+        asked = [(search, search.solver.ask()[:most]) for search in searches]
+        places = [place for _, new_places in asked for place in new_places]
         designs = iter(self.designs.at(places, purpose))
         self.asked += len(places)
-        for way, more in asked:
-            new = [next(designs) for _ in more]
-            way.found += new
+        for search, new_places in asked:
+            new = [next(designs) for _ in new_places]
+            search.designs += new
             if new:
-                way.search.tell([way.rated(design) for design in new])
-        return [way for way, more in asked if more]
+                search.solver.tell([search.rated(design) for design in new])
+        return [search for search, new_places in asked if new_places]
 
     def evolve(self, budget: int, order: Callable[[Sequence[Any]], Sequence[float]]) -> bool:
         """Search by the evolution strategy until the budget of runs is spent.
@@ -286,9 +294,9 @@ def _rank(design: Design, loss: Loss) -> tuple[float, float]:
     return violation(design), value
 
 
-def best_of(found: Sequence[Design], loss: Loss) -> Design | None:
+def best_of(designs: Sequence[Design], loss: Loss) -> Design | None:
     """Return the feasible design with the least loss; the first of equal ones."""
-    feasible = [design for design in found if design.is_feasible and math.isfinite(loss(design))]
+    feasible = [design for design in designs if design.is_feasible and math.isfinite(loss(design))]
     return min(feasible, key=lambda design: (loss(design), design.number), default=None)
 
 
@@ -315,7 +323,7 @@ def optimum(
     Raises
     ------
     NoFeasibleDesignError
-        If none is feasible; says which constraint is least violated, and where.
+        If no design is feasible; the message names the least violated constraint, and where.
     """
     first = first_goals(designs, plan)
     runner = Runner(designs, plan)
@@ -380,10 +388,13 @@ def _then(runner: Runner, start: Design) -> bool:
         return goals.scaled(goals.then, value)
 
     def rated(design: Design) -> Answer:
-        found, main = (completed(designs, design, each) for each in (loss, objective(0)))
-        return Answer(found.loss, np.append(found.slacks, limit - main.loss))
+        second = completed(designs, design, loss)
+        main = completed(designs, design, objective(0))
+        return Answer(second.loss, np.append(second.slacks, limit - main.loss))
 
-    return not runner.run([runner.way(start, rated, SECOND, 1)], runner.plan.evaluations, "then")
+    return not runner.run(
+        [runner.local_search(start, rated, SECOND, 1)], runner.plan.evaluations, "then"
+    )
 
 
 def _front(runner: Runner, starts: list[Design]) -> bool:
@@ -405,17 +416,19 @@ def _front(runner: Runner, starts: list[Design]) -> bool:
         return converged
     levels = [ends[1].losses[1] + span * (n + 1.0) / (LEVELS + 1.0) for n in range(LEVELS)]
     feasible = [design for design in designs.all if design.is_feasible]
-    ways = []
+    searches = []
     for level in levels:
-        near = min(feasible, key=partial(_beyond, level))
-        ways.append(runner.way(near, partial(_at_level, designs, level), SECOND, 1))
-    return not runner.run(ways, budget, "front") and converged
+        start = min(feasible, key=partial(_beyond, level))
+        searches.append(runner.local_search(start, partial(_at_level, designs, level), SECOND, 1))
+    return not runner.run(searches, budget, "front") and converged
 
 
 def _beyond(level: float, design: Design) -> tuple[float, float]:
-    """Return a key for the start at a level of the second objective: within it, the best first."""
-    over = max(design.losses[1] - level, 0.0)
-    return over, design.losses[0]
+    """Return a key of the designs from which to start at a level of the second objective.
+
+    Designs within the level come first, ordered by the first objective.
+    """
+    return max(design.losses[1] - level, 0.0), design.losses[0]
 
 
 def _at_level(designs: Designs, level: float, design: Design) -> Answer:
@@ -428,21 +441,21 @@ def _at_level(designs: Designs, level: float, design: Design) -> Answer:
 def chosen(designs: Designs, plan: Plan) -> Design:
     """Return the best design of all that were evaluated.
 
-    Of a front it is the one nearest to the best of both objectives, each over its range. With a
-    second quantity it is the least of that within 1 % of the best.
+    Of a front it is the design nearest to the best values of both objectives, relative to their
+    ranges. With a second quantity it is the one with the least of it within 1 % of the best.
     """
     if len(plan.objectives) == 2 and (front := front_of(designs)):
         losses = np.array([design.losses for design in front])
         span = np.ptp(losses, axis=0)
-        away = (losses - losses.min(axis=0)) / np.where(span > 0.0, span, 1.0)
-        return front[int(np.hypot(*away.T).argmin())]
+        distances = (losses - losses.min(axis=0)) / np.where(span > 0.0, span, 1.0)
+        return front[int(np.hypot(*distances.T).argmin())]
     best = best_of(designs.all, objective(0))
     if best is None:
         raise NoFeasibleDesignError(_least_violated(designs))
     if not plan.then:
         return best
-    near = [d for d in designs.all if d.is_feasible and d.loss <= best.loss + ONE_PERCENT]
-    return min(near, key=lambda design: (design.values[plan.then], design.number))
+    candidates = [d for d in designs.all if d.is_feasible and d.loss <= best.loss + ONE_PERCENT]
+    return min(candidates, key=lambda design: (design.values[plan.then], design.number))
 
 
 def _least_violated(designs: Designs) -> str:

@@ -18,12 +18,13 @@ from wearsim.errors import PluginError
 from wearsim_optimise.variables import Variable, Vector
 
 RADIUS = 0.2  # first trust region, of the range of a variable
-FINAL = 4e-4  # last one; the error of an optimum is much smaller
-_MOST = 10_000  # evaluations of one search; the budget ends it before
+FINAL = 4e-4  # last trust region; the error of an optimum is much smaller
+_MOST = 10_000  # evaluations of one search, more than the budget allows
 
 
-#: weight of the squared violation of a limit, over it, in the loss: COBYQA may otherwise end where
-#: no limit is kept, if all its first designs violate one; it is zero and flat at a feasible optimum
+#: weight in the loss of the squared violation of a limit, relative to the limit: if all its first
+#: designs violate a limit, COBYQA may otherwise end at an infeasible design. The added term and its
+#: derivative are zero at a feasible optimum
 PENALTY = 10.0
 
 
@@ -110,10 +111,10 @@ class Cobyqa:
 
     def tell(self, rated: Sequence[Rated]) -> None:
         """Take losses and slacks of the designs, or of the first of them."""
-        for place, found in zip(self._next, rated, strict=False):
-            beyond = min(violation(found), 1.0)
-            loss = found.loss + PENALTY * beyond**2
-            self._known[place.tobytes()] = Answer(loss, found.slacks)
+        for place, answer in zip(self._next, rated, strict=False):
+            violated = min(violation(answer), 1.0)
+            loss = answer.loss + PENALTY * violated**2
+            self._known[place.tobytes()] = Answer(loss, answer.slacks)
 
     def _at(self, place: Vector) -> Rated:
         place = self._within(place)
@@ -220,7 +221,7 @@ class Evolution:
         return np.array(places)
 
     def tell(self, rated: Sequence[Rated]) -> None:
-        """Take the generation, ordered."""
+        """Order the designs of the generation, and update the distribution by them."""
         ranks = np.argsort(np.argsort(self._order(rated), kind="stable"), kind="stable")
         self._solver.tell(list(zip(self._solutions, ranks.astype(float).tolist(), strict=True)))
 
@@ -230,17 +231,17 @@ def _or(values: Any) -> Any:
 
 
 def feasible_first(rated: Sequence[Rated]) -> list[float]:
-    """Return the order of designs: feasible ones by loss, after them the others by violation."""
+    """Return numbers that order designs: feasible ones by loss, then the rest by violation."""
     losses = [item.loss for item in rated if violation(item) == 0.0 and math.isfinite(item.loss)]
     worst = max(losses, default=0.0)
-    found = []
+    order = []
     for item in rated:
-        beyond = violation(item)
-        if beyond == 0.0 and math.isfinite(item.loss):
-            found.append(item.loss)
+        violated = violation(item)
+        if violated == 0.0 and math.isfinite(item.loss):
+            order.append(item.loss)
         else:
-            found.append(worst + 1.0 + (beyond if math.isfinite(beyond) else 1e6))
-    return found
+            order.append(worst + 1.0 + (violated if math.isfinite(violated) else 1e6))
+    return order
 
 
 def violation(rated: Rated) -> float:

@@ -125,7 +125,7 @@ def parse_variable(text: str) -> Variable:
         choices = tuple(map(_choice, _parts(values)))
         if len(choices) < 2:
             raise ValueError(f"'{text}' has one value, expected bounds or a list, {EXAMPLE}")
-        if any(first == other for n, first in enumerate(choices) for other in choices[:n]):
+        if any(first == second for n, first in enumerate(choices) for second in choices[:n]):
             raise ValueError(f"'{text}' has a value twice; remove one of them")
         return Variable(keys, "list", 0.0, len(choices) - 1.0, "", choices)
     ends = [_NUMBER.fullmatch(end) for end in (low, high)]

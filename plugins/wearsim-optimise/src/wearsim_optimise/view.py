@@ -64,13 +64,13 @@ class OptimisationView(StudyView[OptimisationResult]):
             rows.append(Row(constraint.text, value + self._activity(constraint.text)))
         if result.raw.front:
             rows.append(Row("front", f"{count(len(result.raw.front))} designs, see the table"))
-        if (near := result.raw.robustness) is not None:
-            rows.append(Row("within the tolerances", self._robustness(near)))
+        if (robustness := result.raw.robustness) is not None:
+            rows.append(Row("within the tolerances", self._robustness(robustness)))
         rows.append(Row("search", self._convergence()))
         return rows
 
     def _convergence(self) -> str:
-        """Return whether the search has converged, and else what to do."""
+        """Return whether the search has converged, and the remedy if not."""
         raw = self.result.raw
         return "converged" if raw.converged else not_converged(raw.request["evaluations"])
 
@@ -94,7 +94,7 @@ class OptimisationView(StudyView[OptimisationResult]):
         return {name: (best.values[name], self.result.goals.unit(name))}
 
     def _at_bound(self, number: float, variable: Any) -> str:
-        """Return that a variable is at a bound, with what moving the bound would bring."""
+        """Return text on a variable at a bound, with the gain from moving the bound."""
         for item in self.result.raw.active:
             if item["constraint"].startswith(f"{variable.name} "):
                 side = "lower" if ">" in item["constraint"] else "upper"
@@ -102,9 +102,9 @@ class OptimisationView(StudyView[OptimisationResult]):
         return ""
 
     def _activity(self, text: str) -> str:
-        """Return whether a constraint is active, with what relaxing it would bring."""
-        found = [item for item in self.result.raw.active if item["constraint"] == text]
-        return f", active{self._brings(found[0])}" if found else ""
+        """Return whether a constraint is active, with the gain from relaxing it."""
+        matching = [item for item in self.result.raw.active if item["constraint"] == text]
+        return f", active{self._brings(matching[0])}" if matching else ""
 
     def _brings(self, item: Mapping[str, Any]) -> str:
         name = self.result.goals.objectives[0][0]
@@ -112,16 +112,16 @@ class OptimisationView(StudyView[OptimisationResult]):
             return ""
         return f"; 1 % more changes {name} by {100.0 * item['gain']:+.2g} %"
 
-    def _robustness(self, near: Mapping[str, Any]) -> str:
+    def _robustness(self, robustness: Mapping[str, Any]) -> str:
         """Return the worst neighbour in words."""
         name = self.result.goals.objectives[0][0]
-        if near["worst"] is None:
-            return f"none of {near['neighbours']} neighbours could be evaluated"
-        change = 100.0 * (near["part"] - 1.0)
-        text = f"{name} {change:+.2g} % at worst of {near['neighbours']} neighbours"
-        for constraint, item in near["violated"].items():
+        if robustness["worst"] is None:
+            return f"none of {robustness['neighbours']} neighbours could be evaluated"
+        change = 100.0 * (robustness["part"] - 1.0)
+        text = f"{name} {change:+.2g} % at worst of {robustness['neighbours']} neighbours"
+        for constraint, item in robustness["violated"].items():
             text += f"; {constraint} is exceeded by up to {100.0 * item['beyond']:.2g} %"
-        return text + (f"; {near['failed']} failed" if near["failed"] else "")
+        return text + (f"; {robustness['failed']} failed" if robustness["failed"] else "")
 
     def study(self) -> Rows:
         """Return rows on the designs, their number and the effort."""

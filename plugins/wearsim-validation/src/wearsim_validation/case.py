@@ -1,4 +1,4 @@
-"""What a case holds: its TOML file as a model, and the published values."""
+"""Cases: the model of their TOML files, and the published values."""
 
 from __future__ import annotations
 

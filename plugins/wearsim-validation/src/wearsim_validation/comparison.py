@@ -85,7 +85,7 @@ class Outcome:
     def verdict(self) -> Verdict:
         """Worst verdict of the series."""
         order = list(VERDICTS)
-        return max((one.verdict for one in self.comparisons), key=order.index)
+        return max((comparison.verdict for comparison in self.comparisons), key=order.index)
 
     @property
     def expected(self) -> bool:
@@ -103,7 +103,7 @@ class Outcome:
             "verdict": self.verdict,
             "as_recorded": self.expected,
             "notes": self.notes,
-            "series": [one.as_json() for one in self.comparisons],
+            "series": [comparison.as_json() for comparison in self.comparisons],
         }
 
 
@@ -115,31 +115,31 @@ def compare(case: Case, on_progress: OnProgress) -> Outcome:
         for variant in case.file.variant
         if variant.needs and variant.needs not in installed
     ]
-    found = []
+    comparisons = []
     for series in case.file.series:
         on_progress(series.name)
         x, published = case.columns[series.x], case.columns[series.published]
-        one = Comparison(series, published.unit, x.unit, x.values, published.values)
+        comparison = Comparison(series, published.unit, x.unit, x.values, published.values)
         if case.file.kind == "ensemble":
             depths = sampled_depths(case, series) / published.si
-            _judge_depths(one, depths)
-            _add_wear_factor(one, depths, wear_rate(scenario_of(case, series)))
+            _judge_depths(comparison, depths)
+            _add_wear_factor(comparison, depths, wear_rate(scenario_of(case, series)))
         else:
             values = partial(_values, case, series)
-            one.columns["computed"] = values(None)
+            comparison.columns["computed"] = values(None)
             for variant in case.file.variant:
                 if not variant.needs or variant.needs in installed:
                     on_progress(f"{series.name}, {variant.name}")
-                    one.columns[variant.name] = values(variant)
+                    comparison.columns[variant.name] = values(variant)
             if case.file.uncertain:
                 on_progress(f"{series.name}, what is not published")
-                one.spread = _spread(case, one, values)
+                comparison.spread = _spread(case, comparison, values)
             if case.file.fit:
                 on_progress(f"{series.name}, fit")
-                _fit(case, one, values)
-            _judge(one)
-        found.append(one)
-    return Outcome(case, found, notes)
+                _fit(case, comparison, values)
+            _judge(comparison)
+        comparisons.append(comparison)
+    return Outcome(case, comparisons, notes)
 
 
 def _values(case: Case, series: Series, variant: Any, changes: Any = None) -> FloatArray:
@@ -147,12 +147,12 @@ def _values(case: Case, series: Series, variant: Any, changes: Any = None) -> Fl
     return np.asarray(computed(case, series, variant, changes) / si)
 
 
-def _spread(case: Case, one: Comparison, values: Callable[..., FloatArray]) -> FloatArray:
+def _spread(case: Case, comparison: Comparison, values: Callable[..., FloatArray]) -> FloatArray:
     """Return the ends of the computed values, the inputs varied one at a time.
 
     The changes are added as independent ones, by their squares.
     """
-    middle, below, above = one.columns["computed"], 0.0, 0.0
+    middle, below, above = comparison.columns["computed"], 0.0, 0.0
     for item in case.file.uncertain:
         change = np.array([values(None, item.low), values(None, item.high)]) - middle
         below = below + np.minimum(change.min(axis=0), 0.0) ** 2
@@ -160,50 +160,50 @@ def _spread(case: Case, one: Comparison, values: Callable[..., FloatArray]) -> F
     return np.array([middle - np.sqrt(below), middle + np.sqrt(above)])
 
 
-def _fit(case: Case, one: Comparison, values: Callable[..., FloatArray]) -> None:
+def _fit(case: Case, comparison: Comparison, values: Callable[..., FloatArray]) -> None:
     """Fit a value of the scenario to each of the first rows, and to all of them together."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415
 
     fit = case.file.fit
     assert fit is not None
-    rows = np.flatnonzero(one.x <= fit.upto)
+    rows = np.flatnonzero(comparison.x <= fit.upto)
     grid = np.linspace(fit.low, fit.high, 9)
-    table = np.array([np.log(values(None, {fit.key: float(k)})[rows]) for k in grid])
-    target = np.log(one.published[rows])
-    alone: list[float | None] = [None] * len(one.x)
+    table = np.array([np.log(values(None, {fit.key: float(point)})[rows]) for point in grid])
+    target = np.log(comparison.published[rows])
+    row_fits: list[float | None] = [None] * len(comparison.x)
 
-    def at(k: float) -> FloatArray:
-        return np.array([np.interp(k, grid, column) for column in table.T])
+    def predicted(parameter: float) -> FloatArray:
+        return np.array([np.interp(parameter, grid, column) for column in table.T])
 
     for place, row in enumerate(rows):
-        gap = table[:, place] - target[place]
-        if gap[0] * gap[-1] < 0.0:
-            alone[row] = float(np.interp(0.0, *_rising(gap, grid)))
+        differences = table[:, place] - target[place]
+        if differences[0] * differences[-1] < 0.0:
+            row_fits[row] = float(np.interp(0.0, *_rising(differences, grid)))
     best = minimize_scalar(
-        lambda k: float(((at(k) - target) ** 2).sum()),
+        lambda parameter: float(((predicted(parameter) - target) ** 2).sum()),
         bounds=(fit.low, fit.high),
         method="bounded",
     )
-    one.fits[fit.key] = alone
-    one.columns[f"{fit.key} {best.x:.2f}"] = values(None, {fit.key: float(best.x)})
-    misfits = np.expm1(at(best.x) - target)
-    one.facts.append(
+    comparison.fits[fit.key] = row_fits
+    comparison.columns[f"{fit.key} {best.x:.2f}"] = values(None, {fit.key: float(best.x)})
+    misfits = np.expm1(predicted(best.x) - target)
+    comparison.facts.append(
         f"best single {fit.key} for these {len(rows)} rows: {best.x:.2f}, which misses them by "
         + ", ".join(f"{100.0 * part:+.0f} %" for part in misfits)
     )
-    fitted = [value for value in alone if value is not None]
+    fitted = [value for value in row_fits if value is not None]
     if fitted:
-        one.facts.append(
+        comparison.facts.append(
             f"{fit.key} by which each row agrees: "
             + ", ".join(f"{value:.2f}" for value in fitted)
             + f"; one value for all is {'not ' if np.ptp(fitted) > 0.05 else ''}enough"
         )
 
 
-def _rising(gap: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return gaps in rising order, and the values that belong to them."""
-    order = np.argsort(gap)
-    return gap[order], grid[order]
+def _rising(differences: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return differences in rising order, and the points of the grid that belong to them."""
+    order = np.argsort(differences)
+    return differences[order], grid[order]
 
 
 def exponent(x: FloatArray, values: FloatArray, error: float = 0.0) -> tuple[float, float]:
@@ -220,17 +220,17 @@ def exponent(x: FloatArray, values: FloatArray, error: float = 0.0) -> tuple[flo
     return float(weight @ np.log(values)), float(np.sqrt(((weight * error / values) ** 2).sum()))
 
 
-def _judge(one: Comparison) -> None:
-    """Add the verdict and what it rests on."""
-    series, rows = one.series, one.counts
-    values, published = one.columns["computed"][rows], one.published[rows]
+def _judge(comparison: Comparison) -> None:
+    """Set the verdict, and add the facts that it follows from."""
+    series, rows = comparison.series, comparison.counts
+    values, published = comparison.columns["computed"][rows], comparison.published[rows]
     difference = values - published
     relative = difference / published
     begins = "" if series.begins is None else f"from {series.x} {series.begins:g} on "
     range_ = f"{100.0 * relative.min():+.1f} to {100.0 * relative.max():+.1f} %"
     if len(relative) == 1:
         range_ = f"{100.0 * relative[0]:+.1f} %"
-    one.facts.insert(0, f"{begins}computed less published: {range_}")
+    comparison.facts.insert(0, f"{begins}computed less published: {range_}")
     verdicts = [_judge_values(series, difference, relative)]
     limits = {
         "the reading error": series.reading_error,
@@ -239,16 +239,16 @@ def _judge(one: Comparison) -> None:
     }
     asked = [words for words, value in limits.items() if value is not None]
     if verdicts == ["not"]:
-        one.facts[0] += f": not within {asked[-1]}"
+        comparison.facts[0] += f": not within {asked[-1]}"
     elif asked:
-        one.facts[0] += f": {VERDICTS[verdicts[0]]}" + (", " + asked[-1]) * (
+        comparison.facts[0] += f": {VERDICTS[verdicts[0]]}" + (", " + asked[-1]) * (
             verdicts == ["tolerance"]
         )
     if series.exponent:
-        verdicts.append(_judge_exponent(one, rows))
-    if one.spread is not None:
-        _add_spread(one, rows)
-    one.verdict = max(verdicts, key=list(VERDICTS).index)
+        verdicts.append(_judge_exponent(comparison, rows))
+    if comparison.spread is not None:
+        _add_spread(comparison, rows)
+    comparison.verdict = max(verdicts, key=list(VERDICTS).index)
 
 
 def _judge_values(series: Series, difference: FloatArray, relative: FloatArray) -> Verdict:
@@ -259,67 +259,67 @@ def _judge_values(series: Series, difference: FloatArray, relative: FloatArray) 
         "scatter": bool(((relative >= low) & (relative <= high)).all()),
         "tolerance": bool((np.abs(relative) <= (series.tolerance or 0.0)).all()),
     }
-    given = series.reading_error, series.scatter, series.tolerance
-    asked = [name for name, value in zip(holds, given, strict=True) if value is not None]
+    limits = series.reading_error, series.scatter, series.tolerance
+    asked = [name for name, value in zip(holds, limits, strict=True) if value is not None]
     best: list[Verdict] = [name for name in asked if holds[name]]
     return best[0] if best else "not" if asked else "misfit"
 
 
-def _judge_exponent(one: Comparison, rows: BoolArray) -> Verdict:
+def _judge_exponent(comparison: Comparison, rows: BoolArray) -> Verdict:
     """Return whether the exponents agree within twice the error of reading, and add them."""
-    # the reading error is a greatest one, uniformly distributed
-    error = (one.series.reading_error or 0.0) / np.sqrt(3.0)
-    x = one.x[rows]
-    there, sigma = exponent(x, one.published[rows], error)
-    here = {name: exponent(x, column[rows])[0] for name, column in one.columns.items()}
-    text = ", ".join(f"{value:.3f} {name}" for name, value in here.items())
+    # the reading error bounds a uniformly distributed error
+    error = (comparison.series.reading_error or 0.0) / np.sqrt(3.0)
+    x = comparison.x[rows]
+    published, sigma = exponent(x, comparison.published[rows], error)
+    exponents = {name: exponent(x, column[rows])[0] for name, column in comparison.columns.items()}
+    text = ", ".join(f"{value:.3f} {name}" for name, value in exponents.items())
     margin = _SIGMA * sigma
-    agrees = abs(here["computed"] - there) <= margin
-    one.facts.append(
-        f"exponent: {there:.3f} ± {margin:.3f} published, {text}:"
+    agrees = abs(exponents["computed"] - published) <= margin
+    comparison.facts.append(
+        f"exponent: {published:.3f} ± {margin:.3f} published, {text}:"
         f" {'' if agrees else 'not '}within the reading error"
     )
     return "reading error" if agrees else "not"
 
 
-def _add_spread(one: Comparison, rows: BoolArray) -> None:
-    assert one.spread is not None
-    low, high = one.spread[:, rows]
-    published = one.published[rows]
+def _add_spread(comparison: Comparison, rows: BoolArray) -> None:
+    assert comparison.spread is not None
+    low, high = comparison.spread[:, rows]
+    published = comparison.published[rows]
     inside = int(((low <= published) & (published <= high)).sum())
-    one.facts.append(
+    comparison.facts.append(
         f"{inside} of {len(published)} rows are within the range of what is not published"
     )
 
 
-def _add_wear_factor(one: Comparison, depths: FloatArray, factor: float) -> None:
+def _add_wear_factor(comparison: Comparison, depths: FloatArray, factor: float) -> None:
     """Add the wear factor of the tests, from that of the computed ones.
 
     Depths grow with its power 2/3, as of rigid bodies in full slip.
     """
-    ratio = np.exp(1.5 * (np.log(one.published).mean() - np.log(depths).mean()))
+    ratio = np.exp(1.5 * (np.log(comparison.published).mean() - np.log(depths).mean()))
     text = f"{1e9 * factor * ratio:.2g} mm^3/J, by the dissipated energy that is computed"
-    one.facts.append(f"K/H of the tests: about {text}")
+    comparison.facts.append(f"K/H of the tests: about {text}")
 
 
-def _judge_depths(one: Comparison, depths: FloatArray) -> None:
+def _judge_depths(comparison: Comparison, depths: FloatArray) -> None:
     """Compare measured depths with those of tests with random inputs.
 
     The wear factor is not known: depths are scaled so that the means of their logarithms agree.
-    The probabilities are those of a depth as far from the median, and of a scatter of as many
-    tests as great, by tests drawn from the computed ones.
+    By tests drawn from the computed ones follow the probability of a depth as far from the median,
+    and that of a scatter as great in as many tests.
     """
-    seen, sample = np.log(one.published), np.log(depths)
-    sample = sample - sample.mean() + seen.mean()
-    one.columns["median"] = np.full(len(seen), np.exp(np.median(sample)))
-    below = np.array([(sample <= value).mean() for value in seen])
+    logarithms, sample = np.log(comparison.published), np.log(depths)
+    sample = sample - sample.mean() + logarithms.mean()
+    comparison.columns["median"] = np.full(len(logarithms), np.exp(np.median(sample)))
+    below = np.array([(sample <= value).mean() for value in logarithms])
     two_sided = 2.0 * np.minimum(below, 1.0 - below)
-    one.fits["probability of a depth as far off"] = two_sided.tolist()
-    draws = np.random.default_rng(1).choice(sample, (_MOST_TESTS, len(seen)))
-    p = float((draws.std(axis=1, ddof=1) >= seen.std(ddof=1)).mean())
-    there, here = seen.std(ddof=1), sample.std(ddof=1)
-    one.facts += [
-        f"standard deviation of ln(depth): {there:.3f} of the tests, {here:.3f} by the inputs",
-        f"probability of a scatter as great in {len(seen)} tests: {p:.2f}",
+    comparison.fits["probability of a depth as far off"] = two_sided.tolist()
+    draws = np.random.default_rng(1).choice(sample, (_MOST_TESTS, len(logarithms)))
+    p = float((draws.std(axis=1, ddof=1) >= logarithms.std(ddof=1)).mean())
+    measured, drawn = logarithms.std(ddof=1), sample.std(ddof=1)
+    comparison.facts += [
+        f"standard deviation of ln(depth): {measured:.3f} of the tests, {drawn:.3f} by the inputs",
+        f"probability of a scatter as great in {len(logarithms)} tests: {p:.2f}",
     ]
-    one.verdict = "scatter" if p > 0.05 and two_sided.min() > 0.05 else "not"
+    comparison.verdict = "scatter" if p > 0.05 and two_sided.min() > 0.05 else "not"

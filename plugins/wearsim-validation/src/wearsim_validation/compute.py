@@ -35,7 +35,7 @@ CONTACT: dict[str, Callable[[wearsim.ContactStudy], float]] = {
 }
 #: energy per rolled distance and contact area where full slip begins
 FULL_SLIP = "T gamma over A where full slip begins"
-_LITTLE = 0.1  # of the greatest wear
+_LITTLE = 0.1  # part of the greatest wear below which a place counts as unworn
 _ADHERING = 0.01  # fraction below which a contact slides fully: its ends adhere longest
 
 
@@ -47,8 +47,8 @@ def _greatest(depths: FloatArray) -> FloatArray:
 def _unworn_lines(run: wearsim.Result) -> float:
     """Return the number of places within the final groove with little of its greatest wear."""
     worn = run.profiles[-1] - run.profiles[0]
-    least = (worn[1:-1] < worn[:-2]) & (worn[1:-1] <= worn[2:]) & (worn[1:-1] > 0.0)
-    return float(np.count_nonzero(least & (worn[1:-1] < _LITTLE * worn.max())))
+    minima = (worn[1:-1] < worn[:-2]) & (worn[1:-1] <= worn[2:]) & (worn[1:-1] > 0.0)
+    return float(np.count_nonzero(minima & (worn[1:-1] < _LITTLE * worn.max())))
 
 
 def _force(contact: wearsim.ContactStudy) -> float:
@@ -84,11 +84,11 @@ def computed(
     changes : mapping, optional
         Further changes of the scenario.
     """
-    every = {**(variant.set if variant else {}), **(changes or {})}
+    overrides = {**(variant.set if variant else {}), **(changes or {})}
     x = case.columns[series.x]
     if case.file.kind == "contact":
-        return np.array([_contact(case, series, every, value) for value in x.values * x.si])
-    scenario = scenario_of(case, series, every)
+        return np.array([_contact(case, series, overrides, value) for value in x.values * x.si])
+    scenario = scenario_of(case, series, overrides)
     if variant and variant.rigid:
         return rigid_depth(scenario, x.values)
     if variant and variant.jump:
@@ -100,10 +100,10 @@ def computed(
 
 def _contact(case: Case, series: Series, changes: Mapping[str, Any], x: float) -> float:
     """Return a quantity of the contact at one x [SI]."""
-    at = {**changes, case.file.vary: float(x)} if case.file.vary else dict(changes)
+    overrides = {**changes, case.file.vary: float(x)} if case.file.vary else dict(changes)
     if series.computed == FULL_SLIP:
         return _index_of_full_slip(case, series, changes)
-    return CONTACT[series.computed](wearsim.study_contact(scenario_of(case, series, at)))
+    return CONTACT[series.computed](wearsim.study_contact(scenario_of(case, series, overrides)))
 
 
 def _index_of_full_slip(case: Case, series: Series, changes: Mapping[str, Any]) -> float:
@@ -138,7 +138,7 @@ def rigid_depth(scenario: wearsim.Scenario, passes: FloatArray) -> FloatArray:
 def wear_rate(scenario: wearsim.Scenario) -> float:
     """Return the K/H by which the bodies of a contact wear together in a roller pass [1/Pa].
 
-    A place on a roller touches less often than one on the cylinder, or more.
+    A point of a roller is in contact less or more often than a point of the cylinder.
     """
     if scenario.wear is None:
         raise ValueError("a scenario without wear")
@@ -149,12 +149,12 @@ def wear_rate(scenario: wearsim.Scenario) -> float:
 
 
 def jumped(scenario: wearsim.Scenario, jump: Jump) -> tuple[FloatArray, FloatArray]:
-    """Return passes and the depth of both bodies, by steps that take their first wear for all.
+    """Return passes and the depth of both bodies, by steps that multiply the wear of one pass.
 
     Parameters
     ----------
     scenario : Scenario
-        With width and number of the strips, which do not change.
+        Scenario with the width and number of the strips, which do not change.
     jump : Jump
         Passes of a step, and the smoothing of the wear across the track.
     """

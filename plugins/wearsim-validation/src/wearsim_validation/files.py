@@ -36,11 +36,11 @@ def read_case(path: Path) -> Case:
         raise _mistake(path, described(error)) from error
     data = path.parent / file.data
     content = _bytes(data)
-    found = hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
-    if found != file.sha256:
+    checksum = hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
+    if checksum != file.sha256:
         raise _mistake(
             data,
-            f"the published values have changed: their checksum is {found}, and {path.name} has"
+            f"the published values have changed: their checksum is {checksum}, and {path.name} has"
             f" {file.sha256[:12]}...; restore the file, or set sha256 if the change is meant",
         )
     columns = _columns(data, content.decode("utf-8"))
@@ -53,9 +53,9 @@ def read_case(path: Path) -> Case:
                 raise _mistake(path, f"{text} {', '.join(known)}")
         for name in (series.x, series.published):
             if name not in columns:
-                there = ", ".join(columns)
+                heads = ", ".join(columns)
                 raise _mistake(path, f"series '{series.name}': no column '{name}' in {file.data},"
-                               f" which has {there}")  # fmt: skip
+                               f" which has {heads}")  # fmt: skip
     return Case(path.stem, path.parent, file, columns)
 
 

@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 _WIDE = 150  # width of tables written to a file or a pipe
 
 
-def rows_of(one: Comparison) -> tuple[list[str], list[list[str]]]:
+def rows_of(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows of the table of a comparison, as text."""
-    unit = "" if one.unit == "1" else f" [{one.unit}]"
-    x_unit = "" if one.x_unit == "1" else f" [{one.x_unit}]"
-    heads = [f"{one.series.x}{x_unit}", f"published{unit}"]
-    columns = [_texts(one.x), _texts(one.published)]
-    for name, values in one.columns.items():
+    unit = "" if comparison.unit == "1" else f" [{comparison.unit}]"
+    x_unit = "" if comparison.x_unit == "1" else f" [{comparison.x_unit}]"
+    heads = [f"{comparison.series.x}{x_unit}", f"published{unit}"]
+    columns = [_texts(comparison.x), _texts(comparison.published)]
+    for name, values in comparison.columns.items():
         heads += [name, "difference"]
-        relative = values / one.published - 1.0
+        relative = values / comparison.published - 1.0
         columns += [
             _texts(values),
             [f"{100.0 * part:+.1f} %" if np.isfinite(part) else "" for part in relative],
         ]
-    if one.spread is not None:
+    if comparison.spread is not None:
         heads.append("range of what is not published")
-        columns.append([f"{low:.3g} to {high:.3g}" for low, high in one.spread.T])
-    for name, fitted in one.fits.items():
+        columns.append([f"{low:.3g} to {high:.3g}" for low, high in comparison.spread.T])
+    for name, fitted in comparison.fits.items():
         heads.append(name)
         columns.append(["" if value is None else f"{value:.2g}" for value in fitted])
     return heads, [list(row) for row in zip(*columns, strict=True)]
@@ -62,17 +62,17 @@ def show(outcome: Outcome) -> None:
     if not screen.is_terminal:
         screen.width = _WIDE
     screen.print(f"\n{outcome.case.name}: {file.title}\n{file.source}\nread: {file.read}")
-    for one in outcome.comparisons:
-        table = Table(title=one.series.name, title_justify="left", box=box.SIMPLE_HEAD)
-        heads, rows = rows_of(one)
+    for comparison in outcome.comparisons:
+        table = Table(title=comparison.series.name, title_justify="left", box=box.SIMPLE_HEAD)
+        heads, rows = rows_of(comparison)
         for head in heads:
             table.add_column(head, justify="right", overflow="fold")
         for row in rows:
             table.add_row(*row)
         screen.print(table)
-        for fact in one.facts:
+        for fact in comparison.facts:
             screen.print(f"  {fact}")
-        screen.print(f"  {VERDICTS[one.verdict]}")
+        screen.print(f"  {VERDICTS[comparison.verdict]}")
     screen.print(verdict_line(outcome))
     for reason in file.reasons:
         screen.print(f"  {reason}")
@@ -102,20 +102,21 @@ def as_json(outcomes: Sequence[Outcome], command: str) -> dict[str, Any]:
         "verdicts": {
             "columns": ["case", "published", "verdict"],
             "rows": [
-                [one.case.name, one.case.file.title, VERDICTS[one.verdict]] for one in outcomes
+                [outcome.case.name, outcome.case.file.title, VERDICTS[outcome.verdict]]
+                for outcome in outcomes
             ],
         }
     }
     for outcome in outcomes:
-        for one in outcome.comparisons:
-            heads, rows = rows_of(one)
-            notes = [f"- {fact}" for fact in (*one.facts, VERDICTS[one.verdict])]
-            tables[f"{outcome.case.name}: {one.series.name}"] = {
+        for comparison in outcome.comparisons:
+            heads, rows = rows_of(comparison)
+            notes = [f"- {fact}" for fact in (*comparison.facts, VERDICTS[comparison.verdict])]
+            tables[f"{outcome.case.name}: {comparison.series.name}"] = {
                 "columns": heads,
                 "rows": rows,
                 "notes": ["\n".join(notes)],
             }
-    found: dict[str, Any] = plain(
+    data: dict[str, Any] = plain(
         {
             "machine": _machine(),
             "command": command,
@@ -123,7 +124,7 @@ def as_json(outcomes: Sequence[Outcome], command: str) -> dict[str, Any]:
             "cases": {outcome.case.name: outcome.as_json() for outcome in outcomes},
         }
     )
-    return found
+    return data
 
 
 def _machine() -> dict[str, Any]:

@@ -68,11 +68,18 @@ FATIGUE_OBSERVABLES: Mapping[str, Variable] = by_name(
         ("roller_damage", "greatest damage of a roller"),
     )
 )
-ALL_OBSERVABLES: Mapping[str, Variable] = {
-    **OBSERVABLES,
-    **CAM_OBSERVABLES,
-    **FATIGUE_OBSERVABLES,
-}
+
+
+def observables_of(*, cam: bool = True, fatigue: bool = True) -> dict[str, Variable]:
+    """Return the observables of tests, of a cam or a cylinder, with or without fatigue."""
+    return {
+        **OBSERVABLES,
+        **(CAM_OBSERVABLES if cam else {}),
+        **(FATIGUE_OBSERVABLES if fatigue else {}),
+    }
+
+
+ALL_OBSERVABLES: Mapping[str, Variable] = observables_of()
 
 #: Variables common to all realisations.
 STATIC: Mapping[str, Variable] = by_name(

@@ -94,9 +94,9 @@ def errors_of(solution: ContactSolution, grid: Grid, case: Case) -> CaseErrors:
     return errors
 
 
-def l2(found: FloatArray, exact: FloatArray) -> float:
+def l2(computed: FloatArray, exact: FloatArray) -> float:
     """Return the L2 norm of the error over that of the exact values."""
-    return float(np.sqrt(((found - exact) ** 2).sum() / (exact**2).sum()))
+    return float(np.sqrt(((computed - exact) ** 2).sum() / (exact**2).sum()))
 
 
 def rms(errors: Iterable[float]) -> float:

@@ -30,9 +30,9 @@ def solved_by(case: Case, reference: str) -> tuple[Case, float]:
         If the reference does not solve the contact.
     """
     grid = case.grid(Method(DEFAULT_MODEL).choice())
-    found = solve_reference(
+    solution = solve_reference(
         *(reference, grid, MATERIALS, case.gap_at(grid.y)), case.longitudinal_curvature, case.point
     )
-    width = contact_width(found.line_load, grid.spacing)
-    exact = Exact(found.power, grid.y, found.dissipation, width, found.peak_pressure)
-    return replace(case, exact=exact), found.own.dissipation
+    width = contact_width(solution.line_load, grid.spacing)
+    exact = Exact(solution.power, grid.y, solution.dissipation, width, solution.peak_pressure)
+    return replace(case, exact=exact), solution.own.dissipation

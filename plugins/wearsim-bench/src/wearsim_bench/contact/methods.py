@@ -157,7 +157,7 @@ def _choices(options: type[Options]) -> list[dict[str, Any]]:
     ]
     choices = []
     for choice in single:
-        pairs = [other | choice for other in single if other.keys() != choice.keys()]
+        pairs = [required | choice for required in single if required.keys() != choice.keys()]
         choices += [tried for tried in (choice, *pairs) if _valid(options, tried)][:1]
     return choices
 
@@ -193,10 +193,10 @@ def _flat(method: Method) -> ContactSolution | None:
         return None
 
 
-def _same(one: ContactSolution | None, other: ContactSolution | None) -> bool:
+def _same(first: ContactSolution | None, second: ContactSolution | None) -> bool:
     """Return whether two normal contacts are identical."""
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one.line_load, other.line_load) and np.array_equal(
-        one.half_length, other.half_length
+    if first is None or second is None:
+        return first is second
+    return np.array_equal(first.line_load, second.line_load) and np.array_equal(
+        first.half_length, second.half_length
     )

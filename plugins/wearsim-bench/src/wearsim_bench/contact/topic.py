@@ -140,7 +140,7 @@ def _solved_by(
     """
     total = sum(len(group.cases) for group in groups)
     errors: list[float] = []
-    found: list[_Group] = []
+    solved_groups: list[_Group] = []
     failure = ContactError(f"'{reference}' solves none of the contacts")
     for group in groups:
         cases = []
@@ -148,15 +148,15 @@ def _solved_by(
             on_progress(f"{reference}: {case.name}", len(errors) / total)
             try:
                 solved, error = solved_by(case, reference)
-            except ContactError as other:
-                failure = other
+            except ContactError as unsolved:
+                failure = unsolved
                 continue
             cases.append(solved)
             errors.append(error)
-        found += [replace(group, cases=cases)] if cases else []
+        solved_groups += [replace(group, cases=cases)] if cases else []
     if not errors:
         raise failure
-    return found, float(np.median(errors))
+    return solved_groups, float(np.median(errors))
 
 
 def _hard_cases() -> dict[str, Sequence[Case]]:

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 _FONT = 7.5  # points
 _SPACING = 9.5  # between two labels [points]
-_AWAY = 1.04  # place of the labels, as a part of the panel's width
+_AWAY = 1.04  # position of the labels, as a part of the panel's width
 
 
 class EndLabel(NamedTuple):
@@ -43,7 +43,8 @@ def label_ends(axes: Axes, labels: Sequence[EndLabel], height: float) -> None:
         Approximate height of the panel [in].
     """
     ordered = sorted(labels, key=lambda label: label.y)
-    ends = [float(axes.transAxes.inverted().transform(_pixels(axes, one))[1]) for one in ordered]
+    to_panel = axes.transAxes.inverted()
+    ends = [float(to_panel.transform(_pixels(axes, label))[1]) for label in ordered]
     places = spread(ends, _SPACING / (72.0 * height))
     for label, place in zip(ordered, places, strict=True):
         axes.annotate(

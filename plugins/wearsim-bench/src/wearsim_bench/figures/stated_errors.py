@@ -11,7 +11,7 @@ from wearsim_bench.measure.measurement import Topic
 from wearsim_bench.stated_errors.study import QUANTITIES, SMALL, STATED, TESTS, coverage
 
 _SIZE = 10.5, 4.6  # in
-_LOWEST = 1e-8  # errors below it are drawn there
+_LOWEST = 1e-8  # smaller errors are drawn at this value
 
 
 def stated_errors_figure(topic: Topic, under: str) -> Figure:
@@ -36,9 +36,9 @@ def stated_errors_figure(topic: Topic, under: str) -> Figure:
             for tolerance, colour, marker in zip(
                 tolerances, (BLUE, ORANGE, GREEN), "os^", strict=False
             ):
-                own = [row for row in rows if row.counts["tolerance"] == tolerance]
+                of_tolerance = [row for row in rows if row.counts["tolerance"] == tolerance]
                 true, stated = (
-                    [100.0 * max(row.errors[key], _LOWEST) for row in own]
+                    [100.0 * max(row.errors[key], _LOWEST) for row in of_tolerance]
                     for key in (name, STATED + name)
                 )
                 label = f"tolerance {tolerance:g}"
@@ -50,9 +50,9 @@ def stated_errors_figure(topic: Topic, under: str) -> Figure:
             axes.set(xscale="log", yscale="log", xlim=(low, high), ylim=(low, high))
             set_log_axis(axes.xaxis, lambda value: f"{value:g}")
             set_log_axis(axes.yaxis, lambda value: f"{value:g}")
-            found = coverage(rows, name)
-            title = f"{name}: {found.covered} of {len(rows)} covered"
-            ratio = found.counts.get("median")
+            statistics = coverage(rows, name)
+            title = f"{name}: {statistics.covered} of {len(rows)} covered"
+            ratio = statistics.counts.get("median")
             title += f",\nmedian ratio {ratio:.2g}" if ratio is not None else ""
             name_axes(axes, title, "true error [%]", "")
         panels[0].set_ylabel("stated error [%]")

@@ -80,9 +80,11 @@ def selected(topic: Topic, group: str) -> list[Measurement]:
     if len(items) <= FEW or not has_front(topic):
         return items
     for method in dict.fromkeys(item.method for item in items):
-        own = [item for item in items if item.method == method]
-        if not any(id(item) in kept for item in own):
-            kept.add(id(min(own, key=lambda item: item.errors.get(topic.error, float("inf")))))
+        of_method = [item for item in items if item.method == method]
+        if not any(id(item) in kept for item in of_method):
+            kept.add(
+                id(min(of_method, key=lambda item: item.errors.get(topic.error, float("inf"))))
+            )
     return [item for item in items if id(item) in kept or item.default or item.remark]
 
 

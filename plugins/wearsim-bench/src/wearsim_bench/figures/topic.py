@@ -123,8 +123,8 @@ def _looks(topic: Topic) -> dict[str, tuple[str, str]]:
         present = [method for method in methods if method in _methods(items)]
         split = len(present) > MOST
         for method in present:
-            others = [m for m in present if not split or _family(m) == _family(method)]
-            used = {looks[m][0] for m in others if m in looks}
+            side_by_side = [m for m in present if not split or _family(m) == _family(method)]
+            used = {looks[m][0] for m in side_by_side if m in looks}
             free = [colour for colour in _COLOURS if colour not in used] or _COLOURS
             looks.setdefault(method, (free[0], _MARKERS[_COLOURS.index(free[0])]))
     return looks
@@ -172,15 +172,15 @@ def _draw_families(
                 drawn = [item for item in items if item.method == method]
                 axes.plot(*_coordinates(drawn, topic.error), color=GREY, lw=0.6, alpha=0.35)
     for axes, family in zip(row, families, strict=False):
-        own = [item for item in items if _family(item.method) == family]
-        _draw_lines(axes, topic, group, own, looks)
+        of_family = [item for item in items if _family(item.method) == family]
+        _draw_lines(axes, topic, group, of_family, looks)
         name_axes(axes, family, f"time of {topic.seconds}", "")
     for first in panels[:, 0]:
         first.set_ylabel(f"{topic.errors[topic.error]} [%]")
     for axes, family in zip(row, families, strict=False):
-        own = [item for item in items if _family(item.method) == family]
-        names = {m: m.removeprefix(family).lstrip(", ") or "no option" for m in _methods(own)}
-        _label_lines(axes, topic, own, names, looks, _SMALL_HEIGHT)
+        of_family = [item for item in items if _family(item.method) == family]
+        names = {m: m.removeprefix(family).lstrip(", ") or "no option" for m in _methods(of_family)}
+        _label_lines(axes, topic, of_family, names, looks, _SMALL_HEIGHT)
 
 
 def _draw_lines(

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.scenario.examples import shipped_scenario
@@ -76,10 +75,10 @@ class RobustnessCase:
         assert isinstance(passes, int)
         return passes
 
-    def scenario(self, passes: int, others: Mapping[str, object]) -> Scenario:
+    def scenario(self, passes: int, further: Mapping[str, object]) -> Scenario:
         """Return the scenario with further changes; `passes` is the default of the case."""
         base = _base()
-        changes = {"operation.passes": passes, **self.changes, **others}
+        changes = {"operation.passes": passes, **self.changes, **further}
         return parse_scenario(base.text, f"{self.name}.toml", self.files.__getitem__, changes)
 
 
@@ -115,7 +114,7 @@ def crown_radius_of(ratio: float) -> float:
     """Return the crown radius of the rig for a fresh patch with b/a = `ratio` [m]."""
     base = _base()
     along = 0.5 * (1.0 / base.cylinder.radius + 1.0 / base.roller.radius)
-    modulus = combine(base.cylinder.material, base.roller.material).contact_modulus
+    modulus = base.pair.contact_modulus
     low, high = 1e-4, 1e4
     while high > low * (1.0 + 1e-12):
         middle = (low * high) ** 0.5
@@ -183,7 +182,7 @@ def _loads(duration: float) -> list[RobustnessCase]:
         RobustnessCase("spring unloaded by wear", spring("6.9 kN/mm")),
         RobustnessCase(
             "spring unloaded to zero",
-            # to 1 mN; a limit on the steps of models that cannot reach it
+            # the load falls to 1 mN; models that cannot reach it stop at the limit of the steps
             {**spring("69 kN/mm"), "operation.passes": 600_000, "evolution.max_steps": 2000},
             steps=16,
         ),

@@ -15,8 +15,8 @@ from wearsim_bench.hard_cases.verdict import Criterion, Verdict
 
 ROUND_OFF = 1e-9  # for sums over some hundred strips and steps
 STEADY, UNSTEADY = 0.01, 0.05  # energy from the power at records, for constant and other loads
-SMOOTH, ROUGH = 0.03, 0.1  # second difference of a smooth contact of 20 strips; of waves
-NEAR, NEAR_ROUGH = 0.02, 0.05  # change from refinement; for a discontinuous profile
+SMOOTH, ROUGH = 0.03, 0.1  # second difference of a smooth contact of 20 strips, and of waves
+NEAR, NEAR_ROUGH = 0.02, 0.05  # change from refinement of continuous and discontinuous profiles
 SIZE = 2.0  # factor on a tolerance, since an error estimate is not exact
 NOISE_OF_STEPS, NOISE_OF_STRIPS = 2e-3, 3e-3  # no order is required of smaller changes
 

@@ -7,7 +7,8 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from wearsim.evolution.quantities import centroid, oscillation
+from wearsim.evolution.observables import centroid
+from wearsim.evolution.quantities import oscillation
 from wearsim.evolution.strips import averaged
 from wearsim.scenario import Scenario
 from wearsim.studies.run.assemble import merged_rollers
@@ -139,9 +140,14 @@ def asymmetry(result: Result, mirrored: Result) -> float:
     """Return the largest relative difference of the final profiles of two mirrored runs."""
     worst = 0.0
     for name in PROFILES:
-        one, other = (item.raw.records[name][-1] for item in (result, mirrored))
+        profile, mirror_profile = (item.raw.records[name][-1] for item in (result, mirrored))
         # only y is reversed, not the order of the rollers
-        worst = max(worst, _relative(float(np.abs(one - other[..., ::-1]).max()), float(one.max())))
+        worst = max(
+            worst,
+            _relative(
+                float(np.abs(profile - mirror_profile[..., ::-1]).max()), float(profile.max())
+            ),
+        )
     return worst
 
 
@@ -151,8 +157,8 @@ def change(coarse: Result, fine: Result) -> float:
     Means over the strips of the coarse run are compared. The body with more wear is used.
     """
     name = max(PROFILES, key=lambda name: float(fine.raw.records[name][-1].max()))
-    one, other = (item.raw.records[name][-1] for item in (coarse, fine))
-    return _relative_difference(one, averaged(other, *map(_grid, (fine, coarse))))
+    coarse_profile, fine_profile = (item.raw.records[name][-1] for item in (coarse, fine))
+    return _relative_difference(coarse_profile, averaged(fine_profile, *map(_grid, (fine, coarse))))
 
 
 def _grid(result: Result) -> Grid:
@@ -173,11 +179,11 @@ def observable_change(first: Result, second: Result) -> float:
     """Return the largest relative difference in depth and volume between two runs."""
     worst = 0.0
     for names in (("depth", "roller_depth"), ("worn_volume", "roller_worn_volume")):
-        one, other = (
+        first_value, second_value = (
             max(float(item.raw.history[name][-1].max()) for name in names)
             for item in (first, second)
         )
-        worst = max(worst, _relative(abs(one - other), other))
+        worst = max(worst, _relative(abs(first_value - second_value), second_value))
     return worst
 
 
@@ -219,9 +225,9 @@ def _spacing(result: Result) -> float:
     return float(result.raw.checkpoint["spacing"])
 
 
-def _relative_difference(one: FloatArray, other: FloatArray) -> float:
-    """Return the L1 norm of the difference relative to that of `other`."""
-    return _relative(float(np.abs(one - other).sum()), float(np.abs(other).sum()))
+def _relative_difference(values: FloatArray, reference: FloatArray) -> float:
+    """Return the L1 norm of the difference of two arrays, relative to that of `reference`."""
+    return _relative(float(np.abs(values - reference).sum()), float(np.abs(reference).sum()))
 
 
 def _relative(difference: float, size: float) -> float:

@@ -51,16 +51,16 @@ class Plan:
             return cls(SHORT, 1, 5, 2, False, {"evolution.tolerance": 5e-3, **changes})
         return cls(LONG, 2, 10, 3, True, changes)
 
-    def run(self, case: RobustnessCase, **others: object) -> Result:
+    def run(self, case: RobustnessCase, **further: object) -> Result:
         """Run a case with further changes; two underscores represent the dot of a key."""
-        return run(self.scenario(case, **others))
+        return run(self.scenario(case, **further))
 
-    def scenario(self, case: RobustnessCase, **others: object) -> Scenario:
+    def scenario(self, case: RobustnessCase, **further: object) -> Scenario:
         """Return the scenario of a case, see `run`."""
         changes = dict(self.changes)
         if case.strips and not case.refused:
             changes["contact.strips"] = case.strips * self.finer
-        changes |= {key.replace("__", "."): value for key, value in others.items()}
+        changes |= {key.replace("__", "."): value for key, value in further.items()}
         return case.scenario(self.passes, changes)
 
     def adaptive(self, case: RobustnessCase) -> list[Result]:

@@ -45,11 +45,11 @@ def rigid_depth(scenario: Scenario) -> float:
 
     area, step = 0.0, passes / _STEPS
     for first, middle, last in zip(forces[:-1:2], forces[1::2], forces[2::2], strict=True):
-        one = worn(area, first)
-        two = worn(area + 0.5 * step * one, middle)
-        three = worn(area + 0.5 * step * two, middle)
-        four = worn(area + step * three, last)
-        area += step * (one + 2.0 * two + 2.0 * three + four) / 6.0
+        k1 = worn(area, first)
+        k2 = worn(area + 0.5 * step * k1, middle)
+        k3 = worn(area + 0.5 * step * k2, middle)
+        k4 = worn(area + step * k3, last)
+        area += step * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0
     return _depth(area, crown, half)
 
 

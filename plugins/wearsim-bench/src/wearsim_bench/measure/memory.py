@@ -16,8 +16,8 @@ def peak_bytes() -> int | None:
     Linux reports it in the status of the process. `getrusage`, used on other systems, starts with
     the peak of the parent process.
     """
-    own = _peak_in_status(os.getpid())
-    return own if own is not None else _used(of_children=False)
+    peak = _peak_in_status(os.getpid())
+    return peak if peak is not None else _used(of_children=False)
 
 
 def family_peak_bytes(workers: int) -> int | None:
@@ -28,15 +28,15 @@ def family_peak_bytes(workers: int) -> int | None:
     Parameters
     ----------
     workers : int
-        Number of worker processes; used where only the peak of the largest one is available.
+        Number of worker processes; used where only the peak of the largest process is available.
     """
-    own = peak_bytes()
-    if own is None:
+    peak = peak_bytes()
+    if peak is None:
         return None
     if _peak_in_status(os.getpid()) is not None:
-        others = psutil.Process().children(recursive=True)
-        return own + sum(_peak_in_status(process.pid) or 0 for process in others)
-    return own + workers * (_used(of_children=True) or 0)
+        descendants = psutil.Process().children(recursive=True)
+        return peak + sum(_peak_in_status(process.pid) or 0 for process in descendants)
+    return peak + workers * (_used(of_children=True) or 0)
 
 
 def _peak_in_status(process: int) -> int | None:
@@ -45,8 +45,8 @@ def _peak_in_status(process: int) -> int | None:
         lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return None
-    found = re.search(r"^VmHWM:\s+(\d+) kB", lines, re.MULTILINE)
-    return 1024 * int(found[1]) if found else None
+    match = re.search(r"^VmHWM:\s+(\d+) kB", lines, re.MULTILINE)
+    return 1024 * int(match[1]) if match else None
 
 
 def _used(*, of_children: bool) -> int | None:

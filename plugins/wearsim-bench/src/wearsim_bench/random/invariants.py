@@ -60,7 +60,7 @@ COMPARED = {
 
 
 class InapplicableError(Exception):
-    """An invariant says nothing on a scenario."""
+    """An invariant does not apply to a scenario."""
 
 
 @dataclass
@@ -197,8 +197,8 @@ def scaling(name: str) -> Callable[[Subject], float]:
 
     def invariant(subject: Subject) -> float:
         units = SYSTEMS[name]
-        other = timed(in_units(subject.scenario, units))
-        return deviation(subject.result, other, IN_UNITS, units)
+        scaled = timed(in_units(subject.scenario, units))
+        return deviation(subject.result, scaled, IN_UNITS, units)
 
     return invariant
 
@@ -283,8 +283,8 @@ def batch_equals_single(subject: Subject) -> float:
         scenario, REALISATIONS, subject.path(), scheduler="serial", stop_requested=_deadline()
     )
     for number, depth in enumerate(many.values("depth")[:, -1]):
-        one = timed(scenario.changed({"sampling.realisation": number}))
-        if float(last(one, "depth").max()) != depth:
+        single = timed(scenario.changed({"sampling.realisation": number}))
+        if float(last(single, "depth").max()) != depth:
             raise AssertionError(f"depth of realisation {number}: {depth} in a batch")
     return 0.0
 
@@ -299,9 +299,11 @@ def more_load_wears_more(subject: Subject) -> float:
     if not isinstance(force, float):
         raise InapplicableError
     more = timed(scenario.changed({"load.normal_force": f"{MORE_LOAD * force!r} N"}))
-    one, other = (float(last(result, "worn_volume").sum()) for result in (subject.result, more))
+    volume, volume_of_more = (
+        float(last(result, "worn_volume").sum()) for result in (subject.result, more)
+    )
     errors = _error(subject.result, "worn_volume") + _error(more, "worn_volume")
-    return max(one - other, 0.0) / max(errors, ROUND_OFF * one, np.finfo(float).tiny)
+    return max(volume - volume_of_more, 0.0) / max(errors, ROUND_OFF * volume, np.finfo(float).tiny)
 
 
 def truth_within_stated_errors(subject: Subject) -> float:
@@ -323,10 +325,10 @@ def truth_within_stated_errors(subject: Subject) -> float:
     if fine.depth == 0.0:
         raise InapplicableError
     true = np.abs(worn_of_result(result).changes_from(fine))
-    found = stated(result)
+    stated_errors = stated(result)
     for name, error in zip(QUANTITIES, true.tolist(), strict=True):
-        subject.errors |= {name: error, STATED + name: found[name]}
-    limits = np.array([found[name] for name in QUANTITIES])
+        subject.errors |= {name: error, STATED + name: stated_errors[name]}
+    limits = np.array([stated_errors[name] for name in QUANTITIES])
     return float((true / np.maximum(limits, SMALL)).max())
 
 

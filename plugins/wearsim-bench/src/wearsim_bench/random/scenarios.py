@@ -15,7 +15,7 @@ GROOVE = "cam-groove"
 GROOVES = 0.25  # part of the cams that are grooves
 MOST_PASSES, MOST_PER_PASS = 3e6, 1e4  # of any test, and of those that solve many passes
 TOLERANCES = {"1e-2": 0.5, "1e-3": 0.5}
-ATTEMPTS = 50  # to draw values that the scenario language accepts
+ATTEMPTS = 50  # attempts to draw values that the scenario language accepts
 MODELS = {
     "hertz": 0.3, "hertz-fastsim": 0.25, "semi-hertzian": 0.25, "slender": 0.2,
 }  # fmt: skip
@@ -131,10 +131,12 @@ def _random_inputs(draws: Draws, base: str) -> None:
     if "rig" in base and "creepage" in draws.changes and draws.chance(0.3):
         creepage = draws.changes["creepage"]
         assert isinstance(creepage, dict)
-        others = {key: value for key, value in creepage.items() if key not in ("yaw", "tilt")}
+        without_angles = {
+            key: value for key, value in creepage.items() if key not in ("yaw", "tilt")
+        }
         radius = f"{draws.log_uniform(0.05, 1.0)} mrad"
         angles = {"distribution": "disc", "radius": radius, "persistence": "per-roller"}
-        draws.changes["creepage"] = {**others, "misalignment": angles}
+        draws.changes["creepage"] = {**without_angles, "misalignment": angles}
 
 
 def _contact_model(draws: Draws, _base: str) -> None:

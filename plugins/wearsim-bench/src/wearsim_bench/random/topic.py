@@ -72,9 +72,9 @@ def random(
     rows: dict[int, list[Measurement]] = {}
     files: dict[str, str] = {}
     work = partial(measured_scenarios, seed=seed, reduce=not effort.quick)
-    for place, found in results_of_tests(work, number, jobs, on_progress):
-        rows[place] = [row for row, _ in found]
-        for _, reproducers in found:
+    for place, measurements in results_of_tests(work, number, jobs, on_progress):
+        rows[place] = [row for row, _ in measurements]
+        for _, reproducers in measurements:
             files |= reproducers
     return topic_of([row for place in range(number) for row in rows[place]], seed, number, files)
 
@@ -105,14 +105,14 @@ def measured_scenario(
         test, _ = random_scenario(seed, place)
     except ScenarioError as error:
         return [(replace(first, failed=str(error)), {})]
-    found = []
+    measurements = []
     for name in INVARIANTS:
         row = measured(name, test.scenario(), first)
         reduced = smallest(test, row) if reduce and row.failed else test
-        found.append((row, reproducer(reduced, row) if row.failed else {}))
+        measurements.append((row, reproducer(reduced, row) if row.failed else {}))
         if row.remark and name == first.setting:
             break  # the run itself ends with a clear error
-    return found
+    return measurements
 
 
 def reproducer(test: RandomTest, row: Measurement) -> dict[str, str]:
@@ -138,17 +138,20 @@ def topic_of(rows: Sequence[Measurement], seed: int, number: int, files: dict[st
     """
     summary = []
     for name in INVARIANTS:
-        own = [row for row in rows if row.setting == name]
-        held = [row.counts[EXCESS] for row in own if EXCESS in row.counts]
+        of_invariant = [row for row in rows if row.setting == name]
+        held = [row.counts[EXCESS] for row in of_invariant if EXCESS in row.counts]
         counts: dict[str, float] = {
-            "tests": len(held) + sum(bool(row.failed) and EXCESS not in row.counts for row in own),
-            "clear": sum(bool(row.remark) for row in own),
-            "broken": sum(bool(row.failed) for row in own),
+            "tests": len(held)
+            + sum(bool(row.failed) and EXCESS not in row.counts for row in of_invariant),
+            "clear": sum(bool(row.remark) for row in of_invariant),
+            "broken": sum(bool(row.failed) for row in of_invariant),
         }
         counts |= {EXCESS: max(held)} if held else {}
-        if any(row.errors for row in own):
-            found = [coverage([row], quantity).covered for row in own for quantity in QUANTITIES]
-            counts["covered"] = sum(found)
+        if any(row.errors for row in of_invariant):
+            covered = [
+                coverage([row], quantity).covered for row in of_invariant for quantity in QUANTITIES
+            ]
+            counts["covered"] = sum(covered)
         summary.append(Measurement(SUMMARY, name, "", counts=counts))
     broken = [row for row in rows if row.failed]
     lines = [f"- {row.method}, {row.setting}: {row.failed}" for row in broken]

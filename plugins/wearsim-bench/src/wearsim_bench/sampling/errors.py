@@ -98,8 +98,8 @@ def references(studies: Sequence[Study]) -> dict[str, Reference]:
     share = (len(numbers) - 1) / len(numbers)
     references = {}
     for group, value in pooled.items():
-        others = np.array([other[group] for other in reduced])
-        error = float(np.sqrt(share * ((others - others.mean()) ** 2).sum()))
+        jackknife = np.array([values[group] for values in reduced])
+        error = float(np.sqrt(share * ((jackknife - jackknife.mean()) ** 2).sum()))
         references[group] = Reference(value, error)
     return references
 

@@ -37,7 +37,7 @@ class MeanContact:
 
     def __init__(self, method: Method, wide: int = 1, fine: int = 1) -> None:
         scenario = shipped_scenario("mean-contact")
-        materials = scenario.cylinder.material, scenario.roller.material
+        materials = scenario.materials
         self.curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
         across, self.point = 1.0 / scenario.roller.crown_radius, study_contact(scenario).point
         usual = grid_about_hertz(None, across, self.curvature, self.point.normal_force, materials)
@@ -99,14 +99,14 @@ def closed_forms() -> Iterator[Saving]:
 
 def _closed_form(method: Method) -> Alternatives:
     rig = MeanContact(method)
-    none, some = (
+    without_spin, slight_spin = (
         _slipping(rig.point, rig.point.creepage.longitudinal, spin) for spin in (0.0, _SLIGHT)
     )
     ways = {
-        "no spin": rig.batch("dissipation", none),
-        "negligible spin": rig.batch("dissipation", some),
+        "no spin": rig.batch("dissipation", without_spin),
+        "negligible spin": rig.batch("dissipation", slight_spin),
     }
-    return Alternatives(ways, _limit(method, some))
+    return Alternatives(ways, _limit(method, slight_spin))
 
 
 def _limit(method: Method, point: OperatingPoint) -> Callable[[], FloatArray] | None:

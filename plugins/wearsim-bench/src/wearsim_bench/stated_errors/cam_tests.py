@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim_bench.stated_errors.random_tests import Draws, rounded, shipped
 
@@ -31,7 +30,7 @@ def cam_changes(draws: Draws, share: float) -> str:
     """
     changes, base = draws.changes, draws.choice(BASES)
     rig = shipped(base)
-    modulus = combine(rig.cylinder.material, rig.roller.material).contact_modulus
+    modulus = rig.pair.contact_modulus
     while True:
         radius, roller = draws.log_uniform(*CAM), draws.log_uniform(*ROLLER)
         crown, preload = draws.log_uniform(*CROWN), draws.log_uniform(*PRELOAD)

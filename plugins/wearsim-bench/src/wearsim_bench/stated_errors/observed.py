@@ -69,15 +69,15 @@ def _worn_state(problem: WearProblem, reference: Reference) -> WearState:
 def errors_of(result: Result, true: dict[str, FloatArray]) -> dict[str, tuple[float, float]]:
     """Return true and stated errors at the end of a run by observable.
 
-    They are relative to the greatest value over the rollers, and those of angles in radians. Of
-    several rollers the one with the smallest ratio of stated to true error counts.
+    Errors are relative to the greatest value over the rollers; those of angles are in radians. Of
+    several rollers, the one with the smallest ratio of stated to true error counts.
     """
-    found = {}
+    errors = {}
     for name, exact in true.items():
-        own, stated = (np.ravel(result.raw.history[n][-1]) for n in (name, f"{name}_error"))
-        error, scale = np.abs(own - exact), float(np.abs(exact).max()) or 1.0
+        computed, stated = (np.ravel(result.raw.history[n][-1]) for n in (name, f"{name}_error"))
+        error, scale = np.abs(computed - exact), float(np.abs(exact).max()) or 1.0
         if name.endswith("angle"):
             error, scale = np.minimum(error, math.tau - error), 1.0
         worst = int(np.argmin(stated / np.maximum(error, 1e-300)))
-        found[name] = float(error[worst]) / scale, float(stated[worst]) / scale
-    return found
+        errors[name] = float(error[worst]) / scale, float(stated[worst]) / scale
+    return errors

@@ -38,10 +38,10 @@ class RandomTest:
     files: Mapping[str, str] = field(default_factory=dict)
     stratum: str = "ordinary"
 
-    def scenario(self, **others: object) -> Scenario:
+    def scenario(self, **further: object) -> Scenario:
         """Return the scenario with further changes; two underscores represent the dot of a key."""
         base = shipped(self.base)
-        changes = {**self.changes, **{k.replace("__", "."): v for k, v in others.items()}}
+        changes = {**self.changes, **{k.replace("__", "."): v for k, v in further.items()}}
         files = {**base.files, **self.files}
         return parse_scenario(base.text, f"{self.name}.toml", files.__getitem__, changes)
 

@@ -22,9 +22,8 @@ from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import is_compiled
 from wearsim.evolution.strips import same_strips
 from wearsim.studies.run.draws import draw
-from wearsim.studies.run.grid import contact_centre, contact_positions
-from wearsim.studies.run.groove import widest_patch
-from wearsim.studies.run.inputs import contact_inputs, load_range
+from wearsim.studies.run.inputs import load_range
+from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray, Grid
 from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE, RandomTest
 from wearsim_bench.stated_errors.strata import FEW_PASSES
@@ -33,7 +32,7 @@ from wearsim_bench.stepping.runs import PreparedTest
 
 EACH_PASS = 2 * FEW_PASSES[1]  # passes up to which each one is solved, if the loop is compiled
 LOOSE_FROM = 9  # contacts from which ten times the tolerance is taken
-LONGEST_STEP = 0.02  # of the passes done: error estimates cannot miss what happens within it
+LONGEST_STEP = 0.02  # longest step over the passes done, so that error estimates miss nothing in it
 #: strips per half-width of the fresh patch, and of a groove that is much wider, and the greatest
 #: number for the contacts of a cylinder, of a cam with a few and with many contacts
 PER_PATCH, PER_GROOVE = 72.0, 160.0
@@ -109,11 +108,12 @@ class Worn:
     volume: float
 
     def changes_from(self, exact: Worn | Reference) -> FloatArray:
-        """Return the relative errors of depth, profile and volume, shape (3,), signed but for it.
+        """Return the relative errors of depth, profile and volume, shape (3,).
 
-        Profiles are compared on the strips of this object, in the L2 norm over all bodies.
+        Profiles are compared on the strips of this object, in the L2 norm over all bodies; the
+        errors of depth and volume have a sign.
         """
-        true = np.array([np.interp(self.y, exact.y, one) for one in exact.profiles])
+        true = np.array([np.interp(self.y, exact.y, profile) for profile in exact.profiles])
         weights = np.gradient(self.y)
         norm, difference = (
             float(np.sqrt((weights * part**2).sum())) for part in (true, self.profiles - true)
@@ -166,7 +166,7 @@ def worn_at_end(
     grid : Grid
         The strips.
     tolerance : float
-        Tolerance of the steps; tests with few passes are solved pass by pass for any.
+        Tolerance of the steps; tests with few passes are solved pass by pass.
     longest : float
         Greatest ratio of an implicit step to the passes done.
     until : float
@@ -182,17 +182,17 @@ def worn_at_end(
     prepared = PreparedTest(test.scenario(evolution__tolerance=tolerance), grid)
     stepper, method = prepared.stepper, f"{prepared.name}, {tolerance:g}"
     if np.isfinite(longest):
-        every = PreparedTest(test.scenario(evolution__stepper=EVERY_PASS), grid)
-        few = EACH_PASS if is_compiled(every.problem) else FEW_PASSES[1]
-        if prepared.stop <= few:
-            prepared, stepper, method = every, every.stepper, EVERY_PASS
+        pass_by_pass = PreparedTest(test.scenario(evolution__stepper=EVERY_PASS), grid)
+        most_passes = EACH_PASS if is_compiled(pass_by_pass.problem) else FEW_PASSES[1]
+        if prepared.stop <= most_passes:
+            prepared, stepper, method = pass_by_pass, pass_by_pass.stepper, EVERY_PASS
         elif isinstance(stepper, ImplicitStepper):
             # with the same treatment of strips at the edge of a contact
             stepper = CappedStepper(tolerance, longest, stepper.by_doubling)
     problem = prepared.problem if grows else replace(prepared.problem, growth=())
     state = fresh_state(problem)
-    most = test.scenario().evolution.max_steps
-    for advance in evolve(problem, state, stepper, prepared.stop, lambda _: np.inf, 10 * most):
+    max_steps = test.scenario().evolution.max_steps
+    for advance in evolve(problem, state, stepper, prepared.stop, lambda _: np.inf, 10 * max_steps):
         state, final = advance.end, advance.problem
         if time.process_time() > until:
             raise SolverError(f"the reference takes longer than {SECONDS:g} s")
@@ -225,13 +225,10 @@ def final_grid(test: RandomTest, until: float) -> tuple[Grid, float, float]:
     ones are not worn.
     """
     scenario = test.scenario()
-    load = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
+    means, load = Setup(scenario), load_range(scenario, scenario.total_time)[1]
     load += draw(scenario).range_of("normal_force_offset")[1]
-    patch = widest_patch(scenario, load).b
-    rollers = range(scenario.operation.rollers)
-    centre = contact_centre(scenario, rollers)
-    positions = contact_positions(scenario, contact_inputs(scenario, rollers))
-    shift = float(np.abs(positions - centre).max())
+    patch, centre = means.widest_patch(load).b, means.centre
+    shift = float(np.abs(means.positions - centre).max())
     half, reason = shift + 1.5 * patch, "the groove is wider than all strips"
     for _ in range(MOST_PILOTS):
         strips = 2 * int(np.ceil(min(PILOT_STRIPS * half / patch, 90.0))) + 1
@@ -282,16 +279,16 @@ def reference_of(test: RandomTest, folder: Path | None) -> Reference:
 
 
 def kept(path: Path | None, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Return the arrays of a file, or compute them and write it; also a failure is kept."""
+    """Return the arrays of a file, or compute and write them; a failure is written too."""
     if path is not None and path.exists():
         try:
             with np.load(path) as arrays:
-                found = {name: arrays[name][()] for name in arrays}
+                stored = {name: arrays[name][()] for name in arrays}
         except (OSError, ValueError, TypeError, EOFError, BadZipFile) as error:
             raise ResultsFileError(f"{path}: is not a reference solution; delete it") from error
-        if _FAILURE in found:
-            raise SolverError(f"{found[_FAILURE]} (kept in {path.name})")
-        return found
+        if _FAILURE in stored:
+            raise SolverError(f"{stored[_FAILURE]} (kept in {path.name})")
+        return stored
     failure: SolverError | None = None
     try:
         computed = compute()

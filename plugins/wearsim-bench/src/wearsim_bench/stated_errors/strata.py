@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim_bench.stated_errors.cam_tests import cam_changes
 from wearsim_bench.stated_errors.random_tests import Draws, RandomTest, rounded, shipped
@@ -61,7 +60,7 @@ class Sizes:
     def patch(self) -> HertzContact:
         """The patch of the unworn bodies."""
         rig = shipped(RIG)
-        modulus = combine(rig.cylinder.material, rig.roller.material).contact_modulus
+        modulus = rig.pair.contact_modulus
         return hertz(0.5 * self.curvature, 0.5 / self.crown, self.load, modulus)
 
     @property
@@ -195,15 +194,15 @@ def _angles(
     if stratum == ADHESION:
         greatest["yaw"] = 0.5 * sizes.creepage
     keys: dict[str, object] = {}
-    found = 0.0
+    greatest_yaw = 0.0
     for name, limit in greatest.items():
         angles = [draws.uniform(-limit, limit) for _ in range(rollers)]
         if draws.chance(0.2):
             texts = [f"{1e3 * angle:.4g} mrad" for angle in angles]
             same = rollers == 1 or draws.chance(0.5)
             keys[name] = texts[0] if same else texts
-            found = max(map(abs, angles)) if name == "yaw" else found
-    return keys, found
+            greatest_yaw = max(map(abs, angles)) if name == "yaw" else greatest_yaw
+    return keys, greatest_yaw
 
 
 def _set_wear(
@@ -225,14 +224,16 @@ def _set_wear(
     widened = draws.log_uniform(*GROOVE) ** 2 - 1.0
     depth = widened * patch.b**2 / (2.0 * sizes.crown)
     depth = min(max(depth, DEPTH[0]), DEPTH[1], 0.05 * sizes.roller)
-    half = math.sqrt(patch.b**2 + 2.0 * sizes.crown * depth)
+    half_width = math.sqrt(patch.b**2 + 2.0 * sizes.crown * depth)
     if differs:
-        across = 0.2 * half**2 / (2.0 * sizes.crown) * sizes.curvature
+        across = 0.2 * half_width**2 / (2.0 * sizes.crown) * sizes.curvature
         adhering = min(across / sizes.saturation, 1.0)
         slip = math.hypot(slip, across * adhering * (2.0 - adhering))
-    both = 1.0 + ratio * sizes.cylinder / sizes.roller
-    per_factor = sizes.friction * slip * 0.75 * sizes.load * both  # depth per pass times width
-    work = (half**3 - patch.b**3) / (3.0 * sizes.crown) / per_factor  # K/H times passes
+    both_bodies = 1.0 + ratio * sizes.cylinder / sizes.roller
+    per_factor = (
+        sizes.friction * slip * 0.75 * sizes.load * both_bodies
+    )  # depth per pass times width
+    work = (half_width**3 - patch.b**3) / (3.0 * sizes.crown) / per_factor  # K/H times passes
     passes = draws.log_uniform(*(FEW_PASSES if few else PASSES))
     factor = min(max(work / passes, K_OVER_H[0]), K_OVER_H[1])
     if not few:

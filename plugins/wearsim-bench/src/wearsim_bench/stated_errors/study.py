@@ -62,11 +62,11 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
         observed = errors_of(result, observed_of(test, reference))
     except Exception as error:
         return _failed(row, LACKS, error)
-    own = worn_of_result(result)
+    worn = worn_of_result(result)
     errors = {
-        **_named("", own.changes_from(reference)),
+        **_named("", worn.changes_from(reference)),
         **{STATED + name: value for name, value in stated(result).items()},
-        **_named(STEPS, own.changes_from(same)),
+        **_named(STEPS, worn.changes_from(same)),
         **_named(STRIPS, same.changes_from(reference)),
         **{name: true for name, (true, _) in observed.items()},
         **{STATED + name: estimate for name, (_, estimate) in observed.items()},
@@ -75,10 +75,10 @@ def measured(test: RandomTest, folder: Path | None) -> Measurement:
         "tolerance": test.tolerance,
         "steps": result.steps,
         "solves": int(np.max(result.solves[-1])),
-        "strips": len(own.y),
+        "strips": len(worn.y),
         "strips_grew": int(grew),
         DRAWN: int(any(item.is_redrawn for item in test.scenario().random)),
-        "final_depth": own.depth,
+        "final_depth": worn.depth,
         "reference_strips": len(reference.y),
         "reference_seconds": float(reference.seconds),
         **_named(OWN, reference.by_strips),
@@ -98,7 +98,7 @@ def _named(prefix: str, values: FloatArray) -> dict[str, float]:
     }
 
 
-def timed_run(test: RandomTest, **others: object) -> tuple[Result, float]:
+def timed_run(test: RandomTest, **further: object) -> tuple[Result, float]:
     """Return the result of a test with further changes of its scenario, and its time [s].
 
     Raises
@@ -115,7 +115,7 @@ def timed_run(test: RandomTest, **others: object) -> tuple[Result, float]:
             raise TimeoutError(f"the run takes longer than {SECONDS:g} s")
         return False
 
-    result = run(test.scenario(**others), stop_requested=is_late)
+    result = run(test.scenario(**further), stop_requested=is_late)
     return result, time.perf_counter() - start
 
 
@@ -136,17 +136,18 @@ def worn_of_result(result: Result) -> Worn:
 def stated(result: Result) -> dict[str, float]:
     """Return the stated relative errors at the end of a run by quantity.
 
-    Those of a cam are due to steps and strips: a reference has the stations of the run.
+    Those of a cam are the errors due to steps and strips only, since a reference has the stations
+    of the run.
     """
     last = {name: column[-1] for name, column in result.raw.history.items()}
-    found = {}
+    errors = {}
     for name in QUANTITIES:
         error = float(np.max(result.final[f"relative_{name}_error"]))
         by_stations = last.get(f"{name}_error_by_stations")
         if by_stations is not None:
             error *= 1.0 - float(np.max(by_stations / last[f"{name}_error"]))
-        found[name] = error
-    return found
+        errors[name] = error
+    return errors
 
 
 def _without_stepping_error(
@@ -193,8 +194,8 @@ class Coverage:
     @property
     def greatest_step(self) -> float:
         """Greatest true error by steps alone over the tolerance."""
-        each = zip(self.by_steps, self.tolerances, strict=False)
-        return max((error / limit for error, limit in each), default=0.0)
+        pairs = zip(self.by_steps, self.tolerances, strict=False)
+        return max((error / limit for error, limit in pairs), default=0.0)
 
     @property
     def counts(self) -> dict[str, float]:
@@ -227,8 +228,8 @@ def worst(rows: Sequence[Measurement], quantity: str, count: int) -> list[Measur
     """Return the tests with the greatest ratios of true to stated error, in decreasing order."""
 
     def ratio(row: Measurement) -> float:
-        true, own = row.errors[quantity], row.errors[STATED + quantity]
-        return float("inf") if true < SMALL else own / true
+        true, estimate = row.errors[quantity], row.errors[STATED + quantity]
+        return float("inf") if true < SMALL else estimate / true
 
     done = [row for row in rows if not row.failed and quantity in row.errors]
     return [row for row in sorted(done, key=ratio)[:count] if ratio(row) < 1.0]

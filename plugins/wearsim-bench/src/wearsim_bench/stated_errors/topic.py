@@ -174,8 +174,8 @@ def results_of_tests(
     """
     scheduler, done = "serial" if jobs == 1 else "processes", 0
     with executor(scheduler, None if jobs == 1 else jobs, realisations=number) as processes:
-        for places, found in processes.results(work, iter([place] for place in range(number))):
-            for place, result in zip(places, found, strict=True):
+        for places, results in processes.results(work, iter([place] for place in range(number))):
+            for place, result in zip(places, results, strict=True):
                 done += 1
                 yield place, result
             on_progress(f"test {done} of {number}", done / number)
@@ -201,20 +201,20 @@ def requirements(rows: Sequence[Measurement]) -> str:
     counted = [row for row in rows if not row.failed.startswith((CLEAR, LACKS))]
     lines = []
     for name in ALL_QUANTITIES:
-        found = coverage(counted, name)
-        if not found.true and name in OBSERVED:
+        statistics = coverage(counted, name)
+        if not statistics.true and name in OBSERVED:
             continue
-        part = found.covered / max(len(found.true), 1)
+        part = statistics.covered / max(len(statistics.true), 1)
         lines.append(_verdict(part >= COVERED, f"{name} covered in {part:.1%} of the tests"))
-        median = found.counts.get("median", 0.0)
+        median = statistics.counts.get("median", 0.0)
         if name in QUANTITIES:
             ratio = f"{name}: median of stated/true {median:.3g}"
             lines.append(_verdict(median < MOST_RATIO, ratio))
         for stratum in dict.fromkeys(row.setting for row in counted):
-            some = [row for row in counted if row.setting == stratum]
-            found = coverage(some, name)
-            part = found.covered / max(len(found.true), 1)
-            if found.true and part < COVERED_IN_STRATUM:
+            of_stratum = [row for row in counted if row.setting == stratum]
+            statistics = coverage(of_stratum, name)
+            part = statistics.covered / max(len(statistics.true), 1)
+            if statistics.true and part < COVERED_IN_STRATUM:
                 lines.append(_verdict(False, f"{name} covered in {part:.1%} of '{stratum}'"))
     steps = max(coverage(counted, name).greatest_step for name in QUANTITIES)
     lines.append(_verdict(steps <= MOST_BY_STEPS, f"errors by steps up to {steps:.3g} tolerances"))
@@ -246,16 +246,16 @@ def statistics(rows: Sequence[Measurement]) -> dict[str, list[Measurement]]:
         tests[STRATUM.format(stratum)] = [row for row in rows if row.setting == stratum]
     tolerances = {row.counts["tolerance"] for row in rows if not row.failed}
     for tolerance in sorted(tolerances, reverse=True):
-        same = [row for row in rows if row.counts.get("tolerance") == tolerance]
-        tests[TOLERANCE.format(tolerance)] = same
+        of_tolerance = [row for row in rows if row.counts.get("tolerance") == tolerance]
+        tests[TOLERANCE.format(tolerance)] = of_tolerance
     groups = {}
-    for group, some in tests.items():
-        lost = {"failed": sum(bool(row.failed) for row in some)}
-        if some:
+    for group, of_group in tests.items():
+        lost = {"failed": sum(bool(row.failed) for row in of_group)}
+        if of_group:
             groups[group] = [
-                Measurement(group, name, "", counts=coverage(some, name).counts | lost)
+                Measurement(group, name, "", counts=coverage(of_group, name).counts | lost)
                 for name in ALL_QUANTITIES
-                if name in QUANTITIES or coverage(some, name).true
+                if name in QUANTITIES or coverage(of_group, name).true
             ]
     for name in ALL_QUANTITIES:
         group = UNCOVERED.format(name)

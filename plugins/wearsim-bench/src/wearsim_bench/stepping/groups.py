@@ -111,11 +111,11 @@ class StepperBenchmark:
             return replace(row, seconds=seconds), Reference(end, {})
         steps = partial(by_solver, "LSODA", prepared.problem, CONVERGED)
         end, seconds = timed(lambda: steps(prepared.stop))
-        looser, other = (
+        looser, by_bdf = (
             errors_of(by_solver(solver, prepared.problem, tolerance, prepared.stop), end)
             for solver, tolerance in _CHECKS
         )
-        reference = Reference(end, {name: max(looser[name], other[name]) for name in looser})
+        reference = Reference(end, {name: max(looser[name], by_bdf[name]) for name in looser})
         setting = f"converged, {_power(CONVERGED)}"
         row = self._row("LSODA", setting, end, known=reference.known)
         return replace(row, seconds=seconds), reference

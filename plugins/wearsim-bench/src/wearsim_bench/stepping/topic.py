@@ -23,10 +23,10 @@ from wearsim_bench.stepping.turns import LONG, NEGLIGIBLE, NOTABLE, ROUNDS, TIE,
 
 RIG = "rig-450min"
 SPRING = {"load.kind": "spring", "load.stiffness": "690 N/mm"}
-WHOLE, PART, EARLY = 450.0, 45.0, 4.5  # min
+WHOLE, PART, EARLY = 450.0, 45.0, 4.5  # lengths of tests [min]
 TOLERANCES = (1e-1, 1e-2, DEFAULT_TOLERANCE, 1e-4, 1e-5)
 FEWER = (1e-1, 1e-2, DEFAULT_TOLERANCE, 1e-4)
-#: Of the default stepper.
+#: tolerances of the default stepper
 FINER = (1e-1, 5e-2, 2e-2, 1e-2, 5e-3, 2e-3, DEFAULT_TOLERANCE, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
 STRIPS, EARLY_STRIPS = (25, 41, 75), (15, 25, 41)
 QUICK = 0.005  # fraction of every test

@@ -82,7 +82,7 @@ class Comparison:
 
     @property
     def dominates(self) -> bool:
-        """Whether the stepper is as fast and as near, within ties."""
+        """Whether the stepper is as fast and as accurate as the solver, within `TIE`."""
         return max(self.ratios.values()) <= TIE
 
     def __str__(self) -> str:
@@ -95,10 +95,10 @@ class Comparison:
 def comparison(stepper: TimedRun, solver: TimedRun, name: str) -> Comparison:
     """Return the comparison of a stepper called `name` with a solver, by paired times."""
     pairs = zip(stepper.times, solver.times, strict=False)
-    ratios = {"time": median(mine / other for mine, other in pairs)}
-    for quantity, error in solver.row.errors.items():
-        own = stepper.row.errors[quantity]
-        ratios[quantity] = max(own, NEGLIGIBLE) / max(error, NEGLIGIBLE)
+    ratios = {"time": median(stepper_time / solver_time for stepper_time, solver_time in pairs)}
+    for quantity, solver_error in solver.row.errors.items():
+        stepper_error = stepper.row.errors[quantity]
+        ratios[quantity] = max(stepper_error, NEGLIGIBLE) / max(solver_error, NEGLIGIBLE)
     parts = stepper.row.method.removeprefix(name).lstrip(", "), stepper.row.setting
     return Comparison(", ".join(filter(None, parts)), ratios)
 
@@ -115,17 +115,17 @@ def compared(runs: Sequence[TimedRun], stepper: str, solvers: Sequence[str]) -> 
     solvers : sequence of str
         Starts of the names of the solvers.
     """
-    own = [run for run in runs if run.times and run.row.method.startswith(stepper)]
+    stepper_runs = [run for run in runs if run.times and run.row.method.startswith(stepper)]
     remarked = []
     for run in runs:
         notable = run.row.errors.get("profile", 0.0) >= NOTABLE
-        if own and run.times and notable and run.row.method.startswith(tuple(solvers)):
-            found = [comparison(mine, run, stepper) for mine in own]
-            dominating = [item for item in found if item.dominates]
+        if stepper_runs and run.times and notable and run.row.method.startswith(tuple(solvers)):
+            comparisons = [comparison(stepper_run, run, stepper) for stepper_run in stepper_runs]
+            dominating = [item for item in comparisons if item.dominates]
             chosen = (
                 min(dominating, key=lambda item: item.ratios["time"])
                 if dominating
-                else min(found, key=lambda item: max(item.ratios.values()))
+                else min(comparisons, key=lambda item: max(item.ratios.values()))
             )
             remarked.append(replace(run, row=replace(run.row, remark=str(chosen))))
         else:
