@@ -219,7 +219,7 @@ def test_explicit_step_is_the_wear_at_its_start(rig):
     assert end.energy[0] == pytest.approx(volume / FACTOR, rel=1e-9)
     errors = COVER * rig.sizes(depth, 0.5 * (depth - count * rig.rate(depth)))
     np.testing.assert_allclose(errors_of(end), errors, rtol=1e-6)
-    assert (end.passes[0], end.steps) == (count, 1)
+    assert (end.passes[0], end.steps, tried.warning) == (count, 1, None)
     allowed = SHARE * 1e-3 * depth.max()
     by_volume = errors[1] / (SHARE * 1e-3 * volume)
     assert tried.excess[0] == pytest.approx(max(errors[0] / allowed, by_volume), rel=1e-6)
