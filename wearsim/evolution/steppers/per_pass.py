@@ -264,8 +264,7 @@ def run_in_python(
         one = with_contacts(passes, np.array([number]))
         multiplicity = float(kinematics.multiplicity[r])
         for s in range(stations):
-            speed, part = kinematics.rolling_speed, 1.0 / stations
-            length = kinematics.cylinder_radius / stations
+            speed, part, length = kinematics.rolling_speed, 1.0, kinematics.cylinder_radius
             if cam is not None:
                 speed, part = float(cam.rolling_speed[s, 0, 0]), float(cam.time_share[s, 0, 0])
                 length = float(cam.length[s, 0, 0]) / math.tau
