@@ -120,3 +120,19 @@ def test_row_of_a_realisation_has_its_own_passes() -> None:
     assert sums[0] == pytest.approx([0.1, 0.2, 0.3, 0.4])
     assert sums[1] == pytest.approx(damage[0, :, 0])
     assert sums[2] == pytest.approx(damage[:2, :, 0].sum(axis=0))
+
+
+@pytest.mark.parametrize("passes", [0.4, 1.0, 3.0])
+def test_few_passes_add_their_damage(passes: float) -> None:
+    old, start, length = np.zeros((4, 1, 1)), np.array([2.0]), np.array([passes])
+    first, last = np.full((1, 1), 1e-6), np.full((1, 1), 3e-6)
+    damage, _ = damage_of_step(
+        old, first, last, np.empty((0, 1)), start, length, np.array([[np.nan], [1.0]]), 1.0
+    )
+
+    def rate(done: float) -> float:  # a power of the passes and the constant
+        power = np.log(3.0) / np.log((3.0 + passes) / 3.0)
+        return float(1e-6 * ((done + 1.0) / 3.0) ** power)
+
+    known = quad(rate, 2.0, 2.0 + passes)[0]
+    assert damage[0, 0, 0] == pytest.approx(known, rel=2e-3)

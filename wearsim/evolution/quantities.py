@@ -105,7 +105,7 @@ class Varying:
 
 @dataclass(frozen=True)
 class OneStation:
-    """The station of a cylinder, with the methods that `CamStations` has for those of a cam.
+    """The station of a cylinder, with the attributes that `CamStations` has for those of a cam.
 
     Parameters
     ----------
@@ -118,7 +118,6 @@ class OneStation:
     longitudinal_curvature: float
     rolling_speed: float
     track_radius: float
-    #: as of `CamStations`
     load_factor: ClassVar[float] = 1.0
     pressure_angle: ClassVar[float] = 0.0
     inertia: ClassVar[FloatArray] = np.zeros((0, 0))
@@ -135,9 +134,8 @@ class OneStation:
 
     def greatest(self, values: FloatArray) -> Extreme:
         """Return the value of the station, without an angle."""
-        value = self.greatest_value(values)
-        unknown = np.full(value.shape, np.nan)
-        return Extreme(value, unknown, unknown, unknown)
+        unknown = np.full(values.shape[1:], np.nan)
+        return Extreme(self.greatest_value(values), unknown, unknown, unknown)
 
     def greatest_value(self, values: FloatArray) -> FloatArray:
         """Return the value of the station, the greatest along the first axis."""
@@ -165,7 +163,7 @@ class OneStation:
 
     def over_radius(self, depth: FloatArray) -> FloatArray:
         """Return depths over the radius of curvature of the surface."""
-        return np.asarray(depth / self.track_radius)
+        return depth / self.track_radius
 
     def matches(self, other: Track) -> bool:
         """Return whether tests on both tracks can be joined."""
@@ -337,10 +335,7 @@ class CamStations:
         return sum_in_order(share * values, axis=0)[None]
 
     def matches(self, other: Track) -> bool:
-        """Return whether tests at these and at other stations can be joined.
-
-        Both must stay at the same angles, and have no feedback by inertia.
-        """
+        """Return whether tests can be joined: at equal, fixed stations without inertia."""
         if isinstance(other, OneStation):
             return False
         fixed = self.relocated is None and other.relocated is None
@@ -404,10 +399,10 @@ class Kinematics:
         return self if self.cam is None else replace(self, cam=self.cam.at(realisations))
 
     @classmethod
-    def joined(cls, each: Sequence[Kinematics]) -> Kinematics:
+    def joined(cls, tests: Sequence[Kinematics]) -> Kinematics:
         """Return the kinematics of several tests, whose tracks match."""
-        cams = [one.cam for one in each if one.cam is not None]
-        return replace(each[0], cam=CamStations.joined(cams)) if cams else each[0]
+        cams = [test.cam for test in tests if test.cam is not None]
+        return replace(tests[0], cam=CamStations.joined(cams)) if cams else tests[0]
 
     @cached_property
     def physical_rollers(self) -> float:

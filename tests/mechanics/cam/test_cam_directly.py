@@ -18,6 +18,7 @@ from wearsim.mechanics.cam import (
     Stations,
     greatest,
     integral_error,
+    motion_mistakes,
     tangent_cam,
 )
 from wearsim.mechanics.cam.outline import angles_by_chord, angles_by_number
@@ -113,6 +114,9 @@ def test_greatest_value_is_that_of_the_polynomial() -> None:
         assert found.value == pytest.approx(value, abs=1e-9)
         assert found.angle == pytest.approx(angle, abs=1e-4)
         assert found.error == pytest.approx(0.0, abs=1e-12)
+        small = greatest(stations, 1e-9 * np.concatenate([values[0], [0.1], values[1]]))
+        assert (small.value, small.angle) == pytest.approx((1e-9 * value, angle), abs=1e-4)
+        assert small.value == pytest.approx(1e-9 * value, rel=1e-6)
         peaks.append(float(found.angle))
     assert peaks[0] < PANELS[1].start
     assert peaks[1] > PANELS[1].stop
@@ -187,3 +191,8 @@ def test_nose_without_a_common_tangent_is_refused(
         tangent_cam(base, nose, distance)
     with pytest.raises(ValueError, match="the nose is within the base circle"):
         tangent_cam(distance + nose, nose, distance)
+
+
+@pytest.mark.parametrize("law", ["cycloidal", "harmonic"])
+def test_motion_that_returns_has_no_mistakes(law: str) -> None:
+    assert motion_mistakes(rise_and_return(law).segments, str) == []

@@ -7,7 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from wearsim.mechanics.cam.smoothing import estimated_noise, scatter_through_points, smoothed
+from wearsim.mechanics.cam.smoothing import (
+    SmoothedCurve,
+    estimated_noise,
+    scatter_through_points,
+    smoothed,
+)
 
 NOISE = 2e-6
 ANGLE = np.sort(math.tau * (np.arange(90) + 0.3 * np.sin(np.arange(90.0))) / 90.0)
@@ -79,3 +84,12 @@ def test_dwells_are_found_and_constant() -> None:
     assert len(curve.arcs) == len(curve.dwells)
     for (_, stop), (start, _) in zip(curve.dwells, curve.arcs, strict=True):
         assert start == stop
+
+
+def test_arcs_are_between_the_dwells():
+    none = np.zeros(0)
+    options = none, none, 0.0, none, none, 0.0
+    dwells = (0.5, 1.0), (3.0, 4.0)
+    curve = SmoothedCurve(*options, dwells, np.zeros((0, 0)))
+    assert curve.arcs == [(1.0, 3.0), (4.0, 0.5 + 2.0 * np.pi)]
+    assert SmoothedCurve(*options, (), np.zeros((0, 0))).arcs == []

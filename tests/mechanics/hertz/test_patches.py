@@ -71,6 +71,7 @@ def test_patch_that_is_given_may_end_at_the_edge_of_the_strips() -> None:
         assert found.centre == pytest.approx([0.2, -0.2])
         assert found.ratio == pytest.approx([0.1 / (0.85 * factor)] * 2)
         assert found.peak_pressure == pytest.approx([1.5 * LOAD / (math.pi * 0.085 * factor)] * 2)
+    assert patches(bodies(2, 0.1, 0.5), gaps, np.full(2, 0.5)).status.tolist() == [CONVERGED] * 2
     lengths = half_lengths(bodies(2, 0.1, 0.5), patches(bodies(2, 0.1, 0.5), gaps, loads), loads)
     assert lengths[0].max() == pytest.approx(0.1, rel=1e-2)
     assert lengths[0] == pytest.approx(lengths[1][::-1])

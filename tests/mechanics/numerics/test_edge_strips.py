@@ -314,3 +314,35 @@ def test_separations_of_two_bodies_add_up(edges: Edges) -> None:
     fill_separations(STATIONS, edges.resolved, edges.separation, share, cam)
     np.testing.assert_array_equal(cam[:2, :2], by_contact[:, :2])
     assert not cam[2].any()
+
+
+@pytest.mark.parametrize("bodies", [ROLLERS_OF_ONE, STATIONS])
+@pytest.mark.parametrize("size", [0.01, 0.3, 3.0])
+def test_strips_start_with_the_shape_of_their_separation(bodies: np.ndarray, size: float) -> None:
+    edges = Edges(bodies)
+    strips, part, apart = edges.strips, edges.part, edges.separation
+    depth = np.array(
+        [[edges.of(strips.rows, k, i) for i in range(STRIPS)] for k in range(CONTACTS)]
+    )
+    approach = (strips.gap + depth).min(axis=1) + size * SIZE
+    start_edges(strips, apart, approach)
+    greatest = np.full(edges.shape, float(bodies[-1, 0] > 0))
+    for k, v, i in edges.each():
+        if 0.0 < part[k, i] < 1.0:
+            rise = 2.0 * apart[k, i] / (1.0 - part[k, i]) ** 2
+        elif part[k, i] == 0.0:
+            # towards the greater neighbour, less where the bodies are far from rigid
+            rise = max(apart[k, max(i - 1, 0)], apart[k, min(i + 1, STRIPS - 1)]) - apart[k, i]
+            if rise > 0.0:
+                kept = (NONE - ELASTIC * size * SIZE / rise) / (NONE - FULL)
+                rise *= min(max(kept, LEAST), 1.0)
+            rise = min(rise, 2.0 * apart[k, i])
+        else:
+            rise = 0.0
+        rise = max(rise, FLAT)
+        assert strips.rise[k, i] == pytest.approx(rise, rel=1e-9)
+        known = depth[k, i] - 0.5 * rise * part[k, i] ** 2
+        assert strips.first[k, i] == pytest.approx(known, rel=1e-9, abs=1e-18)
+        for b in bodies[k // TESTS]:
+            greatest[b, v, i] = max(greatest[b, v, i], part[k, i])
+    assert strips.greatest[:, edges.resolved] == pytest.approx(greatest[:, edges.resolved])

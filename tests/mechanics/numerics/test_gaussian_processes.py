@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from wearsim.mechanics.numerics.gaussian_processes import CELLS, REACH, filter_noise, smooth
+from wearsim.mechanics.numerics.gaussian_processes import (
+    CELLS,
+    REACH,
+    filter_noise,
+    smooth,
+    squared_residuals,
+)
 
 LENGTH = 50e-6
 SPACING = LENGTH / 2.0
@@ -99,3 +105,22 @@ def test_longer_path_begins_with_the_shorter_one():
     np.testing.assert_array_equal(
         filter_noise(noise[:123].copy(), 0.97), filter_noise(noise, 0.97)[:123]
     )
+
+
+def test_squared_residuals_are_those_of_whitened_columns_without_their_lines():
+    rng, points, models = np.random.default_rng(5), 7, 2
+    columns = rng.standard_normal((3, points))
+    decay, gain, scale = rng.random((3, points, models)) + 0.2
+    lines = np.stack(
+        [np.linalg.qr(rng.standard_normal((points, 2)))[0].T for _ in range(models)], axis=2
+    )
+    found = squared_residuals(columns, decay, gain, scale, lines)
+    for m in range(models):
+        for c, column in enumerate(columns):
+            mean, white = 0.0, []
+            for j, value in enumerate(column):
+                error = value - mean
+                white.append(scale[j, m] * error)
+                mean = decay[j, m] * (mean + gain[j, m] * error)
+            left = np.array(white) - lines[:, :, m].T @ (lines[:, :, m] @ white)
+            assert found[m, c] == pytest.approx(left @ left, rel=1e-12)

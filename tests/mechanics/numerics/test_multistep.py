@@ -10,6 +10,7 @@ from wearsim.mechanics.numerics.multistep import (
     ROWS,
     SAFETY,
     extrapolated,
+    first_differences,
     formulas,
     local_errors,
     new_differences,
@@ -191,3 +192,12 @@ def test_local_errors_are_products_of_the_distances():
     none = local_errors(differences, spans, 0.0 * depths, np.array([0]), parts, errors)
     assert none[:2, 0].tolist() == [0.0, 0.0]
     assert not errors.any()
+
+
+def test_first_differences_are_the_rates_and_their_slopes():
+    rates = np.array([[[2.0, 3.0], [4.0, 5.0]]])  # rows, solutions, columns
+    found = first_differences(rates, np.array([2.0, 4.0]))
+    assert found.shape == (6, 1, 2, 2)
+    assert found[0].tolist() == rates.tolist()
+    assert found[1, 0].tolist() == [[1.0, 1.5], [1.0, 1.25]]
+    assert not found[2:].any()

@@ -175,3 +175,26 @@ def test_fresh_bodies_have_no_relative_errors() -> None:
     step.displaced[:], step.depths[:] = 0.0, 0.0
     estimates = step.assess()[3]
     np.testing.assert_array_equal(estimates[2], step.irreducible[2])
+
+
+def test_errors_of_depths_have_the_sum_of_the_errors_of_the_volume():
+    rng = np.random.default_rng(8)
+    errors, parts = rng.standard_normal((1, 3, 4)), rng.random((1, 3, 4))
+    crossed = np.zeros((1, 3, 4), bool)
+    crossed[0, 0, 2] = crossed[0, 2, 1] = True
+    resolved = np.array([True, False, True])
+    past = rng.standard_normal((6, 1, 3, 1))
+    spans = np.array(
+        [[1.0, 1.0, 0.5], [2.5, 2.0, 1.5], [4.0, 3.0, 2.5], [np.inf] * 3, [np.inf] * 3]
+    )
+    orders = np.array([2, 2, 3])
+    found = with_sum(errors, parts, crossed, resolved, past, spans, orders)
+    assert found[0, 1].tolist() == errors[0, 1].tolist()
+    # of the highest order whose point is known: two
+    for v in (0, 2):
+        factor = np.prod(spans[:2, v]) / (1.0 / spans[:3, v]).sum()
+        kept = ~crossed[0, v]
+        assert found[0, v].sum() == pytest.approx(factor * past[3, 0, v, 0])
+        moved = (found - errors)[0, v, kept] / parts[0, v, kept]
+        assert moved == pytest.approx(np.full(kept.sum(), moved[0]))
+        assert not found[0, v, ~kept].any()

@@ -184,6 +184,20 @@ def test_spring_and_terms_change_the_load_of_a_pass(p: int) -> None:
     check_pass(Loop(stiffness=2e7, terms=terms, term_rates=rates), p, 1e-8)
 
 
+def test_stiff_spring_and_contact_share_their_displacement() -> None:
+    check_pass(Loop(stiffness=3e8), 0, 1e-7)
+
+
+def test_pass_from_an_anchor_is_no_full_solution() -> None:
+    loop = Loop(similar=True)
+    loop.passes.base_load[2], loop.passes.tilt[2] = (
+        loop.passes.base_load[1] + 1.0,
+        loop.passes.tilt[1],
+    )
+    assert loop.run(1) == (CONVERGED, 1, 1)
+    assert loop.run(2) == (CONVERGED, 1, 0)
+
+
 def test_pass_from_an_anchor_agrees_with_its_equations() -> None:
     loop = Loop(similar=True)
     assert loop.run(1) == (CONVERGED, 1, 1)

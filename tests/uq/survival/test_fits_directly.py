@@ -12,7 +12,6 @@ from scipy.optimize import minimize, minimize_scalar
 from scipy.special import ndtr, ndtri
 
 from wearsim.uq.distributions.two_levels import TwoLevels
-from wearsim.uq.estimation.intervals import UNKNOWN
 from wearsim.uq.survival.demonstration import drawn_lives, specimens
 from wearsim.uq.survival.distributions import CountedLives, FactorMixture
 from wearsim.uq.survival.fits import (
@@ -20,7 +19,6 @@ from wearsim.uq.survival.fits import (
     FittedLives,
     fit_lives,
     fit_mixture,
-    fitted_quantile,
     standard_score,
 )
 from wearsim.uq.survival.goodness import anderson_darling
@@ -113,8 +111,6 @@ def test_interval_of_a_fit_ends_where_the_deviance_is_that_of_chi_squared(
         assert 2.0 * (fit.log_likelihood + most.fun) == pytest.approx(
             stats.chi2.ppf(0.95, 1), abs=1e-5
         )
-    assert fitted_quantile(fit, share) == found
-    assert fitted_quantile(None, share) == UNKNOWN
 
 
 def test_fit_needs_two_different_lives_that_ended() -> None:

@@ -216,6 +216,11 @@ def test_inspected_failures_are_spread_by_their_probability() -> None:
     found = check_fleet([one()], SINGLE, SINGLE, none)
     assert found.surprise == pytest.approx(math.exp(-3.0 * math.log(2.0)), rel=1e-3)
     assert found.edges.tolist() == [0.0, middle]  # fewer than four failures predicted
+    early = np.full(3, 0.8 * middle)
+    total = 3.0 * hazard(early[:1])[0]
+    many = check_fleet([one()], SINGLE, SINGLE, Fleet(early, early, none.design))
+    above = 1.0 - 0.5 * (stats.poisson.cdf(3, total) + stats.poisson.cdf(2, total))
+    assert many.surprise == pytest.approx(2.0 * above, rel=1e-3)
 
 
 def test_remaining_lives_of_a_known_distribution_are_exact() -> None:

@@ -124,7 +124,7 @@ class Page:
             self._timer.cancel()
 
     def end(self) -> None:
-        """Tell the page that the server ends, since a websocket of a notebook may stay open."""
+        """Inform the page that the server ends, since a websocket of a notebook may stay open."""
         self._reply(ended=True)
 
     # actions of the user
