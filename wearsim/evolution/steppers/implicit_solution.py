@@ -231,9 +231,12 @@ def step_by_formula(
             moved = np.abs(guess - used).max(axis=(0, 2))
             change = np.maximum(change, opening * (moved / depth))
         converged = problem.iteration_tolerance * relaxation
-        adhering = solved.adhesion_fraction.reshape(problem.shape).max(axis=(0, 1)) > ADHERING
-        wear_of_step = np.where(adhering, OF_STEP * opening, np.inf)
-        active &= ~(change <= converged * np.minimum(CONVERGED * depth, wear_of_step))
+        most_change = CONVERGED * depth
+        if solved.adhesion_fraction.max() > ADHERING:
+            adhesion = solved.adhesion_fraction.reshape(problem.shape).max(axis=(0, 1))
+            of_partial_slip = np.where(adhesion > ADHERING, OF_STEP * opening, np.inf)
+            most_change = np.minimum(most_change, of_partial_slip)
+        active &= ~(change <= converged * most_change)
         contacts = solved
         if not active.nonzero()[0].size:
             break

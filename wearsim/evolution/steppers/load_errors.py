@@ -94,7 +94,7 @@ def next_steps_of_energy(
     energy = kernel_input(sums[:, -1:, :, None])
     least = LEAST_ENERGY * end.energy * (1.0 - start.passes / end.passes)
     worn = np.maximum(end.energy - start.energy, least)[None, :, None]
-    ones, order, own = np.ones_like(worn), np.empty_like(orders), np.empty_like(worn)
+    ones, order, own = np.ones(worn.shape), np.empty_like(orders), np.empty_like(worn)
     found = next_steps(
         *(energy, spans, worn, orders, ones[0, :, 0], tolerance, keep, most, ones, own, order)
     )

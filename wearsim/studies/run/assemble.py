@@ -21,7 +21,7 @@ from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
-from wearsim.evolution.strip_errors import LOOSER, LOOSEST
+from wearsim.evolution.strip_errors import COARSE_TAPER, LOOSER, LOOSEST
 from wearsim.evolution.strips import Surfaces
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
@@ -130,7 +130,9 @@ def coarse_stepper(setup: Setup, problem: WearProblem) -> Stepper | None:
     free = replace(setup.scenario, evolution=evolution.model_copy(update={"stepper": "auto"}))
     tolerance = min(LOOSER * evolution.tolerance, LOOSEST)
     if chosen_stepper(free, problem.model, problem.contacts_each) == "implicit":
-        return ImplicitStepper(tolerance, by_doubling=_by_doubling(setup.scenario))
+        stepper = ImplicitStepper(tolerance, by_doubling=_by_doubling(setup.scenario))
+        stepper.taper = COARSE_TAPER
+        return stepper
     return StabilisedStepper(tolerance)
 
 
