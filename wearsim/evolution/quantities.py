@@ -400,7 +400,7 @@ class Kinematics:
 
     @classmethod
     def joined(cls, tests: Sequence[Kinematics]) -> Kinematics:
-        """Return the kinematics of several tests, whose tracks match."""
+        """Return the kinematics of several tests with matching tracks."""
         cams = [test.cam for test in tests if test.cam is not None]
         return replace(tests[0], cam=CamStations.joined(cams)) if cams else tests[0]
 

@@ -30,10 +30,10 @@ import numpy as np
 from wearsim.evolution.integrate import Advance, Evolution
 from wearsim.evolution.observables import greatest, greatest_between
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import elastic_approaches
+from wearsim.evolution.steppers.single_step import volumes_of
 from wearsim.evolution.strips import coarse_problem
 from wearsim.types import FloatArray, Grid
 
@@ -99,9 +99,8 @@ def sizes_of(problem: WearProblem, depths: FloatArray, between: bool = False) ->
     """
     top = greatest_between if between else partial(np.max, axis=-1)
     tops, stations = top(depths), problem.shape[0]
-    volumes = problem.volume_weights[1][:, None] * depths.sum(axis=-1)
     cylinder, rollers = greatest(problem, tops[:stations]), tops[stations:].max(axis=0)
-    return np.array([cylinder, rollers, sum_in_order(volumes, axis=0)])
+    return np.array([cylinder, rollers, volumes_of(problem, depths)])
 
 
 def _means_below_points(depths: FloatArray) -> float:

@@ -71,7 +71,7 @@ def test_slip_goes_on_through_a_jump_and_turns() -> None:
 
 
 def accelerated(reach: float, drag: float = 0.0, size: float = 1.0):
-    """Return requirements of a roller whose speed is 3 + size sin of the angle."""
+    """Return requirements of a roller at the speed 3 + size sin(angle)."""
 
     def rolling(_: Panel, theta: np.ndarray) -> Rolling:
         one = np.ones_like(theta)

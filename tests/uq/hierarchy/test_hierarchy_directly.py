@@ -10,6 +10,7 @@ from scipy import stats
 from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
+from tests.uq.hierarchy.likelihoods import normal
 from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import (
     Hierarchy,
@@ -24,11 +25,6 @@ from wearsim.uq.hierarchy.verdict import Design, Power, simulated_centres, word
 from wearsim.uq.sampling.sobol import Stream
 
 TWO = LikelihoodMixture(np.array([0.7, 0.3]), np.array([0.0, 1.0]), np.array([0.1, 0.2]))
-
-
-def normal(centre: float, std: float) -> LikelihoodMixture:
-    """Return the likelihood of a test whose apparent ln K is normal."""
-    return LikelihoodMixture(np.ones(1), np.array([centre]), np.array([std]))
 
 
 def test_draws_are_smoothed_by_silvermans_width_and_moved_to_keep_the_variance():
@@ -207,7 +203,7 @@ def test_verdict_is_equivalence_first():
 
 
 class Known(Power):
-    """Power whose normal quantile is linear in the logarithm of the number of tests."""
+    """Power with a normal quantile that is linear in the logarithm of the number of tests."""
 
     def rates(self, tests: int, t: float) -> tuple[float, float]:
         return float(ndtr(-2.0 + t * math.log(tests))), 0.0

@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 from scipy.special import chdtrc, chdtri, ndtri
 
+from tests.uq.hierarchy.likelihoods import normal
 from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import Posterior
 from wearsim.uq.hierarchy.verdict import ALPHA, Design, Power, word
 
 #: ln of the energy of the paper's tests, which wore 28, 48 and 62 um: depth ~ energy^(2/3)
 PAPER = 1.5 * np.log([28.0, 48.0, 62.0])
-
-
-def normal(centre: float, std: float) -> LikelihoodMixture:
-    """Return the likelihood of a test whose apparent ln K is normal."""
-    return LikelihoodMixture(np.ones(1), np.array([centre]), np.array([std]))
 
 
 def normal_power(tests: int, variance: float, t: float) -> float:

@@ -25,7 +25,7 @@ SINGLE = TwoLevels(np.array([M]), np.array([T]), np.ones(1))
 
 
 def one(kappa: float = 1e-4, **more: object) -> FactorMixture:
-    """Return one realisation, whose lives are log-normal."""
+    """Return one realisation with log-normal lives."""
     return FactorMixture(np.array([kappa]), SCORE, exact=True, **more)  # type: ignore[arg-type]
 
 

@@ -11,6 +11,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import (
     advanced_terms,
@@ -312,5 +313,4 @@ def energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> Flo
 
 def volumes_of(problem: WearProblem, depths: FloatArray) -> FloatArray:
     """Return the volume of depths of all bodies, as `WearState.stacked`, (realisations,) [m^3]."""
-    volumes: FloatArray = (problem.volume_weights[1][:, None] * depths.sum(axis=-1)).sum(axis=0)
-    return volumes
+    return sum_in_order(problem.volume_weights[1][:, None] * depths.sum(axis=-1), axis=0)

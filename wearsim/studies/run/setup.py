@@ -28,7 +28,7 @@ RARE = 1e-7  # fraction of the passes that may exceed the range of the strips
 
 
 class CylinderTurn:
-    """A turn of a cylinder: that of a cam with one station, whose kinematics are constant.
+    """A turn of a cylinder, as a cam with one station and constant kinematics.
 
     Parameters
     ----------

@@ -215,7 +215,7 @@ class Session:
         return json.dumps(dict(self.design.changes), ensure_ascii=False)
 
 
-#: keys whose value determines which other keys a table has
+#: keys that determine by their value which other keys a table has
 _NAMING = ("kind", "law", "model", "distribution")
 
 
