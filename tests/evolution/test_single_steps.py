@@ -16,7 +16,6 @@ from scipy.optimize import brentq
 
 from tests.evolution import built, stepped
 from tests.evolution.black_box import BlackBox, boxed
-from tests.evolution.test_fatigue import fatigue
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.error_estimates import (
     COVER,
@@ -29,15 +28,6 @@ from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import GROW, SAFETY
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, decay_rates, stability_limit
 from wearsim.evolution.steppers.implicit import ImplicitStepper
-from wearsim.evolution.steppers.per_pass import (
-    CHUNK,
-    DAMAGE_PART,
-    LOAD_TOLERANCE,
-    SLOW_CHUNK,
-    PerPassStepper,
-    run_compiled,
-    run_in_python,
-)
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import (
     StabilisedStepper,
@@ -58,14 +48,14 @@ def line_loads(gap, approach, curvature=90.0):
     return 4.0 / 3.0 * MODULUS * depth * np.sqrt(2.0 * depth / curvature)
 
 
-def solved(gap, load, spacing):
+def solved(gap, load, spacing, curvature=90.0):
     """Return line loads and approach under a load."""
 
     def excess(approach):
-        return line_loads(gap, approach).sum() * spacing - load
+        return line_loads(gap, approach, curvature).sum() * spacing - load
 
     approach = brentq(excess, gap.min(), gap.min() + 1e-3, xtol=1e-20)
-    return line_loads(gap, approach), approach
+    return line_loads(gap, approach, curvature), approach
 
 
 class Rising(BlackBox):
@@ -107,106 +97,6 @@ def rig():
 def errors_of(state):
     """Return the errors of depth, volume and profile of the only test."""
     return np.array([state.depth_error[0], state.volume_error[0], state.profile_error[0]])
-
-
-@pytest.mark.parametrize("offsets", [["0 mm", "0.5 mm", "-1 mm"], ["0 mm", "0 mm", "0 mm"]])
-def test_passes_equal_a_plain_loop(offsets, tmp_path):
-    gain, time_constant, stiffness = 500.0, 2.0, 690e3
-    log = tmp_path / "log.csv"
-    log.write_text("time [s], load [N]\n0, 300\n0.2, 310\n10, 310\n")
-    problem, _, _ = boxed(
-        foundation=True,
-        contact__strips=41,
-        operation__passes=450,
-        roller__offset=offsets,
-        wear__cylinder__k_over_h="1.1e-9 1/Pa",
-        wear__roller__k_over_h="2.2e-9 1/Pa",
-        load={
-            "kind": "recorded",
-            "file": str(log),
-            "stiffness": "690 N/mm",
-            "thermal": {"gain": "500 N/W", "time_constant": "2 s"},
-        },
-    )
-    state, spacing = fresh_state(problem), problem.grid.spacing
-    found = run_in_python(problem, run_in_python(problem, state, 4), 3)
-    gaps, turn, bodies = problem.nominal_gap[0, :, 0], 60.0 / 1000.0, problem.rollers
-    fresh = [solved(gap, LOAD, spacing)[1] - gap.min() for gap in gaps]
-    cylinder, rollers, terms, energy = np.zeros(41), np.zeros((bodies, 41)), np.zeros(bodies), 0.0
-    for number in range(7):
-        r, shared = number % bodies, 3 / bodies  # rollers on one track are merged
-        force = LOAD + 50.0 * (number + 0.5) * turn / 3.0
-        gap, free = gaps[r] + cylinder + rollers[r], force + terms[r]
-        zero = gaps[r].min() + fresh[r] * (force / LOAD) ** (2.0 / 3.0)
-
-        def excess(load, gap=gap, free=free, zero=zero):
-            return free - stiffness * (solved(gap, load, spacing)[1] - zero) - load
-
-        q = solved(gap, brentq(excess, 1.0, 2.0 * LOAD, xtol=1e-9, rtol=1e-12), spacing)[0]
-        cylinder += 100.0 * PER_LOAD * q
-        rollers[r] += 200.0 * PER_LOAD * q * RADII[0] / RADII[1] / shared
-        power = FRICTION * SLIP * q.sum() * spacing * 2.0 * math.pi * RADII[0] / turn
-        energy += power * turn
-        terms[r] += (gain * power - terms[r]) * -math.expm1(-turn / shared / time_constant)
-    assert found.passes[0] == found.steps == 7
-    assert found.solves - state.solves == found.full_solves - state.full_solves == 7
-    for name, exact in (("cylinder_depth", cylinder), ("roller_depth", rollers)):
-        np.testing.assert_allclose(
-            np.squeeze(getattr(found, name)), np.squeeze(exact), rtol=1e-5, atol=1e-6 * exact.max()
-        )
-    np.testing.assert_allclose(found.terms[0, :, 0], terms, rtol=1e-5)
-    assert found.energy[0] == pytest.approx(energy, rel=1e-6)
-
-
-@pytest.mark.parametrize("tilt", ["tilt", "differential_slip"])
-def test_compiled_passes_equal_python_ones(tilt):
-    changes = {"tilt": ["1 mrad", "1 mrad", "-2 mrad"], "differential_slip": True}
-    problem, _, _ = built(
-        contact__strips=41,
-        roller__offset=["0 mm", "0 mm", "1 mm"],
-        load__kind="spring",
-        load__stiffness="690 N/mm",
-        wear__cylinder__k_over_h="1e-9 1/Pa",
-        wear__roller__k_over_h="5e-10 1/Pa",
-        **{f"creepage__{tilt}": changes[tilt]},
-        **{"load.thermal": {"gain": "50 N/W", "time_constant": "2 s"}},
-    )
-    state = fresh_state(problem)
-    slow = run_in_python(problem, state, 7)
-    middle = run_compiled(problem, state, 3)
-    fast = run_compiled(problem, middle, 4)
-    for name in ("cylinder_depth", "roller_depth", "terms", "energy"):
-        one, other = getattr(slow, name), getattr(fast, name)
-        # the load of a spring has this accuracy
-        assert np.abs(one - other).max() < LOAD_TOLERANCE * np.abs(one).max(), name
-    assert (fast.steps, fast.solves, fast.passes[0]) == (7, state.solves + 7, 7.0)
-    # the first pass of each roller is solved fully
-    assert middle.full_solves - state.full_solves == 2
-    unbroken = run_compiled(problem, state, 7)
-    for name in ("cylinder_depth", "roller_depth", "terms", "energy", "full_solves"):
-        assert (getattr(unbroken, name) == getattr(fast, name)).all()
-
-
-def test_records_of_passes_have_the_strips_of_the_run(rig):
-    problem, other = rig.problem, boxed(foundation=True, contact__strips=43)[0]
-    stepper = PerPassStepper(expectation=other)
-    assert PerPassStepper().recorded(problem) is problem
-    found = stepper.recorded(problem)
-    assert found.grid is problem.grid
-    assert stepper.recorded(problem) is found
-
-
-def test_passes_are_taken_together_up_to_a_check_or_the_stop(rig):
-    stepper, (compiled, _, _) = PerPassStepper(), built(contact__strips=41)
-    damaged, _, _ = built(contact__strips=41, **fatigue())
-    state = rig.state.replaced(passes=np.array([12_345.0]))
-    assert stepper.proposed(rig.problem, state) == SLOW_CHUNK
-    assert stepper.proposed(compiled, state) == CHUNK
-    assert stepper.proposed(damaged, state) == math.floor(12_345 * DAMAGE_PART)
-    assert stepper.proposed(damaged, rig.state) == 1.0
-    end, advances = stepped(rig.problem, stepper, 2.5)
-    assert (len(advances), end.passes[0]) == (1, 3.0)
-    assert np.count_nonzero(errors_of(end)) == 0
 
 
 def test_explicit_step_is_the_wear_at_its_start(rig):
