@@ -1,0 +1,144 @@
+"""Equations of implicit steps: wear, energy, loads and terms at the end of each step."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.evolution import built
+from tests.evolution.test_step_loads import Line
+from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step
+from wearsim.evolution.steppers.single_step import energy_per_pass, solve_present
+
+STIFFNESS, GAIN, LAG = 20e6, 500.0, 2.0
+SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
+THERMAL = {"load__thermal": {"gain": "500 N/W", "time_constant": "2 s"}}
+THREE = {
+    "roller__offset": ["-1 mm", "0.3 mm", "1 mm"],
+    "wear__roller__k_over_h": "3e-11 1/Pa",
+}
+CASES = {
+    "constant": {},
+    "three": THREE,
+    "spring": SPRING,
+    "spring, three": {**SPRING, **THREE},
+    "thermal": {**THERMAL, **THREE},
+    "spring, thermal": {**SPRING, **THERMAL},
+    "partial slip": {"creepage__longitudinal": 3e-4},
+    "differential slip": {"creepage__differential_slip": True, **THREE},
+    "ramp": THREE,
+    "other law": {"wear": {"law": "t-gamma", "cylinder": {}, "roller": {}}},
+}
+
+
+def derivative(points, values):
+    """Return the derivative at the last point of the polynomial through all of them."""
+    last = points[-1]
+    total = 0.0
+    for k, (point, value) in enumerate(zip(points, values, strict=True)):
+        others = [other for j, other in enumerate(points) if j != k]
+        if point == last:
+            weight = sum(1.0 / (last - other) for other in others)
+        else:
+            product = math.prod((last - other) for other in others if other != last)
+            weight = product / math.prod(point - other for other in others)
+        total = total + weight * value
+    return total
+
+
+def solved_again(problem, state):
+    """Return contacts on the profiles of a state under its loads, with rates of wear and energy."""
+    carried = state.contacts.line_load.sum(axis=-1) * problem.grid.spacing
+    contacts = solve_present(problem, state, carried.reshape(problem.shape), cold=True)
+    cylinder, roller = problem.sum_of_parts(*problem.wear_parts(contacts, 1.0))
+    rates = np.concatenate([cylinder[:, 0], roller[0]])
+    return contacts, carried.reshape(problem.shape), rates, energy_per_pass(problem, contacts)
+
+
+class Ramp(Line):
+    """Load that rises steadily."""
+
+    def deviation(self, start, stop):
+        return abs(self.rate) * (stop - start) / math.sqrt(12.0)
+
+
+def started(case):
+    """Return problem and start of a case, for two tests where load terms allow it."""
+    problem, _, _ = built(contact__strips=41, **CASES[case])
+    realisations = 1 if problem.terms else 2
+    problem = problem.at(np.zeros(realisations, dtype=np.int64))
+    if case == "ramp":
+        problem = replace(problem, loads=(Ramp(300.0, 4.0), Ramp(300.0, -3.0)))
+    friction = np.array([[0.1, 0.07]])[:, :realisations]
+    inputs = problem.inputs.with_values({"friction": friction})
+    problem = replace(problem, inputs=inputs, iteration_tolerance=1e-11)
+    return problem, ImplicitStepper(1e-3).started(problem, fresh_state(problem))
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_steps_solve_the_formulas_of_their_order(case):
+    problem, state = started(case)
+    many, states = len(state.passes), [state]
+    for order, passes in ((1, [200.0, 300.0]), (2, [300.0, 400.0]), (3, [350.0, 450.0])):
+        given = state.replaced(order=np.full(many, order))
+        state = implicit_step(problem, given, np.array(passes[:many]))
+        assert state.order.tolist() == [order] * many
+        states.append(state)
+    found = [solved_again(problem, one) for one in states]
+    times = [problem.time(one.passes) for one in states]
+    forces = [problem.force(time) for time in times]
+    # the load, and its integral over the passes
+    means = [problem.mean_force(*two) for two in itertools.pairwise(times)]
+    steps = np.diff([one.passes for one in states], axis=0)
+    places = np.vstack([np.zeros(many), np.cumsum(np.array(means) * steps, axis=0)])
+    for order, v in itertools.product((1, 2, 3), range(many)):
+        points = places[: order + 1, v]
+        depths = [one.stacked[:, v] for one in states], [one[2][:, v] for one in found]
+        energies = [one.energy[v] for one in states], [one[3][v] for one in found]
+        past = states[1].past_wear[:, :, v], states[1].past_sums[:, -1, v]
+        for (values, rates), rows in zip((depths, energies), past, strict=True):
+            # passes are counted one by one: half a pass later
+            pairs = zip(values[: order + 1], rates, strict=False)
+            later = [value + 0.5 * rate for value, rate in pairs]
+            slope = rates[order] / forces[order][v]
+            error = derivative(points, later) - slope
+            assert np.abs(error).max() < 1e-7 * np.abs(slope).max()
+            first = (later[1] - later[0]) / (points[1] - points[0])
+            scale = np.abs(rates[1]).max()
+            np.testing.assert_allclose(rows[0], rates[1], rtol=0.0, atol=1e-7 * scale)
+            atol = 1e-7 * scale / forces[0][v]
+            np.testing.assert_allclose(rows[1], first, rtol=0.0, atol=atol)
+    spans = (places[3] - places[:3])[::-1]
+    np.testing.assert_allclose(states[-1].past_spans[:3], spans, rtol=1e-12)
+    for before, after in itertools.pairwise(range(4)):
+        pair = (states[before], found[before]), (states[after], found[after])
+        assert_in_equilibrium(problem, *pair, forces[after])
+
+
+def assert_in_equilibrium(problem, before, after, force):
+    """Check loads and terms at the end of a step, and their part due to feedback."""
+    (start, (old, *_)), (end, (contacts, carried, *_)) = before, after
+    terms = end.terms
+    if problem.terms:
+        power = 0.5 * (old.power + contacts.power).reshape(problem.shape)[0]
+        decay = np.exp(-(end.passes - start.passes) / problem.kinematics.pass_rate / LAG)
+        expected = GAIN * power + (start.terms[0] - GAIN * power) * decay
+        np.testing.assert_allclose(terms[0], expected, rtol=1e-7)
+    loads = np.broadcast_to(force, problem.shape)
+    for term in terms:
+        loads = loads + term
+    if problem.has_spring:
+        approach = contacts.approach.reshape(problem.shape) - problem.nominal_least_gap
+        fresh = end.approach_factor * force ** (2.0 / 3.0)
+        loads = loads - STIFFNESS * (approach - fresh)
+    np.testing.assert_allclose(carried, loads, rtol=1e-8)
+    if end.past_feedback is not None:
+        exact = loads - force
+        np.testing.assert_allclose(
+            end.past_feedback[0], exact, rtol=0.0, atol=1e-7 * abs(exact).max()
+        )
