@@ -9,11 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.evolution import built
+from tests.evolution import built, stepped
 from tests.evolution.test_step_loads import Line
+from wearsim.errors import ContactError, StepError
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers import edges
+from wearsim.evolution.steppers.conditions import conditions_of
 from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step
+from wearsim.evolution.steppers.implicit_solution import step_by_formula
 from wearsim.evolution.steppers.single_step import energy_per_pass, solve_present
+from wearsim.models.contact.slender import Slender
 
 STIFFNESS, GAIN, LAG = 20e6, 500.0, 2.0
 SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
@@ -142,3 +147,68 @@ def assert_in_equilibrium(problem, before, after, force):
         np.testing.assert_allclose(
             end.past_feedback[0], exact, rtol=0.0, atol=1e-7 * abs(exact).max()
         )
+
+
+class Failing(Slender):
+    """Model that fails in its first solutions."""
+
+    def __init__(self, model, error, times=1):
+        vars(self).update(vars(model))
+        self.error, self.left = error, times
+
+    def solve(self, *arguments, **options):
+        self.left -= 1
+        if self.left >= 0:
+            raise self.error
+        return super().solve(*arguments, **options)
+
+
+@pytest.fixture(scope="module")
+def grooved():
+    """Problem, and its state in a groove in which edges of the contact are resolved."""
+    changes = {"wear__cylinder__k_over_h": "1.1e-9 1/Pa", "operation__passes": 13_500}
+    problem, stepper, _ = built(contact__strips=61, **changes)
+    state, _ = stepped(problem, stepper, 2000.0)
+    assert not edges.unresolved(state).any()
+    return problem, state
+
+
+def failing(problem, error, **options):
+    return replace(problem, model=Failing(problem.model, error, **options))
+
+
+@pytest.mark.parametrize("error", [ContactError("none"), StepError("lost", cause="lost")])
+def test_step_that_fails_is_repeated_at_first_order_on_whole_strips(grooved, error):
+    passes = np.array([20.0])
+    for whole in (False, True):
+        problem, state = grooved
+        if whole:
+            state = edges.without_edges(problem, state)
+            state = state.replaced(cylinder_depth=0.0 * state.cylinder_depth)  # without a groove
+        for order in (1, 2):
+            start = state.replaced(order=np.array([order]))
+            if whole and order == 1:
+                with pytest.raises(type(error)):
+                    implicit_step(failing(problem, error), start, passes)
+                continue
+            found = implicit_step(failing(problem, error), start, passes)
+            first = edges.without_edges(problem, start).replaced(order=np.array([1]))
+            exact = step_by_formula(
+                *(problem, first, passes),
+                *(conditions_of(problem, problem, first, passes), np.array([1])),
+            )[0]
+            np.testing.assert_array_equal(found.cylinder_depth, exact.cylinder_depth)
+            assert found.order[0] == 1
+            with pytest.raises(type(error)):
+                implicit_step(failing(problem, error, times=2), start, passes)
+
+
+def test_step_that_fails_is_not_repeated_at_the_outer_strips_or_with_others(grooved):
+    problem, state = grooved
+    start, passes = state.replaced(order=np.array([2])), np.array([20.0])
+    with pytest.raises(StepError, match="outer"):
+        implicit_step(failing(problem, StepError("outer", cause="edge")), start, passes)
+    both = np.zeros(2, dtype=np.int64)
+    two = failing(problem.at(both), ContactError("none"))
+    with pytest.raises(ContactError):
+        implicit_step(two, start.at(both), passes.repeat(2))

@@ -121,13 +121,14 @@ def test_passes_equal_a_plain_loop(case, tmp_path):
     assert found.energy[0] == pytest.approx(energy, rel=1e-6)
 
 
-def test_passes_along_a_cam_equal_a_plain_loop():
+@pytest.mark.parametrize("spring", [0, 200])
+def test_passes_along_a_cam_equal_a_plain_loop(spring):
     factor = 4e-7
     problem, _, _ = built(
         "cam-cycloidal",
         creepage={"longitudinal": SLIP},
         contact__strips=41,
-        load__stiffness="200 N/mm",
+        load__stiffness=f"{spring} N/mm",
         wear__cylinder__k_over_h=f"{factor} 1/Pa",
         wear__roller__k_over_h=f"{2.0 * factor} 1/Pa",
         cam__motion=[
