@@ -206,3 +206,7 @@ def test_steps_aim_at_less_where_errors_have_added_up(rig):
     np.testing.assert_allclose(found, [0.5, LEAST_AIM, 0.5, 0.5, 1.0], rtol=1e-9)
     young = worn.replaced(profile_error=np.full(5, 0.49 * low * tolerance))
     assert (ImplicitStepper(tolerance)._left(problem, young, stop, OF_STEPS) == 1.0).all()
+    errors = {"profile_error": np.array([0.45 * tolerance]), "volume_error": of_volume[:1]}
+    both = worn.at(np.array([0])).replaced(quadrature=0.0 * fixed[:, :1], **errors)
+    found = ImplicitStepper(tolerance)._left(problem.at(np.array([0])), both, stop, OF_STEPS)
+    np.testing.assert_allclose(found, 0.5, rtol=1e-9)

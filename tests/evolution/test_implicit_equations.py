@@ -72,9 +72,22 @@ class Ramp(Line):
         return abs(self.rate) * (stop - start) / math.sqrt(12.0)
 
 
+class Counting(Slender):
+    """Model that counts the contacts that it solves."""
+
+    def __init__(self, model):
+        vars(self).update(vars(model))
+        self.solved = 0
+
+    def solve(self, batch, *arguments, **options):
+        self.solved += len(batch)
+        return super().solve(batch, *arguments, **options)
+
+
 def started(case):
     """Return problem and start of a case, for two tests where load terms allow it."""
     problem, _, _ = built(contact__strips=41, **CASES[case])
+    problem = replace(problem, model=Counting(problem.model))
     realisations = 1 if problem.terms else 2
     problem = problem.at(np.zeros(realisations, dtype=np.int64))
     if case == "ramp":
@@ -88,12 +101,13 @@ def started(case):
 @pytest.mark.parametrize("case", list(CASES))
 def test_steps_solve_the_formulas_of_their_order(case):
     problem, state = started(case)
-    many, states = len(state.passes), [state]
+    many, states, solved = len(state.passes), [state], problem.model.solved
     for order, passes in ((1, [200.0, 300.0]), (2, [300.0, 400.0]), (3, [350.0, 450.0])):
         given = state.replaced(order=np.full(many, order))
         state = implicit_step(problem, given, np.array(passes[:many]))
         assert state.order.tolist() == [order] * many
         states.append(state)
+    assert (state.solves - states[0].solves).sum() == problem.model.solved - solved
     found = [solved_again(problem, one) for one in states]
     times = [problem.time(one.passes) for one in states]
     forces = [problem.force(time) for time in times]
