@@ -16,7 +16,7 @@ from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.conditions import conditions_of
 from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step
-from wearsim.evolution.steppers.implicit_solution import step_by_formula
+from wearsim.evolution.steppers.implicit_solution import CONVERGED, step_by_formula
 from wearsim.evolution.steppers.single_step import energy_per_pass, solve_present
 from wearsim.models.contact.slender import Slender
 
@@ -226,3 +226,36 @@ def test_step_that_fails_is_not_repeated_at_the_outer_strips_or_with_others(groo
     two = failing(problem.at(both), ContactError("none"))
     with pytest.raises(ContactError):
         implicit_step(two, start.at(both), passes.repeat(2))
+
+
+class Noisy(Counting):
+    """Model whose power alternates between two values that differ a little."""
+
+    def __init__(self, model, noise):
+        super().__init__(model)
+        self.noise = noise
+
+    def solve(self, *arguments, **options):
+        found = super().solve(*arguments, **options)
+        factor = 1.0 + 0.5 * self.noise * (-1.0) ** self.solved
+        return replace(found, dissipation=factor * found.dissipation)
+
+
+def test_tolerance_of_an_iteration_is_relaxed_every_twenty_times(grooved):
+    problem, _, _ = built(contact__strips=41)
+    step, exact = np.array([100.0]), problem.iteration_tolerance * CONVERGED
+    state = fresh_state(problem)  # without depths: the wear of the step is all of the depth
+    for noise, solves in ((0.5, 1), (5.0, 21), (50.0, 41)):
+        noisy = replace(problem, model=Noisy(problem.model, noise * exact))
+        end = implicit_step(noisy, state, step)
+        assert end.solves - state.solves == solves
+    noisy = replace(problem, model=Noisy(problem.model, 500.0 * exact))
+    with pytest.raises(StepError, match="did not converge"):
+        implicit_step(noisy, state, step)
+    assert noisy.model.solved == 60
+    cut, state = grooved
+    noisy = replace(cut, model=Noisy(cut.model, 0.1))
+    end = implicit_step(noisy, state.replaced(order=np.array([1])), step)
+    # where strips are cut, the step is repeated on whole strips instead
+    assert end.solves - state.solves == 21
+    assert noisy.model.solved == 20 + 21
