@@ -70,7 +70,7 @@ def plain():
 def test_early_errors_may_be_greater(plain):
     stepper = ImplicitStepper(TOLERANCE)
     late, early = (tried(stepper, *plain, stop=stop) for stop in (STOP, 16.0 * STOP))
-    assert late.excess == pytest.approx(16.0**PART_EXPONENT * early.excess, rel=1e-12)
+    assert late.excess == pytest.approx(16.0**PART_EXPONENT * early.excess, rel=1e-12, abs=0.0)
     assert len(late.path) == 1
     (end,) = late.path
     assert end.steps == 1
@@ -82,7 +82,7 @@ def test_early_errors_may_be_greater(plain):
     ):
         assert 1e-8 * size < error < 0.1 * size
     tighter = tried(ImplicitStepper(0.1 * TOLERANCE), *plain)
-    assert tighter.excess == pytest.approx(10.0 * late.excess, rel=1e-12)
+    assert tighter.excess == pytest.approx(10.0 * late.excess, rel=1e-12, abs=0.0)
 
 
 def test_errors_so_far_shorten_the_next_step_alone(plain):
@@ -91,10 +91,10 @@ def test_errors_so_far_shorten_the_next_step_alone(plain):
     aimed = 1.125 * TIGHT * 6.0 / part  # half of the aim is left
     known = state.replaced(profile_error=np.array([aimed]))
     one, other = tried(stepper, problem, state), tried(stepper, problem, known)
-    assert other.excess == pytest.approx(one.excess, rel=1e-12)
+    assert other.excess == pytest.approx(one.excess, rel=1e-12, abs=0.0)
     order = one.path[0].order[0]
     assert other.path[0].order[0] == order
-    assert other.ratio == pytest.approx(one.ratio * 0.5 ** (1.0 / (order + 1)), rel=1e-12)
+    assert other.ratio == pytest.approx(one.ratio * 0.5 ** (1.0 / (order + 1)), rel=1e-12, abs=0.0)
 
 
 def test_errors_that_no_step_reduces_are_added_once(plain):
@@ -104,7 +104,9 @@ def test_errors_that_no_step_reduces_are_added_once(plain):
         quadrature=fixed, volume_error=fixed[1] + 1e-15, profile_error=fixed[2], order=state.order
     )
     one, other = (tried(stepper, problem, start).path[0] for start in (state, known))
-    assert other.volume_error == pytest.approx(one.volume_error + 1e-15 + fixed[1], rel=1e-9)
+    assert other.volume_error == pytest.approx(
+        one.volume_error + 1e-15 + fixed[1], rel=1e-9, abs=0.0
+    )
     assert other.depth_error >= one.depth_error + fixed[0]
     assert other.profile_error >= one.profile_error + fixed[2]
     assert other.depth_error <= 3.0 * (one.depth_error + fixed[0])
@@ -185,11 +187,11 @@ def test_doubled_step_has_the_greater_of_two_errors(plain, step, jumps):
     assert rough == jumps
     energy = next_steps_of_energy(half, end, TOLERANCE, KEEP, np.array([MAX_ORDER]))
     (of_energy, their_ratio), their_order = energy
-    assert found.excess == pytest.approx(np.maximum(over, of_energy), rel=1e-9)
+    assert found.excess == pytest.approx(np.maximum(over, of_energy), rel=1e-9, abs=0.0)
     expected = order if ratio <= their_ratio else their_order
     assert end.order == expected
     assert all(one.order == expected for one in end.auxiliary.values())
-    assert found.ratio == pytest.approx(np.minimum(ratio, their_ratio), rel=1e-9)
+    assert found.ratio == pytest.approx(np.minimum(ratio, their_ratio), rel=1e-9, abs=0.0)
     forced = tried(ImplicitStepper(TOLERANCE, 400.0), problem, state, step)
     assert forced.path[1].order == min(order[0], MAX_ORDER - 2)
 
@@ -209,8 +211,8 @@ def test_rows_of_a_log_shorter_than_a_step_leave_most_of_its_error(plain, case):
         stepper = ImplicitStepper(tolerance)
         found = tried(stepper, problem, known)
         over, ratio, order, _ = doubled_errors(stepper, problem, known, step, found, left, cover)
-        assert found.excess == pytest.approx(over, rel=1e-9)
-        assert found.ratio == pytest.approx(ratio, rel=1e-9)
+        assert found.excess == pytest.approx(over, rel=1e-9, abs=0.0)
+        assert found.ratio == pytest.approx(ratio, rel=1e-9, abs=0.0)
         assert found.path[1].order == order
 
 

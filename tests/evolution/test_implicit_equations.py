@@ -30,6 +30,7 @@ THREE = {
 CASES = {
     "constant": {},
     "three": THREE,
+    "two": {**THREE, "operation__rollers": 2, "roller__offset": ["0 mm", "0.5 mm"]},
     "spring": SPRING,
     "spring, three": {**SPRING, **THREE},
     "thermal": {**THERMAL, **THREE},

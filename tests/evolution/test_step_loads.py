@@ -168,7 +168,7 @@ def test_displacement_is_the_descent_less_the_recovery(three):
     found = displacement_at(problem, [depths, state.depths], recovered)[0, :, 0]
     np.testing.assert_allclose(found, 0.5 * exact - recovered[0, :, 0], rtol=1e-9)
     approach = state.contacts.approach - gaps.min(axis=1)
-    assert elastic_approach(problem, state)[0] == pytest.approx(approach.min(), rel=1e-12)
+    assert elastic_approach(problem, state)[0] == pytest.approx(approach.min(), rel=1e-12, abs=0.0)
     force = np.array([400.0])
     fresh = approach * ((400.0 + RISE[:, 0]) / (300.0 + RISE[:, 0])) ** (2.0 / 3.0)
     np.testing.assert_allclose(fresh_approach(problem, state, force)[0, :, 0], fresh, rtol=1e-12)
@@ -203,25 +203,29 @@ def test_exposure_is_the_mean_load_times_friction():
     mean = float(RISE.mean())
     constant = conditions_of(problem, problem, state, passes)
     assert constant.force[0] == 300.0
-    assert constant.own[0] == constant.mean[0] == pytest.approx(300.0 + mean, rel=1e-14)
+    assert constant.own[0] == constant.mean[0] == pytest.approx(300.0 + mean, rel=1e-14, abs=0.0)
     rising = PiecewiseLinear(np.array([0.0, 100.0]), np.array([0.1, 0.3]))
     varying = replace(problem, varying=(Varying("friction", (1,), (rising,)),))
     here = varying.at_time(*(np.array([n]) / rate for n in (100.0, 300.0)))
     friction = (0.1 + 0.1 + 0.1 + 0.002 * 200.0 / rate) / 3.0
     found = conditions_of(here, varying, state, passes)
-    assert found.own[0] == found.mean[0] == pytest.approx((300.0 + mean) * friction, rel=1e-12)
+    assert (
+        found.own[0]
+        == found.mean[0]
+        == pytest.approx((300.0 + mean) * friction, rel=1e-12, abs=0.0)
+    )
     creeping = replace(problem, varying=(Varying("longitudinal", (1,), (rising,)),))
     found = conditions_of(creeping, creeping, state, passes)
-    assert found.own[0] == found.mean[0] == pytest.approx(300.0 + mean, rel=1e-14)
+    assert found.own[0] == found.mean[0] == pytest.approx(300.0 + mean, rel=1e-14, abs=0.0)
     line = with_loads(problem, Line(300.0, 4.0, 4.0 * 200.0 / rate / math.sqrt(12.0)))
     found = conditions_of(line, line, state, passes)
-    assert found.force[0] == pytest.approx(300.0 + 4.0 * 300.0 / rate, rel=1e-14)
-    assert found.own[0] == pytest.approx(found.force[0] + mean, rel=1e-14)
-    assert found.mean[0] == pytest.approx(300.0 + 4.0 * 200.0 / rate + mean, rel=1e-14)
+    assert found.force[0] == pytest.approx(300.0 + 4.0 * 300.0 / rate, rel=1e-14, abs=0.0)
+    assert found.own[0] == pytest.approx(found.force[0] + mean, rel=1e-14, abs=0.0)
+    assert found.mean[0] == pytest.approx(300.0 + 4.0 * 200.0 / rate + mean, rel=1e-14, abs=0.0)
     rough = with_loads(problem, Line(300.0, 4.0, 10.0))
     found = conditions_of(rough, rough, state, passes)
-    assert found.force[0] == pytest.approx(300.0 + 4.0 * 200.0 / rate, rel=1e-14)
-    assert found.own[0] == found.mean[0] == pytest.approx(found.force[0] + mean, rel=1e-14)
+    assert found.force[0] == pytest.approx(300.0 + 4.0 * 200.0 / rate, rel=1e-14, abs=0.0)
+    assert found.own[0] == found.mean[0] == pytest.approx(found.force[0] + mean, rel=1e-14, abs=0.0)
 
 
 def test_exposure_of_a_cam_is_the_mean_over_its_turn():
@@ -230,7 +234,7 @@ def test_exposure_of_a_cam_is_the_mean_over_its_turn():
     found = conditions_of(problem, problem, state, np.array([10.0]))
     cam = problem.kinematics.cam
     mean = (cam.time_share * problem.force(np.zeros(1))).sum()
-    assert found.own[0] == pytest.approx(mean, rel=1e-12)
+    assert found.own[0] == pytest.approx(mean, rel=1e-12, abs=0.0)
     assert found.force.shape == (problem.shape[0], 1, 1)
 
 
@@ -245,7 +249,7 @@ def test_loads_of_springs_fall_first_by_the_wear_under_the_load(three):
         load = q[c].sum() * problem.grid.spacing
         slope = 2.0 / 3.0 * (state.contacts.approach[c] - problem.nominal_gap[0, c, 0].min()) / load
         expected = -STIFFNESS * descent / (1.0 + STIFFNESS * slope) / 250.0
-        assert found[c] == pytest.approx(expected, rel=1e-10)
+        assert found[c] == pytest.approx(expected, rel=1e-10, abs=0.0)
 
 
 def stepped_once(problem, spans, sums=None, feedback=None, energy=(2.0, 5.0)):
@@ -284,13 +288,15 @@ def test_error_of_the_loads_is_relative_to_each_of_them(three):
         factor = 10.0 / (1.0 / 10.0 + 1.0 / spans[1, v])
         errors = factor * feedback[2, 0, :, v]
         size = math.sqrt(np.square(errors / scale).mean()) * part[v] / aim
-        assert over[v] == pytest.approx(size / LIMIT, rel=1e-12)
+        assert over[v] == pytest.approx(size / LIMIT, rel=1e-12, abs=0.0)
         best = 2 if size <= LIMIT else 1
         assert order[v] == best
-        assert ratio[v] == pytest.approx(min(SAFETY * size**-0.5, GROW[best - 1]), rel=1e-12)
+        assert ratio[v] == pytest.approx(
+            min(SAFETY * size**-0.5, GROW[best - 1]), rel=1e-12, abs=0.0
+        )
         # without a past point the slope at the start is estimated
         true = np.abs(errors).max() / stiffness[v] if v in {0, 3} else 0.0
-        assert displaced[v] == pytest.approx(true, rel=1e-12)
+        assert displaced[v] == pytest.approx(true, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("energy", [(2.0, 5.0), (4.99, 5.0)])
@@ -302,7 +308,7 @@ def test_error_of_the_energy_is_relative_to_that_of_the_step(energy):
     (over, ratio), order = next_steps_of_energy(start, end, 1e-4, 0.9, np.array([4]))
     worn = max(energy[1] - energy[0], LEAST_ENERGY * energy[1] * (1.0 - 400.0 / 500.0))
     size = 2e-6 * 10.0 / (1.0 / 10.0 + 1.0 / 25.0) / worn / 1e-4
-    assert over[0] == pytest.approx(size / LIMIT, rel=1e-12)
+    assert over[0] == pytest.approx(size / LIMIT, rel=1e-12, abs=0.0)
     best = 2 if size <= LIMIT else 1
     assert order[0] == best
-    assert ratio[0] == pytest.approx(min(SAFETY * size**-0.5, GROW[best - 1]), rel=1e-12)
+    assert ratio[0] == pytest.approx(min(SAFETY * size**-0.5, GROW[best - 1]), rel=1e-12, abs=0.0)
