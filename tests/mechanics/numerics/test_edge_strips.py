@@ -30,7 +30,7 @@ from wearsim.mechanics.numerics.edge_strips import (
     sum_of_wear,
 )
 
-TESTS, STRIPS, ROLLERS = 3, 6, 2
+TESTS, STRIPS, ROLLERS = 3, 12, 2
 CONTACTS, SIZE = ROLLERS * TESTS, 1e-6
 ROLLERS_OF_ONE = np.array([[0, 1], [0, 2]])
 STATIONS = np.array([[0, 2], [1, 2]])  # of a cam that one roller passes
@@ -46,6 +46,7 @@ class Edges:
         self.part[rng.random(self.part.shape) < 0.25] = 0.0
         self.part[rng.random(self.part.shape) < 0.25] = 1.0
         self.separation = np.where(self.part < 1.0, SIZE * rng.random(self.part.shape), 0.0)
+        self.separation[:, ::2] *= 0.1  # some are far smaller than those ahead
         self.approach = SIZE * (2.0 + rng.random(CONTACTS))
         self.wear = SIZE * rng.random((2, CONTACTS, STRIPS)) * (self.part > 0.0)
         self.loads = np.where(rng.random(self.part.shape) < 0.7, 1.0 + self.part, 0.0)
