@@ -11,6 +11,7 @@ from wearsim.mechanics.slender.influence import (
     influence_table,
     mean_asinh,
     middle_curvature,
+    no_table,
     read_influence,
     read_value,
 )
@@ -89,6 +90,14 @@ def test_table_interpolates_the_function(tau, tabulated, function):
     if LOWEST < tau < HIGHEST:
         slope = direct(tau + step, 40, function) - direct(tau - step, 40, function)
         np.testing.assert_allclose(tangent, expected + 0.25 * slope / step, atol=2e-7)
+
+
+def test_tables_are_shared_and_kept() -> None:
+    for tabulated in (influence_table, curvature_table, no_table):
+        table = tabulated(5)
+        assert tabulated(5) is table
+        assert not table.flags.writeable
+    assert no_table(5).shape == (0, 2, 9)
 
 
 def test_vanishing_half_length_is_a_line_load():
