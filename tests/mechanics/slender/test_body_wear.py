@@ -25,6 +25,7 @@ BODIES = {
     "one station and two rollers": [[0, 1], [0, 2], [0, 2]],
     "a contact by itself": [[0, 1], [0, 1], [-1, -1]],
     "a body that wears alone": [[0, 2], [-1, 2], [0, -1], [1, 2]],
+    "bodies that two contacts share in a few strips": [[0, 2], [0, 3], [1, 2]],
 }
 
 
@@ -56,6 +57,9 @@ class Contacts:
         """Return the system of the bodies' depths, and the softness of the contacts."""
         state, softness = self.state, np.full((self.count, STRIPS), -1.0)
         system = new_depth_system(self.bodies, STRIPS)
+        for array in (system.block, system.across, system.outer, system.depth, system.sums):
+            array[:] = np.nan  # of another step
+        system.outer_depth[:], system.response[:], system.approach_slope[:] = np.nan, np.nan, np.nan
         state.fresh[:] = False
         number_depths(self.bodies, self.own, self.shared, state, system, softness)
         for k in range(self.count):

@@ -43,6 +43,7 @@ SPANS = {
 def new_lengths(spacing: float = SPACING) -> HalfLengths:
     lengths: HalfLengths = new_half_lengths(TABLE, 2)
     fill_log_scales(MODULUS, CURVATURE, spacing, lengths.log_scale)
+    lengths.log_ratio[:], lengths.factor[:], lengths.work[:] = np.nan, np.nan, np.nan
     return lengths
 
 
@@ -82,6 +83,7 @@ def loads_of(span: slice) -> np.ndarray:
     line_load[:, span] = 2e4 * (1.0 + np.random.default_rng(3).random((2, STRIPS))[:, span])
     if (line_load[0] > 0.0).sum() > 8:
         line_load[:, (span.start + span.stop) // 2 + 1] = 0.0
+        line_load[:, [span.start, span.stop - 1]] = 0.4  # far less than others
     return line_load
 
 

@@ -115,10 +115,7 @@ def fill_half_lengths(
     for k in range(line_load.shape[0]):
         one_newton = spacing * np.exp(lengths.log_scale[k])
         for j in range(line_load.shape[1]):
-            half_length[k, j] = 0.0
-            if line_load[k, j] > 0.0:
-                square = line_load[k, j] * lengths.factor[k, j]
-                half_length[k, j] = one_newton * np.sqrt(square)
+            half_length[k, j] = one_newton * np.sqrt(line_load[k, j] * lengths.factor[k, j])
 
 
 @subroutine
