@@ -1,7 +1,8 @@
 """Kernels of an implicit step, interpreted, against plain formulas for each test.
 
-A cylinder and two rollers wear in three tests, of which the last one does not resolve edges; or
-strips in contact as wholes are counted, or edges are not followed.
+A cylinder and two rollers, or two stations of a cam and a roller, wear in three tests, of which the
+last one does not resolve edges; or strips in contact as wholes are counted, or edges are not
+followed.
 """
 
 from __future__ import annotations
@@ -34,21 +35,23 @@ from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_
 from wearsim.mechanics.numerics.multistep import ROWS, formulas, new_differences
 
 TESTS, STRIPS, SIZE = 3, 5, 1e-6
-BODIES = np.array([[0, 1], [0, 2]])
-SHAPE, CONTACTS = (3, TESTS, STRIPS), len(BODIES) * TESTS
+ROLLERS, STATIONS = np.array([[0, 1], [0, 2]]), np.array([[0, 2], [1, 2]])
+SHAPE, CONTACTS = (3, TESTS, STRIPS), len(ROLLERS) * TESTS
 
 
 class Step:
-    """Random arrays of a step, with edges that are "resolved", "counted" or of "none"."""
+    """Random arrays of a step, with edges that are "resolved", of a "cam", "counted" or "none"."""
 
     def __init__(self, edges: str) -> None:
         rng = np.random.default_rng(6)
         self.edges, contacts = edges, (CONTACTS, STRIPS)
+        self.bodies = STATIONS if edges == "cam" else ROLLERS
         self.orders, self.passes = np.array([2, 3, 2]), WHOLE_PASSES * np.array([3.0, 0.4, 1.0])
         self.spans = np.cumsum(WHOLE_PASSES * (2.0 + rng.random((ROWS - 1, TESTS))), axis=0)
         self.exposure, self.mean_exposure = 1.0 + rng.random((2, TESTS))
         self.past_wear = SIZE * rng.standard_normal((ROWS, *SHAPE))
         self.past_wear[0] = np.abs(self.past_wear[0])
+        self.past_wear[0, 2, 0] = 0.0  # a roller that does not wear in one test
         self.past_sums = SIZE * rng.standard_normal((ROWS, 4, TESTS, 1))
         self.past_feedback = rng.standard_normal((ROWS, 2, TESTS, 1))
         self.depths, self.gap = SIZE * rng.random(SHAPE), SIZE * rng.random(contacts)
@@ -63,7 +66,7 @@ class Step:
         if edges == "counted":  # in one test only
             self.part = np.where(rng.random(contacts) < 0.6, 1.0, 0.0)
             self.in_groove[1] = True
-        if edges != "resolved":
+        if edges in {"counted", "none"}:
             self.separation = self.separation[:, :0]
         if edges == "none":
             self.part, self.whole_steps = self.part[:, :0], self.whole_steps[:, :0]
@@ -74,12 +77,12 @@ class Step:
         self.loads = np.where(rng.random(contacts) < 0.8, 1.0 + rng.random(contacts), 0.0)
         self.exponents = 0.4 + rng.random(contacts)
         self.about = np.full((5, *contacts), np.nan)
-        self.compliance = np.full((TESTS, len(BODIES), 2, STRIPS), np.nan)
+        self.compliance = np.full((TESTS, len(ROLLERS), 2, STRIPS), np.nan)
 
     def begin(self) -> None:
         begin_step(
             self.spans, self.orders, self.passes, self.exposure, self.mean_exposure,
-            self.past_wear, self.past_sums, self.past_feedback, self.depths, BODIES, self.gap,
+            self.past_wear, self.past_sums, self.past_feedback, self.depths, self.bodies, self.gap,
             self.approach, self.wear, self.share, self.separation, self.part, self.whole_steps,
             self.in_groove, self.resolved, self.of_tests, self.sums, self.feedback,
             self.of_bodies, self.of_contacts,
@@ -89,7 +92,7 @@ class Step:
     def strips(self) -> tuple[Any, ...]:
         """Arguments of all later kernels."""
         known = self.gap, self.depths, self.part, self.of_bodies, self.of_contacts
-        return BODIES, self.resolved, *known
+        return self.bodies, self.resolved, *known
 
     def copied(self) -> Any:
         """Return `EdgeStrips` that share no array."""
@@ -97,10 +100,12 @@ class Step:
 
     def by_contact(self, values: np.ndarray) -> np.ndarray:
         """Return values of the two bodies of each contact, (2, contacts, strips)."""
-        return np.stack([values[BODIES[:, side]].reshape(CONTACTS, STRIPS) for side in range(2)])
+        return np.stack(
+            [values[self.bodies[:, side]].reshape(CONTACTS, STRIPS) for side in range(2)]
+        )
 
 
-@pytest.fixture(params=["resolved", "counted", "none"])
+@pytest.fixture(params=["resolved", "cam", "counted", "none"])
 def step(request: pytest.FixtureRequest) -> Step:
     return Step(request.param)
 
@@ -117,15 +122,16 @@ def test_step_begins_with_its_formula(step: Step) -> None:
     np.testing.assert_allclose(step.of_tests, [worn_passes, half, *distances], rtol=1e-13)
     resolved = np.ones(TESTS, bool)
     fill_resolved(step.separation, step.part, resolved)
-    assert step.resolved.tolist() == resolved.tolist() == [step.edges == "resolved"] * 2 + [False]
+    followed = step.edges in {"resolved", "cam"}
+    assert step.resolved.tolist() == resolved.tolist() == [followed, followed, False]
     young, crossed, parts = np.empty(SHAPE, bool), np.empty(SHAPE, bool), np.empty(SHAPE)
     state = step.part, step.whole_steps, step.orders, step.past_wear[0]
-    mark_strips(BODIES, resolved | step.in_groove, *state, young, crossed, parts)
+    mark_strips(step.bodies, resolved | step.in_groove, *state, young, crossed, parts)
     assert young.any() == (step.edges != "none")
     first_order = (lengths / step.exposure - half) / worn_passes
     scale = np.where(young, first_order[:, None], 1.0)
     apart = np.empty(SHAPE)
-    fill_separations(BODIES, resolved, step.separation, step.share, apart)
+    fill_separations(step.bodies, resolved, step.separation, step.share, apart)
     added, guess = np.einsum("wkv,krvi->wrvi", weights, step.past_wear)
     added = np.where(young, half[:, None] * step.past_wear[0], added)
     level = step.depths - apart
@@ -160,7 +166,7 @@ def test_wear_is_linearised_about_the_depth_of_each_strip(step: Step) -> None:
     np.testing.assert_array_equal(step.about[:2], [gaps, slopes])
     compliance, opened = np.empty_like(step.compliance), np.empty_like(gaps)
     constant, of_wear = np.empty_like(step.wear), (step.loads, step.wear, step.exponents)
-    linearised_wear(*of_wear, slopes, BODIES, gaps, compliance, opened, constant)
+    linearised_wear(*of_wear, slopes, step.bodies, gaps, compliance, opened, constant)
     np.testing.assert_array_equal(step.compliance, compliance)
     np.testing.assert_array_equal(step.about[2:], [opened, *constant])
 
@@ -175,7 +181,7 @@ def test_solution_is_compared_with_the_linearised_wear_and_the_edges(step: Step)
     by_formula, exponents, known = wear * passes, step.exponents.copy(), np.empty(SHAPE)
     linear, strips, level = np.empty_like(loads), step.copied(), step.of_contacts[2].copy()
     of_bodies = wear_of_bodies(
-        *(loads, step.loads, by_formula, step.wear, step.compliance, step.about[3:], BODIES),
+        *(loads, step.loads, by_formula, step.wear, step.compliance, step.about[3:], step.bodies),
         *(step.of_bodies[3], 1.0, step.about[1], active, exponents, known, linear),
     )
     gaps, slopes = step.about[:2]
@@ -191,7 +197,7 @@ def test_solution_is_compared_with_the_linearised_wear_and_the_edges(step: Step)
     np.testing.assert_allclose(found[1:], of_bodies[1:], rtol=1e-12)
     greatest = np.maximum(of_bodies[0], of_edges / OF_EDGES)
     np.testing.assert_allclose(found[0], greatest, rtol=1e-9)
-    if step.edges == "resolved":
+    if step.resolved.any():
         assert (of_edges[:2] / OF_EDGES > of_bodies[0, :2]).any()
 
 
@@ -206,7 +212,7 @@ def test_step_ends_with_the_sums_of_its_formula(step: Step, broken: str) -> None
         step.of_bodies[3, 0, :, 1] -= 9.0 * SIZE
         step.of_bodies[2, 0, :, 1] -= 9.0 * SIZE
         step.sums[:3] = 0.0
-    for c, pair in enumerate(BODIES):
+    for c, pair in enumerate(step.bodies):
         for side, b in enumerate(pair):
             worn[b] += step.wear[side].reshape(-1, TESTS, STRIPS)[c]
     energy = SIZE * np.array([1.0, 2.0, 3.0])
@@ -240,8 +246,8 @@ def test_step_ends_with_the_sums_of_its_formula(step: Step, broken: str) -> None
     expected = ends + np.where(follows, spread, 0.0)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     apart = np.zeros(SHAPE)
-    if step.edges == "resolved":
-        fill_separations(BODIES, step.resolved, fields[0], step.share, apart)
+    if step.resolved.any():
+        fill_separations(step.bodies, step.resolved, fields[0], step.share, apart)
     change = expected - apart - step.of_bodies[1]
     change = np.where(follows, change, step.of_bodies[2] + worn)
     of_steps = np.array(distances)
