@@ -212,10 +212,11 @@ def test_wear_of_bodies_is_compared_with_the_linearised_one():
     loads, shape = random_loads(rng), (2, 4, STRIPS)
     old = np.where(rng.random(loads.shape) < 0.8, loads * (0.6 + rng.random(loads.shape)), 0.0)
     old[:, 3] = loads[:, 3] * np.exp(MIN_LOG_CHANGE * np.array([0.9, 1.1, -0.9, -1.1]))
-    wear, old_wear = (rng.random(shape) * (one > 0.0) for one in (loads, old))
+    wear, old_wear = (1e-6 * rng.random(shape) * (one > 0.0) for one in (loads, old))
     slopes = 0.5 + rng.random(loads.shape)
-    compliance, constant = 1e-5 * rng.random((TESTS, 2, 2, STRIPS)), rng.random(shape)
-    base, exponents = 2.0 * rng.random((3, TESTS, STRIPS)), np.full(loads.shape, 0.9)
+    compliance = 1e-11 * rng.random((TESTS, 2, 2, STRIPS))
+    constant, base = 1e-6 * rng.random(shape), 2e-6 * rng.random((3, TESTS, STRIPS))
+    exponents = np.full(loads.shape, 0.9)
     worn, linear = np.empty(base.shape), np.empty(loads.shape)
     sizes = wear_of_bodies(
         *(loads, old, wear, old_wear, compliance, constant, ROLLERS, base, 1.2, slopes),

@@ -161,6 +161,14 @@ def test_coupled_step_is_that_of_one_dense_system(contacts: Contacts) -> None:
     np.testing.assert_allclose(approach, expected, rtol=1e-9)
 
 
+@pytest.mark.parametrize("side", [0, 1])
+def test_system_without_a_solution_is_not_factored(side: int) -> None:
+    contacts = Contacts(BODIES["two stations and two rollers"])
+    system, _ = contacts.system()
+    contacts.shared[:, side] = np.nan
+    assert not factor_depths(contacts.shared, contacts.state, system)
+
+
 def test_less_numerous_bodies_remain_in_the_outer_system() -> None:
     for bodies, touched in ((BODIES["one cylinder and three rollers"], 1),
                             (BODIES["three stations and one roller"], 0)):  # fmt: skip

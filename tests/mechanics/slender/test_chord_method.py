@@ -78,8 +78,8 @@ def chord_state(known: ContactConstants) -> ChordState:
 
 @pytest.mark.parametrize(
     "places",
-    [range(2, 9), [0, 1, 5, 8, STRIPS - 1], range(STRIPS), [6], [3, 5]],
-    ids=["one patch", "at both ends", "all strips", "one strip", "two strips"],
+    [range(2, 9), [0, 1, 5, 8, STRIPS - 1], range(STRIPS), [0], [9, STRIPS - 1]],
+    ids=["one patch", "at both ends", "all strips", "first strip", "last strip"],
 )
 def test_anchor_holds_the_inverse_of_the_jacobian(places: list[int]) -> None:
     line_load, known = np.zeros((2, STRIPS)), constants()
