@@ -265,7 +265,9 @@ def test_solution_from_an_anchor_is_that_of_newtons_method(coupled: bool, crown:
     state.gap[:] = tilted
     assert solve_from_anchor(1, 30.1, tilted.min(), loads, known, state)
     exact = newton(tilted, 30.1, 1, known)
-    assert loads.line_load[1] == pytest.approx(exact, abs=2e-5 * exact.max())
+    # the interaction of half-lengths is that of the anchor
+    accuracy = 2e-5 if coupled else 1e-7
+    assert loads.line_load[1] == pytest.approx(exact, rel=accuracy, abs=accuracy * exact.max())
     assert loads.line_load[1].sum() * SPACING == pytest.approx(30.1, rel=1e-9)
     # a strip beside the contact that closes its gap needs a full solution
     elastic = loads.approach[1] - tilted.min()

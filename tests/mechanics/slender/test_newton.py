@@ -263,7 +263,7 @@ def test_contacts_without_a_jacobian_are_refused() -> None:
         these.start()
         if broken == "unit":
             these.set = these.set._replace(unit=0.0, compliance=0.0 * these.compliance)
-            these.state.softness[:] = 0.0
+            these.state.softness[:], these.state.unit_load_sum[:] = 0.0, 1.0
         if broken == "worn":
             these.worn[:] = np.nan
         if broken == "unit_load_sum":

@@ -279,6 +279,21 @@ def test_pass_without_load_is_an_error_or_a_rest() -> None:
         np.testing.assert_array_equal(array, before[name], name)
 
 
+def test_pass_with_load_by_its_terms_alone_rests_where_passes_may() -> None:
+    rates, terms = np.array([[2.0, 0.25, 0.5]]), np.array([[300.0, 200.0]])
+    loop = Loop(terms=terms.copy(), term_rates=rates)
+    loop.passes.base_load[:2] = 0.0
+    check_pass(loop, 0, 1e-8)
+    loop.rests, before = True, loop.copies()
+    assert loop.run(1) == (CONVERGED, 1, 0)
+    after = loop.copies()
+    np.testing.assert_allclose(after.pop("terms")[0, 1], 0.5 * terms[0, 1], rtol=1e-14)
+    for name, array in after.items():
+        np.testing.assert_array_equal(array, before[name], name)
+    loop.passes.base_load[1] = 0.5  # a little load of its own
+    assert loop.run(1) == (CONVERGED, 1, 1)
+
+
 def test_spring_carries_no_load_beyond_its_length() -> None:
     loop = Loop(stiffness=1e9)
     loop.wear.cylinder_depth[:] += 1e-5
