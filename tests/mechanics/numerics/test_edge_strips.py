@@ -198,8 +198,10 @@ def test_linearised_wear_has_value_and_slope_of_the_mean_wear(edges: Edges) -> N
         assert (slopes[k] == 1.0).all()
 
 
-def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges) -> None:
+@pytest.mark.parametrize("part", [1.0, 0.0])
+def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges, part: float) -> None:
     rng = np.random.default_rng(2)
+    edges.loads *= part
     gaps, slopes = np.empty(edges.level.shape), np.empty(edges.level.shape)
     linearise_edges(edges.strips, edges.level, edges.wear, gaps, slopes)
     linear, apart = SIZE * rng.random((2, CONTACTS, STRIPS))

@@ -189,6 +189,7 @@ def random_loads(rng):
 def test_linearised_wear_of_all_contacts_opens_the_gaps():
     rng = np.random.default_rng(1)
     loads, exponents = random_loads(rng), 0.4 + rng.random((4, STRIPS))
+    loads[0, :2], loads[3, 0], loads[3, 1:] = [1e5, 0.0], 1e5, 0.0  # a load at the end
     slopes = np.where(rng.random((4, STRIPS)) < 0.7, 0.5 + rng.random((4, STRIPS)), np.inf)
     wear, gap = rng.random((2, 4, STRIPS)) * (loads > 0.0), rng.random((4, STRIPS))
     compliance, opened = np.full((TESTS, 2, 2, STRIPS), np.nan), np.full_like(gap, np.nan)
@@ -253,13 +254,14 @@ def test_wear_of_bodies_is_compared_with_the_linearised_one():
     assert none.tolist() == [[0.0, 0.0], [0.0, 0.0], [np.inf, np.inf]]
 
 
-def test_errors_of_bodies_with_several_contacts_are_filled_by_wear():
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_errors_of_bodies_with_several_contacts_are_filled_by_wear(size):
     rng, shape, spacing = np.random.default_rng(3), (3, TESTS, STRIPS), 1e-4
-    loads, (errors, added) = random_loads(rng), 1e-8 * rng.standard_normal((2, *shape))
+    loads, (errors, added) = size * random_loads(rng), 1e-8 * rng.standard_normal((2, *shape))
     loads[1, 2], loads[3, 2] = 0.0, 0.0
     wear, exponents = 2e-6 * rng.random((2, 4, STRIPS)), 0.5 + rng.random((4, STRIPS))
     approaches, gap = 4e-6 + 2e-6 * rng.random(4), 1e-6 * rng.random((4, STRIPS))
-    depths, stiffness = 1e-6 * rng.random(shape), np.array([0.0, 4e6, 2e6, 0.0])
+    depths, stiffness = 1e-6 * rng.random(shape), size * np.array([0.0, 4e6, 2e6, 0.0])
     weights = np.array([[1.0, 0.0, 0.0], [2e-4, 3e-4, 5e-4]])
     carried, sizes = carried_errors(
         *(errors, added, loads, wear, exponents, approaches, gap, depths, ROLLERS, stiffness),
