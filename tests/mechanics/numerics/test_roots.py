@@ -65,3 +65,11 @@ def test_secant_does_not_converge_where_a_function_is_flat():
     assert converged.tolist() == [True, False, False]
     alone = secant_roots(lambda x: np.tanh(3.0 * x) - 0.5, np.array([0.1]), np.full(1, 0.3))
     assert found[0] == alone[0][0]
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_secant_does_not_converge_far_from_the_guess(size):
+    root = size * np.array([2.9, -2.9, 3.1, -3.1])
+    found, converged = secant_roots(lambda x: x - root, np.zeros(4), np.full(4, 0.3 * size))
+    assert converged.tolist() == [True, True, False, False]
+    assert found[:2] == pytest.approx(root[:2], rel=1e-12)

@@ -352,8 +352,14 @@ def test_penetrated_strips_start_with_a_tenth_of_their_spring() -> None:
         known[chosen] = 0.1 * (5e-6 - state.surface[0, chosen]) / UNIT
         np.testing.assert_allclose(line_load[0], known)
         assert state.fresh[0]
-    state.surface[0, [2, 3, 9]] = 5e-6 * (1.0 - 0.5 * GAP_TOLERANCE)
-    assert not add_penetrated(0, 1, 12, 1, UNIT, state, approach, line_load)
+    # the tolerance is a part of the approach, or of its height above the least surface
+    for lowest, size in ((1e-6, 5e-6), (-3e-6, 8e-6)):
+        state.surface[0, 5] = lowest
+        for part in (0.95, 1.05):
+            state.surface[0, [2, 3, 9]] = 5e-6 - part * GAP_TOLERANCE * size
+            arguments = UNIT, state, approach, line_load.copy()
+            assert add_penetrated(0, 1, 12, 1, *arguments) == (part > 1.0)
+    state.surface[0, [2, 3, 9, 5]] = 6e-6, 6e-6, 6e-6, 1e-6
     state.surface[0, 13] = 0.0  # its surface is not complete
     assert not add_penetrated(0, 1, 12, 1, UNIT, state, approach, line_load)
     # from the fortieth iteration on the tolerance is ten times as great
