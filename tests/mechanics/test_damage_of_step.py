@@ -55,13 +55,13 @@ def test_bent_powers_are_integrated_within_their_error() -> None:
     assert damage[0, 0, 0] == pytest.approx(added(rate), rel=1e-3)
     span = np.log((START + LENGTH + CONSTANT) / (START + CONSTANT))
     expected = 0.3 * span**2 / 12.0 * damage[0, 0, 0]
-    assert damage[1, 0, 0] == pytest.approx(expected, rel=1e-9)
+    assert damage[1, 0, 0] == pytest.approx(expected, rel=1e-9, abs=0.0)
 
 
 def test_contact_that_begins_has_the_mean_damage() -> None:
     damage, _ = step(lambda passes: 0.0 if passes < 2000.0 else 3e-7)
-    assert damage[0, 0, 0] == pytest.approx(0.5 * 3e-7 * LENGTH, rel=1e-12)
-    assert damage[1, 0, 0] == pytest.approx(0.5 * 3e-7 * LENGTH, rel=1e-12)
+    assert damage[0, 0, 0] == pytest.approx(0.5 * 3e-7 * LENGTH, rel=1e-12, abs=0.0)
+    assert damage[1, 0, 0] == pytest.approx(0.5 * 3e-7 * LENGTH, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("part", [0.0, 1e-7, 0.4, 3.0])
