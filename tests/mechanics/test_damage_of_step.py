@@ -67,7 +67,9 @@ def plain(old, first, last, removed, start, length, past, constant, slope):
 
     nodes, weights = np.polynomial.legendre.leggauss(3)
     at, rows = place(start + 0.5 * length * (1.0 + nodes)), []
-    for before, one, other, kept, error, part in zip(old[3], first, last, *old[:2], removed):
+    for before, one, other, kept, error, part in zip(
+        old[3], first, last, *old[:2], removed, strict=True
+    ):
         mean, doubt = 0.5 * (one + other), 0.5 * abs(other - one)
         if one > 0.0 < other:
             bend, curved, ends = 0.0, past < start and before > 0.0, mean
