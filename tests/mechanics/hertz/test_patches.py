@@ -169,7 +169,7 @@ def test_section_of_a_prescribed_patch_is_symmetric_about_its_vertex() -> None:
 def test_contacts_of_a_batch_have_their_own_gap_and_curvature() -> None:
     y = np.linspace(-6e-3, 6e-3, 121)
     gaps = np.stack([1.2 * (y - 4e-4) ** 2, 1.2 * y**2, 2.5 * y**2, 2.5 * y**2 + 200.0 * y**3])
-    row = np.array([0, 0, 1, 2, 2, 3, 3, 1])
+    row = np.array([0, 0, 0, 2, 2, 3, 3, 1])
     curved = np.array([45.0, 0.8, 45.0, 45.0, 0.9, 45.0, 3.0, 45.0])
     loads = LOAD * np.array([1.0, 0.2, 1.5, 1.0, 0.3, 0.7, 0.1, 90.0])
     given = Bodies(y, y[1] - y[0], curved, MODULUS, 0.0, 0.0, 1e-10, 200)
