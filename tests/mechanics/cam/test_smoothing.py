@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -29,6 +30,21 @@ def table(seed: int, noise: float = NOISE) -> np.ndarray:
 def test_noise_of_a_table_is_that_of_its_points() -> None:
     found = [estimated_noise(ANGLE, table(seed)) for seed in range(20)]
     assert np.mean(found) == pytest.approx(NOISE, rel=0.12)
+    values, found = table(2), []
+    values[30:40] = values[30]  # rounded: differences of zero do not count
+    for order in (4, 6, 8):
+        differences = []
+        for first in range(90):
+            rows = np.arange(first, first + order + 1)
+            x = ANGLE[rows % 90] + math.tau * (rows >= 90)
+            # the divided difference, for errors of unit size
+            gaps = x[:, None] - x + np.eye(order + 1)
+            weight = 1.0 / np.prod(gaps, axis=1)
+            near = values[rows % 90] - values[first]
+            differences.append(abs(weight @ near) / np.linalg.norm(weight))
+        known = np.array(differences)
+        found.append(np.median(known[known > 0.0]) / 0.6745)
+    assert estimated_noise(ANGLE, values) == pytest.approx(min(found), rel=1e-6, abs=0.0)
     scaled = estimated_noise(ANGLE, 3.0 * table(1))
     assert scaled == pytest.approx(3.0 * estimated_noise(ANGLE, table(1)), rel=1e-9, abs=0.0)
     assert estimated_noise(ANGLE, np.zeros(90)) == 0.0
@@ -62,9 +78,14 @@ def test_drawn_coefficients_scatter_by_the_standard_error() -> None:
 def test_spline_through_points_scatters_with_the_square_of_their_number() -> None:
     once, twice = (scatter_through_points(np.zeros(n), NOISE) for n in (90, 180))
     assert twice == pytest.approx(4.0 * once)
+    # white noise up to the frequency pi/h of points at a distance h: the integral of w^4 h/(2 pi)
+    spacing = math.tau / 90.0
+    expected = NOISE * math.sqrt(math.pi**4 / (5.0 * spacing**4))
+    assert once == pytest.approx(expected, rel=1e-12)
 
 
-def test_dwells_are_found_and_constant() -> None:
+def with_dwells() -> np.ndarray:
+    """Return a lift that rests outside of the angles 2 to 4 and 5 to 6.2."""
     rise = np.clip((ANGLE - 2.0) / 2.0, 0.0, 1.0)
     fall = np.clip((ANGLE - 5.0) / 1.2, 0.0, 1.0)
 
@@ -72,8 +93,78 @@ def test_dwells_are_found_and_constant() -> None:
         return part - np.sin(math.tau * part) / math.tau
 
     values = 5e-3 * (smooth(rise) - smooth(fall))
-    values += 1e-7 * np.random.default_rng(3).standard_normal(len(ANGLE))
-    curve = smoothed(ANGLE, values)
+    return values + 1e-7 * np.random.default_rng(3).standard_normal(len(ANGLE))
+
+
+def basis(curve: SmoothedCurve, angle: np.ndarray) -> np.ndarray:
+    """Return all splines of a curve and two derivatives, shape (3, points, splines)."""
+    return np.stack([curve(angle, one) for one in np.eye(len(curve.knots))], axis=-1)
+
+
+def matrices(curve: SmoothedCurve, angle: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return free splines at angles, their second derivatives over a turn, and the penalty."""
+    count = len(curve.knots)
+    tied = np.eye(count)
+    for start, stop in curve.dwells:  # of a dwell the coefficients are equal
+        used = basis(curve, np.array([0.5 * (start + stop)]))[0, 0] > 0.0
+        tied[:, used] = 0.0
+        tied[used, np.flatnonzero(used)[0]] = 1.0
+    tied = tied[:, tied.any(axis=0)]
+    edges = np.unique(np.append(curve.knots, curve.knots[0] + math.tau))
+    penalty = np.zeros((count, count))
+    for low, high in itertools.pairwise(edges):
+        # the second derivative is cubic, its own second derivative linear
+        x = np.linspace(0.0, 1.0, 4)
+        inside = low + (1e-9 + (1.0 - 2e-9) * x) * (high - low)
+        cubics = np.linalg.solve(np.vander(x, 4), basis(curve, inside)[2])
+        ends = np.array([2.0 * cubics[1], 6.0 * cubics[0] + 2.0 * cubics[1]]) / (high - low) ** 2
+        mass = np.array([[2.0, 1.0], [1.0, 2.0]]) * (high - low) / 6.0
+        penalty += ends.T @ mass @ ends
+    around = np.linspace(0.0, math.tau, 1440, endpoint=False)
+    rows = basis(curve, angle)[0], basis(curve, around)[2]
+    return rows[0] @ tied, rows[1] @ tied, tied.T @ penalty @ tied, tied
+
+
+@pytest.mark.parametrize("noise", [None, 3e-7])
+@pytest.mark.parametrize("dwells", [False, True])
+def test_spline_has_the_greatest_restricted_likelihood(noise: float | None, dwells: bool) -> None:
+    values = with_dwells() if dwells else table(8)
+    curve = smoothed(ANGLE, values, noise, dwells=dwells)
+    assert bool(curve.dwells) == dwells
+    design, second, penalty, tied = matrices(curve, ANGLE)
+    free = np.linalg.lstsq(tied, curve.coefficients, rcond=None)[0]
+    assert tied @ free == pytest.approx(curve.coefficients, rel=1e-12)
+    assert curve.residual == pytest.approx(values - design @ free, abs=1e-12)
+    # least squares with a penalty
+    pull, bent = design.T @ curve.residual, penalty @ free
+    weight = (pull @ bent) / (bent @ bent)
+    np.testing.assert_allclose(pull, weight * bent, atol=1e-5 * np.abs(pull).max())
+
+    def score(weight: float) -> float:
+        matrix = design.T @ design + weight * penalty
+        best = np.linalg.solve(matrix, design.T @ values)
+        left = values - design @ best
+        squares = left @ left + weight * best @ penalty @ best
+        determinants = np.linalg.slogdet(matrix)[1] - (len(free) - 1) * math.log(weight)
+        if noise is None:
+            return (len(values) - 1) * math.log(squares) + determinants
+        return squares / noise**2 + determinants
+
+    assert score(weight) < min(score(0.67 * weight), score(1.49 * weight))
+    inverse = np.linalg.inv(design.T @ design + weight * penalty)
+    freedom = np.trace(inverse @ design.T @ design)
+    sigma = math.sqrt(curve.residual @ curve.residual / (90.0 - freedom))
+    assert curve.noise == pytest.approx(sigma, rel=1e-4, abs=0.0)
+    covariance = sigma**2 * tied @ inverse @ tied.T
+    found = curve.factor @ curve.factor.T
+    np.testing.assert_allclose(found, covariance, atol=1e-3 * np.abs(covariance).max())
+    variance = np.einsum("ij,jk,ik->i", second, inverse, second)
+    expected = sigma * math.sqrt(variance.mean())
+    assert curve.second_error == pytest.approx(expected, rel=1e-3, abs=0.0)
+
+
+def test_dwells_are_found_and_constant() -> None:
+    curve = smoothed(ANGLE, with_dwells())
     assert curve.dwells
     for start, stop in curve.dwells:
         inside = np.linspace(start, stop, 20)
