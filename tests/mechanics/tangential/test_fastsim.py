@@ -267,6 +267,11 @@ def test_few_elements_are_close_to_the_closed_form(elliptic):
     np.testing.assert_allclose(found[:2], expected[:2], atol=8e-3 * scale)
     np.testing.assert_allclose(found[2], expected[2], atol=8e-3 * scale * case.half_length.max())
     np.testing.assert_allclose(found[3], expected[3], atol=8e-3 * case.half_length.max())
+    # tractions are proportional to bound and gradients
+    length, bound, _, *gradients = case.arguments[:5]
+    small = closed_form(length, 1e-12 * bound, elliptic, *(1e-12 * one for one in gradients))
+    np.testing.assert_allclose(small[:3], 1e-12 * expected[:3], rtol=1e-10)
+    np.testing.assert_allclose(small[3], expected[3], rtol=1e-10)
 
 
 def test_strips_without_contact_or_creepage_have_no_force():

@@ -214,6 +214,10 @@ def test_first_failed_contact_is_returned():
         curvature_x=1.0,
     )
     assert (failed, patches.status[0]) == (0, NO_LIMIT)
+    row = np.where(np.arange(CONTACTS) == 5, 3, ROW)
+    failed, found, patches = solve(theory(), operating_points(), row, np.vstack([GAPS, -(Y**2)]))
+    assert (failed, patches.status[5]) == (5, NO_CURVATURE)
+    assert not found.power[5:].any()
 
 
 def full_slip(friction, variation=None, spin=0.0, lateral=0.0, carried=False, **options):
