@@ -42,6 +42,7 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
     coefficient,
     flexibilities,
     one_flexibility,
+    short_limit,
     spline,
 )
 from wearsim.types import Grid
@@ -335,3 +336,10 @@ def test_strips_have_the_tractions_of_march_and_their_work(elliptic, xi, eta, ph
         assert total == pytest.approx(value * GRID.spacing, rel=1e-10, abs=0.0), name
     fraction = adhering.sum() / (2.0 * length.sum())
     assert found.adhesion_fraction[0] == pytest.approx(fraction, rel=1e-12)
+    # the same coefficients by other means
+    for kind, same in ((TABLE, kalker), (LINE_LIMIT, short_limit(a / b, NU)[:3])):
+        powers = [
+            solve(options._replace(kalker=how, given=np.array(same)), inputs, row, gap)[1].power
+            for how in (kind, GIVEN)
+        ]
+        assert powers[0] == pytest.approx(powers[1], rel=1e-12)
