@@ -93,6 +93,8 @@ def test_error_of_an_integral_is_that_of_its_last_coefficients() -> None:
     assert integral_error(stations, values) == pytest.approx(known)
     both = integral_error(stations, np.column_stack([values, 2.0 * values]))
     assert both == pytest.approx([known, 2.0 * known])
+    still = Stations((PANELS[1],) * 2, (1, 1))
+    assert integral_error(still, np.ones((2, 3))).tolist() == [0.0] * 3
 
 
 def test_greatest_value_is_that_of_the_polynomial() -> None:

@@ -76,6 +76,8 @@ def test_arcs_of_a_cam_touch_each_other() -> None:
         assert points[0] == pytest.approx(points[1], abs=1e-15)
     with pytest.raises(ValueError, match="touches both"):
         three_arc_cam(20 * MM, 6 * MM, 22 * MM, 19 * MM)
+    with pytest.raises(ValueError, match="touches both"):  # the nose is blunter than the flanks
+        three_arc_cam(20 * MM, 61 * MM, 40 * MM, 60 * MM)
     with pytest.raises(ValueError, match="beyond"):
         three_arc_cam(20 * MM, 6 * MM, -22 * MM, 60 * MM)
 

@@ -119,6 +119,29 @@ def test_roller_with_enough_traction_does_not_skid() -> None:
     assert skid_arcs(WHOLE, accelerated(1.0 + 1e-9)) == []
     assert skid_arcs(HALVES, accelerated(1.0 + 1e-9)) == []
     assert skid_arcs(WHOLE, accelerated(0.999)) != []
+    assert skid_arcs(WHOLE, accelerated(0.9999)) != []  # within an interval of the samples
+
+
+@pytest.mark.parametrize("panels", [WHOLE, HALVES])
+@pytest.mark.parametrize("reach", [0.3, 0.02])
+def test_heavy_roller_skids_forwards_and_backwards_in_turn(panels: list, reach: float) -> None:
+    # half a turn each: w = sin(x) - sin(x0) - r (x - x0) from x0, where w(x0 + pi) = 0
+    arcs = skid_arcs(panels, accelerated(reach))
+    first = math.asin(-0.5 * math.pi * reach)
+
+    def slip(theta: np.ndarray) -> np.ndarray:
+        since = np.mod(theta - first, math.tau)
+        half = np.mod(since, math.pi)
+        one = np.sin(first + half) - math.sin(first) - reach * half
+        return np.where(since < math.pi, one, -one)
+
+    for arc in arcs:
+        assert arc.slip == pytest.approx(slip(arc.theta), abs=1e-4)
+        inside = (arc.theta > arc.theta[0]) & (arc.theta < arc.theta[-1])
+        rate = np.cos(arc.theta) - np.sign(arc.slip) * reach
+        assert arc.slip_per_rad[inside] == pytest.approx(rate[inside], abs=1e-9)
+    lengths = [arc.theta[-1] - arc.theta[0] for arc in arcs]
+    assert sum(lengths) == pytest.approx(math.tau, abs=0.03)
 
 
 def test_roller_that_never_rolls_is_refused() -> None:

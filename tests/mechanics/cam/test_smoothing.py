@@ -163,6 +163,31 @@ def test_spline_has_the_greatest_restricted_likelihood(noise: float | None, dwel
     assert curve.second_error == pytest.approx(expected, rel=1e-3, abs=0.0)
 
 
+def test_dwells_are_runs_of_samples_without_significant_motion() -> None:
+    first, around = smoothed(ANGLE, with_dwells(), dwells=False), np.arange(1440) * math.tau / 1440
+    rows = basis(first, around)[1:] @ first.factor
+    still = np.all(np.abs(first(around)[1:]) < 3.5 * np.linalg.norm(rows, axis=2), axis=0)
+    freedom = 90.0 - first.residual @ first.residual / first.noise**2
+    known = []
+    for place in np.flatnonzero(still & ~np.roll(still, 1)):
+        count = int(np.argmin(np.roll(still, -place)))  # samples of the run
+        low, high = around[place], around[place] + (count - 1) * around[1]
+        if high - low > 3.0 * math.tau / freedom:  # two resolved lengths, and half a one at an end
+            ends = low + 0.5 * math.tau / freedom, high - 0.5 * math.tau / freedom
+            known.append((ends[0] % math.tau, ends[1] - ends[0] // math.tau * math.tau))
+    curve = smoothed(ANGLE, with_dwells())
+    assert np.array(curve.dwells) == pytest.approx(np.array(sorted(known)), abs=1e-9)
+    # knots are triple at the ends of dwells, and equally spaced between them
+    for start, stop in curve.arcs:
+        edges = np.mod([start, stop], math.tau)
+        assert [np.isclose(curve.knots, edge).sum() for edge in edges] == [3, 3]
+        between = np.mod(curve.knots - start, math.tau)
+        inner = np.unique(between[(between > 1e-9) & (between < stop - start - 1e-9)])
+        number = round((stop - start) * 45.0 / math.tau)
+        assert inner == pytest.approx((stop - start) * np.arange(1, number) / number)
+    assert smoothed(ANGLE, table(0)).dwells == ()
+
+
 def test_dwells_are_found_and_constant() -> None:
     curve = smoothed(ANGLE, with_dwells())
     known = (6.2 - math.tau, 2.0), (4.0, 5.0)

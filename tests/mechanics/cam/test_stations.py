@@ -102,9 +102,9 @@ def test_mistakes_of_a_motion_name_the_segment(parts, place, words):
 
 def test_motion_at_a_boundary_is_that_of_the_following_segment():
     motion = rise_and_return("harmonic")
-    assert motion.segment_at(np.radians([0.0, 90.0, 180.0, 270.0, 360.0, -90.0])).tolist() == [
-        *(0, 1, 2, 3, 0, 3)
-    ]
+    assert motion.segment_at(
+        np.radians([0.0, 90.0, 180.0, 270.0, 360.0, -90.0, -1e-13])
+    ).tolist() == [*(0, 1, 2, 3, 0, 3, 0)]
     second = motion.lift(np.radians([90.0, 89.999]))[2]
     assert second[0] > 0.0
     assert second[1] == 0.0
@@ -189,6 +189,8 @@ def test_choice_halves_panels_and_is_scaled_by_the_whole_turn():
     # the kinks are in panels that were halved six times
     width = min(panel.stop - panel.start for panel in stations.panels)
     assert width == pytest.approx(math.tau / 64.0)
+    sizes = np.array([panel.stop - panel.start for panel in stations.panels])
+    assert max(np.array(stations.numbers)[sizes < 1.5 * width]) == 25
     smooth = np.abs(np.sin(angle - 1.0)) > math.sin(width)
     assert away[smooth].max() < 1e-3
     many = choose_stations([WHOLE], lambda panel, theta: np.sin(theta)[None], 1e-3)
