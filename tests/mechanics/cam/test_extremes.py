@@ -68,8 +68,19 @@ def test_dwell_has_no_error_and_a_rise_with_one_station_is_unknown():
     panels = Panel(0, 0.0, 3.0, dwell=True), Panel(1, 3.0, 2.0 * math.pi, dwell=False)
     flat = greatest(Stations(panels, (1, 5)), np.ones(6))
     assert (flat.value, flat.error) == (1.0, 0.0)
-    unknown = greatest(Stations(panels, (1, 1)), np.array([1.0, 3.0]))
+    unknown = greatest(Stations(panels, (1, 1)), np.array([-1.0, 3.0]))
     assert unknown.error == 3.0
+    assert unknown.angle_error == pytest.approx(0.5 * (2.0 * math.pi - 3.0))
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize(("excess", "twin"), [(1e-10, True), (1e-7, False)])
+def test_equal_panels_are_twins(scale: float, excess: float, twin: bool):
+    half = Panel(0, 0.0, math.pi, dwell=False), Panel(1, math.pi, 2.0 * math.pi, dwell=False)
+    values = bump(stations(6).angle[:6], 1.0, 0.8)
+    found = greatest(Stations(half, (6, 6)), scale * np.append(values, values * (1.0 + excess)))
+    assert (found.angle < math.pi) == twin
+    assert (found.angle_error > 0.99 * math.pi) == (not twin)
 
 
 def test_angle_of_a_dwell_is_uncertain_where_the_rise_beside_it_may_be_greater():

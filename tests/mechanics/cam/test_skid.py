@@ -96,7 +96,7 @@ def test_roller_skids_where_acceleration_exceeds_the_traction(reach: float, drag
     assert (arcs[0].theta[0], arcs[0].theta[-1]) == pytest.approx((0.0, end - math.tau), abs=2e-3)
     inside = np.linspace(begin + 0.05, math.tau, 5)
     known = [forwards(theta) for theta in inside]
-    assert arcs[-1].slip_at(inside) == pytest.approx(known, abs=1e-4)
+    assert arcs[-1].slip_at(inside) == pytest.approx(known, abs=1e-6)
     # backwards from -cos = reach + drag on
     if reach + drag < 1.0:
         limit = reach + drag
@@ -109,7 +109,7 @@ def test_roller_skids_where_acceleration_exceeds_the_traction(reach: float, drag
         (middle,) = arcs[1:-1]
         assert (middle.theta[0], middle.theta[-1]) == pytest.approx((turned, stop), abs=4e-3)
         inside = np.linspace(turned + 0.05, stop - 0.05, 5)
-        assert middle.slip_at(inside) == pytest.approx([backwards(x) for x in inside], abs=1e-4)
+        assert middle.slip_at(inside) == pytest.approx([backwards(x) for x in inside], abs=1e-6)
     for arc in arcs:
         assert isinstance(arc, SkidArc)
         assert (np.diff(arc.theta) > 0.0).all()
@@ -119,7 +119,8 @@ def test_roller_with_enough_traction_does_not_skid() -> None:
     assert skid_arcs(WHOLE, accelerated(1.0 + 1e-9)) == []
     assert skid_arcs(HALVES, accelerated(1.0 + 1e-9)) == []
     assert skid_arcs(WHOLE, accelerated(0.999)) != []
-    assert skid_arcs(WHOLE, accelerated(0.9999)) != []  # within an interval of the samples
+    short = skid_arcs(WHOLE, accelerated(0.9999))  # begins and ends next to a sample
+    assert [len(arc.theta) for arc in short] == [3, 4, 2]
 
 
 @pytest.mark.parametrize("panels", [WHOLE, HALVES])
@@ -137,9 +138,11 @@ def test_heavy_roller_skids_forwards_and_backwards_in_turn(panels: list, reach: 
 
     for arc in arcs:
         assert arc.slip == pytest.approx(slip(arc.theta), abs=1e-4)
-        inside = (arc.theta > arc.theta[0]) & (arc.theta < arc.theta[-1])
-        rate = np.cos(arc.theta) - np.sign(arc.slip) * reach
-        assert arc.slip_per_rad[inside] == pytest.approx(rate[inside], abs=1e-9)
+        rate = np.cos(arc.theta) - np.sign(arc.slip[1]) * reach
+        assert arc.slip_per_rad[1:-1] == pytest.approx(rate[1:-1], abs=1e-9)
+        assert arc.slip_per_rad[-1] == pytest.approx(rate[-1], abs=2e-4)
+    # parts end where the slip turns, at the ends of panels and where rolling could begin
+    assert len(arcs) == 3 + len(panels)
     lengths = [arc.theta[-1] - arc.theta[0] for arc in arcs]
     assert sum(lengths) == pytest.approx(math.tau, abs=0.03)
 

@@ -84,16 +84,17 @@ def test_spline_through_points_scatters_with_the_square_of_their_number() -> Non
     assert once == pytest.approx(expected, rel=1e-12)
 
 
-def with_dwells() -> np.ndarray:
-    """Return a lift that rests outside of the angles 2 to 4 and 5 to 6.2."""
+def with_dwells(height=5e-3, noise=1e-7, seed=3, uneven=1.0) -> np.ndarray:
+    """Return a lift that rests outside of the angles 2 to 4 and 5 to 6.2, there with more noise."""
     rise = np.clip((ANGLE - 2.0) / 2.0, 0.0, 1.0)
     fall = np.clip((ANGLE - 5.0) / 1.2, 0.0, 1.0)
 
     def smooth(part: np.ndarray) -> np.ndarray:
         return part - np.sin(math.tau * part) / math.tau
 
-    values = 5e-3 * (smooth(rise) - smooth(fall))
-    return values + 1e-7 * np.random.default_rng(3).standard_normal(len(ANGLE))
+    values = height * (smooth(rise) - smooth(fall))
+    sizes = noise * np.where((ANGLE > 4.0) & (ANGLE < 5.0), uneven, 1.0)
+    return values + sizes * np.random.default_rng(seed).standard_normal(len(ANGLE))
 
 
 def basis(curve: SmoothedCurve, angle: np.ndarray) -> np.ndarray:
@@ -163,19 +164,32 @@ def test_spline_has_the_greatest_restricted_likelihood(noise: float | None, dwel
     assert curve.second_error == pytest.approx(expected, rel=1e-3, abs=0.0)
 
 
-def test_dwells_are_runs_of_samples_without_significant_motion() -> None:
-    first, around = smoothed(ANGLE, with_dwells(), dwells=False), np.arange(1440) * math.tau / 1440
+@pytest.mark.parametrize(
+    ("options", "count"),
+    [
+        ({}, 2),
+        ({"noise": 1e-6, "seed": 0}, 2),
+        ({"height": 2e-5, "noise": 1e-6, "seed": 0}, 1),  # the other one is too short
+        ({"noise": 5e-6, "seed": 2, "uneven": 2.0}, 1),  # the other one scatters
+    ],
+)
+def test_dwells_are_runs_of_samples_without_significant_motion(options: dict, count: int) -> None:
+    values, around = with_dwells(**options), np.arange(1440) * math.tau / 1440
+    first = smoothed(ANGLE, values, dwells=False)
     rows = basis(first, around)[1:] @ first.factor
     still = np.all(np.abs(first(around)[1:]) < 3.5 * np.linalg.norm(rows, axis=2), axis=0)
-    freedom = 90.0 - first.residual @ first.residual / first.noise**2
+    length = math.tau / (90.0 - first.residual @ first.residual / first.noise**2)
     known = []
     for place in np.flatnonzero(still & ~np.roll(still, 1)):
-        count = int(np.argmin(np.roll(still, -place)))  # samples of the run
-        low, high = around[place], around[place] + (count - 1) * around[1]
-        if high - low > 3.0 * math.tau / freedom:  # two resolved lengths, and half a one at an end
-            ends = low + 0.5 * math.tau / freedom, high - 0.5 * math.tau / freedom
-            known.append((ends[0] % math.tau, ends[1] - ends[0] // math.tau * math.tau))
-    curve = smoothed(ANGLE, with_dwells())
+        last = place + int(np.argmin(np.roll(still, -place))) - 1  # of the run
+        # half a resolved length is left out at either end
+        low, high = place * around[1] + 0.5 * length, last * around[1] - 0.5 * length
+        inside = values[np.mod(ANGLE - low, math.tau) <= high - low]
+        most = first.noise**2 * (1.0 + 4.0 * math.sqrt(2.0 / max(len(inside), 1)))
+        if high - low >= 2.0 * length and len(inside) > 4 and inside.var(ddof=1) < most:
+            known.append((low % math.tau, high - low // math.tau * math.tau))
+    assert len(known) == count
+    curve = smoothed(ANGLE, values)
     assert np.array(curve.dwells) == pytest.approx(np.array(sorted(known)), abs=1e-9)
     # knots are triple at the ends of dwells, and equally spaced between them
     for start, stop in curve.arcs:
@@ -186,6 +200,7 @@ def test_dwells_are_runs_of_samples_without_significant_motion() -> None:
         number = round((stop - start) * 45.0 / math.tau)
         assert inner == pytest.approx((stop - start) * np.arange(1, number) / number)
     assert smoothed(ANGLE, table(0)).dwells == ()
+    assert smoothed(ANGLE, 1e-3 + 1e-3 * (table(0) - lift(ANGLE))).dwells == ()
 
 
 def test_dwells_are_found_and_constant() -> None:

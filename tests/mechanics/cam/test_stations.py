@@ -193,6 +193,19 @@ def test_choice_halves_panels_and_is_scaled_by_the_whole_turn():
     assert max(np.array(stations.numbers)[sizes < 1.5 * width]) == 25
     smooth = np.abs(np.sin(angle - 1.0)) > math.sin(width)
     assert away[smooth].max() < 1e-3
+    # the greatest value, at the end of the turn, is the scale
+    grows = [
+        choose_stations([WHOLE], lambda _, theta, size=size: size * np.exp(1.5 * theta)[None], 1e-6)
+        for size in (1e-4, 1.0, 1e4)
+    ]
+    whole = {}
+    places = np.linspace(0.0, 1.0, 193)
+    for count in NUMBERS:
+        values = np.exp(1.5 * math.tau * (lobatto(count)[0] - 1.0))
+        exact = np.exp(1.5 * math.tau * (places - 1.0))
+        whole[count] = np.abs(interpolation(count, places) @ values - exact).max()
+    least = next(count for count in NUMBERS if whole[count] <= 1e-6)
+    assert [one.numbers for one in grows] == [(least,)] * 3
     many = choose_stations([WHOLE], lambda panel, theta: np.sin(theta)[None], 1e-3)
     assert many.numbers == (13,)
 
