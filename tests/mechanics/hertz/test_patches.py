@@ -73,6 +73,7 @@ def test_patch_that_is_given_may_end_at_the_edge_of_the_strips() -> None:
         found = patches(bodies(2, 0.1, 0.85 * factor), gaps, loads)
         assert found.status.tolist() == [status] * 2
         assert found.centre == pytest.approx([0.2, -0.2])
+        assert found.iterations.tolist() == [0, 0]
         assert found.ratio == pytest.approx([0.1 / (0.85 * factor)] * 2)
         assert found.peak_pressure == pytest.approx([1.5 * LOAD / (math.pi * 0.085 * factor)] * 2)
     assert patches(bodies(2, 0.1, 0.5), gaps, np.full(2, 0.5)).status.tolist() == [CONVERGED] * 2
@@ -107,6 +108,7 @@ def test_fit_needs_three_strips_and_a_valley() -> None:
     flat = fit_parabola(y, np.full(3, 2.0), 0.0, 1.5)
     assert flat[0] == pytest.approx(0.0, abs=1e-12)
     assert math.isnan(flat[1])
+    assert fit_parabola(y, y - 2.0 * y**2, 0.0, 1.5)[0] == pytest.approx(-2.0)
     assert fit_centred(y, y**2, 0.0, 1.5, 1e-9)[3] == CONVERGED
     assert fit_centred(y, -(y**2), 0.0, 1.5, 1e-9)[3] == NO_CURVATURE
     assert fit_centred(y[:2], y[:2] ** 2, -0.5, 1.5, 1e-9)[3] == TOO_FEW_STRIPS
@@ -186,3 +188,25 @@ def test_contacts_of_a_batch_have_their_own_gap_and_curvature() -> None:
         assert found.iterations[k] == fit[4]
     assert found.ratio[0] == found.ratio[2]  # of different size
     assert len(set(found.ratio[:7])) == 6
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.8, -3.0])
+def test_patches_move_with_the_strips(moved: float) -> None:
+    gap = 2.0 * (Y - 0.1) ** 2 + 0.4 * (Y - 0.1) ** 3 + 0.3 * np.maximum(0.1 - Y**2, 0.0)
+    expected = fit_within(Y, gap, SPACING, 1e-10)
+    curvature, centre, *rest = fit_within(Y + moved, gap, SPACING, 1e-10)
+    assert (curvature, centre - moved, *rest) == pytest.approx(expected, abs=1e-9)
+    expected = hertz_on_profile(Y, gap, 45.0, 3e9, MODULUS, 1e-8, 200)
+    assert expected[5] == CONVERGED
+    curvature, half_width, centre, *rest = hertz_on_profile(
+        Y + moved, gap, 45.0, 3e9, MODULUS, 1e-8, 200
+    )
+    assert (curvature, half_width, centre - moved) == pytest.approx(expected[:3], abs=1e-7)
+    # a parabola is known from one fit, and has a patch up to the edges of the strips
+    unit = hertz(45.0, 1.0, 1.0, MODULUS).b
+    for width, status in ((1.04, CONVERGED), (1.06, LEAVES_STRIPS)):
+        load = (width / unit) ** 3
+        found = patches(bodies(y=Y + moved), Y[None] ** 2, np.array([load]))
+        assert (found.status[0], found.iterations[0]) == (status, 1)
+        single = hertz_on_profile(Y + moved, Y**2, 45.0, load, MODULUS, 1e-10, 200)
+        assert single[4:] == (1, status)
