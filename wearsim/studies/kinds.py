@@ -17,7 +17,7 @@ def wearsim_study_kinds() -> Iterable[StudyKind]:
         "run",
         summary="one wear test",
         result="wearsim.studies.run.result:Result",
-        view="wearsim.studies.run.view:RunView",
+        view="wearsim.studies.run.view:view_of_run",
         data="wearsim.studies.run.result:RunData",
         format="wearsim-run",
         holds="a wear test, from `wearsim run`",
