@@ -347,12 +347,3 @@ def _columns(
 def _last(value: Any) -> int:
     """Return the last value of a history, or the number itself."""
     return int(np.ravel(value)[-1])
-
-
-def view_of_run(result: Result) -> RunView:
-    """Return the view of the run of a cylinder, or of a cam."""
-    if not result.is_cam:
-        return RunView(result)
-    from wearsim.studies.cam.run_view import CamRunView  # noqa: PLC0415  (not of a cylinder)
-
-    return CamRunView(result)
