@@ -16,7 +16,7 @@ from wearsim.evolution.steppers.loads import smooth_loads
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
 from wearsim.mechanics.numerics.linearised_wear import difference_sizes
 from wearsim.plugins import BODIES
-from wearsim.types import FloatArray
+from wearsim.types import BoolArray, FloatArray
 
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
@@ -25,6 +25,8 @@ UNCERTAIN = 0.3  # part of the bias by variation within a step that may be wrong
 VARYING_COVER = 2.0  # further safety factor where inputs vary, so that errors change irregularly
 SHARE = 0.7  # part of the tolerance that one step may use
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
+ROUND_OFF = 1e-9  # relative standard deviation up to which a load or an input is constant
+ADHERING = 0.1  # part of a contact that adheres from which it is in partial slip
 DEPTHS = ("cylinder_depth", "roller_depth")
 
 
@@ -79,7 +81,8 @@ def variation_bias(
     first: FloatArray,
     passes: FloatArray,
     follows_trends: bool = False,
-) -> tuple[Depths, FloatArray] | None:
+    negligible: float = 0.0,
+) -> tuple[Depths, FloatArray, BoolArray] | None:
     """Return the wear and energy that a step misses where load and processes vary within it.
 
     The step takes their exact means, but wear is not linear in them. The bias due to the variance
@@ -95,13 +98,19 @@ def variation_bias(
         Start and length of the step [passes].
     follows_trends : bool
         Whether the scheme takes a smooth load at the end of the step instead of its mean.
+    negligible : float
+        Half the square of a relative standard deviation up to which the bias is neglected, except
+        in partial slip and where the wear is not proportional to the dissipated power. The relative
+        bias is of this size times a factor below one, such as 2/9 for a power of 2/3.
 
     Returns
     -------
     depths : tuple of ndarray
         Depth of cylinder and rollers to add, shapes as in `WearState` [m].
     energy : ndarray, shape (realisations,)
-        Energy to add [J]. None is returned where nothing varies.
+        Energy to add [J].
+    varies : ndarray of bool, shape (realisations,)
+        Whether the load or an input varies. None is returned where nothing does.
     """
     if problem.constant_load is not None and not problem.varying:
         return None
@@ -115,32 +124,42 @@ def variation_bias(
             deviation = np.where(smooth_loads(problem, first, passes), 0.0, deviation)
             deviations[0] = name, rollers, deviation
     averaged = problem.at_time(start, stop)
-    loads = carried_loads(problem, end.contacts)
-    mean: WearIncrement | None = None
-    biases: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    loads, least = carried_loads(problem, end.contacts), np.full(len(first), ROUND_OFF)
+    if problem.linear_wear:
+        adhesion = end.contacts.adhesion_fraction.reshape(problem.shape).max(axis=(0, 1))
+        least[adhesion <= ADHERING] = max(math.sqrt(2.0 * negligible), ROUND_OFF)
+    varies, chosen = np.zeros((2, len(first)), dtype=np.bool_)
+    shifts: list[tuple[str, FloatArray]] = []
     for name, rollers, deviation in deviations:
         values = loads if name == "normal_force_offset" else getattr(averaged.inputs, name)
         values = values.reshape(-1, values.shape[-1])
-        significant = deviation > 1e-9 * np.abs(values).max(axis=0)
+        greatest = np.abs(values).max(axis=0)
+        varies |= deviation > ROUND_OFF * greatest
+        significant = deviation > least * greatest
         if not significant.any():
             continue
+        chosen |= significant
         # a load and a friction coefficient are never below zero
         bounded = name in {"normal_force_offset", "friction"}
-        greatest = 0.9 * values.min(axis=0) if bounded else np.inf
-        size = np.where(significant, np.minimum(deviation, greatest), 0.0)
-        shift = np.where(np.isin(problem.roller, rollers)[:, None], size, 0.0)
-        mean = mean or _shifted_wear(averaged, end, loads, {}, passes)
-        less, more = (
-            _shifted_wear(averaged, end, loads, {name: sign * shift}, passes)
-            for sign in (-1.0, 1.0)
-        )
-        columns = zip(*(_wear_and_energy(wear, passes) for wear in (less, mean, more)), strict=True)
-        cylinder, roller, energy = (0.5 * (low - 2.0 * mid + up) for low, mid, up in columns)
-        biases.append((cylinder, roller, energy))
-    if not biases:
-        return None
-    cylinder, roller, energy = (np.sum(parts, axis=0) for parts in zip(*biases, strict=True))
-    return (cylinder, roller), energy
+        most = 0.9 * values.min(axis=0) if bounded else np.inf
+        size = np.where(significant, np.minimum(deviation, most), 0.0)
+        shifts.append((name, np.where(np.isin(problem.roller, rollers)[:, None], size, 0.0)))
+    cylinders, all_rollers, energies = (np.zeros_like(values) for values in (*end.depths, first))
+    places = chosen.nonzero()[0]
+    if places.size:
+        part, length = (averaged.at(places), end.at(places), loads[..., places]), passes[places]
+        mean = _wear_and_energy(_shifted_wear(*part, {}, length), length)
+        for name, shift in shifts:
+            less, more = (
+                _wear_and_energy(_shifted_wear(*part, {name: change}, length), length)
+                for change in (-shift[:, places], shift[:, places])
+            )
+            columns = zip(less, mean, more, strict=True)
+            cylinder, roller, energy = (0.5 * (low - 2.0 * mid + up) for low, mid, up in columns)
+            cylinders[:, :, places] += cylinder
+            all_rollers[:, :, places] += roller
+            energies[places] += energy
+    return (cylinders, all_rollers), energies, varies
 
 
 def _deviations(
@@ -205,7 +224,7 @@ def _shifted_wear(
         for name, shift in shifts.items()
         if name != "normal_force_offset"
     }
-    shifted = problem.with_inputs(replace(problem.inputs, **values))
+    shifted = problem.with_inputs(replace(problem.inputs, **values)) if values else problem
     contacts = solve_present(shifted, end, loads + shifts.get("normal_force_offset", 0.0))
     return WearIncrement(shifted, contacts, passes)
 

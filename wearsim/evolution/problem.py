@@ -36,6 +36,7 @@ _CONSTANTS = (
     *("shape", "body_rows", "volume_weights", "nominal_least_gap", "cylinder_share", "has_spring"),
     *("constant_load", "pauses", "greatest_load", "_wear_coefficients"),
 )
+_OF_LOAD = {"normal_force_offset"}  # inputs on which no other constant value depends
 _OF_GAP = "nominal_gap", "contact_gap", "nominal_least_gap", "has_crowned_gap"
 
 
@@ -356,8 +357,11 @@ class WearProblem:
         for name in _CONSTANTS if self.laws and self.linear_wear else ():
             getattr(self, name)  # computed once, for all problems with other inputs
         found = object.__new__(WearProblem)
-        tilted = not np.array_equal(inputs.tilt, self.inputs.tilt)
-        lost = {"nominal_batch", "spin", *(_OF_GAP if tilted else ())}
+        before, after = vars(self.inputs), vars(inputs)
+        changed = {name for name in after if after[name] is not before.get(name)}
+        lost = set() if changed <= _OF_LOAD else {"nominal_batch", "spin"}
+        if "tilt" in changed and not np.array_equal(inputs.tilt, self.inputs.tilt):
+            lost.update(_OF_GAP)
         found.__dict__.update({n: v for n, v in self.__dict__.items() if n not in lost})
         found.__dict__.update(inputs=inputs, varying=())
         return found

@@ -20,7 +20,7 @@ measures how far slip is partial. In a fresh contact, too, strips enter the cont
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
 from typing import TypeAlias
@@ -38,6 +38,7 @@ from wearsim.evolution.strips import coarse_problem
 from wearsim.types import FloatArray, Grid
 
 LOOSER = 12.0  # tolerance of the coarse test over that of the test
+LOOSER_ITERATIONS = 4.0  # the same of the iterations of a step
 LOOSEST = 0.1  # greatest tolerance of a coarse test
 COARSE_TAPER = 2.0  # as of `Trial`; fewer steps before the end leave the estimates as they are
 # safety factors on the differences of depth, volume and profile where the rate of wear does not
@@ -195,6 +196,7 @@ def coarse_courses(
         None for a test that fails on the coarse strips.
     """
     coarse, courses = coarse_problem(problem), [Course() for _ in needed]
+    coarse = replace(coarse, iteration_tolerance=LOOSER_ITERATIONS * coarse.iteration_tolerance)
     try:
         state = fresh_state(coarse)
         tests = Evolution(coarse, state, stepper, stop, max_steps, lambda _: np.inf)

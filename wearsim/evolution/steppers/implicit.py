@@ -234,6 +234,12 @@ class ImplicitStepper(StepDoublingStepper):
         """Return the implicit step."""
         return implicit_step
 
+    def whole_step(
+        self, problem: WearProblem, start: WearState, step: FloatArray, end: WearState, scheme: Step
+    ) -> WearState:
+        """Return the solution by a whole step; its iteration starts from the contacts of `end`."""
+        return implicit_step(problem, start, step, end)
+
 
 def _varies(problem: WearProblem) -> bool:
     """Return whether load or inputs vary in time."""
@@ -268,7 +274,9 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     )
 
 
-def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
+def implicit_step(
+    problem: WearProblem, state: WearState, passes: FloatArray, near: WearState | None = None
+) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
     A backward differentiation formula of the order in `state`. Energy changes by the same formula
@@ -277,7 +285,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
     decrease is repeated at second order, and at first order if they still decrease; so is one in
     which contact would be lost. A step in which the load jumps is of first order. The state
-    returned has the order of its formula.
+    returned has the order of its formula. The iteration for the contacts starts from those of
+    `near`, by default of the start of the step.
 
     Raises
     ------
@@ -295,7 +304,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:
-        end, decreased = step_by_formula(here, state, passes, conditions, order)
+        end, decreased = step_by_formula(here, state, passes, conditions, order, near)
     except (StepError, ContactError) as error:
         # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
         # on which the contact is not found; strips that are not cut are the simpler problem

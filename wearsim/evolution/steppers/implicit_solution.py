@@ -10,6 +10,7 @@ import numpy as np
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
+from wearsim.evolution.error_estimates import ADHERING
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
 from wearsim.evolution.steppers.conditions import Conditions
@@ -37,9 +38,9 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 MAX_FIXED_POINT = 60
 DAMPED_FROM = 10  # iterations; far fewer are usual
 CONVERGED = 500.0  # change of wear over the whole depth, relative to the tolerance of iterations
-# the same over the wear of the step, from this part of a contact that adheres on: the dissipated
-# power then depends on the line loads
-OF_STEP, ADHERING = 5000.0, 0.1
+# the same over the wear of the step, in partial slip: the dissipated power then depends on the line
+# loads
+OF_STEP = 5000.0
 LEAST_GUESS = 0.1  # first guess of a load over the one before; ratio of its iterates
 # relative change of loads with a spring: part of that in the step, at most this over the tolerance
 # of iterations
@@ -131,6 +132,7 @@ def step_by_formula(
     passes: FloatArray,
     conditions: Conditions,
     order: IntArray,
+    near: WearState | None = None,
 ) -> tuple[WearState, BoolArray]:
     """Return the state after an implicit step, and whether depths or energy decrease.
 
@@ -149,13 +151,15 @@ def step_by_formula(
         Length of the step.
     conditions : Conditions
     order : ndarray of int, shape (realisations,)
+    near : WearState, optional
+        State from whose contacts the iteration starts, by default that at the start of the step.
 
     Raises
     ------
     StepError
         If the iteration does not converge.
     """
-    past, contacts, depths = Past.of(state), state.contacts, state.stacked
+    past, contacts, depths = Past.of(state), (near or state).contacts, state.stacked
     bodies, gap = problem.body_rows, problem.contact_gap
     share = np.array(problem.cylinder_wear_share[: passes.size, 0])  # at the first station
     shape, strips = contacts.line_load.shape, problem.grid.strips
@@ -186,7 +190,7 @@ def step_by_formula(
         depths,
         bodies,
         gap,
-        kernel_input(contacts.approach),
+        kernel_input(state.contacts.approach),
         wear,
         share,
         past.separation,
@@ -204,7 +208,9 @@ def step_by_formula(
         *(bodies, resolved, gap, depths, past.part, of_bodies, of_contacts),
     )
     base, guess = of_bodies[3], of_bodies[4]
-    exponents = np.array(state.wear_exponents).reshape(shape)
+    exponents = np.array((near or state).wear_exponents).reshape(shape)
+    if near is not None and near.past_feedback is not None:
+        feedback = near.past_feedback[0].reshape(feedback.shape)
     loads = LoadsOfStep(problem, state, conditions.force, passes, feedback)
     stations, active = problem.shape[0], np.ones(realisations, dtype=np.bool_)
     iterations = np.zeros(realisations, dtype=np.int64)

@@ -28,6 +28,7 @@ from wearsim.types import BoolArray, FloatArray
 # least error of the greatest depth over that of the profile; it is about 0.6 times that one except
 # where the difference crosses zero
 LEAST = 0.3
+NEGLIGIBLE = 0.02  # half the variance of a load or an input that is neglected, over the tolerance
 
 
 @dataclass(frozen=True)
@@ -93,11 +94,13 @@ class StepDoublingStepper(Stepper):
         coarse_start = state.coarse_step_solution or state
         half = scheme(problem, state, 0.5 * step)
         end = scheme(problem, half, 0.5 * step)
-        coarse = scheme(problem, coarse_start, step)
+        coarse = self.whole_step(problem, coarse_start, step, end, scheme)
         end = with_pass_errors(problem, state, end, coarse, scheme, step)
-        bias = variation_bias(problem, end, state.passes, step, self.follows_trends)
+        negligible = NEGLIGIBLE * self.tolerance
+        bias = variation_bias(problem, end, state.passes, step, self.follows_trends, negligible)
+        varies = np.zeros(len(step), dtype=np.bool_)
         if bias is not None:
-            depths, energy = bias
+            depths, energy, varies = bias
             end, coarse = (
                 one.with_added(depths).replaced(energy=one.energy + energy) for one in (end, coarse)
             )
@@ -105,9 +108,6 @@ class StepDoublingStepper(Stepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         after = end.stacked - coarse.stacked
         change = after - (state.stacked - coarse_start.stacked)
-        varies = np.zeros(len(step), dtype=np.bool_)
-        if bias is not None:
-            varies = np.asarray(sum(np.count_nonzero(b, axis=(0, 1, 3)) for b in bias[0])) > 0
         cover = COVER * np.where(varies, VARYING_COVER, 1.0)
         added, reached = (cover * np.abs(sizes(problem, end, one)) for one in (change, after))
         auxiliary = {
@@ -131,6 +131,12 @@ class StepDoublingStepper(Stepper):
             **auxiliary,
         )
         return Doubled((half, end), added, reached, varies)
+
+    def whole_step(
+        self, problem: WearProblem, start: WearState, step: FloatArray, end: WearState, scheme: Step
+    ) -> WearState:
+        """Return the solution by a whole step from `start`; `end` is that by two halves."""
+        return scheme(problem, start, step)
 
     def excess(
         self, problem: WearProblem, state: WearState, doubled: Doubled, stop: float

@@ -1,0 +1,50 @@
+"""Bias of the wear of a step within which the load varies."""
+
+import numpy as np
+import pytest
+
+from tests.evolution import built
+from wearsim.evolution.error_estimates import ADHERING, variation_bias
+from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.single_step import carried_loads, energy_per_pass
+
+
+def varying_load(**changes):
+    """Return problem, fresh state, arguments of one long step, and half the relative variance."""
+    problem, _, stop = built("rig-ensemble", **changes)
+    state, (load,) = fresh_state(problem), problem.varying
+    deviation = load.paths[0].deviation(0.0, problem.time(stop))
+    relative = deviation / np.abs(carried_loads(problem, state.contacts)).max()
+    return problem, state, (np.zeros(1), np.full(1, stop)), 0.5 * relative**2
+
+
+def test_bias_of_a_small_variance_is_below_the_bound_and_is_neglected():
+    problem, state, step, half = varying_load(creepage__longitudinal=4e-3)
+    assert state.contacts.adhesion_fraction.max() < ADHERING
+    depths, energy, varies = variation_bias(problem, state, *step)
+    of_step = energy_per_pass(problem, state.contacts) * step[1]
+    assert varies
+    assert 0.0 < np.abs(energy) < half * of_step
+    assert np.abs(depths[0]).max() > 0.0
+    kept, same_energy, _ = variation_bias(problem, state, *step, negligible=0.99 * half)
+    np.testing.assert_array_equal(same_energy, energy)
+    np.testing.assert_array_equal(kept[0], depths[0])
+    none, no_energy, varies = variation_bias(problem, state, *step, negligible=1.01 * half)
+    assert varies  # safety factors of varying loads still apply
+    assert not (none[0].any())
+    assert not (none[1].any())
+    assert not (no_energy.any())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"creepage__longitudinal": 1e-5}, {"wear": {"law": "t-gamma"}}],
+    ids=["partial slip", "wear by a power of the power"],
+)
+def test_bias_is_not_neglected_where_wear_may_depend_strongly_on_the_load(changes):
+    problem, state, step, half = varying_load(**changes)
+    expected = variation_bias(problem, state, *step)
+    found = variation_bias(problem, state, *step, negligible=10.0 * half)
+    np.testing.assert_array_equal(found[1], expected[1])
+    np.testing.assert_array_equal(found[0][0], expected[0][0])
+    assert np.abs(expected[1]) > 0.0
