@@ -233,8 +233,8 @@ class ImplicitStepper(StepDoublingStepper):
     def whole_step(
         self, problem: WearProblem, start: WearState, step: FloatArray, end: WearState, scheme: Step
     ) -> WearState:
-        """Return the solution by a whole step; its iteration starts from the contacts of `end`."""
-        return implicit_step(problem, start, step, end)
+        """Return the solution by a whole step, about the exponents of the wear found by halves."""
+        return scheme(problem, start.replaced(wear_exponents=end.wear_exponents), step)
 
 
 def _varies(problem: WearProblem) -> bool:
@@ -270,9 +270,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     )
 
 
-def implicit_step(
-    problem: WearProblem, state: WearState, passes: FloatArray, near: WearState | None = None
-) -> WearState:
+def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
     A backward differentiation formula of the order in `state`. Energy changes by the same formula
@@ -281,8 +279,7 @@ def implicit_step(
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
     decrease is repeated at second order, and at first order if they still decrease; so is one in
     which contact would be lost. A step in which the load jumps is of first order. The state
-    returned has the order of its formula. The iteration for the contacts starts from those of
-    `near`, by default of the start of the step.
+    returned has the order of its formula.
 
     Raises
     ------
@@ -300,7 +297,7 @@ def implicit_step(
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:
-        end, decreased = step_by_formula(here, state, passes, conditions, order, near)
+        end, decreased = step_by_formula(here, state, passes, conditions, order)
     except (StepError, ContactError) as error:
         # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
         # on which the contact is not found; strips that are not cut are the simpler problem
