@@ -19,6 +19,7 @@ from wearsim.mechanics.cam import (
     greatest,
     integral_error,
     motion_mistakes,
+    shape_motion,
     tangent_cam,
 )
 from wearsim.mechanics.cam.outline import angles_by_chord, angles_by_number
@@ -92,6 +93,8 @@ def test_error_of_an_integral_is_that_of_its_last_coefficients() -> None:
     assert integral_error(stations, values) == pytest.approx(known)
     both = integral_error(stations, np.column_stack([values, 2.0 * values]))
     assert both == pytest.approx([known, 2.0 * known])
+    still = Stations((PANELS[1],) * 2, (1, 1))
+    assert integral_error(still, np.ones((2, 3))).tolist() == [0.0] * 3
 
 
 def test_greatest_value_is_that_of_the_polynomial() -> None:
@@ -116,7 +119,7 @@ def test_greatest_value_is_that_of_the_polynomial() -> None:
         assert found.error == pytest.approx(0.0, abs=1e-12)
         small = greatest(stations, 1e-9 * np.concatenate([values[0], [0.1], values[1]]))
         assert (small.value, small.angle) == pytest.approx((1e-9 * value, angle), abs=1e-4)
-        assert small.value == pytest.approx(1e-9 * value, rel=1e-6)
+        assert small.value == pytest.approx(1e-9 * value, rel=1e-6, abs=0.0)
         peaks.append(float(found.angle))
     assert peaks[0] < PANELS[1].start
     assert peaks[1] > PANELS[1].stop
@@ -191,6 +194,41 @@ def test_nose_without_a_common_tangent_is_refused(
         tangent_cam(base, nose, distance)
     with pytest.raises(ValueError, match="the nose is within the base circle"):
         tangent_cam(distance + nose, nose, distance)
+
+
+SLIDER = Follower(25.0 * MM, 20.0 * MM, offset=7.0 * MM)
+ARM = Follower(25.0 * MM, 20.0 * MM, "swinging", centre_distance=90.0 * MM, arm_length=50.0 * MM)
+TANGENT = tangent_cam(25.0 * MM, 10.0 * MM, 20.0 * MM)
+
+
+@pytest.mark.parametrize(
+    ("profile", "follower", "words"),
+    [
+        (TANGENT[1:2] * 2 + TANGENT[2:], SLIDER, "two straight parts of a cam meet at a corner"),
+        (TANGENT[::-1], SLIDER, "do not follow one another"),
+        (TANGENT[::-1], ARM, "do not follow one another"),
+        (tangent_cam(25.0 * MM, 10.0 * MM, 0.2), ARM, "the arm does not reach the cam"),
+    ],
+)
+def test_profile_that_a_follower_cannot_follow_is_refused(profile, follower, words) -> None:
+    with pytest.raises(ValueError, match=words):
+        shape_motion(profile, follower)
+
+
+@pytest.mark.parametrize("follower", [SLIDER, ARM, replace(ARM, towards=True)])
+def test_nose_points_along_the_motion_at_the_start_of_a_turn(follower: Follower) -> None:
+    motion = shape_motion(TANGENT, follower)
+    assert [part.name for part in motion.segments] == [
+        *("nose", "flank", "base circle", "flank", "nose")
+    ]
+    assert motion.starts[-1] == math.tau
+    # the roller touches the nose at its centre's distance of 30 mm from (20 mm, 0)
+    position = follower.rest + motion.lift(np.zeros(1))[0, 0]
+    if follower.swings:  # seen from the axis, the pivot is on x
+        centre = 90.0 * MM - 50.0 * MM * np.exp(-1j * position)
+        assert abs(centre - 20.0 * MM) == pytest.approx(30.0 * MM)
+    else:
+        assert abs(complex(7.0 * MM, position) - 20.0j * MM) == pytest.approx(30.0 * MM)
 
 
 @pytest.mark.parametrize("law", ["cycloidal", "harmonic"])

@@ -76,6 +76,8 @@ def test_arcs_of_a_cam_touch_each_other() -> None:
         assert points[0] == pytest.approx(points[1], abs=1e-15)
     with pytest.raises(ValueError, match="touches both"):
         three_arc_cam(20 * MM, 6 * MM, 22 * MM, 19 * MM)
+    with pytest.raises(ValueError, match="touches both"):  # the nose is blunter than the flanks
+        three_arc_cam(20 * MM, 61 * MM, 40 * MM, 60 * MM)
     with pytest.raises(ValueError, match="beyond"):
         three_arc_cam(20 * MM, 6 * MM, -22 * MM, 60 * MM)
 
@@ -92,19 +94,21 @@ FOLLOWERS = {
 
 
 @pytest.mark.parametrize("name", FOLLOWERS)
-@pytest.mark.parametrize("depth", [0.0, 0.2 * MM])
-def test_surface_is_the_envelope_of_the_roller(name: str, depth: float) -> None:
+@pytest.mark.parametrize(("depth", "inner"), [(0.0, False), (0.2 * MM, False), (0.2 * MM, True)])
+def test_surface_is_the_envelope_of_the_roller(name: str, depth: float, inner: bool) -> None:
     follower, theta = FOLLOWERS[name], np.linspace(0.2, 5.0, 7)
     height = 6 * MM if name == "translating" else 0.1
 
     def points(angles: np.ndarray) -> np.ndarray:
         waves = [0.5 * (1.0 - np.cos(angles)), 0.5 * np.sin(angles), 0.5 * np.cos(angles)]
-        kinematics = follower.kinematics(height * np.stack(waves))
+        kinematics = follower.kinematics(height * np.stack(waves), inner)
         found = surface_points(follower, kinematics, angles, depth)
         return np.stack([one[0] + 1j * one[1] for one in found])
 
     centre, contact = points(theta)
-    np.testing.assert_allclose(np.abs(centre - contact), 8 * MM + depth, rtol=1e-12)
+    radius = 8 * MM - depth if inner else 8 * MM + depth
+    np.testing.assert_allclose(np.abs(centre - contact), radius, rtol=1e-12)
+    assert (np.abs(contact) > np.abs(centre)).all() == inner
     if not follower.swings:
         rest = math.sqrt((28 * MM) ** 2 - (4 * MM) ** 2)
         lift = height * 0.5 * (1.0 - np.cos(theta))

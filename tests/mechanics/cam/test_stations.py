@@ -102,9 +102,9 @@ def test_mistakes_of_a_motion_name_the_segment(parts, place, words):
 
 def test_motion_at_a_boundary_is_that_of_the_following_segment():
     motion = rise_and_return("harmonic")
-    assert motion.segment_at(np.radians([0.0, 90.0, 180.0, 270.0, 360.0, -90.0])).tolist() == [
-        *(0, 1, 2, 3, 0, 3)
-    ]
+    assert motion.segment_at(
+        np.radians([0.0, 90.0, 180.0, 270.0, 360.0, -90.0, -1e-13])
+    ).tolist() == [*(0, 1, 2, 3, 0, 3, 0)]
     second = motion.lift(np.radians([90.0, 89.999]))[2]
     assert second[0] > 0.0
     assert second[1] == 0.0
@@ -189,8 +189,23 @@ def test_choice_halves_panels_and_is_scaled_by_the_whole_turn():
     # the kinks are in panels that were halved six times
     width = min(panel.stop - panel.start for panel in stations.panels)
     assert width == pytest.approx(math.tau / 64.0)
+    sizes = np.array([panel.stop - panel.start for panel in stations.panels])
+    assert max(np.array(stations.numbers)[sizes < 1.5 * width]) == 25
     smooth = np.abs(np.sin(angle - 1.0)) > math.sin(width)
     assert away[smooth].max() < 1e-3
+    # the greatest value, at the end of the turn, is the scale
+    grows = [
+        choose_stations([WHOLE], lambda _, theta, size=size: size * np.exp(1.5 * theta)[None], 1e-6)
+        for size in (1e-4, 1.0, 1e4)
+    ]
+    whole = {}
+    places = np.linspace(0.0, 1.0, 193)
+    for count in NUMBERS:
+        values = np.exp(1.5 * math.tau * (lobatto(count)[0] - 1.0))
+        exact = np.exp(1.5 * math.tau * (places - 1.0))
+        whole[count] = np.abs(interpolation(count, places) @ values - exact).max()
+    least = next(count for count in NUMBERS if whole[count] <= 1e-6)
+    assert [one.numbers for one in grows] == [(least,)] * 3
     many = choose_stations([WHOLE], lambda panel, theta: np.sin(theta)[None], 1e-3)
     assert many.numbers == (13,)
 

@@ -102,11 +102,11 @@ def test_swapped_curvatures_swap_the_axes(exponent, load):
 def test_equal_curvatures_have_a_circular_patch():
     patch = hertz(5.0, 5.0, 300.0, MODULUS)
     radius = (0.75 * 300.0 * 0.1 / MODULUS) ** (1.0 / 3.0)  # R = 1/(2 A)
-    assert patch.a == pytest.approx(radius, rel=1e-13)
+    assert patch.a == pytest.approx(radius, rel=1e-13, abs=0.0)
     assert patch.a == patch.b
-    assert patch.approach == pytest.approx(radius**2 / 0.1, rel=1e-13)
+    assert patch.approach == pytest.approx(radius**2 / 0.1, rel=1e-13, abs=0.0)
     nearby = hertz(5.0, 5.0 * (1.0 + 1e-12), 300.0, MODULUS)
-    assert nearby.a == pytest.approx(patch.a, rel=1e-11)
+    assert nearby.a == pytest.approx(patch.a, rel=1e-11, abs=0.0)
 
 
 @settings(deadline=None)  # the first call compiles
@@ -135,7 +135,7 @@ def test_load_below_is_the_integral_of_the_line_load():
 def test_given_hertz_ellipse_has_the_approach_of_hertz():
     patch = hertz(45.0, 1.0, 300.0, MODULUS)
     assert given_ellipse(patch.a, patch.b, 300.0, MODULUS).approach == pytest.approx(
-        patch.approach, rel=1e-13
+        patch.approach, rel=1e-13, abs=0.0
     )
 
 

@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from scipy.special import ellipkm1
 
+from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.mechanics.hertz.parabola_fit import (
     CONVERGED,
     LEAVES_STRIPS,
@@ -15,6 +17,8 @@ from wearsim.mechanics.hertz.parabola_fit import (
     fit_centred,
     fit_parabola,
     hertz_on_profile,
+    is_parabola,
+    strips_within,
 )
 from wearsim.mechanics.hertz.patches import (
     NO_GAP,
@@ -69,6 +73,7 @@ def test_patch_that_is_given_may_end_at_the_edge_of_the_strips() -> None:
         found = patches(bodies(2, 0.1, 0.85 * factor), gaps, loads)
         assert found.status.tolist() == [status] * 2
         assert found.centre == pytest.approx([0.2, -0.2])
+        assert found.iterations.tolist() == [0, 0]
         assert found.ratio == pytest.approx([0.1 / (0.85 * factor)] * 2)
         assert found.peak_pressure == pytest.approx([1.5 * LOAD / (math.pi * 0.085 * factor)] * 2)
     assert patches(bodies(2, 0.1, 0.5), gaps, np.full(2, 0.5)).status.tolist() == [CONVERGED] * 2
@@ -103,6 +108,7 @@ def test_fit_needs_three_strips_and_a_valley() -> None:
     flat = fit_parabola(y, np.full(3, 2.0), 0.0, 1.5)
     assert flat[0] == pytest.approx(0.0, abs=1e-12)
     assert math.isnan(flat[1])
+    assert fit_parabola(y, y - 2.0 * y**2, 0.0, 1.5)[0] == pytest.approx(-2.0)
     assert fit_centred(y, y**2, 0.0, 1.5, 1e-9)[3] == CONVERGED
     assert fit_centred(y, -(y**2), 0.0, 1.5, 1e-9)[3] == NO_CURVATURE
     assert fit_centred(y[:2], y[:2] ** 2, -0.5, 1.5, 1e-9)[3] == TOO_FEW_STRIPS
@@ -134,3 +140,73 @@ def test_patch_on_a_profile_is_consistent_with_its_own_fit() -> None:
     assert curvature == pytest.approx(terms[2], rel=1e-6)
     narrow = hertz_on_profile(y[100:141], gap(y)[100:141], 45.0, 30.0 * LOAD, MODULUS, 1e-10, 200)
     assert narrow[5] == LEAVES_STRIPS
+
+
+def test_gap_is_a_parabola_to_round_off_of_its_greatest_height() -> None:
+    gap = 0.7 + 3.0 * (Y - 0.25) ** 2  # up to 4.7 above its vertex
+    assert is_parabola(Y, gap, 3.0, 0.25, 0.7)
+    for i in (0, 10, 20):
+        for change, expected in ((1e-14, True), (-1e-14, True), (4e-14, False), (-4e-14, False)):
+            moved = gap.copy()
+            moved[i] += change
+            assert is_parabola(Y, moved, 3.0, 0.25, 0.7) == expected
+    assert [strips_within(Y, 0.02, width) for width in (0.01, 0.03, 0.09, 0.55)] == [0, 1, 2, 11]
+
+
+def test_section_of_a_prescribed_patch_is_symmetric_about_its_vertex() -> None:
+    gap = 2.0 * (Y + 0.45) ** 2 + 0.3 * (Y + 0.45) ** 3
+    curvature, centre, height, span, status = fit_within(Y, gap, SPACING, 1e-10)
+    assert status == CONVERGED
+    _, vertex, *_ = fit_parabola(Y, gap, 0.0, 1.05)
+    assert span == pytest.approx(1.05 - abs(vertex), rel=1e-12)
+    again = fit_parabola(Y, gap, centre, span)
+    assert (curvature, centre, height) == pytest.approx(again[:3], abs=1e-9)
+    found = patches(bodies(1, 0.1, 0.4), gap[None], np.array([LOAD]))
+    expected = curvature, centre, height
+    assert found.centre[0] == pytest.approx(expected[1], abs=1e-9)
+    first = 1.5 * LOAD / (math.pi * MODULUS * 0.4) * ellipkm1(0.25**2)
+    assert found.approach[0] == pytest.approx(first + height, rel=1e-9)
+
+
+def test_contacts_of_a_batch_have_their_own_gap_and_curvature() -> None:
+    y = np.linspace(-6e-3, 6e-3, 121)
+    gaps = np.stack([1.2 * (y - 4e-4) ** 2, 1.2 * y**2, 2.5 * y**2, 2.5 * y**2 + 200.0 * y**3])
+    row = np.array([0, 0, 0, 2, 2, 3, 3, 1])
+    curved = np.array([45.0, 0.8, 45.0, 45.0, 0.9, 45.0, 3.0, 45.0])
+    loads = LOAD * np.array([1.0, 0.2, 1.5, 1.0, 0.3, 0.7, 0.1, 90.0])
+    given = Bodies(y, y[1] - y[0], curved, MODULUS, 0.0, 0.0, 1e-10, 200)
+    found = Patches(*np.full((6, 8), math.nan), *np.zeros((2, 8), dtype=np.int64))
+    find_patches(given, gaps, row, loads, found)
+    assert found.status.tolist() == [CONVERGED] * 7 + [LEAVES_STRIPS]
+    for k in range(7):
+        fit = hertz_on_profile(y, gaps[row[k]], curved[k], loads[k], MODULUS, 1e-10, 200)
+        patch = hertz(curved[k], fit[0], loads[k], MODULUS)
+        known = patch.a, patch.b, patch.peak_pressure, patch.approach + fit[3], patch.a / patch.b
+        sizes = found.a[k], found.b[k], found.peak_pressure[k], found.approach[k], found.ratio[k]
+        assert sizes == pytest.approx(known, rel=1e-9, abs=0.0)
+        assert found.centre[k] == pytest.approx(fit[2], abs=1e-9)
+        assert found.iterations[k] == fit[4]
+    assert found.ratio[0] == found.ratio[2]  # of different size
+    assert len(set(found.ratio[:7])) == 6
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.8, -3.0])
+def test_patches_move_with_the_strips(moved: float) -> None:
+    gap = 2.0 * (Y - 0.1) ** 2 + 0.4 * (Y - 0.1) ** 3 + 0.3 * np.maximum(0.1 - Y**2, 0.0)
+    expected = fit_within(Y, gap, SPACING, 1e-10)
+    curvature, centre, *rest = fit_within(Y + moved, gap, SPACING, 1e-10)
+    assert (curvature, centre - moved, *rest) == pytest.approx(expected, abs=1e-9)
+    expected = hertz_on_profile(Y, gap, 45.0, 3e9, MODULUS, 1e-8, 200)
+    assert expected[5] == CONVERGED
+    curvature, half_width, centre, *rest = hertz_on_profile(
+        Y + moved, gap, 45.0, 3e9, MODULUS, 1e-8, 200
+    )
+    assert (curvature, half_width, centre - moved) == pytest.approx(expected[:3], abs=1e-7)
+    # a parabola is known from one fit, and has a patch up to the edges of the strips
+    unit = hertz(45.0, 1.0, 1.0, MODULUS).b
+    for width, status in ((1.04, CONVERGED), (1.06, LEAVES_STRIPS)):
+        load = (width / unit) ** 3
+        found = patches(bodies(y=Y + moved), Y[None] ** 2, np.array([load]))
+        assert (found.status[0], found.iterations[0]) == (status, 1)
+        single = hertz_on_profile(Y + moved, Y**2, 45.0, load, MODULUS, 1e-10, 200)
+        assert single[4:] == (1, status)

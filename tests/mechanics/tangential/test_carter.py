@@ -110,6 +110,68 @@ def test_mean_direction_for_small_rotation_is_its_series():
     assert mean_direction(1.0, 0.0, turn)[2] == pytest.approx(expected, abs=turn**5)
 
 
+# Gauss quadrature for the weight sqrt(1 - s^2): exact for polynomials up to the degree 13
+PLACES = np.cos(np.pi * np.arange(1, 8) / 8.0)
+WEIGHTS = (1.0 - PLACES**2) / 4.0
+
+
+def tractions_of_the_docstring(d_x, d_y, whole):
+    """Return forces and moment by quadrature of the tractions of `carter`, and the adhering part.
+
+    Over mu q, mu q a and 2 a; lengths are over a.
+    """
+    slip_x, slip_y, spin = scaled(d_x, d_y, whole)
+    psi = min(max(whole, -SPIN_LIMIT), SPIN_LIMIT)
+    t = np.roots([1.0 - psi * psi, -2.0 * d_y * psi, -d_x * d_x - d_y * d_y]).max()
+    slip = np.hypot(slip_x, slip_y)
+    y_hat, e, turn = np.array([0.0, psi]), np.array([0.0, psi]), np.zeros(2)
+    if slip > 0.0:
+        e = np.array([d_x / t, d_y / t + psi])
+        turn = np.array([slip_x, slip_y]) / slip - e
+    reach = max(1.0 - t, 0.0)
+    back = t + reach * PLACES  # in the adhesion zone
+    if t < 1.0:
+        per = 1.0 / t if t > 0.0 else 0.0
+        whole_strip = e + np.outer(1.5 - (1.0 + PLACES) * per, turn)
+        reduced = np.outer((1.0 + back) * per - 0.5, turn) - (e - y_hat)
+    else:
+        whole_strip = e + np.outer(1.0 - 0.5 / t**2 - PLACES / t, turn)
+        reduced = np.zeros((7, 2))
+    force = -(WEIGHTS @ whole_strip + reach**2 * (WEIGHTS @ reduced))
+    moment = -(WEIGHTS * PLACES @ whole_strip + reach**2 * (WEIGHTS * back @ reduced))[1]
+    # the rotation of the slip along the strip, and spin beyond its limit
+    local = np.column_stack([np.full(7, slip_x), slip_y + spin * A * PLACES])
+    size = np.hypot(*local.T)[:, None]
+    direction = np.divide(local, size, out=np.zeros((7, 2)), where=size > 0.0)
+    mean, turning = WEIGHTS @ direction, (WEIGHTS * PLACES @ direction)[1]
+    rotating = whole != 0.0 and t > 1.0
+    turned = max(0.0, 1.0 - 1.0 / t**2 - (TURNED * slip / (spin * A)) ** 2) if rotating else 0.0
+    scrubbed = max(0.0, 1.0 - SPIN_LIMIT / abs(whole)) if whole else 0.0
+    force = (1.0 - scrubbed) * (force + turned * (turn + e - mean)) - scrubbed * mean
+    moment = (1.0 - scrubbed) * ((1.0 - turned) * moment - turned * turning) - scrubbed * turning
+    return np.array([*force, moment, (1.0 - scrubbed) * reach])
+
+
+@pytest.mark.parametrize("psi", [0.0, 0.15, -0.35, 0.6, -1.4])
+@pytest.mark.parametrize(
+    ("d_x", "d_y"),
+    [(0.3, -0.2), (-0.1, 0.3), (0.7, 0.5), (-1.2, 0.4), (1.5, -2.5), (0.0, 0.4), (0.0, 0.0)],
+)
+def test_strip_force_integrates_the_tractions_of_its_description(d_x, d_y, psi):
+    motion = scaled(d_x, d_y, psi)
+    found = [*force(*motion), strip_force(A, Q, MU, STEEPNESS, *motion, *MODULI)[3] / (2.0 * A)]
+    expected = tractions_of_the_docstring(d_x, d_y, psi)
+    assert found == pytest.approx(expected, rel=1e-11, abs=1e-12)
+    # without the full formula where neither the slip turns nor the spin exceeds its limit
+    turns = carter.spin_turns(A, MU * STEEPNESS, *motion, MODULI[1])
+    turn = abs(motion[2]) * A
+    assert turns == (turn > TURNED * np.hypot(*motion[:2]) or abs(psi) > SPIN_LIMIT)
+    if not turns:
+        full = strip_force(A, Q, MU, STEEPNESS, *motion, *MODULI)
+        straight = carter.straight_force(A, MU * Q, MU * STEEPNESS, *motion, *MODULI)
+        assert straight == pytest.approx(full, rel=1e-15)
+
+
 sizes = st.floats(-6.0, 6.0).map(lambda x: np.sign(x) * 10.0 ** (abs(x) - 4.0) if x else 0.0)
 
 

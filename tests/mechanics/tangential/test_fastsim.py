@@ -17,6 +17,7 @@ from wearsim.mechanics.tangential.fastsim import (
     WORK,
     bound_shape,
     closed_form,
+    closed_form_into,
     end_weights,
     march,
     march_fields,
@@ -185,7 +186,7 @@ def test_fields_integrate_to_the_sums_of_the_march(problem, elliptic):
         assert found == pytest.approx(
             expected, rel=1e-9, abs=1e-10 * np.abs(integrand).max() * dx[5]
         )
-    assert sums[3] == pytest.approx(sticks[1:].sum(axis=0) * dx, rel=1e-12)
+    assert sums[3] == pytest.approx(sticks[1:].sum(axis=0) * dx, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("elliptic", [False, True])
@@ -266,6 +267,11 @@ def test_few_elements_are_close_to_the_closed_form(elliptic):
     np.testing.assert_allclose(found[:2], expected[:2], atol=8e-3 * scale)
     np.testing.assert_allclose(found[2], expected[2], atol=8e-3 * scale * case.half_length.max())
     np.testing.assert_allclose(found[3], expected[3], atol=8e-3 * case.half_length.max())
+    # tractions are proportional to bound and gradients
+    length, bound, _, *gradients = case.arguments[:5]
+    small = closed_form(length, 1e-12 * bound, elliptic, *(1e-12 * one for one in gradients))
+    np.testing.assert_allclose(small[:3], 1e-12 * expected[:3], rtol=1e-10)
+    np.testing.assert_allclose(small[3], expected[3], rtol=1e-10)
 
 
 def test_strips_without_contact_or_creepage_have_no_force():
@@ -277,6 +283,14 @@ def test_strips_without_contact_or_creepage_have_no_force():
     ):
         assert np.all(found[:3] == 0.0)
         assert found[3] == pytest.approx([0.0, 2e-4])
+    # rows of an earlier contact are overwritten
+    former = np.full((ROWS, 3), 7.0)
+    closed_form_into(2, half_length, peak, False, none, 0.0, former)
+    assert former[:3].tolist() == [[0.0, 0.0, 7.0]] * 3
+    former = np.full((ROWS, 3), 7.0)
+    fields = 0.0, 0.0, 10, former, None
+    march_into(2, half_length, peak, None, 0, False, none, 0.0, 0.0, *fields)
+    assert former[:3].tolist() == [[0.0, 0.0, 7.0]] * 3
 
 
 @pytest.mark.parametrize("strip", [0.1, 0.5, 0.9])

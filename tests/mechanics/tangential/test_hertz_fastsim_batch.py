@@ -18,9 +18,11 @@ from wearsim.mechanics.hertz.patches import (
     NO_LOAD,
     Bodies,
     Patches,
+    cut_into_strips,
     find_patches,
     half_lengths,
 )
+from wearsim.mechanics.tangential.fastsim import march
 from wearsim.mechanics.tangential.hertz_fastsim_batch import (
     ALWAYS,
     EXACT,
@@ -40,6 +42,7 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
     coefficient,
     flexibilities,
     one_flexibility,
+    short_limit,
     spline,
 )
 from wearsim.types import Grid
@@ -94,10 +97,10 @@ def test_parabola_has_the_patch_of_its_curvature(curvatures):
     patches = find(gap, np.zeros(1, dtype=np.int64), load, curvature_x=curvatures[0])
     patch = hertz(*curvatures, 300.0, MODULUS)
     assert patches.iterations[0] == 1
-    assert (patches.a[0], patches.b[0]) == pytest.approx((patch.a, patch.b), rel=1e-13)
+    assert (patches.a[0], patches.b[0]) == pytest.approx((patch.a, patch.b), rel=1e-13, abs=0.0)
     assert patches.ratio[0] == pytest.approx(patch.a / patch.b, rel=1e-13)
-    assert patches.approach[0] == pytest.approx(patch.approach + 3e-6, rel=1e-13)
-    assert patches.centre[0] == pytest.approx(1e-4, rel=1e-11)
+    assert patches.approach[0] == pytest.approx(patch.approach + 3e-6, rel=1e-13, abs=0.0)
+    assert patches.centre[0] == pytest.approx(1e-4, rel=1e-11, abs=0.0)
 
 
 def test_prescribed_patch_keeps_its_axes_under_any_load():
@@ -212,6 +215,10 @@ def test_first_failed_contact_is_returned():
         curvature_x=1.0,
     )
     assert (failed, patches.status[0]) == (0, NO_LIMIT)
+    row = np.where(np.arange(CONTACTS) == 5, 3, ROW)
+    failed, found, patches = solve(theory(), operating_points(), row, np.vstack([GAPS, -(Y**2)]))
+    assert (failed, patches.status[5]) == (5, NO_CURVATURE)
+    assert not found.power[5:].any()
 
 
 def full_slip(friction, variation=None, spin=0.0, lateral=0.0, carried=False, **options):
@@ -287,3 +294,52 @@ def test_single_flexibility_is_that_of_the_creepages_and_the_spin():
     assert found.adhesion_fraction[0] == pytest.approx(1.0, rel=1e-2)
     failed, _, patches = solve(theory(kalker=GIVEN), inputs, row, GAPS[1:2])
     assert (failed, patches.status[0]) == (0, NO_LIMIT)  # coefficients of zero
+
+
+@pytest.mark.parametrize("elliptic", [False, True])
+@pytest.mark.parametrize(("xi", "eta", "phi"), [(4e-4, -2e-4, 0.0), (1e-3, 1e-4, 1.0)])
+def test_strips_have_the_tractions_of_march_and_their_work(elliptic, xi, eta, phi):
+    friction, radius = 0.1 + 20.0 * Y, 0.02 + Y
+    one = [np.array([value]) for value in (300.0, xi, eta, phi)]
+    field, none = friction[None, None], np.zeros((0, len(Y)))
+    inputs = ContactInputs(*one, field, False, none, np.array([2.6]), radius[None])
+    options = theory()._replace(elliptic=elliptic)
+    row, gap = np.zeros(1, np.int64), GAPS[1:2]
+    _, found, patches = solve(options, inputs, row, gap)
+    a, b, centre = patches.a[0], patches.b[0], patches.centre[0]
+    length, load, middle, part = np.empty((4, len(Y)))
+    cut_into_strips(bodies(1), a, b, centre, 300.0, length, load, middle, part)
+    turning = -phi * (Y - Y @ load / load.sum())
+    kalker = [coefficient(which, a / b, NU, spline(which)) for which in range(3)]
+    flex = flexibilities(CreepageCoefficients(*kalker, math.nan), a, b, SHEAR)
+    section = np.where(part > 0.0, np.maximum(1.0 - (middle / b) ** 2, 0.0), 0.0)
+    peak = 1.5 * np.sqrt(section) if elliptic else 2.0 * section
+    gradients = xi / flex.longitudinal + turning / flex.spin, eta / flex.lateral, phi / flex.spin
+    bound = friction * peak * 300.0 / (math.pi * a * b)
+    along, across, moment, adhering = march(length, bound, elliptic, *gradients, 24)
+    work = -2.6 * part * ((xi + turning) * along + eta * across + phi * moment)
+    if phi:  # three flexibilities may state a negative work, which others take
+        assert work.min() < 0.0
+    power, given = work.sum(), np.maximum(work, 0.0)
+    dissipation = given * power / given.sum()
+    np.testing.assert_allclose(found.dissipation[0], dissipation, rtol=1e-9, atol=1e-12 * power)
+    lever = Y - Y @ load / load.sum()
+    known = {
+        "power": power,
+        "force_x": part @ along,
+        "force_y": part @ across,
+        "spin_moment": part @ moment - (part * lever) @ along,
+        "torque": -(part * radius) @ along,
+    }
+    for name, value in known.items():
+        total = getattr(found, name)[0]
+        assert total == pytest.approx(value * GRID.spacing, rel=1e-10, abs=0.0), name
+    fraction = adhering.sum() / (2.0 * length.sum())
+    assert found.adhesion_fraction[0] == pytest.approx(fraction, rel=1e-12)
+    # the same coefficients by other means
+    for kind, same in ((TABLE, kalker), (LINE_LIMIT, short_limit(a / b, NU)[:3])):
+        powers = [
+            solve(options._replace(kalker=how, given=np.array(same)), inputs, row, gap)[1].power
+            for how in (kind, GIVEN)
+        ]
+        assert powers[0] == pytest.approx(powers[1], rel=1e-12)

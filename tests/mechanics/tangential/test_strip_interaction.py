@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, short_limit
 from wearsim.mechanics.tangential.strip_interaction import (
     _add_group,
     coupling_length,
@@ -26,6 +27,25 @@ def induced(force_x, force_y, spacing, length):
 def test_infinitely_wide_contact_has_the_moduli_of_the_material():
     assert effective_moduli(1e-6, STEEL) == pytest.approx((110e9, 77e9), rel=1e-4)
     assert effective_moduli(1e3, STEEL) == effective_moduli(50.0, STEEL)
+
+
+@pytest.mark.parametrize("ratio", [3e-3, 0.1, 1.0, 19.9])
+def test_moduli_of_an_ellipse_are_those_of_kalkers_coefficients(ratio):
+    found = creepage_coefficients(ratio, 1.0 - 77.0 / 110.0)
+    limits = short_limit(1e-9, 1.0 - 77.0 / 110.0)
+    expected = 110e9 * found.c11 / limits[0], 77e9 * found.c22 / limits[1]
+    assert effective_moduli(ratio, STEEL) == pytest.approx(expected, rel=3e-4)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_induced_slip_of_a_distant_strip_falls_with_the_square_of_the_distance(sign):
+    # W is 1/|y| far from a strip, also in a contact that is thousands of times as wide as long
+    forces = np.zeros((2, 2000))
+    forces[:, 0] = 3.0, 5.0
+    found = induced(*forces[:, ::sign].copy(), 1.0, 1.0)[:, ::sign]
+    for distance in (4, 20, 100, 500, 1999):
+        expected = -sign * POISSON / (np.pi * 77e9) * np.array([5.0, 3.0]) / distance**2
+        assert found[:, distance] == pytest.approx(expected, rel=0.1, abs=0.0)
 
 
 def test_ellipse_is_its_own_equivalent_ellipse():

@@ -10,6 +10,7 @@ from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import (
     SUMS,
+    bound_steepness,
     compile_strip_contacts,
     new_tractions,
     strip_contacts,
@@ -107,6 +108,14 @@ def test_neglected_induced_slip_of_longitudinal_creepage_is_small(longitudinal):
     assert not single.force_y.any()
     assert slight.work.sum() == pytest.approx(single.work.sum(), rel=6e-4)
     assert np.linalg.norm(slight.work - single.work) < 2e-3 * np.linalg.norm(single.work)
+
+
+def test_steepness_is_the_mean_by_load():
+    half_length, line_load = np.array([7.0, 2.0, 0.5, 0.3]), np.array([0.0, 0.1, 0.3, 0.0])
+    steepness = 4.0 / np.pi * np.array([0.1 / 2.0**2, 0.3 / 0.5**2])  # 2 p0/a
+    expected = (0.1 * steepness[0] + 0.3 * steepness[1]) / 0.4
+    assert bound_steepness(half_length, line_load) == pytest.approx(expected, rel=1e-14)
+    assert bound_steepness(half_length, np.zeros(4)) == 0.0
 
 
 def test_distant_patches_are_independent():

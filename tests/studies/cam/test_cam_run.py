@@ -245,11 +245,11 @@ def test_results_of_a_cam_are_exported_and_drawn(tmp_path, eccentric):
 def test_equal_stations_are_solved_once():
     scenario = prescribed(**SHORT)
     problem = assemble_problem(draw(scenario))[0]
-    cam_ = problem.kinematics.cam
+    cam_ = problem.kinematics.track
     assert (len(cam_.angle), len(cam_.along.angle)) == (13, 28)
     assert cam_.length.sum() == pytest.approx(cam_.along.length.sum(), rel=1e-14)
     assert cam_.time_share.sum() == pytest.approx(1.0, rel=1e-14)
-    whole = replace(problem.kinematics, cam=cam_.along)
+    whole = replace(problem.kinematics, track=cam_.along)
     gap = np.repeat(problem.flat_gap[:1], 28, axis=0)
     states = []
     for one in (problem, replace(problem, kinematics=whole, flat_gap=gap)):

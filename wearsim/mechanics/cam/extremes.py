@@ -147,7 +147,7 @@ def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[F
         return [rows[:, 0], middle, np.zeros_like(middle), np.zeros_like(middle)]
     value, phi, bend, cosines, samples, place = _peaks(rows)
     points, count = _sampling(number)[0], samples.shape[1] - 1
-    error = np.abs(cosines[:, max(number - 2, 1) :]).sum(axis=1)
+    error = np.abs(cosines[:, number - 2 :]).sum(axis=1)
     part_of_panel = 0.5 - 0.5 * np.cos(phi)
     # the vertex lies where samples are within twice the error
     beside = points[np.minimum(place + 1, count)] - points[np.maximum(place - 1, 0)]

@@ -87,7 +87,7 @@ def angles_by_number(parts: Sequence[tuple[Points, float, float]], number: int) 
     ]
     ends = np.cumsum([0.0, *(length[-1] for length in lengths)])
     wanted = ends[-1] * np.arange(number) / number
-    places = np.clip(np.searchsorted(ends, wanted, side="right") - 1, 0, len(parts) - 1)
+    places = np.searchsorted(ends, wanted, side="right") - 1
     return [
         np.interp(wanted[places == part] - ends[part], length, each)
         for part, (length, each) in enumerate(zip(lengths, fine, strict=True))

@@ -149,13 +149,11 @@ class _Trace:
     def follow(self, slip: float) -> tuple[float, list[tuple[FloatArray, ...]]]:
         """Return the slip at the end, from that at the start, and the arcs between."""
         arcs: list[list[tuple[float, float, float]]] = []
-        inside = slip != 0.0
         spin, rise, drag, reach = self.spin, self.spin_per_rad, self.drag, self.reach
         for place in range(0, len(self.theta) - 1, 2):
             low, high = self.theta[place], self.theta[place + 2]
             if slip == 0.0:
                 if abs(self.demand[place + 2]) <= 1.0:
-                    inside = False
                     continue
                 sign = math.copysign(1.0, self.demand[place + 2])
                 start = low
@@ -165,7 +163,6 @@ class _Trace:
                 rate = self._rate(place + 2, sign, 0.0)
                 slip = 0.5 * rate * (high - start) if start > low else rate * (high - start)
                 arcs.append([(start, 0.0, 0.0 if start > low else rate), (high, slip, rate)])
-                inside = True
                 continue
             sign = math.copysign(1.0, slip)
             first, middle, last = (
@@ -173,9 +170,8 @@ class _Trace:
                 (rise[k] + (drag[k] if spin[k] >= slip else -drag[k]) - sign * reach[k])
                 for k in (place, place + 1, place + 2)
             )
-            if not inside or not arcs:
+            if not arcs:
                 arcs.append([(low, slip, first)])
-                inside = True
             after = slip + (high - low) / 6.0 * (first + 4.0 * middle + last)
             if after * sign > 0.0:
                 slip = after
@@ -185,13 +181,13 @@ class _Trace:
             part = slip / (slip - after)
             stop = low + part * (high - low)
             arcs[-1].append((stop, 0.0, first + part * (last - first)))
-            slip, inside = 0.0, False
+            slip = 0.0
             if abs(self.demand[place]) > 1.0 >= abs(self.demand[place + 2]):
                 # rolling begins somewhere in the rest of the interval
                 arcs[-1].append((high, 0.0, 0.0))
             elif abs(self.demand[place + 2]) > 1.0:
                 turned = math.copysign(1.0, self.demand[place + 2])
                 rate = self._rate(place + 2, turned, 0.0)
-                slip, inside = rate * (high - stop), True
+                slip = rate * (high - stop)
                 arcs.append([(stop, 0.0, rate), (high, slip, rate)])
         return slip, [tuple(np.array(arc).T) for arc in arcs if arc[-1][0] > arc[0][0]]

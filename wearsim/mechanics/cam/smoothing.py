@@ -284,7 +284,7 @@ def _dwells(fit: _Fit, values: FloatArray) -> tuple[tuple[float, float], ...]:
     still = np.ones(_SAMPLES, dtype=np.bool_)
     for order in (1, 2):
         still &= np.abs(derivatives[order]) < _SURE * fit.standard_errors(along, order)
-    if still.all() or not still.any():
+    if still.all():
         return ()
     turned = int(np.flatnonzero(~still)[0])  # an angle of motion, from which the runs are counted
     around = np.roll(still, -turned)

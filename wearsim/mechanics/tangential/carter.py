@@ -159,8 +159,6 @@ def strip_force(
         Length of the adhesion zone [m].
     """
     bound = friction * line_load
-    if slip_x == 0.0 and slip_y == 0.0 and spin == 0.0:
-        return 0.0, 0.0, 0.0, 2.0 * half_length
     if bound <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
     steep = friction * steepness

@@ -142,7 +142,7 @@ def _march_slip(j: int, strip: Strip, steps: int, sums: FloatArray) -> None:
     for k in range(steps):
         x = a * (cosine * half_cos - sine * half_sin)
         way = arc / (sine * half_cos + cosine * half_sin)
-        next_cos = cosine * step_cos - sine * step_sin if k < steps - 1 else -1.0
+        next_cos = cosine * step_cos - sine * step_sin
         next_sin = sine * step_cos + cosine * step_sin if k < steps - 1 else 0.0
         slip_x, slip_y = slip_at(strip, x, e_x, e_y)
         n_x, n_y = turn_direction(strip, slip_x, slip_y, way, e_x, e_y)
@@ -212,8 +212,8 @@ def fastrip_fields(
     """
     out = np.zeros((4, points, len(half_length)))
     for j in range(len(half_length)):
-        loaded = half_length[j] > 0.0 and bound_peak[j] > 0.0
-        if loaded and not beyond_strip_theory(j, half_length, bound_peak, motion, moduli):
+        beyond = beyond_strip_theory(j, half_length, bound_peak, motion, moduli)
+        if half_length[j] > 0.0 and not beyond:
             _fill_fields(j, strip_of(j, half_length, bound_peak, motion, moduli), out)
     return out
 

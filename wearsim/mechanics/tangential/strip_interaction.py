@@ -35,7 +35,7 @@ from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.tangential.kalker_coefficients import coefficient, short_limit, spline
 from wearsim.types import FloatArray
 
-_STEP = 0.05  # of ln(a/b) in the table; the error of linear interpolation is below 1e-4
+_STEP = 0.05  # of ln(a/b) in the table; the error of linear interpolation is below 3e-4
 _LOWEST = math.log(2e-3)  # ln(a/b) below which a contact is treated as infinitely wide
 _HIGHEST = math.log(20.0)
 
