@@ -139,7 +139,7 @@ def test_passes_along_a_cam_equal_a_plain_loop(spring):
     assert not is_compiled(problem)
     state, stations, spacing = fresh_state(problem), problem.shape[0], problem.grid.spacing
     found = run_in_python(problem, run_in_python(problem, state, 1), 2)
-    cam, gap = problem.kinematics.cam, problem.nominal_gap[0, 0, 0]
+    cam, gap = problem.kinematics.track, problem.nominal_gap[0, 0, 0]
     columns = "longitudinal_curvature", "rolling_speed", "length", "time_share", "stiffness"
     curvature, speed, length, share, stiffness = (getattr(cam, n)[:, 0, 0] for n in columns)
     force = problem.force(np.zeros(1))[:, 0, 0]

@@ -178,7 +178,7 @@ def test_damage_under_a_varying_friction_has_no_point_before():
 
 def test_damage_on_a_cam_varies_with_the_load_on_its_follower():
     problem, _, _ = built("cam-cycloidal", contact__strips=41, **fatigue())
-    cam = problem.kinematics.cam
+    cam = problem.kinematics.track
     varied = with_loads(problem, Scattered(40.0, 50.0, 300.0))
     state = fresh_state(problem)
     start, end = (state.replaced(passes=np.array([n])) for n in (100.0, 110.0))

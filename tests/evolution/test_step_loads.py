@@ -232,7 +232,7 @@ def test_exposure_of_a_cam_is_the_mean_over_its_turn():
     problem, _, _ = built("cam-cycloidal", contact__strips=41)
     state = fresh_state(problem)
     found = conditions_of(problem, problem, state, np.array([10.0]))
-    cam = problem.kinematics.cam
+    cam = problem.kinematics.track
     mean = (cam.time_share * problem.force(np.zeros(1))).sum()
     assert found.own[0] == pytest.approx(mean, rel=1e-12, abs=0.0)
     assert found.force.shape == (problem.shape[0], 1, 1)
