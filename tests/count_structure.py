@@ -14,6 +14,11 @@ KINDS = {
     *("RunData", "DissipationData", "EnsembleData", "IdentificationData"),
     *("ContactStudy", "CamStudy", "Comparison", "Compared"),
 }
+#: names by which code asks whether a body is a cam or a cylinder
+CAMS = {
+    *("cam", "is_cam", "has_cam", "along_cam"),
+    *("OneStation", "CamStations", "CylinderTurn", "CamTurn"),
+}
 #: what shows results: the verbs, the renderers, and the views of every kind
 PRESENTATION = re.compile(
     r"wearsim/(cli/(commands|render)/|report/|cli/(render|solver_state)\.py|scenario/display\.py"
@@ -38,6 +43,34 @@ def asks_for_a_kind(node: ast.AST) -> bool:
     return node.func.id == "isinstance" and bool(names & KINDS)
 
 
+def tests_in(node: ast.AST) -> list[ast.expr]:
+    """Return the conditions of a node: of a branch or a loop, or operands of `and` and `or`."""
+    if isinstance(node, ast.If | ast.IfExp | ast.While | ast.Assert):
+        return [node.test]
+    if isinstance(node, ast.comprehension):
+        return node.ifs
+    return [node] if isinstance(node, ast.BoolOp) else []
+
+
+def branches_on_cams(tree: ast.AST) -> int:
+    """Return the number of conditions that ask whether there is a cam, each counted once.
+
+    A condition on an attribute of a cam, such as its groove, is none of them.
+    """
+    seen: set[int] = set()
+    branches = 0
+    for node in ast.walk(tree):
+        for test in tests_in(node):
+            parts = list(ast.walk(test))
+            owners = {id(p.value) for p in parts if isinstance(p, ast.Attribute | ast.Subscript)}
+            asked = {getattr(p, "id", getattr(p, "attr", "")) for p in parts if id(p) not in owners}
+            keys = {p.value for p in parts if isinstance(p, ast.Constant)}
+            if id(test) not in seen and (asked & CAMS or "cam" in keys):
+                branches += 1
+                seen |= {id(part) for part in parts}
+    return branches
+
+
 def counts(root: Path = ROOT) -> dict[str, int]:
     """Return the numbers by what is counted, over all modules of wearsim."""
     texts = {str(p.relative_to(root)): p.read_text() for p in (root / "wearsim").rglob("*.py")}
@@ -49,6 +82,7 @@ def counts(root: Path = ROOT) -> dict[str, int]:
         "isinstance on kinds": sum(
             asks_for_a_kind(node) for tree in trees.values() for node in ast.walk(tree)
         ),
+        "branches on cams": sum(map(branches_on_cams, trees.values())),
         "files naming LifeResult": len(naming),
         "files outside its folder naming LifeResult": len(naming) - len(home),
         "files of presentation": len(shown),

@@ -117,6 +117,6 @@ def test_columns_of_a_log_are_chosen_by_name(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"choose other names with load\.columns"):
         load_scenario(path, test)
     scenario = load_scenario(path, {**test, "load.columns": ["Zeit", "Kraft"]})
-    assert scenario.load.build().extremes(0.0, 3660.0) == pytest.approx((300.0, 310.0))
+    assert scenario.load.built.extremes(0.0, 3660.0) == pytest.approx((300.0, 310.0))
     with pytest.raises(ScenarioError, match="time and load need two columns"):
         load_scenario(path, {**test, "load.columns": ["Zeit", "Zeit"]})

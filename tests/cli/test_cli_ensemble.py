@@ -223,7 +223,7 @@ def test_sweep_writes_one_file_per_value_and_compares_them(command: Command, tes
     result = command("ensemble", tests, "-n", 12, *swept, *HERE)
     assert result.exit_code == 0, result.output
     light, heavy = (open_ensemble(f"s-{value}.h5") for value in ("250N", "350N"))
-    assert light.scenario.load.build().mean(0.0, 1.0) == 250.0
+    assert light.scenario.load.built.mean(0.0, 1.0) == 250.0
     assert (heavy.at_end("depth") > light.at_end("depth")).all()
     rows = " ".join(result.stdout.split())
     assert "compared depth at the end, for values of load.normal_force" in rows

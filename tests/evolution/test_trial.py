@@ -36,6 +36,7 @@ def test_forced_steps_are_accepted_as_they_are() -> None:
     assert trial.accepts(9.0, 123.4, 0.1)
     assert (trial.proposed, trial.rejected) == (123.4, 0)
     assert trial.step(0.0, 1000.0) == 123.4
+    assert trial.step(850.0, 1000.0) == 123.4
     assert trial.step(950.0, 1000.0) == 50.0
 
 

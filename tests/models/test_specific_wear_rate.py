@@ -30,7 +30,7 @@ def test_sliding_test_wears_rate_times_load_times_distance():
     scenario = rig(RATE, **changes)
     result = wearsim.run(scenario)
     distance = 0.04 * scenario.rolling_speed * 60.0
-    assert result.worn_volume[-1] == pytest.approx(1e-14 * 300.0 * distance, rel=1e-9)
+    assert result.worn_volume[-1] == pytest.approx(1e-14 * 300.0 * distance, rel=1e-9, abs=0.0)
 
 
 def test_rate_and_wear_factor_give_equal_runs():

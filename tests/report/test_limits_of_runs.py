@@ -17,7 +17,6 @@ from wearsim.scenario import Scenario
 from wearsim.studies.dry_run import dry_run
 from wearsim.studies.dry_run_table import plan
 from wearsim.studies.run.result import Result
-from wearsim.studies.run.view import limit_rows
 
 LIMITS = {"depth": "5 um", "lift_error": "1 mm", "volume": "1 mm^3", "peak_pressure": "500 MPa"}
 
@@ -49,7 +48,7 @@ def test_limit_is_reached_when_and_by_how_much_the_history_says(result):
 
 
 def test_rows_and_page_say_reached_or_not(result):
-    rows = {row.label: row.text for row in limit_rows(result)}
+    rows = {row.label: row.text for row in result.view.limit_rows()}
     turns = result.limits[0]["reached_at_passes"]
     assert f"reached after about {turns:,.0f} turns" in rows["limit of depth"]
     assert "of 5.000 um at the end" in rows["limit of depth"]

@@ -320,7 +320,7 @@ def test_empty_scenario_lacks_the_required_tables(parse: Parse) -> None:
         parse(text="")
     assert str(caught.value).splitlines() == [
         f"rig.toml: [{table}]: the table is missing"
-        for table in ("roller", "cylinder", "operation", "load", "friction", "creepage")
+        for table in ("cylinder", "roller", "operation", "load", "friction", "creepage")
     ]
 
 

@@ -97,14 +97,14 @@ def test_terms_are_added_to_a_load(parse: Parse) -> None:
     term = '\n[load.thermal]\ngain = "50 N/W"\ntime_constant = "20 min"\n'
     load = parse(('normal_force = "300 N"\n', f'normal_force = "300 N"\n{term}')).load
     assert [(item.name, item.options.gain) for item in load.terms] == [("thermal", 50.0)]
-    assert load.build() == ("built", load.options)
-    assert load.terms[0].build() == ("built", load.terms[0].options)
+    assert load.built == ("built", load.options)
+    assert load.terms[0].built == ("built", load.terms[0].options)
 
 
 def test_plugins_are_built_with_their_options(parse: Parse) -> None:
     scenario = parse(('model = "slender"', 'model = "hertz-fastsim"\nmx = 7\nstrips = 41'))
     assert scenario.contact.build(None, ()) == ("built", scenario.contact.options)
-    assert scenario.wear.build() == ("built", scenario.wear.options)
+    assert scenario.wear.built == ("built", scenario.wear.options)
     assert (scenario.contact.options.mx, scenario.contact.strips) == (7, 41)
 
 

@@ -413,6 +413,8 @@ def test_moments_of_the_uniform_and_exponential_distributions_are_recognised() -
     assert families == ["truncated normal"] * 2
     assert cut_normal(-math.inf, math.inf, 0.0, 1.0).family == "normal"
     bent = maximum_entropy((1.0, 3.0), 1.8, 0.75)
+    assert bent.family == "exponential of a quadratic"
+    assert maximum_entropy((1.0, 3.0), 1.8, 0.2).family == "truncated normal"
     x = np.linspace(1.0, 3.0, 20_001)
     assert bent.antimode is not None
     assert bent.antimode[0] == pytest.approx(x[bent.density(x).argmin()], abs=1e-3)

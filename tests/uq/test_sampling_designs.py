@@ -242,3 +242,11 @@ def test_nested_scramble_is_that_of_plain_integers():
         known.append(reversed_bits(mixed))
     assert sobol.nested_scramble(words, key).tolist() == known
     assert sobol.reverse_bits(words).tolist() == [reversed_bits(word) for word in words.tolist()]
+
+
+@pytest.mark.parametrize("name", [KNOWN[0], UNKNOWN[0]])
+def test_sobol_numbers_are_in_the_middle_of_their_intervals(name):
+    drawn = sobol.scrambled(5, name, 1, 3, 50, 0)
+    intervals = drawn * 2.0**32
+    np.testing.assert_array_equal(intervals - np.floor(intervals), 0.5)
+    assert ((drawn > 0.0) & (drawn < 1.0)).all()

@@ -38,7 +38,7 @@ def greatest_depth(depths: Depths) -> FloatArray:
 def volume_of(problem: WearProblem, depths: Depths) -> FloatArray:
     """Return the volume of depths of cylinder and rollers, shape (realisations,) [m^3]."""
     kinematics, spacing = problem.kinematics, problem.grid.spacing
-    cylinder = worn_volume(depths[0], spacing, kinematics.track_radius)
+    cylinder = worn_volume(depths[0], spacing, kinematics.track.track_radius)
     rollers = worn_volume(depths[1][0], spacing, kinematics.roller_radius)
     mean = mean_along(mean_along(cylinder, axis=1), axis=0)[0, 0]
     return np.asarray(mean + sum_in_order(kinematics.multiplicity[:, None] * rollers, axis=0))
@@ -295,7 +295,7 @@ def _volume_variance(problem: WearProblem, end: WearState, passes: FloatArray) -
     kinematics, spacing = problem.kinematics, problem.grid.spacing
     cylinder, roller = problem.depths_worn(end.contacts, dict.fromkeys(BODIES, 1.0))
     ratio = np.asarray(kinematics.roller_share * kinematics.physical_rollers)[..., None]
-    volume = worn_volume(cylinder, spacing, kinematics.track_radius)
+    volume = worn_volume(cylinder, spacing, kinematics.track.track_radius)
     volume = volume + worn_volume(roller * ratio, spacing, kinematics.roller_radius)
     # differences between the means of the rollers are not random
     deviation = volume - problem.per_roller(volume)[:, problem.roller]

@@ -73,27 +73,19 @@ def peak_to_peak(track: Track, errors: FloatArray) -> FloatArray:
     return np.asarray(most + least)
 
 
-def greatest(problem: WearProblem, values: FloatArray) -> FloatArray:
-    """Return the greatest of values, stations first, over the angle of a cam."""
-    return problem.kinematics.track.greatest_value(values)
-
-
 def extremes(problem: WearProblem, state: WearState) -> dict[str, Extreme]:
-    """Return extremes over the angle of a cam, with their angles, by name; none of a cylinder.
+    """Return extremes over the angle of a cam, with their angles, by name.
 
     They are the "depth", of shape (realisations,) [m], and of shape (rollers, realisations) the
     "peak_pressure" of the contacts of the state [Pa], and greatest and smallest lift error as
     "least_wear" and "greatest_wear" [m], the last with its sign changed.
     """
-    cam = problem.kinematics.cam
-    if cam is None:
-        return {}
-    errors = lift_errors(problem, state)
+    track, errors = problem.kinematics.track, lift_errors(problem, state)
     return {
-        "depth": cam.greatest(state.cylinder_depth[:, 0].max(axis=-1)),
-        "peak_pressure": cam.greatest(peak_pressures(problem, state)),
-        "least_wear": cam.greatest(errors),
-        "greatest_wear": cam.greatest(-errors),
+        "depth": track.greatest(state.cylinder_depth[:, 0].max(axis=-1)),
+        "peak_pressure": track.greatest(peak_pressures(problem, state)),
+        "least_wear": track.greatest(errors),
+        "greatest_wear": track.greatest(-errors),
     }
 
 
@@ -123,7 +115,7 @@ def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArr
 
 def depth(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest depth of the cylinder, shape (realisations,) [m]."""
-    return greatest(problem, state.cylinder_depth[:, 0].max(axis=-1))
+    return problem.kinematics.track.greatest_value(state.cylinder_depth[:, 0].max(axis=-1))
 
 
 def roller_depth(problem: WearProblem, state: WearState) -> FloatArray:
@@ -133,14 +125,16 @@ def roller_depth(problem: WearProblem, state: WearState) -> FloatArray:
 
 def volume(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the worn volume of the cylinder, shape (realisations,) [m^3]."""
-    radius, spacing = problem.kinematics.track_radius, problem.grid.spacing
+    radius, spacing = problem.kinematics.track.track_radius, problem.grid.spacing
     volumes = worn_volume(state.cylinder_depth, spacing, radius)
     return np.asarray(mean_along(volumes, axis=0)[0, 0])
 
 
 def groove_width(problem: WearProblem, state: WearState, threshold: float) -> FloatArray:
     """Return the width of the groove deeper than `threshold` [m], (realisations,) [m]."""
-    return greatest(problem, width(problem.grid.y, state.cylinder_depth[:, 0], threshold))
+    return problem.kinematics.track.greatest_value(
+        width(problem.grid.y, state.cylinder_depth[:, 0], threshold)
+    )
 
 
 def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
@@ -172,7 +166,9 @@ def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:
 
 def clearance(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest worn descent of a roller, shape (realisations,) [m]."""
-    return np.asarray(greatest(problem, worn_descents(problem, state)).max(axis=0))
+    return np.asarray(
+        problem.kinematics.track.greatest_value(worn_descents(problem, state)).max(axis=0)
+    )
 
 
 def peak_pressures(problem: WearProblem, state: WearState) -> FloatArray:
@@ -234,7 +230,9 @@ def _on_next_strips(problem: WearProblem, state: WearState) -> FloatArray:
 def peak_pressure(stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest pressure at the present loads, shape (realisations,) [Pa]."""
     recorded, state, _ = present_contacts(stepper, problem, state)
-    return np.asarray(greatest(recorded, peak_pressures(recorded, state)).max(axis=0))
+    return np.asarray(
+        recorded.kinematics.track.greatest_value(peak_pressures(recorded, state)).max(axis=0)
+    )
 
 
 def width(y: FloatArray, worn: FloatArray, threshold: float) -> FloatArray:

@@ -208,7 +208,7 @@ class WearProblem:
         volume of the body over the sum of its depths over the strips [m^2].
         """
         kinematics, stations = self.kinematics, self.shape[0]
-        cylinder = np.broadcast_to(np.ravel(kinematics.track_radius) / stations, stations)
+        cylinder = np.broadcast_to(np.ravel(kinematics.track.track_radius) / stations, stations)
         rollers = kinematics.roller_radius * kinematics.multiplicity
         kinds = np.concatenate([np.ones(stations), np.zeros(self.rollers)])
         volumes = 2.0 * np.pi * self.grid.spacing * np.concatenate([cylinder, rollers])
@@ -264,8 +264,8 @@ class WearProblem:
     def nominal_batch(self) -> ContactBatch:
         """All contacts with the inputs that no step changes, on the unworn bodies without load."""
         columns: dict[str, FloatArray | float] = {
-            "longitudinal_curvature": self.kinematics.longitudinal_curvature,
-            "rolling_speed": self.kinematics.speed,
+            "longitudinal_curvature": self.kinematics.track.longitudinal_curvature,
+            "rolling_speed": self.kinematics.track.rolling_speed,
             "longitudinal": self.inputs.longitudinal,
             "lateral": self.inputs.yaw,
             "spin": self.spin,
@@ -415,7 +415,8 @@ class WearProblem:
         for depth, body in zip(found, BODIES, strict=True):
             factor = self.wear_factors[body]
             if factor is None:
-                speeds = np.broadcast_to(self.kinematics.speed, self.shape).ravel().tolist()
+                speed = self.kinematics.track.rolling_speed
+                speeds = np.broadcast_to(speed, self.shape).ravel().tolist()
                 each = zip(contacts, cycle(self.laws), speeds, strict=False)
                 depths = np.array([law.depth_per_pass(body, c, v) for c, law, v in each])
                 depth[:] = passes[body] * depths.reshape(dissipation.shape)
@@ -430,7 +431,7 @@ class WearProblem:
         None if wear is not linear in the dissipation.
         """
         shape, found = (*self.kinematics.track.axes, len(self.laws)), {}
-        speeds = np.broadcast_to(self.kinematics.speed, shape).ravel().tolist()
+        speeds = np.broadcast_to(self.kinematics.track.rolling_speed, shape).ravel().tolist()
         for body in BODIES:
             each = zip(cycle(self.laws), speeds, strict=False)
             factors = [law.depth_per_dissipation(body, speed) for law, speed in each]

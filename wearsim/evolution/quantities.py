@@ -123,10 +123,25 @@ class OneStation:
     inertia: ClassVar[FloatArray] = np.zeros((0, 0))
     skids: ClassVar[FloatArray] = np.zeros((0, 2))
     angles: ClassVar[None] = None
+    whole: ClassVar[None] = None
     panels: ClassVar[None] = None
     relocated: ClassVar[None] = None
     recorded: ClassVar[None] = None
     axes: ClassVar[tuple[int, ...]] = ()
+    places: ClassVar[IntArray] = np.zeros(1, dtype=np.int64)
+    in_pass_loop: ClassVar[bool] = True  # of models that compile the passes
+
+    def at(self, _realisations: IntArray) -> OneStation:
+        """Return the station, which all realisations have."""
+        return self
+
+    def joined(self, _others: Sequence[Track]) -> OneStation:
+        """Return the station of several tests, of which each `matches` this one."""
+        return self
+
+    def station(self, _number: int) -> tuple[float, ...]:
+        """Return rolling velocity [m/s], part of a turn, and radius of the track [m]."""
+        return self.rolling_speed, 1.0, self.track_radius
 
     def at_unworn(self, values: FloatArray) -> FloatArray:
         """Return the values."""
@@ -237,6 +252,7 @@ class CamStations:
     relocated: Callable[[FloatArray], CamStations] | None = None
     moved_skids: Callable[[FloatArray], FloatArray] | None = None
     recorded: FloatArray | None = None
+    in_pass_loop: ClassVar[bool] = False
 
     @property
     def axes(self) -> tuple[int, ...]:
@@ -283,6 +299,11 @@ class CamStations:
         if self.panels is None:
             return np.asarray(values.max(axis=0))
         return greatest_value(self.panels, values[self.places])
+
+    def station(self, number: int) -> tuple[float, ...]:
+        """Return rolling velocity [m/s], part of a turn, and radius of the track [m]."""
+        columns = self.rolling_speed, self.time_share, self.length / (2.0 * np.pi)
+        return tuple(float(column[number, 0, 0]) for column in columns)
 
     def at_angle(self, values: FloatArray, angle: float) -> FloatArray:
         """Return values of the stations, first axis, interpolated to an angle [rad]."""
@@ -336,31 +357,29 @@ class CamStations:
 
     def matches(self, other: Track) -> bool:
         """Return whether tests can be joined: at equal, fixed stations without inertia."""
-        if isinstance(other, OneStation):
-            return False
         fixed = self.relocated is None and other.relocated is None
         return (
             fixed
             and self.inertia.size == other.inertia.size == 0
             and all(
-                np.array_equal(getattr(first, name), getattr(second, name))
-                for first, second in ((self, other), (self.along, other.along))
+                np.array_equal(getattr(first, name), getattr(second, name, ()))
+                for first, second in ((self, other), (self.along, other.whole or other))
                 for name in ("angle", "segment", "time_share", "length", "places")
             )
         )
 
-    @classmethod
-    def joined(cls, stations: Sequence[CamStations]) -> CamStations:
-        """Return the stations of several tests, of which each `matches` the first."""
-        first, differing = stations[0], dict[str, Any]()
+    def joined(self, others: Sequence[Track]) -> CamStations:
+        """Return the stations of several tests, of which each `matches` these."""
+        differing = dict[str, Any]()
         excluded = {"whole", "panels", "relocated", "moved_skids", "recorded"}
-        names = [item.name for item in fields(first) if item.name not in excluded]
+        names = [item.name for item in fields(self) if item.name not in excluded]
+        tests = [self, *others]
         for name in names:
-            values = [getattr(test, name) for test in stations]
+            values = [getattr(test, name) for test in tests]
             if not all(np.array_equal(v, values[0], equal_nan=True) for v in values[1:]):
                 differing[name] = np.concatenate(values, axis=2)
-        whole = [test.whole for test in stations if test.whole is not None]
-        return replace(first, **differing, whole=cls.joined(whole) if whole else None)
+        whole = [test.whole for test in tests if test.whole]
+        return replace(self, **differing, whole=whole[0].joined(whole[1:]) if whole else None)
 
 
 Track: TypeAlias = OneStation | CamStations
@@ -378,31 +397,26 @@ class Kinematics:
         Rolling velocity V [m/s]; on a cam that of the base circle.
     multiplicity : ndarray of int, shape (rollers,)
         Physical rollers represented by each roller of the problem; identical ones are merged.
-    cam : CamStations, optional
-        Stations of a cam.
+    track : OneStation or CamStations
+        Station of the cylinder, or those of the cam.
     """
 
     cylinder_radius: float
     roller_radius: float
     rolling_speed: float
     multiplicity: FloatArray
-    cam: CamStations | None = None
-
-    @cached_property
-    def track(self) -> Track:
-        """Stations of the cam, or the one of the cylinder."""
-        curvature = 1.0 / self.cylinder_radius + 1.0 / self.roller_radius
-        return self.cam or OneStation(curvature, self.rolling_speed, self.cylinder_radius)
+    track: Track
 
     def at(self, realisations: IntArray) -> Kinematics:
         """Return the kinematics of some realisations, by number and in that order."""
-        return self if self.cam is None else replace(self, cam=self.cam.at(realisations))
+        track = self.track.at(realisations)
+        return self if track is self.track else replace(self, track=track)
 
     @classmethod
     def joined(cls, tests: Sequence[Kinematics]) -> Kinematics:
         """Return the kinematics of several tests with matching tracks."""
-        cams = [test.cam for test in tests if test.cam is not None]
-        return replace(tests[0], cam=CamStations.joined(cams)) if cams else tests[0]
+        first, *others = (test.track for test in tests)
+        return replace(tests[0], track=first.joined(others))
 
     @cached_property
     def physical_rollers(self) -> float:
@@ -415,27 +429,12 @@ class Kinematics:
         return self.physical_rollers * (self.rolling_speed / (2.0 * np.pi * self.cylinder_radius))
 
     @cached_property
-    def longitudinal_curvature(self) -> FloatArray | float:
-        """Relative curvature along rolling; of a cam at every station, (stations, 1, 1) [1/m]."""
-        return self.track.longitudinal_curvature
-
-    @cached_property
-    def speed(self) -> FloatArray | float:
-        """Rolling velocity; of a cam at every station, (stations, 1, 1) [m/s]."""
-        return self.track.rolling_speed
-
-    @cached_property
-    def track_radius(self) -> FloatArray | float:
-        """Radius of the track whose volume each station represents, as `speed` [m]."""
-        return self.track.track_radius
-
-    @cached_property
     def roller_share(self) -> FloatArray | float:
         """Overrollings of a point of one roller per pass of all rollers.
 
         The mean over the stations is that of a turn of a cam; shape (stations, 1, 1).
         """
-        return self.track_radius / self.roller_radius / self.physical_rollers
+        return self.track.track_radius / self.roller_radius / self.physical_rollers
 
 
 def worn_volume(worn: FloatArray, spacing: float, radius: FloatArray | float) -> FloatArray:

@@ -109,7 +109,7 @@ def _skids_differ(present: FloatArray, moved: FloatArray) -> bool:
 
 def _at_stations(problem: WearProblem, cam: CamStations) -> WearProblem:
     """Return the problem at other stations of its cam."""
-    moved = replace(problem, kinematics=replace(problem.kinematics, cam=cam))
+    moved = replace(problem, kinematics=replace(problem.kinematics, track=cam))
     if any(growth.by_angle for growth in problem.growth):
         return with_surfaces(moved)
     flat_gap = np.broadcast_to(problem.flat_gap[:1], (len(cam.angle), *problem.flat_gap.shape[1:]))

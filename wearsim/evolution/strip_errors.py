@@ -28,7 +28,7 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.evolution.integrate import Advance, Evolution
-from wearsim.evolution.observables import greatest, greatest_between
+from wearsim.evolution.observables import greatest_between
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
@@ -100,7 +100,8 @@ def sizes_of(problem: WearProblem, depths: FloatArray, between: bool = False) ->
     """
     top = greatest_between if between else partial(np.max, axis=-1)
     tops, stations = top(depths), problem.shape[0]
-    cylinder, rollers = greatest(problem, tops[:stations]), tops[stations:].max(axis=0)
+    cylinder = problem.kinematics.track.greatest_value(tops[:stations])
+    rollers = tops[stations:].max(axis=0)
     return np.array([cylinder, rollers, volumes_of(problem, depths)])
 
 

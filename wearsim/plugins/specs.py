@@ -428,7 +428,8 @@ class StudyKind(Spec):
         Reference of the class of its results, derived from `wearsim.results.content.StudyResult` if
         it has a file.
     view : str
-        Reference of a class derived from `wearsim.report.view.View`, called with a result.
+        Reference of a class derived from `wearsim.report.view.View`, or of a function that returns
+        such a view; called with a result.
     data : str
         Reference of the class of the content of its files, derived from
         `wearsim.results.content.StudyData`, which has their schema.

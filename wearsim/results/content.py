@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -91,6 +91,14 @@ class Variable:
 
 
 Item = TypeVar("Item", Axis, Variable)
+
+
+def of_present(
+    groups: Mapping[str, Mapping[str, Variable]], present: Set[str]
+) -> dict[str, Variable]:
+    """Return the variables of groups, all of whose words are present: "cam", "cam fatigue"."""
+    chosen = (group for words, group in groups.items() if present >= set(words.split()))
+    return {name: variable for group in chosen for name, variable in group.items()}
 
 
 def by_name(items: Iterable[Item]) -> dict[str, Item]:

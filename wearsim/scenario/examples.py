@@ -107,7 +107,7 @@ def scenario_schema() -> dict[str, Any]:
     tables: dict[str, Any] = {}
     for table, model in TABLES.items():
         keys = _fields(model, table, random)
-        if table == "cam":
+        if "motion" in keys:
             motion, laws = model.model_fields["motion"], _motion_laws()
             described = Field(None, description=motion.description)
             kind: Any = tuple[laws, ...]  # type: ignore[valid-type]
@@ -125,8 +125,8 @@ def scenario_schema() -> dict[str, Any]:
             keys["axial_profile"] = str | _axial_profiles(table, random), described
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
         kind = kind or _model(table, model.__doc__, keys)
-        needed = table in REQUIRED and table != "cylinder"  # a cam may replace it
-        tables[table] = kind, Field(... if needed else None, description=model.__doc__)
+        default = ... if table in REQUIRED else None
+        tables[table] = kind, Field(default, description=model.__doc__)
     for spec in installed(TableSpec):
         owned = _model(spec.name, spec.summary, _fields(spec.options))
         tables[spec.name] = owned, Field(None, description=spec.summary)

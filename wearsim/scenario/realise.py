@@ -68,8 +68,7 @@ def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
     if "load" in sections:
         check_load(mistakes, sections["load"])
     if bodies:
-        names = ("roller", "cylinder", "cam")
-        check_axial(mistakes, {name: getattr(scenario, name) for name in names})
+        check_axial(mistakes, {"roller": scenario.roller, "cylinder": scenario.cylinder})
     mistakes.raise_any()
     return replace(
         scenario,

@@ -289,7 +289,7 @@ class Scenario:
     @cached_property
     def axial_gap(self) -> AxialGap:
         """Gap of roller and cylinder along the axis, without start profiles."""
-        return axial_gap(self.roller, self.cylinder)
+        return axial_gap(self.roller, self.cylinder, self.pair)
 
     @cached_property
     def rolling_speed(self) -> float:
@@ -300,6 +300,11 @@ class Scenario:
     def pass_rate(self) -> float:
         """Roller passes per unit of time, all rollers together [1/s]."""
         return self.operation.rollers * self.operation.speed / math.tau
+
+    @cached_property
+    def life_unit(self) -> tuple[str, float]:
+        """Unit in which the length of a test is counted, and the roller passes in it."""
+        return ("turns", float(self.operation.rollers)) if self.cam else ("passes", 1.0)
 
     @cached_property
     def total_passes(self) -> int:

@@ -254,7 +254,7 @@ def _single(scout: Scenario) -> _State:
 
 
 def _unworn(scout: Scenario, grid: Grid) -> _State:
-    problem = build_problem(scout, prepared_model(scout, grid), grid, {})
+    problem = build_problem(Setup(scout), prepared_model(scout, grid), grid, {})
     return _state(scout, grid, unworn_contacts(problem))
 
 

@@ -56,7 +56,7 @@ def dry_run(scenario: Scenario) -> Data:
     """
     is_run = scenario.has_length and scenario.wear is not None
     scenario = with_chosen_model(scenario, is_run)
-    load, means = scenario.load.build(), Setup(scenario)
+    load, means = scenario.load.built, Setup(scenario)
     low, high = load_range(scenario, scenario.total_time if is_run else 0.0)
     roller, cylinder = scenario.roller, scenario.cylinder
     crowned = roller.axial_profile.form == "crown"

@@ -16,9 +16,49 @@ _RADII = ("radius_m", "crown_radius_m", "width_m", "edge_radius_m", "chamfer_m")
 _UNITS = {"_m": ("mm", 1e-3), "_Pa": ("GPa", 1e9), "_rad": ("mrad", 1e-3)}  # by ends of keys
 
 
+class _Cylinder:
+    """Texts on a test of a cylinder, from `dry_run`."""
+
+    name, unit, per_unit = "cylinder", "passes", 1.0
+
+    def __init__(self, data: Data) -> None:
+        self.data = data
+
+    def body(self) -> list[str]:
+        """Return radius and form."""
+        return _fields(self.data["cylinder"], "radius_m", digits=6) + _form(self.data["cylinder"])
+
+    def speed(self) -> str:
+        """Return the rolling speed."""
+        return f"{self.data['rolling_speed_m_per_s']:.4g} m/s"
+
+
+class _Cam(_Cylinder):
+    """Texts on a test of a cam."""
+
+    name, unit = "cam", "turns"
+
+    def __init__(self, data: Data) -> None:
+        super().__init__(data)
+        self.cam, self.per_unit = data["cam"], float(data.get("test", {}).get("rollers", 1))
+
+    def body(self) -> list[str]:
+        """Return radius, form, follower and number of stations."""
+        kind = f"{self.cam['follower']} follower" + (" in a groove" if self.cam["groove"] else "")
+        stations = f"{len(self.cam['stations']['angle_rad'])} stations"
+        radius, form = _fields(self.cam, "base_radius_m", digits=6), _form(self.data["cylinder"])
+        return [*radius, *form, kind, stations]
+
+    def speed(self) -> str:
+        """Return the range of the rolling speed."""
+        speeds = self.cam["stations"]["rolling_speed_m_per_s"]
+        return _range((speeds.min(), speeds.max()), "m/s", 1.0)
+
+
 def plan(data: Data) -> TableRows:
     """Return the description from `dry_run` as rows of name and value, in engineering units."""
     roller, patch = data["roller"], data["initial_patch"]
+    track = _Cylinder(data) if data["cam"] is None else _Cam(data)
     radii = [*_fields(roller, *_RADII, digits=6), *_fields(roller, "offset_m"), *_form(roller)]
     size = (
         f"{1e3 * patch['length_m']:.4g} x {1e3 * patch['width_m']:.4g} mm,"
@@ -26,10 +66,10 @@ def plan(data: Data) -> TableRows:
     )
     return [
         ("roller", ", ".join(radii)),
-        _body_row(data),
+        (track.name, ", ".join(track.body())),
         *profile_rows(data["profile"]),
         ("elasticity", ", ".join(_fields(data, "contact_modulus_Pa", "shear_modulus_Pa"))),
-        ("rolling speed", _speed_text(data)),
+        ("rolling speed", track.speed()),
         ("load", _load_text(data["load"])),
         *_log_rows(data["log"]),
         *([("friction", f"{data['friction']:.4g}")] if "friction" in data else []),
@@ -38,7 +78,7 @@ def plan(data: Data) -> TableRows:
         *_random_rows(data),
         ("contact model", f"{data['contact_model']}: {data['contact_model_summary']}"),
         ("initial patch (Hertz)", size),
-        *_test_rows(data),
+        *_test_rows(track),
     ]
 
 
@@ -58,36 +98,13 @@ def _fields(data: Data, *keys: str, digits: int = 4) -> list[str]:
     return texts
 
 
-def _body_row(data: Data) -> tuple[str, str]:
-    """Return the row of the cylinder or the cam."""
-    cam = data["cam"]
-    if cam is None:
-        cylinder = data["cylinder"]
-        texts = [*_fields(cylinder, "radius_m", digits=6), *_form(cylinder)]
-        return "cylinder", ", ".join(texts)
-    kind = f"{cam['follower']} follower" + (" in a groove" if cam["groove"] else "")
-    stations = f"{len(cam['stations']['angle_rad'])} stations"
-    texts = [*_fields(cam, "base_radius_m", digits=6), *_form(data["cylinder"]), kind, stations]
-    return "cam", ", ".join(texts)
-
-
 def _form(body: Data) -> list[str]:
     """Return the form along the axis of a body whose crown radius does not say it."""
     return [f"axial profile {body['axial_profile']}"] if body["axial_profile"] else []
 
 
-def _speed_text(data: Data) -> str:
-    if data["cam"] is None:
-        return f"{data['rolling_speed_m_per_s']:.4g} m/s"
-    speeds = data["cam"]["stations"]["rolling_speed_m_per_s"]
-    return _range((speeds.min(), speeds.max()), "m/s", 1.0)
-
-
-def station_table(data: Data) -> tuple[list[str], list[list[str]]] | None:
+def station_table(stations: Data) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows of the table of a cam's stations, in engineering units."""
-    stations = (data["cam"] or {}).get("stations")
-    if stations is None:
-        return None
     heads = ["angle [deg]", "weight [deg]", "V [m/s]", "curvature [1/mm]", "N [N]"]
     sizes = [np.degrees(1.0), np.degrees(1.0), 1.0, 1e-3, 1.0]
     columns = [values * size for values, size in zip([*stations.values()][1:], sizes, strict=True)]
@@ -180,7 +197,8 @@ def _random_rows(data: Data) -> TableRows:
     return [*rows, ("sampling", ", ".join(words))]
 
 
-def _test_rows(data: Data) -> TableRows:
+def _test_rows(track: _Cylinder) -> TableRows:
+    data = track.data
     if "test" not in data:
         return [("runs as", f"one contact, {data['strips']} strips (no duration or no wear law)")]
     test = data["test"]
@@ -198,20 +216,20 @@ def _test_rows(data: Data) -> TableRows:
         ("strips", strips),
         ("stepper", f"{test['stepper']}, tolerance {test['tolerance']:.1e}"),
         *_forecast_rows(data["forecast"]),
-        *_pitting_rows(data),
-        *_limit_rows(data),
+        *_pitting_rows(track),
+        *_limit_rows(track),
     ]
 
 
-def _pitting_rows(data: Data) -> TableRows:
+def _pitting_rows(track: _Cylinder) -> TableRows:
     """Return rows on pitting without wear; none of a scenario without fatigue."""
-    pitting = data.get("pitting_without_wear")
+    pitting = track.data.get("pitting_without_wear")
     if pitting is None:
         return []
-    rollers = None if data["cam"] is None else data["test"]["rollers"]
-    names = {"cylinder": "cylinder" if data["cam"] is None else "cam", "roller": "rollers"}
+    names = {"cylinder": track.name, "roller": "rollers"}
     sources = [(f"fatigue of the {names[body]}", text) for body, text in pitting["sources"].items()]
-    return [("pitting without wear", unworn_text(pitting, rollers)), *sources]
+    text = unworn_text(pitting, track.name, track.unit, track.per_unit)
+    return [("pitting without wear", text), *sources]
 
 
 def _rounded(value: float, digits: int = 2) -> str:
@@ -243,10 +261,10 @@ def _forecast_rows(forecast: Data) -> TableRows:
     return [("forecast", wear), ("takes about", effort)]
 
 
-def _limit_rows(data: Data) -> TableRows:
+def _limit_rows(track: _Cylinder) -> TableRows:
     """Return a row for each limit of [limit], as forecast."""
-    rows, test = [], data["test"]
-    for item in data["forecast"]["limits"]:
+    rows, test = [], track.data["test"]
+    for item in track.data["forecast"]["limits"]:
         unit = limit_unit(item["quantity"])
         size = 1.0 / PER_SI[unit]
         name = f"limit of {item['quantity'].replace('_', ' ')}"
@@ -257,9 +275,7 @@ def _limit_rows(data: Data) -> TableRows:
             passes = item["reached_at_passes"]
             seconds = passes / test["passes"] * test["duration_s"]
             when = f"{_rounded(seconds / 60.0)} min"
-            length = f"{_rounded(passes)} passes"
-            if data["cam"] is not None:
-                length = f"{_rounded(passes / test['rollers'])} turns"
+            length = f"{_rounded(passes / track.per_unit)} {track.unit}"
             text = f"reached after about {length}, {when}: about {ratio} at the end"
         rows.append((name, text))
     return rows

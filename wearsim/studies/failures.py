@@ -139,7 +139,7 @@ def _too_fine(error: SolverError, scenario: Scenario) -> tuple[str, str]:
 
 def _lost(error: SolverError, scenario: Scenario) -> tuple[str, str]:
     stiffness = getattr(scenario.load.options, "stiffness", 0.0)
-    if scenario.cam is not None:
+    if hasattr(scenario.load.options, "preload"):
         return error.message, f"raise load.preload, or lower {length_key(scenario)}"
     if stiffness:
         spring = f"load.stiffness = {in_engineers_unit(stiffness, 'N/m')}"
@@ -153,18 +153,17 @@ def _lost(error: SolverError, scenario: Scenario) -> tuple[str, str]:
 def _skid(error: SolverError, scenario: Scenario) -> tuple[str, str]:
     creepage, friction = scenario.creepage, scenario.friction.coefficient
     load, carried = error.state["normal_force"], error.state["carried"]
-    reason, remedies = "", []
-    start = greatest_load(scenario)
-    if scenario.cam is None and load < 0.99 * start:
-        reason = f"; the load has fallen from {start:.4g} N"
+    reason, most, of_inertia = "", "", ["lower roller.inertia"]
+    if scenario.cam is None:
+        most, of_inertia, start = f" to below {1e3 * carried:.4g} N mm", [], greatest_load(scenario)
+        reason = f"; the load has fallen from {start:.4g} N" if load < 0.99 * start else ""
+    remedies = []
     if any(scenario.per_roller(creepage.yaw)):
         reason += "; creepage.yaw takes a part of the friction"
     if creepage.bearing_torque:
         torque = 1e3 * creepage.bearing_torque
-        most = f" to below {1e3 * carried:.4g} N mm" if scenario.cam is None else ""
         remedies.append(f"lower creepage.bearing_torque = {torque:.6g} N mm{most}")
-    if scenario.cam is not None:
-        remedies.append("lower roller.inertia")
+    remedies += of_inertia
     if creepage.bearing_friction:
         remedies.append(f"lower creepage.bearing_friction = {creepage.bearing_friction:.4g}")
     remedies.append(f"raise friction.coefficient = {friction:.4g} or the load")

@@ -26,6 +26,7 @@ import numpy as np
 from wearsim.errors import SolverError
 from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import CamStations
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.loads import fresh_approach, with_feedback
 from wearsim.evolution.steppers.single_step import solve_loaded, solve_present
@@ -134,20 +135,19 @@ class WearForecast:
             done, column = course["passes"], course[name]
             return np.array([np.interp(passes, done[:, s], column[:, s]) for s in stations])
 
-        depth = there("total")
+        depth, track = there("total"), problem.kinematics.track
         values = {
             "depth": there("cylinder").max(),
             "roller_depth": there("roller").max(),
-            "volume": np.mean(math.tau * np.ravel(problem.kinematics.track_radius) * there("area")),
+            "volume": np.mean(math.tau * np.ravel(track.track_radius) * there("area")),
             "width": there("width").max(),
             "peak_pressure": there("pressure").max(),
             "energy": problem.mean_over_turn(there("energy")[:, None])[0, 0],
             "clearance": depth.max(),
         }
-        cam = problem.kinematics.cam
-        if cam is not None:
-            away = np.sign(np.ravel(cam.load_factor)) * depth
-            values["lift_error"] = np.ptp(away / np.cos(np.ravel(cam.pressure_angle)))
+        if isinstance(track, CamStations):
+            away = np.sign(np.ravel(track.load_factor)) * depth
+            values["lift_error"] = np.ptp(away / np.cos(np.ravel(track.pressure_angle)))
         if problem.fatigue is not None:
             values |= damage_after(problem, self._places, course, passes)
         return {

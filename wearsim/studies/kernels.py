@@ -67,7 +67,7 @@ def kernels_of(
     if steps and model == "slender" and theory == "strip" and name == "per-pass":
         names |= {"run_passes"}
     roles = {item.role for item in scenario.random}
-    varies = "process" in roles or not scenario.load.build().constant
+    varies = "process" in roles or not scenario.load.built.constant
     redrawn = any(item.is_redrawn for item in scenario.random)
     # the test on coarse strips
     coarse = evolution.strip_error and not (name == "per-pass" and redrawn)

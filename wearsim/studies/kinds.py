@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from wearsim.plugins import StudyKind, hookimpl
 
@@ -17,7 +18,7 @@ def wearsim_study_kinds() -> Iterable[StudyKind]:
         "run",
         summary="one wear test",
         result="wearsim.studies.run.result:Result",
-        view="wearsim.studies.run.view:RunView",
+        view="wearsim.studies.kinds:view_of_run",
         data="wearsim.studies.run.result:RunData",
         format="wearsim-run",
         holds="a wear test, from `wearsim run`",
@@ -107,3 +108,14 @@ def wearsim_study_kinds() -> Iterable[StudyKind]:
         view="wearsim.studies.comparison.view:ComparisonView",
         protocol=2,
     )
+
+
+def view_of_run(result: Any) -> Any:
+    """Return the view of the run of a cylinder, or of a cam."""
+    if result.is_cam:
+        from wearsim.studies.cam.run_view import CamRunView  # noqa: PLC0415  (when it is shown)
+
+        return CamRunView(result)
+    from wearsim.studies.run.view import RunView  # noqa: PLC0415  (when it is shown)
+
+    return RunView(result)

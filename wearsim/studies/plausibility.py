@@ -73,7 +73,7 @@ def plausibility_warnings(setup: Setup) -> list[str]:
 
 def greatest_load(scenario: Scenario) -> float:
     """Return the greatest load of the test, or of the start of a single contact [N]."""
-    load = scenario.load.build()
+    load = scenario.load.built
     if isinstance(load, FollowerLoad):
         return turn_of(scenario).normal_range[1]
     return load.extremes(0.0, scenario.total_time if scenario.has_length else 0.0)[1]
@@ -92,8 +92,8 @@ def _of_pressure(setup: Setup, load: float, friction: float) -> Iterator[str]:
     scenario, (patch, force) = setup.scenario, setup.hardest_patch(load)
     pressure = patch.peak_pressure
     text = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
-    other = "cylinder" if scenario.cam is None else "cam"
-    for name, body in (("roller", scenario.roller), (other, scenario.cylinder)):
+    bodies = ("roller", scenario.roller), (scenario.cylinder.name, scenario.cylinder)
+    for name, body in bodies:
         strength, hardness = body.material.yield_stress, body.material.hardness
         limit, what = hardness, "its hardness"
         if strength is not None:
@@ -199,7 +199,7 @@ def _of_cam(scenario: Scenario) -> list[str]:
 
 
 def _of_log(scenario: Scenario) -> Iterator[str]:
-    gaps: FloatArray = scenario.load.build().gaps
+    gaps: FloatArray = scenario.load.built.gaps
     file = load_file(scenario)
     if file and len(gaps):
         how = getattr(scenario.load.options, "gaps", "interpolate")

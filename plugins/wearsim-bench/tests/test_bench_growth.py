@@ -112,7 +112,7 @@ def test_family_peak_includes_children():
 def test_all_numbers_of_passes_wear_the_same_groove():
     few, many = (Workload(RIG, same_groove(count)).scenario_with() for count in (10**4, 10**9))
     for scenario in (few, many):
-        law = scenario.wear.build()
+        law = scenario.wear.built
         worn = law.depth_per_dissipation("cylinder", 1.0) * scenario.total_passes
         assert worn == pytest.approx(1.1e-11 * 1_350_000)
 

@@ -30,7 +30,7 @@ from wearsim.mechanics.numerics.edge_strips import (
     sum_of_wear,
 )
 
-TESTS, STRIPS, ROLLERS = 3, 6, 2
+TESTS, STRIPS, ROLLERS = 3, 12, 2
 CONTACTS, SIZE = ROLLERS * TESTS, 1e-6
 ROLLERS_OF_ONE = np.array([[0, 1], [0, 2]])
 STATIONS = np.array([[0, 2], [1, 2]])  # of a cam that one roller passes
@@ -46,6 +46,7 @@ class Edges:
         self.part[rng.random(self.part.shape) < 0.25] = 0.0
         self.part[rng.random(self.part.shape) < 0.25] = 1.0
         self.separation = np.where(self.part < 1.0, SIZE * rng.random(self.part.shape), 0.0)
+        self.separation[:, ::2] *= 0.1  # some are far smaller than those ahead
         self.approach = SIZE * (2.0 + rng.random(CONTACTS))
         self.wear = SIZE * rng.random((2, CONTACTS, STRIPS)) * (self.part > 0.0)
         self.loads = np.where(rng.random(self.part.shape) < 0.7, 1.0 + self.part, 0.0)
@@ -197,8 +198,10 @@ def test_linearised_wear_has_value_and_slope_of_the_mean_wear(edges: Edges) -> N
         assert (slopes[k] == 1.0).all()
 
 
-def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges) -> None:
+@pytest.mark.parametrize("part", [1.0, 0.0])
+def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges, part: float) -> None:
     rng = np.random.default_rng(2)
+    edges.loads *= part
     gaps, slopes = np.empty(edges.level.shape), np.empty(edges.level.shape)
     linearise_edges(edges.strips, edges.level, edges.wear, gaps, slopes)
     linear, apart = SIZE * rng.random((2, CONTACTS, STRIPS))

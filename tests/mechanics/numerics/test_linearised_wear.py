@@ -4,6 +4,10 @@ import numpy as np
 import pytest
 
 from wearsim.mechanics.numerics.linearised_wear import (
+    FOUNDATION,
+    LEAST,
+    LEAST_EXPONENT,
+    MIN_LOG_CHANGE,
     carried_errors,
     difference_sizes,
     linearised_wear,
@@ -163,3 +167,132 @@ def test_exponents_of_finished_realisations_are_kept():
     assert exponents[1] == pytest.approx([0.7, 0.7])
     assert worn[0] == pytest.approx(new**0.7)
     assert sizes[1] == pytest.approx([1.5**0.7] * 2)
+
+
+TESTS, STRIPS = 2, 9
+ROLLERS = np.array([[0, 1], [0, 2]])  # two rollers on one cylinder
+
+
+def contacts():
+    """Yield contact, its roller, test and number."""
+    for c in range(len(ROLLERS)):
+        for v in range(TESTS):
+            yield c, v, c * TESTS + v
+
+
+def random_loads(rng):
+    """Return line loads of all contacts, some of them zero [N/m]."""
+    loads = 1e5 * (0.5 + rng.random((len(ROLLERS) * TESTS, STRIPS)))
+    return np.where(rng.random(loads.shape) < 0.7, loads, 0.0)
+
+
+def test_linearised_wear_of_all_contacts_opens_the_gaps():
+    rng = np.random.default_rng(1)
+    loads, exponents = random_loads(rng), 0.4 + rng.random((4, STRIPS))
+    loads[0, :2], loads[3, 0], loads[3, 1:] = [1e5, 0.0], 1e5, 0.0  # a load at the end
+    slopes = np.where(rng.random((4, STRIPS)) < 0.7, 0.5 + rng.random((4, STRIPS)), np.inf)
+    wear, gap = rng.random((2, 4, STRIPS)) * (loads > 0.0), rng.random((4, STRIPS))
+    compliance, opened = np.full((TESTS, 2, 2, STRIPS), np.nan), np.full_like(gap, np.nan)
+    constant, place = np.full_like(wear, np.nan), np.arange(STRIPS)
+    linearised_wear(loads, wear, exponents, slopes, ROLLERS, gap, compliance, opened, constant)
+    np.testing.assert_allclose(constant, (1.0 - exponents) * wear / slopes, rtol=1e-13)
+    expected = gap.copy()
+    for c, v, k in contacts():
+        for other, _, m in (one for one in contacts() if one[1] == v):
+            expected[k] += constant[0, m] + constant[1, m] * (other == c)
+        for side in range(2):
+            inside = loads[k] > 0.0
+            ratio = np.interp(place, place[inside], wear[side, k, inside] / loads[k, inside])
+            found = compliance[v, c, side]
+            np.testing.assert_allclose(found, exponents[k] * ratio / slopes[k], rtol=1e-12)
+    np.testing.assert_allclose(opened, expected, rtol=1e-13)
+
+
+def test_wear_of_bodies_is_compared_with_the_linearised_one():
+    rng = np.random.default_rng(2)
+    loads, shape = random_loads(rng), (2, 4, STRIPS)
+    old = np.where(rng.random(loads.shape) < 0.8, loads * (0.6 + rng.random(loads.shape)), 0.0)
+    old[:, 3] = loads[:, 3] * np.exp(MIN_LOG_CHANGE * np.array([0.9, 1.1, -0.9, -1.1]))
+    wear, old_wear = (1e-6 * rng.random(shape) * (one > 0.0) for one in (loads, old))
+    slopes = 0.5 + rng.random(loads.shape)
+    compliance = 1e-11 * rng.random((TESTS, 2, 2, STRIPS))
+    constant, base = 1e-6 * rng.random(shape), 2e-6 * rng.random((3, TESTS, STRIPS))
+    exponents = np.full(loads.shape, 0.9)
+    worn, linear = np.empty(base.shape), np.empty(loads.shape)
+    sizes = wear_of_bodies(
+        *(loads, old, wear, old_wear, compliance, constant, ROLLERS, base, 1.2, slopes),
+        *(np.array([True, False]), exponents, worn, linear),
+    )
+    known, opening, part, scaled = (np.zeros(base.shape) for _ in range(4))
+    for c, v, k in contacts():
+        for side, b in enumerate(ROLLERS[c]):
+            known[b, v] += wear[side, k]
+            scaled[b, v] += wear[side, k] / slopes[k]
+            part[b, v] += constant[side, k] + compliance[v, c, side] * loads[k]
+    np.testing.assert_allclose(worn, known, rtol=1e-13)
+    expected = np.zeros((3, TESTS))
+    for c, v, k in contacts():
+        pair = ROLLERS[c]
+        opening = part[pair, v].sum(axis=0)
+        np.testing.assert_allclose(linear[k], opening, rtol=1e-13)
+        rest = np.abs(scaled[pair, v].sum(axis=0) - opening) * np.minimum(slopes[k], 1.0)
+        total = known[pair, v].sum(axis=0)
+        deepest = (base[pair, v].sum(axis=0) + total).max()
+        expected[:, v] = np.maximum(expected[:, v], [rest.max(), total.max(), deepest])
+        for i in range(STRIPS):
+            exponent, both = 0.9, loads[k, i] > 0.0 and old[k, i] > 0.0
+            rise = np.log(loads[k, i] / old[k, i]) if both else 0.0
+            if v == 0 and abs(rise) > MIN_LOG_CHANGE:
+                of_wear = np.log(wear[:, k, i].sum() / old_wear[:, k, i].sum())
+                exponent = min(max(of_wear / rise, LEAST_EXPONENT), 1.2)
+            assert exponents[k, i] == pytest.approx(exponent, rel=1e-9)
+    np.testing.assert_allclose(sizes, expected, rtol=1e-12)
+    none = wear_of_bodies(
+        *(loads, old, 0.0 * wear, 0.0 * wear, 0.0 * compliance, 0.0 * constant, ROLLERS),
+        *(0.0 * base, 1.2, slopes, np.ones(2, bool), exponents, worn, linear),
+    )
+    assert none.tolist() == [[0.0, 0.0], [0.0, 0.0], [np.inf, np.inf]]
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_errors_of_bodies_with_several_contacts_are_filled_by_wear(size):
+    rng, shape, spacing = np.random.default_rng(3), (3, TESTS, STRIPS), 1e-4
+    loads, (errors, added) = size * random_loads(rng), 1e-8 * rng.standard_normal((2, *shape))
+    loads[1, 2], loads[3, 2] = 0.0, 0.0
+    wear, exponents = 2e-6 * rng.random((2, 4, STRIPS)), 0.5 + rng.random((4, STRIPS))
+    approaches, gap = 4e-6 + 2e-6 * rng.random(4), 1e-6 * rng.random((4, STRIPS))
+    depths, stiffness = 1e-6 * rng.random(shape), size * np.array([0.0, 4e6, 2e6, 0.0])
+    weights = np.array([[1.0, 0.0, 0.0], [2e-4, 3e-4, 5e-4]])
+    carried, sizes = carried_errors(
+        *(errors, added, loads, wear, exponents, approaches, gap, depths, ROLLERS, stiffness),
+        *(spacing, weights),
+    )
+    whole, soft, own = errors + added, np.zeros(shape), np.zeros((2, 4, STRIPS))
+    for c, v, k in contacts():
+        inside = loads[k] > 0.0
+        own[:, k, inside] = (exponents[k] * wear[:, k])[:, inside] / loads[k, inside]
+        for side, b in enumerate(ROLLERS[c]):
+            soft[b, v] += own[side, k]
+    expected = whole.copy()
+    for c, v, k in contacts():
+        pair = ROLLERS[c]
+        least = (gap[k] + depths[pair, v].sum(axis=0)).min()
+        elastic = FOUNDATION * (approaches[k] - least) / loads[k].max()
+        spring = (loads[k] > 0.0) / (elastic + soft[pair, v].sum(axis=0))
+        opened = whole[pair, v].sum(axis=0)
+        level = spring @ opened / (spring.sum() + stiffness[k] / spacing)
+        expected[pair, v] -= own[:, k] * spring * (opened - level)
+    np.testing.assert_allclose(carried, expected, rtol=1e-10, atol=1e-22)
+    assert np.abs(carried - whole).max() > 0.3 * np.abs(whole).max()
+    of_depths = difference_sizes(depths, carried, weights)
+    profile = of_depths[2] / of_depths[3]
+    np.testing.assert_allclose(sizes[2], profile, rtol=1e-12)
+    least = LEAST * profile * depths.max(axis=(0, 2))
+    np.testing.assert_allclose(sizes[0], np.maximum(of_depths[0], least), rtol=1e-12)
+    volume = np.einsum("b,bvi->v", weights[1], carried - errors)
+    np.testing.assert_allclose(sizes[1], np.abs(volume), rtol=1e-9)
+    fresh = carried_errors(
+        *(errors, added, loads, wear, exponents, approaches, gap, 0.0 * depths, ROLLERS),
+        *(stiffness, spacing, weights),
+    )[1]
+    assert not fresh[2].any()

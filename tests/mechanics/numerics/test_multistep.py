@@ -117,6 +117,19 @@ def test_order_is_lowered_after_a_sudden_growth_of_the_step():
         assert distances.ravel() == pytest.approx([length, *(length + spans[:-1, 0])])
 
 
+def test_missing_points_have_no_weights():
+    spans = np.array([[1.0, np.inf], [2.5, np.inf], [np.inf] * 2, [np.inf] * 2, [np.inf] * 2])
+    weights, factor = np.full((2, ROWS, 2), np.nan), np.empty(2)
+    distances, start = np.empty((ROWS - 1, 2)), np.array([0.5, 0.0])
+    formulas(spans, np.array([1.2, 0.7]), np.array([4, 4]), start, weights, factor, distances)
+    # three points and one: formulas of third and of first order, without missing differences
+    assert factor == pytest.approx([1.0 / (1 / 1.2 + 1 / 2.2 + 1 / 3.7), 0.7])
+    assert weights[1, :3, 0] == pytest.approx([0.5, 1.2, 1.2 * 2.2])
+    assert weights[1, :1, 1] == pytest.approx([0.0])
+    assert not weights[:, 3:, 0].any()
+    assert not weights[:, 1:, 1].any()
+
+
 def test_missing_points_have_no_estimate():
     spans = np.array([[1.0], [2.0], [np.inf], [np.inf], [np.inf]])
     errors, _ = errors_of(np.ones((ROWS, 1, 1, 2)), spans, np.ones((1, 1, 2)), 1)

@@ -11,11 +11,11 @@ from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 @given(st.integers(0, 10**6), st.floats(0.0, 5.0), st.floats(0.0, 5.0))
 def test_mean_and_deviation_are_exact_integrals(seed, one, other):
     random = np.random.default_rng(seed)
-    path = PiecewiseLinear(np.arange(6.0), random.uniform(-2.0, 3.0, 6))
+    inner = np.array([0.0, 0.2, 1.9, 2.6, 4.5, 5.0])
+    path = PiecewiseLinear(inner, random.uniform(-2.0, 3.0, 6))
     start, stop = min(one, other), max(one, other) + 1e-3
     stop = min(stop, 5.0)
     # the samples are nodes, so that the trapezoidal rule and Simpson's rule are exact
-    inner = np.arange(6.0)
     nodes = np.unique([start, stop, *inner[(inner > start) & (inner < stop)]])
     if len(nodes) < 2 or stop - start < 1e-6:
         return

@@ -113,8 +113,10 @@ def test_sum_without_past_points_has_no_error() -> None:
     assert not found.any()
 
 
-def test_estimates_cover_errors_of_steps_edges_and_sums() -> None:
+@pytest.mark.parametrize("points", [2, 3, ROWS])
+def test_estimates_cover_errors_of_steps_edges_and_sums(points: int) -> None:
     step = Step()
+    step.spans[points - 1 :] = np.inf  # missing past points
     young, crossed = np.empty(SHAPE, bool), np.empty(SHAPE, bool)
     parts, own, orders = np.empty(SHAPE), np.empty(SHAPE), np.empty(TESTS, np.int64)
     state = step.part, step.whole_steps, step.orders, step.past[0]
@@ -143,7 +145,7 @@ def test_estimates_cover_errors_of_steps_edges_and_sums() -> None:
             profile += step.displaced[v] / deepest
         if step.resolved[v]:
             spans = step.spans[:2, v]
-            first_order = spans[0] / (1.0 / spans).sum() * step.past[2, :, v]
+            first_order = spans[0] / (1.0 / spans).sum() * step.past[2, :, v] * (points > 2)
             at_edge = np.where(crossed[:, v], own[:, v], 0.0)
             at_edge += np.where(young[:, v] & (step.past[0, :, v] > 0.0), first_order, 0.0)
             edges = EDGES * np.linalg.norm(at_edge) / np.linalg.norm(step.depths[:, v])

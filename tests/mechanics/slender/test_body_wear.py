@@ -25,6 +25,7 @@ BODIES = {
     "one station and two rollers": [[0, 1], [0, 2], [0, 2]],
     "a contact by itself": [[0, 1], [0, 1], [-1, -1]],
     "a body that wears alone": [[0, 2], [-1, 2], [0, -1], [1, 2]],
+    "bodies that two contacts share in a few strips": [[0, 2], [0, 3], [1, 2]],
 }
 
 
@@ -56,6 +57,9 @@ class Contacts:
         """Return the system of the bodies' depths, and the softness of the contacts."""
         state, softness = self.state, np.full((self.count, STRIPS), -1.0)
         system = new_depth_system(self.bodies, STRIPS)
+        for array in (system.block, system.across, system.outer, system.depth, system.sums):
+            array[:] = np.nan  # of another step
+        system.outer_depth[:], system.response[:], system.approach_slope[:] = np.nan, np.nan, np.nan
         state.fresh[:] = False
         number_depths(self.bodies, self.own, self.shared, state, system, softness)
         for k in range(self.count):
@@ -155,6 +159,14 @@ def test_coupled_step_is_that_of_one_dense_system(contacts: Contacts) -> None:
     for k, step in enumerate(steps):
         np.testing.assert_allclose(contacts.state.step[k, : len(step)], step, rtol=1e-9)
     np.testing.assert_allclose(approach, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_system_without_a_solution_is_not_factored(side: int) -> None:
+    contacts = Contacts(BODIES["two stations and two rollers"])
+    system, _ = contacts.system()
+    contacts.shared[:, side] = np.nan
+    assert not factor_depths(contacts.shared, contacts.state, system)
 
 
 def test_less_numerous_bodies_remain_in_the_outer_system() -> None:

@@ -7,10 +7,12 @@ from scipy.integrate import quad
 from wearsim.mechanics.slender.influence import (
     HIGHEST,
     LOWEST,
+    STEP,
     curvature_table,
     influence_table,
     mean_asinh,
     middle_curvature,
+    no_table,
     read_influence,
     read_value,
 )
@@ -91,9 +93,20 @@ def test_table_interpolates_the_function(tau, tabulated, function):
         np.testing.assert_allclose(tangent, expected + 0.25 * slope / step, atol=2e-7)
 
 
+def test_tables_are_shared_and_kept() -> None:
+    for tabulated in (influence_table, curvature_table, no_table):
+        table = tabulated(5)
+        assert tabulated(5) is table
+        assert not table.flags.writeable
+        nodes = round((HIGHEST - LOWEST) / STEP) + 1
+        assert table.shape == (0 if tabulated is no_table else nodes, 2, 9)
+
+
 def test_vanishing_half_length_is_a_line_load():
     value, tangent = np.empty(40), np.empty(40)
     read_influence(influence_table(40), -50.0, 40, value, tangent)
     k = np.arange(1, 40)
     np.testing.assert_allclose(value[1:], np.log((k + 0.5) / (k - 0.5)), atol=1e-8)
+    np.testing.assert_array_equal(value, tangent)
+    read_influence(influence_table(40), LOWEST, 40, tangent, np.empty(40))
     np.testing.assert_array_equal(value, tangent)

@@ -8,11 +8,18 @@ from scipy.optimize import brentq
 
 from wearsim.mechanics.numerics.lu import solve_factored
 from wearsim.mechanics.slender.body_wear import add_depths
-from wearsim.mechanics.slender.half_length import fill_log_scales, find_factors, new_half_lengths
+from wearsim.mechanics.slender.half_length import (
+    REACH,
+    add_length_slopes,
+    fill_log_scales,
+    find_factors,
+    new_half_lengths,
+)
 from wearsim.mechanics.slender.influence import (
     curvature_table,
     influence_table,
     no_table,
+    read_influence,
     read_value,
 )
 from wearsim.mechanics.slender.newton import CAUTIOUS, GAP_TOLERANCE, add_penetrated
@@ -81,11 +88,58 @@ def test_jacobian_is_the_slope_of_the_displacements(lengths: str) -> None:
     state.surface[0] = 0.0
     assert fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
     np.testing.assert_allclose(state.surface[0], expected, rtol=1e-12)
+    assert (state.unit_load[0, : len(inside)] == 1.0).all()
     residual = np.linspace(-1e-6, 2e-6, len(inside))
     state.step[0, : len(inside)] = residual
     solve_factored(state.matrix[0], state.size[0], state.step[0])
     found = slopes @ state.step[0, : len(inside)]
     np.testing.assert_allclose(found, residual, atol=1e-4 * np.abs(residual).max())
+
+
+def unfactored(factors: np.ndarray) -> np.ndarray:
+    """Return the matrix by columns of factors as of `factor_in_place`."""
+    pivots = np.diag(1.0 / np.diag(factors))
+    found: np.ndarray = (np.tril(factors, -1) + np.eye(len(factors))) @ (
+        np.triu(factors, 1) + pivots
+    )
+    return found
+
+
+@pytest.mark.parametrize("lengths", LENGTHS)
+@pytest.mark.parametrize("inside", [range(3, 12), [2, 3, 4, 7, 8, 12], [7], range(STRIPS)])
+def test_jacobian_has_the_tangents_of_the_table(lengths: str, inside: list[int]) -> None:
+    contact, line_load, own = Contact(lengths), np.zeros((1, STRIPS)), np.ones((1, STRIPS))
+    own *= 1e-12 * np.arange(STRIPS)
+    line_load[0, inside] = 3e4 * (1.0 + np.random.default_rng(4).random(len(inside)))
+    state, places, size = contact.state, np.arange(STRIPS), len(inside)
+    number_strips(0, line_load, 2, state)
+    find_factors(0, line_load, True, contact.lengths)
+    state.surface[0], state.outer[:] = 1e-6, np.nan
+    assert fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
+    followed = slice(state.left[0], state.right[0])
+    matrix, near = np.zeros((size, size)), np.zeros((REACH + 1, STRIPS))
+    surface = np.full(STRIPS, 1e-6)
+    for column, j in enumerate(inside):
+        value, tangent = np.empty((2, STRIPS))
+        tau = contact.lengths.log_ratio[0, j]
+        read_influence(contact.table, tau, STRIPS, value, tangent)
+        distance = np.abs(places - j)
+        surface += UNIT * line_load[0, j] * value[distance]
+        expected = UNIT * tangent[distance]
+        np.testing.assert_allclose(state.outer[0, column, followed], expected[followed], rtol=1e-11)
+        matrix[column] = expected[inside]
+        assert state.diagonal[0, column] == pytest.approx(UNIT * tangent[0], rel=1e-12)
+        near[:, j] = UNIT * line_load[0, j] * (tangent - value)[: REACH + 1]
+    np.testing.assert_allclose(state.surface[0, followed], surface[followed], rtol=1e-12)
+    if lengths == "coupled":
+        found = contact.lengths.near[: REACH + 1, 2 * REACH : -2 * REACH]
+        scale = np.abs(near).max()
+        np.testing.assert_allclose(found[:, inside], near[:, inside], atol=1e-12 * scale)
+        add_length_slopes(0, line_load, state.rows, contact.lengths, matrix)
+    matrix += np.diag(own[0, inside])
+    scale = np.abs(matrix).max()
+    found = unfactored(state.matrix[0, :size, :size])
+    np.testing.assert_allclose(found, matrix, atol=1e-12 * scale)
 
 
 def test_approach_keeps_the_load() -> None:
@@ -159,9 +213,10 @@ def test_strips_in_tension_leave_the_contact() -> None:
     assert change == pytest.approx(greatest, rel=1e-12)
 
 
-def test_foundation_carries_the_load() -> None:
+@pytest.mark.parametrize("load", [2e5, 1e3, 1e-3])
+def test_foundation_carries_the_load(load: float) -> None:
     gap = 5.0 * np.linspace(-1e-3, 1e-3, STRIPS)[None] ** 2
-    compliance, soft, load = np.linspace(0.0, 4e-12, STRIPS)[None], 2e-11, 2e5
+    compliance, soft = np.linspace(0.0, 4e-12, STRIPS)[None], 2e-11
     line_load, approach = np.zeros((1, STRIPS)), np.zeros(1)
     rest_on_foundation(0, gap, compliance, soft, load, 0, STRIPS, line_load, approach)
 
@@ -248,19 +303,19 @@ def test_residual_is_corrected_by_the_own_load_of_each_strip() -> None:
 
 def test_cautious_steps_reduce_loads_before_strips_leave() -> None:
     state, line_load = new_newton_state(1, STRIPS), np.zeros((1, STRIPS))
-    line_load[0, 3:8] = 10.0, 1e-6, 8.0, 6.0, 4.0
+    line_load[0, 3:9] = 10.0, 0.9e-5, 8.0, 6.0, 4.0, 1.1e-5
     before = line_load.copy()
     number_strips(0, line_load, 1, state)
     state.fresh[0] = False
-    state.step[0, :5] = 0.5, -1.0, -8.0, -7.0, 0.0
+    state.step[0, :6] = 0.5, -1.0, -8.0, -7.0, 0.0, -1.0
     change, left = update_loads(line_load, state, True)
     # by a tenth at a time; a load far below the peak is removed
-    assert line_load[0, 3:8].tolist() == pytest.approx([10.5, 0.0, 0.8, 0.6, 4.0])
+    assert line_load[0, 3:9].tolist() == pytest.approx([10.5, 0.0, 0.8, 0.6, 4.0, 1.1e-6])
     np.testing.assert_allclose(state.change, line_load - before)
     assert (change, left, state.fresh[0]) == (pytest.approx(0.72), True, True)
     state.fresh[0] = False
     number_strips(0, line_load, 1, state)
-    state.step[0, :4] = 0.1
+    state.step[0, :5] = 0.1, 0.1, 0.1, 0.1, 0.0
     assert update_loads(line_load, state, False) == (pytest.approx(0.1 / 10.5), False)
     assert not state.fresh[0]
     state.step[0, 0] = np.nan
@@ -272,10 +327,12 @@ def test_separation_is_that_of_the_deformed_surfaces() -> None:
     line_load[0, 6:9] = 1.0
     number_strips(0, line_load, 2, state)
     gap = 1e-6 * (np.arange(STRIPS)[None] - 7.0) ** 2
-    state.surface[0], separation = gap[0] + 3e-6, np.full((1, STRIPS), -1.0)
-    state.surface[0, 11:] = state.surface[0, :4] = np.nan  # not followed
+    followed = (np.arange(STRIPS) >= 4) & (np.arange(STRIPS) < 11)
+    pushed = 1e-6 * np.clip(np.arange(STRIPS), 4, 10) - 4e-6  # as the nearest followed strip
+    state.surface[0], separation = gap[0] + pushed, np.full((1, STRIPS), -1.0)
+    state.surface[0, ~followed] = np.nan
     fill_separation(0, gap, 4.5e-6, line_load, state, separation)
-    known = np.maximum(gap[0] + 3e-6 - 4.5e-6, 0.0)
+    known = np.maximum(gap[0] + pushed - 4.5e-6, 0.0)
     known[6:9] = 0.0
     np.testing.assert_allclose(separation[0], known, atol=1e-20)
 
@@ -295,8 +352,14 @@ def test_penetrated_strips_start_with_a_tenth_of_their_spring() -> None:
         known[chosen] = 0.1 * (5e-6 - state.surface[0, chosen]) / UNIT
         np.testing.assert_allclose(line_load[0], known)
         assert state.fresh[0]
-    state.surface[0, [2, 3, 9]] = 5e-6 * (1.0 - 0.5 * GAP_TOLERANCE)
-    assert not add_penetrated(0, 1, 12, 1, UNIT, state, approach, line_load)
+    # the tolerance is a part of the approach, or of its height above the least surface
+    for lowest, size in ((1e-6, 5e-6), (-3e-6, 8e-6)):
+        state.surface[0, 5] = lowest
+        for part in (0.95, 1.05):
+            state.surface[0, [2, 3, 9]] = 5e-6 - part * GAP_TOLERANCE * size
+            arguments = UNIT, state, approach, line_load.copy()
+            assert add_penetrated(0, 1, 12, 1, *arguments) == (part > 1.0)
+    state.surface[0, [2, 3, 9, 5]] = 6e-6, 6e-6, 6e-6, 1e-6
     state.surface[0, 13] = 0.0  # its surface is not complete
     assert not add_penetrated(0, 1, 12, 1, UNIT, state, approach, line_load)
     # from the fortieth iteration on the tolerance is ten times as great

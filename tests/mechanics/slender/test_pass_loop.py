@@ -13,9 +13,24 @@ import numpy as np
 import pytest
 
 from wearsim.mechanics.slender.chord_method import ContactConstants, Loads, new_chord_state
+from wearsim.mechanics.slender.half_length import REACH
 from wearsim.mechanics.slender.influence import curvature_table, influence_table
-from wearsim.mechanics.slender.newton import CONVERGED, solve_slender
-from wearsim.mechanics.slender.pass_loop import UNLOADED, Passes, Wear, run_passes
+from wearsim.mechanics.slender.newton import (
+    CONVERGED,
+    NO_CONVERGENCE,
+    NOT_FINITE,
+    SINGULAR,
+    solve_slender,
+)
+from wearsim.mechanics.slender.pass_loop import (
+    SMALL,
+    UNLOADED,
+    Passes,
+    Wear,
+    _fill_growth,
+    _wear_strips,
+    run_passes,
+)
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import new_tractions, solve_strips
 
@@ -44,6 +59,8 @@ class Loop:
     terms: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
     term_rates: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     load: float = 300.0
+    crown: float = 5.0
+    constants: ContactConstants = CONSTANTS
 
     def __post_init__(self) -> None:
         count = 6
@@ -54,7 +71,7 @@ class Loop:
             1e-4 * np.arange(count),
             0.2 * np.arange(count),
         )
-        self.nominal = np.array([5.0, 6.0])[:, None] * Y**2 + 1e-6
+        self.nominal = self.crown * np.array([1.0, 1.2])[:, None] * Y**2 + 1e-6
         self.from_apex = np.stack([Y, 1.1 * Y])
         slips = np.stack([1e-4 * Y / Y[-1], -2e-4 * (Y / Y[-1]) ** 2])
         self.wear = Wear(
@@ -87,7 +104,7 @@ class Loop:
             self.from_apex,
             SPEED,
             self.similar,
-            CONSTANTS,
+            self.constants,
             self.wear,
             self.loads,
             new_chord_state(CONSTANTS, 2, STRIPS),
@@ -173,8 +190,11 @@ def check_pass(loop: Loop, p: int, accuracy: float) -> None:
 
 
 @pytest.mark.parametrize("p", [0, 2, 4])
-def test_pass_agrees_with_its_equations(p: int) -> None:
-    check_pass(Loop(), p, 1e-8)
+@pytest.mark.parametrize("crown", [5.0, 0.02], ids=["in the middle", "on all strips"])
+def test_pass_agrees_with_its_equations(crown: float, p: int) -> None:
+    loop = Loop(crown=crown)
+    check_pass(loop, p, 1e-8)
+    assert (loop.loads.line_load[ORDER[p % 3]] > 0.0).all() == (crown < 1.0)
 
 
 @pytest.mark.parametrize("p", [0, 1])
@@ -184,12 +204,21 @@ def test_spring_and_terms_change_the_load_of_a_pass(p: int) -> None:
     check_pass(Loop(stiffness=2e7, terms=terms, term_rates=rates), p, 1e-8)
 
 
+@pytest.mark.parametrize(("load", "stiffness"), [(300.0, 2e7), (0.01, 1e4)])
+def test_spring_of_a_worn_contact_has_a_smaller_load(load: float, stiffness: float) -> None:
+    loop = Loop(load=load, stiffness=stiffness)
+    loop.fresh[:] = 0.3e-6  # the bodies are worn by more
+    check_pass(loop, 0, 1e-7)
+    assert loop.loads.line_load[0].sum() * SPACING < load
+
+
 def test_stiff_spring_and_contact_share_their_displacement() -> None:
     check_pass(Loop(stiffness=3e8), 0, 1e-7)
 
 
-def test_pass_from_an_anchor_is_no_full_solution() -> None:
-    loop = Loop(similar=True)
+@pytest.mark.parametrize("crown", [5.0, 0.02], ids=["in the middle", "on all strips"])
+def test_pass_from_an_anchor_is_no_full_solution(crown: float) -> None:
+    loop = Loop(similar=True, crown=crown)
     loop.passes.base_load[2], loop.passes.tilt[2] = (
         loop.passes.base_load[1] + 1.0,
         loop.passes.tilt[1],
@@ -198,8 +227,17 @@ def test_pass_from_an_anchor_is_no_full_solution() -> None:
     assert loop.run(2) == (CONVERGED, 1, 0)
 
 
-def test_pass_from_an_anchor_agrees_with_its_equations() -> None:
-    loop = Loop(similar=True)
+def test_light_contact_is_solved_from_its_anchor() -> None:
+    loop = Loop(similar=True, crown=30.0)
+    loop.passes.base_load[:], loop.passes.tilt[:] = 1e-4, 0.0
+    assert loop.run(1) == (CONVERGED, 1, 1)
+    assert loop.loads.line_load.max() < 1.0
+    assert loop.run(2) == (CONVERGED, 1, 0)
+
+
+@pytest.mark.parametrize("crown", [5.0, 0.02], ids=["in the middle", "on all strips"])
+def test_pass_from_an_anchor_agrees_with_its_equations(crown: float) -> None:
+    loop = Loop(similar=True, crown=crown)
     assert loop.run(1) == (CONVERGED, 1, 1)
     np.testing.assert_array_equal(loop.loads.anchor[1], loop.loads.line_load[1])
     assert loop.loads.anchor_approach[1] == loop.loads.approach[1]
@@ -222,8 +260,8 @@ def test_far_from_the_anchor_it_is_moved() -> None:
 
 def test_passes_follow_each_other() -> None:
     whole, parts = Loop(load=200.0), Loop(load=200.0)
-    assert whole.run(0, 4) == (CONVERGED, 4, 4)
-    for p in range(4):
+    assert whole.run(1, 4) == (CONVERGED, 4, 4)
+    for p in range(1, 5):
         parts.run(p)
     for name, array in whole.copies().items():
         np.testing.assert_array_equal(array, parts.copies()[name], name)
@@ -242,7 +280,78 @@ def test_pass_without_load_is_an_error_or_a_rest() -> None:
         np.testing.assert_array_equal(array, before[name], name)
 
 
+def test_pass_with_load_by_its_terms_alone_rests_where_passes_may() -> None:
+    rates, terms = np.array([[2.0, 0.25, 0.5]]), np.array([[300.0, 200.0]])
+    loop = Loop(terms=terms.copy(), term_rates=rates)
+    loop.passes.base_load[:2] = 0.0
+    check_pass(loop, 0, 1e-8)
+    loop.rests, before = True, loop.copies()
+    assert loop.run(1) == (CONVERGED, 1, 0)
+    after = loop.copies()
+    np.testing.assert_allclose(after.pop("terms")[0, 1], 0.5 * terms[0, 1], rtol=1e-14)
+    for name, array in after.items():
+        np.testing.assert_array_equal(array, before[name], name)
+    loop.passes.base_load[1] = 0.5  # a little load of its own
+    assert loop.run(1) == (CONVERGED, 1, 1)
+
+
 def test_spring_carries_no_load_beyond_its_length() -> None:
     loop = Loop(stiffness=1e9)
     loop.wear.cylinder_depth[:] += 1e-5
     assert loop.run(0)[0] == UNLOADED
+
+
+def test_load_of_a_rigid_spring_does_not_converge() -> None:
+    loop = Loop(stiffness=1e20)
+    loop.wear.cylinder_depth[:], loop.wear.roller_depth[:] = 0.0, 0.0
+    assert loop.run(0) == (NO_CONVERGENCE, 0, 0)
+
+
+def test_contact_without_a_solution_ends_the_passes() -> None:
+    loop = Loop()
+    loop.nominal[1, 3] = np.inf
+    assert loop.run(0, 3) == (NOT_FINITE, 1, 1)
+
+
+def test_singular_anchor_is_refused() -> None:
+    loop = Loop(similar=True, constants=CONSTANTS._replace(unit=0.0))
+    loop.loads.anchor[1] = 1.0
+    assert loop.run(0, 2) == (SINGULAR, 0, 0)
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3])
+@pytest.mark.parametrize("part", [0.99 * SMALL, -0.99 * SMALL, 1.5 * SMALL, 0.5])
+def test_growth_of_the_loads_is_a_logarithm(part: float, size: float) -> None:
+    for first, last in ((1, 3), (0, 4)):
+        anchor, shape = np.zeros((2, 5)), np.array([3.0, 2.0, 3.0, 0.7, 0.9])
+        anchor[1, first : last + 1] = size * shape[first : last + 1]
+        relative = np.array([1.0 - part / 2.0, 1.0 + part, 0.985, 1.0, 1.0 - part / 3.0])
+        loads = Loads(anchor * relative, anchor, anchor, np.zeros(2), np.zeros(2))
+        growth, known = np.full(5 + 4 * REACH, 9.0), np.zeros(5 + 4 * REACH)
+        _fill_growth(1, first, last, loads, growth, len(growth))
+        inside = slice(first + 2 * REACH, last + 1 + 2 * REACH)
+        known[inside] = np.log(relative)[first : last + 1]
+        np.testing.assert_allclose(growth, known, atol=4e-13)
+
+
+@pytest.mark.parametrize("size", [0.99 * SMALL, 3.0 * SMALL])
+def test_half_lengths_of_an_anchored_contact_follow_the_loads(size: float) -> None:
+    loop, state = Loop(), new_chord_state(CONSTANTS, 2, STRIPS)
+    rng, line_load = np.random.default_rng(6), loop.loads.line_load
+    line_load[1] = 1e5 * (1.0 + rng.random(9))
+    state.loaded[1], state.active[1] = 9, np.arange(9)
+    # ln q grows by one in one strip only, on which the others depend
+    loop.loads.anchor[1] = line_load[1]
+    loop.loads.anchor[1, 4] *= np.exp(-1.0)
+    growth = size * np.linspace(-1.0, 1.0, 9)
+    for i in range(9):
+        state.lengths.slope[1, REACH + 4 - i, i + 2 * REACH] = growth[i]
+    state.lengths.factor[1] = 0.5 + rng.random(9)
+    for anchored in (True, False):
+        state.work[:], state.tractions.work[:] = np.nan, np.nan
+        passes = loop.passes, CONSTANTS, state, loop.wear
+        _wear_strips(1, 0, loop.loads, anchored, *passes)
+        grown = np.exp(growth) if anchored else np.ones(9)
+        square = 4.0 * line_load[1] * state.lengths.factor[1] * grown
+        known = np.sqrt(square / (np.pi * MODULUS * CURVATURE[1]))
+        np.testing.assert_allclose(state.strip_inputs[0], known, rtol=7e-14)

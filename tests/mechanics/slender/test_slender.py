@@ -167,6 +167,28 @@ def test_profiles_satisfy_the_equations(name, strips, lengths):
     assert_solved(grid, gap, [300.0], no_wear(1, strips), q, approach, lengths)
 
 
+def test_newtons_method_takes_few_iterations():
+    grid = Grid.spanning(-3e-3, 3e-3, 41)
+    wave, taken = np.cos(2000.0 * grid.y), []
+    for name, lengths in (("flat", "coupled"), ("two patches", "coupled"), ("step", "local")):
+        gap, q = shape_of(name, grid.y), None
+        # from no start, a near and a far one
+        for depth, load in ((0.0, 300.0), (2e-8, 303.0), (2e-6, 330.0)):
+            found = solve(grid, gap + depth * wave, load, start=q, lengths=lengths)
+            status, q, _, iterations = found
+            assert status == CONVERGED
+            taken.append(iterations)
+    gaps = np.array([(grid.y - offset) ** 2 for offset in (-0.5e-3, 0.2e-3, 0.5e-3)])
+    random = np.random.default_rng(3)
+    for bodies in GROUPS.values():
+        wear, q = SharedWear(np.array(bodies), 2e-11 * random.random((3, 2, 41))), None
+        for part in (1.0, 1.02):
+            status, q, _, iterations = solve(grid, part * gaps, [300.0, 250.0, 400.0], wear, q)
+            assert status == CONVERGED
+            taken.append(iterations)
+    assert sum(taken) <= 66
+
+
 def test_ten_micrometre_bump_has_two_patches():
     grid = Grid.spanning(-3e-3, 3e-3, 120)
     _, (q,), _, _ = solve(grid, shape_of("two patches", grid.y), 300.0)
@@ -342,6 +364,16 @@ def test_load_converges_with_the_grid():
         else:
             errors.append(np.abs(coarse - exact).sum() / exact.sum())
     assert errors[0] < 0.6 * errors[1] < 0.36 * errors[2]
+
+
+def test_useless_start_is_replaced_by_none():
+    grid = Grid.spanning(-2.7e-4, 2.7e-4, 41)
+    start, gap = np.zeros((1, 41)), 500.0 * grid.y**2
+    start[0, 20] = 300.0 / grid.spacing  # too long for a strip
+    status, warm, _, _ = solve(grid, gap, 300.0, start=start, lengths="local")
+    assert status == CONVERGED
+    _, cold, _, _ = solve(grid, gap, 300.0, lengths="local")
+    np.testing.assert_allclose(warm, cold, atol=RESIDUAL_LOAD["local"] * cold.max())
 
 
 def test_too_narrow_strips_are_refused():

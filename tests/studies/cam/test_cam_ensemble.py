@@ -54,10 +54,10 @@ def test_lift_error_does_not_depend_on_the_batch():
     run = runner("cycloidal")
     problems = [run.prepare(number, {}).problem for number in range(3)]
     together = joined_problem(problems)
-    errors = np.random.default_rng(3).normal(size=(len(together.kinematics.cam.angle), 1, 3))
-    spread = peak_to_peak(together.kinematics.cam, errors)
+    errors = np.random.default_rng(3).normal(size=(len(together.kinematics.track.angle), 1, 3))
+    spread = peak_to_peak(together.kinematics.track, errors)
     for number, problem in enumerate(problems):
-        own = peak_to_peak(problem.kinematics.cam, errors[..., [number]])
+        own = peak_to_peak(problem.kinematics.track, errors[..., [number]])
         assert (spread[:, [number]] == own).all()
 
 

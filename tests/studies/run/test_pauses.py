@@ -168,7 +168,7 @@ GAP = {float(k): 300.0 - k for k in [*range(11), *range(70, 131)]}
 
 
 def test_gap_is_interpolated_held_or_an_error() -> None:
-    loads = {gaps: paused(GAP, load__gaps=gaps).load.build() for gaps in ("hold", "interpolate")}
+    loads = {gaps: paused(GAP, load__gaps=gaps).load.built for gaps in ("hold", "interpolate")}
     times = np.array([10.0, 40.0, 69.999, 71.0])
     np.testing.assert_allclose(loads["interpolate"].force(times), 300.0 - times, rtol=1e-12)
     np.testing.assert_allclose(loads["hold"].force(times), [290.0, 290.0, 290.0, 229.0])
@@ -183,7 +183,7 @@ def test_gap_is_interpolated_held_or_an_error() -> None:
 
 
 def test_schedule_of_few_times_has_no_gaps() -> None:
-    assert paused().load.build().gaps.shape == (0, 2)
+    assert paused().load.built.gaps.shape == (0, 2)
 
 
 def test_interrupted_pause_continues(path: Path) -> None:

@@ -11,6 +11,7 @@ from wearsim.models.random.varying import OrnsteinUhlenbeck
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import strips_of_run
+from wearsim.studies.run.setup import Setup
 
 DRAWN = {
     "offset": np.array([[0.0, 2e-4, -1e-4], [1e-4, 0.0, 3e-4]]),
@@ -40,7 +41,7 @@ def test_realisations_equal_problems_of_one(case):
     scenario = scenario_of(contact__strips=81, contact__width="6 mm", **CASES[case])
     grid = strips_of_run(draw(scenario))
     model = prepared_model(scenario, grid)
-    whole = build_problem(scenario, model, grid, DRAWN, rollers=(0, 1), realisations=3)
+    whole = build_problem(Setup(scenario), model, grid, DRAWN, rollers=(0, 1), realisations=3)
     powers = whole.values_of(fresh_state(whole).contacts, "power")
     assert whole.shape == powers.shape == (1, 2, 3)
     assert len(np.unique(powers)) == 6
@@ -49,7 +50,7 @@ def test_realisations_equal_problems_of_one(case):
             name: np.broadcast_to(values, (2, 3))[roller, realisation].reshape(1, 1)
             for name, values in DRAWN.items()
         }
-        problem = build_problem(scenario, model, grid, single, rollers=(roller,))
+        problem = build_problem(Setup(scenario), model, grid, single, rollers=(roller,))
         assert (problem.nominal_gap[0, 0, 0] == whole.nominal_gap[0, roller, realisation]).all()
         power = problem.values_of(fresh_state(problem).contacts, "power").item()
         assert power == pytest.approx(powers[0, roller, realisation], rel=1e-12)
@@ -60,7 +61,7 @@ def test_inputs_that_are_not_drawn_take_no_memory():
     grid = strips_of_run(draw(scenario))
     model = prepared_model(scenario, grid)
     friction = {"friction": np.full((1, 1000), 0.1)}
-    problem = build_problem(scenario, model, grid, friction, realisations=1000)
+    problem = build_problem(Setup(scenario), model, grid, friction, realisations=1000)
     assert problem.nominal_gap.shape == (1, 1, 1000, 81)
     assert problem.nominal_gap.strides[2] == 0
 

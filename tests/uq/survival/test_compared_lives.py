@@ -162,8 +162,9 @@ def test_ratio_of_counted_quantiles_is_that_of_resampled_lives(share: float):
         found = quantile_ratio(*pair, share, paired=paired, samples=60, seed=7)
         expected = [value, *bootstrap(functions, 12, len(other), paired, 60)]
         assert parts(found) == pytest.approx(expected, rel=1e-12)
-    few = CountedLives(lives[0][:4])
-    assert quantile_ratio(few, few, share) == UNKNOWN
+    few, enough = CountedLives(lives[0][:4]), CountedLives(lives[0][:5])
+    assert quantile_ratio(few, enough, share) == UNKNOWN
+    assert quantile_ratio(enough, enough, share) != UNKNOWN
 
 
 @pytest.mark.parametrize("paired", [True, False])

@@ -303,3 +303,30 @@ def test_median_ranks_reach_from_the_first_to_the_last_life() -> None:
     assert median_rank(7, float(0.5 * (positions[2] + positions[3]))) == pytest.approx(3.5)
     assert math.isnan(median_rank(7, float(positions[-1]) + 1e-9))
     assert math.isnan(median_rank(0, 0.5))
+
+
+def test_two_realisations_have_an_interval_and_one_has_none() -> None:
+    two, one = (FactorMixture(kappa, SCORE) for kappa in (np.array([1.0, 1.3]), np.ones(1)))
+    for life in (6.0, 8.0):
+        found = two.probability_before(life)
+        failed = two.failed(np.array([life]))[:, 0]
+        error, degrees = two.error(life, failed)
+        assert parts(found) == pytest.approx(parts(logit_interval(failed.mean(), error, degrees)))
+        assert 0.0 < found.low < found.value < found.high < 1.0
+        assert parts(one.probability_before(life))[1:] == [0.0, 1.0]
+    quantile = two.quantile(0.5)
+    assert 0.0 < quantile.low < quantile.value < quantile.high < math.inf
+    assert parts(one.quantile(0.5))[1:] == [0.0, math.inf]
+
+
+def test_interval_of_a_quantile_contains_the_step_at_it() -> None:
+    lives = np.array([1.0, 2.0, 2.0, 3.0, 5.0, 8.0, 13.0])
+    counted = CountedLives(lives)
+    for share in (0.4, 0.5, 0.8):
+        value = counted.quantile_of_mean(share)
+        assert np.abs(lives - value).min() < 1e-9
+        failed = (lives <= value * (1.0 + 1e-9)).astype(float)
+        error, degrees = counted.error(value * (1.0 + 1e-9), failed)
+        ends = logit_interval(share, error, degrees)
+        found = counted.quantile(share)
+        assert found.low == pytest.approx(counted.quantile_of_mean(ends.low), rel=1e-12)

@@ -46,8 +46,8 @@ def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False)
         write_json(data)
         return
     write_table(f"ok: {loaded.title}", plan(data))
-    if stations := station_table(data):
-        write_list(*stations)
+    if data["cam"]:
+        write_list(*station_table(data["cam"]["stations"]))
     write_notes(data["notes"], data["warnings"])
 
 

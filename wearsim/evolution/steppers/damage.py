@@ -119,13 +119,11 @@ def _of_varying_load(
     displacement = displacement_at(here, [state.depths], np.zeros(()))
     force = mean_force(here, start, passes)
     mean = with_feedback(here, force, displacement, state.terms)
-    cam = problem.kinematics.cam
-    factor = 1.0 if cam is None else cam.load_factor
     found = np.zeros(np.shape(start.stacked))
     for offset, weight in _load_nodes(problem, *times):
         if not weight.any():
             continue
-        loads = mean + factor * offset
+        loads = mean + problem.kinematics.track.load_factor * offset
         loads = np.maximum(loads, _LEAST * np.abs(mean))
         batch = contact_batch(here, here.gap(*state.depths), loads, *state.depths)
         contacts = here.model.solve(batch, warm=state.contacts)

@@ -78,7 +78,7 @@ def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
     assert state.past_sums is not None
     assert state.past_wear is not None
     loaded = state.contacts.line_load.reshape(*problem.shape, problem.grid.strips) > 0.0
-    sums = np.concatenate([state.past_wear.sum(axis=-1), state.past_sums[:, -1:]], axis=1)
+    sums = np.concatenate([state.past_wear.sum(axis=-1), state.past_sums], axis=1)
     counts = np.where(loaded, SETTLED, 0.0)
     return state.replaced(separation=None, part=1.0 * loaded, whole_steps=counts, past_sums=sums)
 

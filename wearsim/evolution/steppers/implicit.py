@@ -186,11 +186,7 @@ class ImplicitStepper(StepDoublingStepper):
         added = doubled.added[0] / np.where(allowed > 0.0, allowed, np.inf)
         over = np.maximum(over, added)
         ratio = np.where(added > 1.0, np.minimum(ratio, self.ratio(added)), ratio)
-        unknown = np.isinf(past.spans[1])
-        if unknown.any():
-            excess = self.excess(problem, state, doubled, stop)
-            over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
-        over = np.where(unknown, over, over * left)
+        over = over * left
         if self.by_doubling and not _varies(problem):
             least = max(self.tolerance, LEAST_OF_JUMPS)
             of_energy, their_order = next_steps_of_energy(half, end, least, KEEP, most)

@@ -109,7 +109,7 @@ def is_compiled(problem: WearProblem) -> bool:
     """Return whether the contact model has a compiled loop that covers the problem."""
     linear = all(problem.wear_factors[body] is not None for body in BODIES)
     lags = all(term.lag() is not None for term in problem.terms.values())
-    prescribed = not problem.free and problem.kinematics.cam is None
+    prescribed = not problem.free and problem.kinematics.track.in_pass_loop
     return problem.model.capabilities.pass_loop and linear and lags and prescribed
 
 
@@ -213,7 +213,7 @@ def run_compiled(
         fresh_approach=fresh[0],
         nominal_gap=np.array(problem.flat_gap[0, :, 0]),
         from_apex=np.array(problem.from_apex[:, 0]),
-        longitudinal_curvature=np.full(rollers, kinematics.longitudinal_curvature),
+        longitudinal_curvature=np.full(rollers, kinematics.track.longitudinal_curvature),
         rolling_speed=np.full(rollers, speed),
         slip_base=slip_base,
         spin_arm=spin_arm,
@@ -252,7 +252,7 @@ def run_in_python(
     problem: WearProblem, state: WearState, count: int, redraw: Redraw | None = None
 ) -> WearState:
     """Run `count` passes of a single realisation by full solves: slow, but for any plugin."""
-    kinematics, cam = problem.kinematics, problem.kinematics.cam
+    kinematics = problem.kinematics
     force, passes = _passes(problem, state, count, redraw)
     fresh = _fresh_approaches(state, force, passes)
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
@@ -264,16 +264,13 @@ def run_in_python(
         one = with_contacts(passes, np.array([number]))
         multiplicity = float(kinematics.multiplicity[r])
         for s in range(stations):
-            speed, part, length = kinematics.rolling_speed, 1.0, kinematics.cylinder_radius
-            if cam is not None:
-                speed, part = float(cam.rolling_speed[s, 0, 0]), float(cam.time_share[s, 0, 0])
-                length = float(cam.length[s, 0, 0]) / math.tau
-            ratio = length / kinematics.roller_radius / multiplicity
+            speed, part, radius = kinematics.track.station(s)
+            ratio = radius / kinematics.roller_radius / multiplicity
             unworn = one.nominal_gap[s, 0, 0]
             gap = unworn + cylinder[s, 0, 0] + roller[0, r, 0]
             free = float(force[number, s]) + float(terms[:, r, 0].sum())
             zero = float(unworn.min() + fresh[s, number])
-            stiffness = float(np.reshape(problem.stiffness, (-1, 1))[s if cam else 0, 0])
+            stiffness = float(np.reshape(problem.stiffness, (-1, 1))[s, 0])
             most = free - stiffness * (float(gap.min()) - zero)
             if problem.pauses and min(most, float(force[number, s])) <= 0.0:
                 for t, term in enumerate(problem.terms.values()):

@@ -225,10 +225,10 @@ def linearise_edges(
                 slope += max(worn, 0.0) / strips.rise[k, i]
                 without = level[k, i] - part * worn / slope - ahead
             gaps[k, i], slopes[k, i] = strips.gap[k, i] + without, slope
-            for side in range(2):  # what the scaled wear of a strip opens beyond its mean wear
-                scaled[side, k, i] = 0.0
-                if slope < np.inf:
-                    scaled[side, k, i] = (1.0 / slope - 1.0) * wear[side, k, i]
+            # what the scaled wear of a strip opens beyond its mean wear
+            beyond = 1.0 / slope - 1.0 if slope < np.inf else 0.0
+            for side in range(2):
+                scaled[side, k, i] = beyond * wear[side, k, i]
     if contacts == realisations:
         return
     sum_of_wear(strips, scaled, sums)

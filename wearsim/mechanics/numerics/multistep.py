@@ -252,10 +252,11 @@ def next_steps(
     found = np.empty((2, len(part)))
     for v in range(len(part)):
         known, order = 0, orders[v]
+        # without an estimate the order is kept
+        excess, best, ratio, longest = 0.0, order, GROW[0], 0.0
         for k in range(MAX_ORDER):
             sizes[k, v] = sizes[k, v] * part[v] / aim
             known += np.isfinite(sizes[k, v])
-        excess, ratio, best, longest = 0.0, 0.0, 1, 0.0
         if known > 0:
             excess = sizes[min(order, known) - 1, v] / LIMIT
         known = min(known, most[v])
@@ -264,9 +265,7 @@ def next_steps(
             worth = keep * size if other < order else size
             if worth >= longest:
                 longest, ratio, best = worth, size, other
-        if known == 0:
-            best, ratio = order, GROW[0]
-        elif order + 1 > known and order < most[v] and excess <= 1.0:
+        if 0 < known < order + 1 and order < most[v] and excess <= 1.0:
             best = order + 1  # the first steps have no estimate of the next order
         next_orders[v] = best
         found[0, v], found[1, v] = excess, min(ratio, GROW[best - 1])

@@ -226,7 +226,7 @@ def factor_depths(shared: FloatArray, state: NewtonState, system: DepthSystem) -
             for v in range(size[b]):
                 block[b, u, v] = 0.0
             block[b, u, u] = 1.0
-        for u in range(count if size[b] > 0 else 0):
+        for u in range(count):
             for v in range(size[b]):
                 across[b, u, v] = 0.0
     for k in range(len(response)):
@@ -247,9 +247,9 @@ def factor_depths(shared: FloatArray, state: NewtonState, system: DepthSystem) -
                     wear = shared[k, outer_side, i] * response[k, column, row]
                     outer[opened_outer, number[c, i]] += wear
     for b in range(len(size)):
-        if size[b] > 0 and not factor_in_place(block[b], size[b]):
+        if not factor_in_place(block[b], size[b]):
             return False
-        for u in range(count if size[b] > 0 else 0):
+        for u in range(count):
             solve_factored(block[b], size[b], across[b, u])
     for k in range(len(response)):
         b = system.touched[k, 0]
@@ -337,18 +337,16 @@ def solve_depths(
             if c >= 0 and number[c, i] >= 0:
                 outer_depth[number[c, i]] += shared[k, system.side[1], i] * step[k, row]
     for b in range(len(size)):
-        if size[b] > 0:
-            solve_factored(system.block[b], size[b], depth[b])
-    if count > 0:
-        for k in range(len(response)):
-            b = system.touched[k, 0]
-            if b >= 0:
-                subtract_outer_wear(k, shared, state, system, depth[b], outer_depth)
-        solve_factored(system.outer, count, outer_depth)
-        for b in range(len(size)):
-            for u in range(count if size[b] > 0 else 0):
-                for unknown in range(size[b]):
-                    depth[b, unknown] -= system.across[b, u, unknown] * outer_depth[u]
+        solve_factored(system.block[b], size[b], depth[b])
+    for k in range(len(response)):
+        b = system.touched[k, 0]
+        if b >= 0:
+            subtract_outer_wear(k, shared, state, system, depth[b], outer_depth)
+    solve_factored(system.outer, count, outer_depth)
+    for b in range(len(size)):
+        for u in range(count):
+            for unknown in range(size[b]):
+                depth[b, unknown] -= system.across[b, u, unknown] * outer_depth[u]
     for k in range(len(response)):
         b, c = system.touched[k, 0], system.touched[k, 1]
         for column in range(state.size[k]):

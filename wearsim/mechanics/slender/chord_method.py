@@ -385,7 +385,7 @@ def solve_fully(
         loads.line_load[g, i] = line_load[0, 0, i]
     if not anchored:
         _number_strips(g, loads.line_load, state)
-        find_factors(g, loads.line_load, True, state.lengths)
+        find_factors(g, loads.line_load, False, state.lengths)
         return CONVERGED
     for i in range(n):
         loads.anchor[g, i], loads.anchor_gap[g, i] = line_load[0, 0, i], state.gap[i]

@@ -61,12 +61,10 @@ class HalfLengths(NamedTuple):
 def new_half_lengths(table: FloatArray, contacts: int) -> HalfLengths:
     """Return the `HalfLengths` of contacts, to be filled."""
     n = (table.shape[2] + 1) // 2
-    wide = n + 4 * REACH
-    slopes = np.empty((contacts + 2, 2 * REACH + 1, wide))
-    for k in range(contacts + 2):  # numba compiles loops faster than np.zeros
-        for c in range(2 * REACH + 1):
-            for i in range(wide):
-                slopes[k, c, i] = 0.0
+    slopes = np.empty((contacts + 2, 2 * REACH + 1, n + 4 * REACH))
+    flat = slopes.reshape(slopes.size)
+    for i in range(slopes.size):  # numba compiles a loop faster than np.zeros
+        flat[i] = 0.0
     return HalfLengths(
         table,
         np.empty(contacts),
@@ -115,10 +113,7 @@ def fill_half_lengths(
     for k in range(line_load.shape[0]):
         one_newton = spacing * np.exp(lengths.log_scale[k])
         for j in range(line_load.shape[1]):
-            half_length[k, j] = 0.0
-            if line_load[k, j] > 0.0:
-                square = line_load[k, j] * lengths.factor[k, j]
-                half_length[k, j] = one_newton * np.sqrt(square)
+            half_length[k, j] = one_newton * np.sqrt(line_load[k, j] * lengths.factor[k, j])
 
 
 @subroutine

@@ -110,8 +110,16 @@ TABLES: dict[str, type[Options]] = {
 #: tables of distributions of this project, ignored with a note where these are not installed
 FIRST_PARTY = {"optimise": "wearsim-optimise"}
 #: [cam] replaces [cylinder]
-REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
-_ABSENT = {*REQUIRED, "wear", "fatigue", "cam", "follower", "lubricant"}  # tables without defaults
+REQUIRED = ("roller", "operation", "load", "friction", "creepage")  # and a cylinder or a cam
+_ABSENT = {
+    *REQUIRED,
+    "cylinder",
+    "wear",
+    "fatigue",
+    "cam",
+    "follower",
+    "lubricant",
+}  # tables without defaults
 #: functions that read the tables with more checks than their models have
 READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
     "roller": read_roller,
@@ -322,7 +330,7 @@ def parse_fields(
     tables = of_follower(data)
     sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
     owned = _read_owned(mistakes, data)
-    assemble_cam(mistakes, sections, "cam" in tables)
+    assemble_cam(mistakes, sections)
     sections |= check_axial(mistakes, sections)
     check_limits(mistakes, data, sections["limit"])
     check_lists(mistakes, data)
@@ -411,7 +419,7 @@ def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
 
 
 def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> Any:
-    if table not in data and table in REQUIRED and not (table == "cylinder" and "cam" in data):
+    if table not in data and table in REQUIRED:
         mistakes.add(table, "", "the table is missing")
     if table not in data and table in _ABSENT:
         return None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from pydantic import Field
 
 from wearsim.errors import ScenarioError
-from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.plugins import AxialPair, AxialProfile, AxialProfileSpec, Options, registry
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import amount, target_of
@@ -86,15 +86,16 @@ def read_axial(mistakes: Mistakes, key: AxialKey | None, table: str) -> AxialCho
     return None if options is None else AxialChoice(named.form, options)
 
 
-def pair_of(roller: Roller, cylinder: Cylinder) -> AxialPair:
-    """Return the pair for which axial profiles are designed."""
-    modulus = combine(cylinder.material, roller.material).contact_modulus
-    return AxialPair(roller.width, modulus, 1.0 / cylinder.radius + 1.0 / roller.radius)
+def pair_of(roller: Roller, cylinder: Cylinder, elastic: ElasticPair | None = None) -> AxialPair:
+    """Return the pair for which axial profiles are designed; elastic constants if known."""
+    elastic = elastic or combine(cylinder.material, roller.material)
+    curvature = 1.0 / cylinder.radius + 1.0 / roller.radius
+    return AxialPair(roller.width, elastic.contact_modulus, curvature)
 
 
-def axial_gap(roller: Roller, cylinder: Cylinder) -> AxialGap:
+def axial_gap(roller: Roller, cylinder: Cylinder, elastic: ElasticPair) -> AxialGap:
     """Return the gap of two bodies along their axis, without start profiles."""
-    pair = pair_of(roller, cylinder)
+    pair = pair_of(roller, cylinder, elastic)
     forms = roller.axial_profile.build(pair), cylinder.axial_profile.build(pair)
     return AxialGap(*forms, roller.width, roller.radius)
 
@@ -111,8 +112,8 @@ def check_axial(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Ro
     roller, cylinder = sections["roller"], sections["cylinder"]
     if roller is None or cylinder is None or not (roller.radius and cylinder.radius):
         return {}
-    body = "cam" if sections.get("cam") is not None else "cylinder"
-    profile = _built(mistakes, "roller", roller.axial_profile, pair_of(roller, cylinder))
+    pair = pair_of(roller, cylinder)
+    profile = _built(mistakes, "roller", roller.axial_profile, pair)
     if profile is not None and math.isfinite(profile.length):
         width, length = roller.width, profile.length
         if width is None:
@@ -120,7 +121,7 @@ def check_axial(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Ro
         elif width > _WIDER * length:
             most = f"at most {1e3 * length:.6g} mm, the length of roller.axial_profile"
             mistakes.add("roller", "width", "exceeds its profile", f"{1e3 * width:.6g} mm", most)
-    _built(mistakes, body, cylinder.axial_profile, pair_of(roller, cylinder))
+    _built(mistakes, cylinder.name, cylinder.axial_profile, pair_of(roller, cylinder))
     return {"roller": roller}
 
 

@@ -254,6 +254,8 @@ class Cylinder:
         Form along the axis.
     start_surface : StartSurface, optional
         Initial height of a cam's surface above its nominal shape.
+    name : str
+        "cylinder", or "cam" for the base circle of a cam.
     """
 
     radius: float
@@ -263,6 +265,7 @@ class Cylinder:
     profile_filter: float | None = None
     axial_profile: AxialChoice = field(default_factory=straight)
     start_surface: StartSurface | None = None
+    name: str = "cylinder"
 
 
 def _radius(radius: float | None, diameter: float | None) -> float:

@@ -169,21 +169,36 @@ class Cam:
         return "rad" if self.follower.swings else "m"
 
 
+_NO_MEANING = "has no meaning without [cam]"
+#: Keys that go with a cam only: table, key, what is wrong without one, and what is expected.
+_OF_CAMS = (
+    ("operation", "turns", _NO_MEANING, None),
+    ("roller", "inertia", _NO_MEANING, None),
+    (
+        *("creepage", "bearing_friction"),
+        *("is only for [cam], whose load differs along the angle", "bearing_torque"),
+    ),
+    ("limit", "lift_error", "is a quantity of cams", "depth or clearance"),
+)
+
+
 def refuse_cylinder(mistakes: Mistakes, data: Mapping[str, object]) -> None:
     """Add the mistakes of tables that go with a cam only, or with a cylinder only."""
-    if "cam" in data and "cylinder" in data:
-        mistakes.add("cylinder", "", "a test has either a cylinder or a cam", None, "one of them")
-    if "cam" in data and "follower" not in data:
-        mistakes.add("follower", "", "the table is missing", None, "it goes with [cam]")
-    if "cam" not in data:
-        if "follower" in data:
-            mistakes.add("follower", "", "has no meaning without [cam]")
-        if "lubricant" in data:
-            mistakes.add("lubricant", "", "has no meaning without [cam]")
-        for table, key in (("operation", "turns"), ("roller", "inertia")):
+    if "cam" in data:
+        if "cylinder" in data:
+            what = "a test has either a cylinder or a cam"
+            mistakes.add("cylinder", "", what, None, "one of them")
+        if "follower" not in data:
+            mistakes.add("follower", "", "the table is missing", None, "it goes with [cam]")
+    else:
+        if "cylinder" not in data:
+            mistakes.add("cylinder", "", "the table is missing")
+        for table in [name for name in ("follower", "lubricant") if name in data]:
+            mistakes.add(table, "", _NO_MEANING)
+        for table, key, what, expected in _OF_CAMS:
             keys = data.get(table)
-            if isinstance(keys, dict) and key in keys:
-                mistakes.add(table, key, "has no meaning without [cam]")
+            if isinstance(keys, dict) and keys.get(key):
+                mistakes.add(table, key, what, None, expected)
         load = data.get("load")
         if isinstance(load, dict) and str(load.get("kind", "")).startswith("follower"):
             mistakes.add(
@@ -236,7 +251,9 @@ def read_cam(
     start = read_start_surface(mistakes, table.start_profile)
     if form is None:
         return None
-    body = Cylinder(table.base_radius, table.material, axial_profile=form, start_surface=start)
+    body = Cylinder(
+        table.base_radius, table.material, axial_profile=form, start_surface=start, name="cam"
+    )
     return body, cam
 
 
@@ -297,7 +314,7 @@ def of_follower(data: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-def assemble_cam(mistakes: Mistakes, sections: dict[str, Any], has_cam: bool) -> None:
+def assemble_cam(mistakes: Mistakes, sections: dict[str, Any]) -> None:
     """Replace the tables [cam] and [follower] by the cam and its base circle.
 
     Parameters
@@ -305,14 +322,8 @@ def assemble_cam(mistakes: Mistakes, sections: dict[str, Any], has_cam: bool) ->
     mistakes : Mistakes
     sections : dict
         The tables that have been read; None after mistakes in them.
-    has_cam : bool
-        Whether the scenario has a table [cam], also one with mistakes.
     """
     table, follower = sections["cam"], sections.pop("follower")
-    creepage = sections["creepage"]
-    if not has_cam and creepage is not None and creepage.bearing_friction > 0.0:
-        what = "is only for [cam], whose load differs along the angle"
-        mistakes.add("creepage", "bearing_friction", what, None, "bearing_torque")
     if table is not None:
         read = read_cam(mistakes, table, follower, sections["roller"])
         sections |= dict(zip(("cylinder", "cam"), read or (None, None), strict=True))

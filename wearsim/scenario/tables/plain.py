@@ -319,8 +319,6 @@ def check_limits(mistakes: Mistakes, tables: Mapping[str, Any], limits: LimitTab
     """Add the mistakes of limits that need a table which the scenario does not have."""
     if limits is None:
         return
-    if limits.lift_error and "cam" not in tables:
-        mistakes.add("limit", "lift_error", "is a quantity of cams", None, "depth or clearance")
     for key in () if "fatigue" in tables else ("damage", "pitting"):
         if (limit := getattr(limits, key)) is not None:
             what, remedy = "needs the fatigue of the bodies", "a table [fatigue]"

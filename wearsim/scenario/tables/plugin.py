@@ -137,8 +137,9 @@ class TermChoice:
     name: str
     options: Options
 
-    def build(self) -> LoadTerm:
-        """Return a new term."""
+    @cached_property
+    def built(self) -> LoadTerm:
+        """The term."""
         return cast("LoadTerm", registry().get(LoadSpec, self.name).factory(self.options))
 
 
@@ -160,12 +161,9 @@ class LoadChoice:
     options: Options
     terms: tuple[TermChoice, ...] = ()
 
-    def build(self) -> Load:
-        """Return the load, without its terms; it is made once."""
-        return self._load
-
     @cached_property
-    def _load(self) -> Load:
+    def built(self) -> Load:
+        """The load, without its terms."""
         return cast("Load", registry().get(LoadSpec, self.kind).factory(self.options))
 
 
@@ -181,8 +179,9 @@ class WearChoice:
         """Registered specification of the wear law."""
         return registry().get(WearLawSpec, self.law)
 
-    def build(self) -> WearLaw:
-        """Return a new wear law."""
+    @cached_property
+    def built(self) -> WearLaw:
+        """The wear law."""
         return self.spec.factory(self.options)
 
 
@@ -339,7 +338,7 @@ def read_load(mistakes: Mistakes, raw: Mapping[str, object]) -> LoadChoice | Non
 def check_load(mistakes: Mistakes, load: LoadChoice) -> None:
     """Add the mistakes of a file that the load reads."""
     try:
-        load.build()
+        load.built  # noqa: B018  (reads its file)
     except ScenarioError as error:
         files = {key: getattr(value, "path", None) for key, value in load.options}
         mistakes.add_file(error, "load", key_of_file(files, error.file))

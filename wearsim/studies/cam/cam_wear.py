@@ -38,8 +38,16 @@ class Wanted:
     high: float
 
 
+class CylinderView:
+    """Worn profile of one test's cylinder, as `CamView` has those of a cam."""
+
+    def profiles(self, depth: FloatArray, _fall: FloatArray) -> dict[str, FloatArray]:
+        """Return the worn profile from that of the station [m]."""
+        return {"cylinder": depth[0]}
+
+
 @dataclass(frozen=True)
-class CamView:
+class CamView(CylinderView):
     """Interpolation between the stations of one test's cam.
 
     Parameters
@@ -65,15 +73,21 @@ class CamView:
         at_angles = np.array(rows).reshape(len(rows), stations.count)
         return cls(angles, at_angles, stations.values_at_angles(eye, CURVE_ANGLES))
 
-    def grooves(self, depth: FloatArray) -> dict[str, FloatArray]:
-        """Return the worn profile of each surface from the profiles at all stations [m].
+    def profiles(self, depth: FloatArray, fall: FloatArray) -> dict[str, FloatArray]:
+        """Return the worn profile of each surface, and the fall of the lift over the angle [m].
 
         Parameters
         ----------
         depth : ndarray, shape (stations, strips)
+        fall : ndarray, shape (stations,)
         """
         depths = np.maximum(self.at_angles @ depth, 0.0)
-        return dict(zip(self.angles, depths, strict=True))
+        return {**dict(zip(self.angles, depths, strict=True)), LIFT: self.along @ fall}
+
+
+def view_of(scenario: Scenario, angles: Mapping[str, float]) -> CylinderView:
+    """Return the view of a scenario's test; angles as of `CamView`."""
+    return CylinderView() if scenario.cam is None else CamView.of(scenario, angles)
 
 
 def falls_of_lift(problem: WearProblem, state: WearState) -> FloatArray:

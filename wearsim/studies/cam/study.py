@@ -12,7 +12,6 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.contacts import unworn_contacts
-from wearsim.evolution.problem import WearProblem
 from wearsim.mechanics.cam import Panel, extreme
 from wearsim.mechanics.film import minimum_film
 from wearsim.results.viewed import Viewed
@@ -154,10 +153,10 @@ def study_cam(
         point = turn.at_angles(chosen)
     setup = Setup(scenario)
     patches = setup.patches_at(point)
-    problem = _fresh_problem(setup, chosen)
+    grid = contact_grid(setup, turn.normal_range[1])
+    problem = build_problem(setup, prepared_model(scenario, grid), grid, {}, angles=chosen)
     contacts = problem.model.solve(unworn_contacts(problem))
-    if problem.kinematics.cam is not None:
-        contacts = contacts.at(problem.kinematics.cam.places)
+    contacts = contacts.at(problem.kinematics.track.places)
     panels = turn.panels
     steepest = extreme(panels, lambda p, x: np.abs(turn.at(p, x).kinematics.pressure_angle))
     sharpest, _ = extreme(panels, lambda p, x: turn.at(p, x).kinematics.curvature)
@@ -200,12 +199,6 @@ def study_cam(
 def peak_pressures(setup: Setup, point: Point) -> FloatArray:
     """Return the peak pressure of the fresh contact after Hertz, shape (points,) [Pa]."""
     return np.array([patch.peak_pressure for patch in setup.patches_at(point)])
-
-
-def _fresh_problem(setup: Setup, angles: FloatArray | None) -> WearProblem:
-    scenario = setup.scenario
-    grid = contact_grid(setup, turn_of(scenario).normal_range[1])
-    return build_problem(scenario, prepared_model(scenario, grid), grid, {}, angles=angles)
 
 
 def _film(turn: CamTurn, point: Point) -> FloatArray | None:

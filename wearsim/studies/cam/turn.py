@@ -55,7 +55,7 @@ class CamTurn:
         self.scenario, self.cam = scenario, scenario.cam
         self._path = path_of(self.cam)
         self.speed = scenario.operation.speed
-        load = scenario.load.build()
+        load = scenario.load.built
         self.load = load if isinstance(load, FollowerLoad) else None
         self._constant = 0.0 if self.load else float(load.force(np.zeros(1))[0])
         self._worn: tuple[Stations, FloatArray] | None = None

@@ -30,7 +30,6 @@ from wearsim.studies.run.draws import Drawer, units_of
 from wearsim.studies.run.grid import realisation_grid, wider_grid
 from wearsim.studies.run.inputs import (
     FIELDS,
-    contact_inputs,
     contact_values,
     load_range,
 )
@@ -204,13 +203,14 @@ class Realisations:
             what = "has many contacts, and this study solves one"
             remedy = "wearsim cam for its contacts, or wearsim ensemble"
             raise ScenarioError(scenario.file, [Mistake("cam", "", what, None, remedy)])
-        mean_load, setup = load_range(scenario, 0.0)[0], Setup(scenario)
+        mean_load, self._setup = load_range(scenario, 0.0)[0], Setup(scenario)
+        setup = self._setup
         self._once, field, self.notes = acting_inputs(scenario)
         drawer = Drawer(self._once, scenario.sampling.plan, count)
         self.values, self.units = drawer.columns(0, count), units_of(self._once)
         drawn = self._drawn(slice(None))
         self.loads = np.full(count, mean_load) + drawn.get("normal_force_offset", 0.0)
-        centres = setup.positions_of(contact_inputs(scenario, [0], drawn))
+        centres = setup.positions_of(setup.inputs_of([0], drawn))
         self.grid = realisation_grid(setup, mean_load, self.loads, centres)
         if scenario.cylinder.profile is not None and _is_wider_than_profile(scenario):
             shift = float(np.ptp(centres))
@@ -245,7 +245,7 @@ class Realisations:
     def solve_mean_problem(self) -> ContactBatchSolution:
         """Solve the contact with every input at its mean."""
         return self.model.solve(
-            unworn_contacts(build_problem(self.scenario, self.model, self.grid, {}))
+            unworn_contacts(build_problem(self._setup, self.model, self.grid, {}))
         )
 
     def _drawn(self, part: slice) -> dict[str, FloatArray]:
@@ -257,7 +257,7 @@ class Realisations:
         """Return the contacts of some realisations."""
         drawn = {name: values[None] for name, values in self._drawn(part).items()}
         count = part.stop - part.start
-        problem = build_problem(self.scenario, self.model, self.grid, drawn, realisations=count)
+        problem = build_problem(self._setup, self.model, self.grid, drawn, realisations=count)
         forms = {key: column[part] for key, column in self.values.items() if is_axial(key)}
         if forms:
             problem = self._with_forms(problem, drawn, forms)
@@ -268,8 +268,7 @@ class Realisations:
     ) -> WearProblem:
         """Return the problem with the drawn forms of the bodies along the axis."""
         count = problem.shape[2]
-        offsets = contact_inputs(self.scenario, [0], drawn)["offset"]
-        offsets = np.broadcast_to(offsets, (1, count))
+        offsets = np.broadcast_to(self._setup.inputs_of([0], drawn)["offset"], (1, count))
         parts = []
         for number in range(count):
             values = {key: float(column[number]) for key, column in forms.items()}
@@ -361,8 +360,7 @@ def _acts(scenario: Scenario, item: RandomInput) -> bool:
     values = {*item.extremes, *item.scalar.quantile(_BETWEEN).tolist()}
     start = np.zeros(1)
     forces = {
-        float(realise(scenario, {item.name: value}).load.build().force(start)[0])
-        for value in values
+        float(realise(scenario, {item.name: value}).load.built.force(start)[0]) for value in values
     }
     if len(forces) == 1:
         return False

@@ -220,7 +220,7 @@ def _contact(
 ) -> tuple[ContactModel, FloatArray, float, OperatingPoint]:
     """Return the model for strips, gap [m], curvature along rolling [1/m] and the point."""
     model = prepared_model(scenario, grid)
-    batch = unworn_contacts(build_problem(scenario, model, grid, {}))
+    batch = unworn_contacts(build_problem(Setup(scenario), model, grid, {}))
     return model, batch.gap[0], float(batch.longitudinal_curvature[0]), batch.point(0)
 
 

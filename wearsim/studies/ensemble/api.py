@@ -413,10 +413,11 @@ def ensemble_content(
         cam=scenario.cam is not None,
         fatigue=scenario.fatigue is not None,
     )
-    return header, {
-        **({"angle": CURVE_ANGLES} if header.cam else {}),
+    static = {
+        "angle": CURVE_ANGLES,
         "y": grid.y,
         "multiplicity": np.ones(scenario.operation.rollers),
         "record_passes": passes,
         "record_time": passes / scenario.pass_rate,
     }
+    return header, {n: v for n, v in static.items() if n in header.schema.variables}

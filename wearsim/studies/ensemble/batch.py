@@ -27,8 +27,7 @@ from wearsim.evolution.strip_errors import (
 )
 from wearsim.plugins import BODIES
 from wearsim.scenario import Scenario
-from wearsim.studies.cam.observables import cam_observables, lift_curves
-from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.cam.observables import observables_of_track
 from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.fatigue.observables import fatigue_curves
 from wearsim.studies.run.assemble import coarse_stepper
@@ -217,7 +216,7 @@ def observables_of(
         "power": row["power"],
         "normal_force": sum_in_order(row["normal_force"] * count, axis=0) / count.sum(),
         "peak_pressure": row["peak_pressure"].max(axis=0),
-        **cam_observables(problem, state, row),
+        **observables_of_track(problem).of_ensemble(state, row),
     }
     if "damage" in row:
         columns |= {name: row[name] for name in ("damage", "pitting", "cylinder_damage")}
@@ -240,22 +239,8 @@ def curves_at_end(
     scenarios : sequence of Scenario
         Scenario of each realisation.
     """
-    depths, cam = state.cylinder_depth[:, 0], problem.kinematics.cam
-    if cam is None:
-        damages = fatigue_curves(problem, state, ())
-        pairs = zip(depths[0], damages, strict=True)
-        return [{"depth_profile": profile, **damage} for profile, damage in pairs]
-    angles = cam.greatest(depths.max(axis=-1)).angle.tolist()
-    stations = [turn_of(scenario).stations for scenario in scenarios]
-    lifts, damages = lift_curves(problem, state, stations), fatigue_curves(problem, state, stations)
-    return [
-        {
-            "depth_profile": np.maximum(cam.at_angle(depths[:, v], angle), 0.0),
-            "lift_error_curve": lifts[v],
-            **damages[v],
-        }
-        for v, angle in enumerate(angles)
-    ]
+    curves = observables_of_track(problem).curves(state, scenarios)
+    return [a | b for a, b in zip(fatigue_curves(problem, state), curves, strict=True)]
 
 
 def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:

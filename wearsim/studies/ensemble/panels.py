@@ -78,12 +78,14 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
         "profile": _profile(result, measured),
     }
     lower = ["profile"]
-    if result.raw.cam and len(result.profiles):
-        panels["lift"] = _lift_error(result)
-        lower.append("lift")
-    if result.raw.fatigue and len(result.profiles):
-        panels["damage"] = _damage(result)
-        lower.append("damage")
+    curves = (
+        ("lift", "lift_error_curve", _lift_error),
+        ("damage", "cylinder_damage_profile", _damage),
+    )
+    for name, curve, panel in curves:
+        if len(result.profiles) and curve in result.raw.schema.variables:
+            panels[name] = panel(result)
+            lower.append(name)
     panels["effects"] = _effects(result)
     panels |= draws_panels(result, "depth", result.at_end("depth"), Axis("depth at the end", "um"))
     lower.append("effects")

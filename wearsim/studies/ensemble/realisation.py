@@ -95,8 +95,8 @@ def closed_form_depths(
             drawn = np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
         return drawn[:, None] if drawn.ndim == 1 else drawn
 
-    creepage, load = scenario.creepage, scenario.load.build()
-    law = None if scenario.wear is None else scenario.wear.build()
+    creepage, load = scenario.creepage, scenario.load.built
+    law = None if scenario.wear is None else scenario.wear.built
     factors = {}
     for body in ("cylinder", "roller"):
         factor = None if law is None else law.depth_per_dissipation(body, speed)

@@ -41,7 +41,7 @@ from wearsim.results.study_view import (
     varying_rows,
 )
 from wearsim.studies.ensemble.file.data import Band, Effect, EnsembleData
-from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, LIFE, PENDING
+from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, KEPT, LIFE, PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.fatigue.view import (
     fatigue_data,
@@ -131,18 +131,16 @@ class RealisationsView(StudyView[Shown]):
         if result.count:
             tables["courses.csv"] = [with_sources(_courses(result), scenario)]
             tables["profile.csv"] = [_band("y", "m", "depth", result.band())]
-        if result.count and result.raw.cam:
+        curves = result.raw.schema.variables.keys() if result.count else ()
+        if "lift_error_curve" in curves:
             band = result.band("lift_error_curve")
             tables["lift_error.csv"] = [_band("angle", "rad", "lift error", band)]
-        if result.count and result.raw.fatigue:
-            names = ["cylinder_damage_profile", "roller_damage_profile"]
-            names += ["damage_curve"] if result.raw.cam else []
-            for name in names:
-                axis, unit = ("angle", "rad") if name == "damage_curve" else ("y", "m")
-                band = result.band(name)
-                if band.mean.any():  # of a body that may pit
-                    columns = _band(axis, unit, "damage", band, "1")
-                    tables[f"{name}.csv"] = [with_sources(columns, scenario)]
+        for name in [name for name in KEPT if "damage" in name and name in curves]:
+            axis, unit = ("angle", "rad") if name == "damage_curve" else ("y", "m")
+            band = result.band(name)
+            if band.mean.any():  # of a body that may pit
+                columns = _band(axis, unit, "damage", band, "1")
+                tables[f"{name}.csv"] = [with_sources(columns, scenario)]
         if result.failed:
             numbers, errors = map(str, result.errors), result.errors.values()
             failures = {"realisation": list(numbers), "error": list(errors)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,7 +78,7 @@ def unworn_data(scenario: Scenario, problem: WearProblem) -> dict[str, Any] | No
     choice, state = scenario.fatigue, fresh_state(problem)
     if choice is None or state.damage is None:
         return None
-    rate, cam = state.damage[2], problem.kinematics.cam
+    rate = state.damage[2]
     cylinder, rollers = greatest_damages(problem, rate)
     damages = {
         "passes": effective_damage(problem, rate),
@@ -89,30 +90,31 @@ def unworn_data(scenario: Scenario, problem: WearProblem) -> dict[str, Any] | No
     }
     data["probability"] = choice.probability
     data["sources"] = {body: law.source for body, law in choice.laws.items()}
-    if cam is not None:
-        angle = cam.greatest(rate[: problem.shape[0]].max(axis=-1)).angle
-        data["angle_rad"] = float(angle[0])
+    damage = rate[: problem.shape[0]].max(axis=-1)
+    angle = float(problem.kinematics.track.greatest(damage).angle[0])
+    if math.isfinite(angle):  # not of a cylinder
+        data["angle_rad"] = angle
     return data
 
 
-def unworn_text(data: dict[str, Any], rollers: int | None) -> str:
+def unworn_text(data: dict[str, Any], body: str, unit: str, size: float) -> str:
     """Return the life of a test by pitting without wear in words.
 
     Parameters
     ----------
     data : dict
         From `unworn_data`.
-    rollers : int, optional
-        Rollers of a cam, whose life is in turns.
+    body, unit : str
+        "cylinder" or "cam", and the unit of its life.
+    size : float
+        Roller passes in the unit.
     """
-    unit, size = ("passes", 1.0) if rollers is None else ("turns", float(rollers))
 
     def life(name: str) -> str:
         passes = data[name]
         return "infinite" if passes is None else f"{shown(passes / size, '1', 3)} {unit}"
 
     text = f"{life('passes')} to a probability of {data['probability']:g}"
-    body = "cylinder" if rollers is None else "cam"
     place = f" at {shown(data['angle_rad'], 'deg')}" if "angle_rad" in data else ""
     parts = [
         f"{name} {life(key)}{where}"

@@ -20,16 +20,22 @@ if TYPE_CHECKING:
 EXCLUDED = "fatigue (pitting)"  # by a study without the table [fatigue]
 
 
-def fatigue_rows(result: Result) -> Rows:
-    """Return rows on damage and pitting at the end of a run; none without fatigue."""
+def fatigue_rows(result: Result, body: str) -> Rows:
+    """Return rows on damage and pitting at the end of a run; none without fatigue.
+
+    Parameters
+    ----------
+    result : Result
+    body : str
+        "cylinder" or "cam".
+    """
     if not result.raw.fatigue:
         return []
     final = result.final
     damage, error = (np.asarray(final[name], dtype=float) for name in ("damage", "damage_error"))
-    greatest = f"cylinder {shown(_most(final['cylinder_damage']), '1')}"
-    if result.is_cam:
-        place = shown(_most(final["damage_angle_rad"]), "deg")
-        greatest = f"cam {shown(_most(final['cylinder_damage']), '1')} at {place}"
+    greatest = f"{body} {shown(_most(final['cylinder_damage']), '1')}"
+    if "damage_angle_rad" in final:
+        greatest += f" at {shown(_most(final['damage_angle_rad']), 'deg')}"
     greatest += f", roller {shown(_most(final['roller_damage']), '1')}"
     return [
         Row("effective damage", with_error(damage, float(np.max(error)), "1")),
@@ -55,7 +61,7 @@ def source_rows(scenario: Scenario | None) -> Rows:
     """Return a row for each body that may pit: its fatigue law and the source of the constants."""
     if scenario is None or scenario.fatigue is None:
         return []
-    names = {"cylinder": "cylinder" if scenario.cam is None else "cam", "roller": "rollers"}
+    names = {"cylinder": scenario.cylinder.name, "roller": "rollers"}
     return [
         Row(f"fatigue of the {names[body]}", f"{law.law}; source: {law.source}")
         for body, law in scenario.fatigue.laws.items()

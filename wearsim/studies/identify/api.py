@@ -18,6 +18,7 @@ from wearsim.results.io.outputs import check_output
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.cam_wear import Wanted, size_of
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.identify.analysis import Identified, identified
 from wearsim.studies.identify.inputs import contained_inputs, with_known
 from wearsim.studies.identify.lifts import read_change
@@ -237,8 +238,7 @@ class _Study:
             mistake = Mistake("roller", "axial_profile", what, form, remedy)
             raise ScenarioError(scenario.file, [mistake])
         if item.lift is not None:
-            assert scenario.cam is not None
-            trace = read_change(item, scenario.cam.follower)
+            trace = read_change(item, turn_of(scenario).cam.follower)
             size = float(size_of(item.surface, smoothed(trace.height)))
             return _Ready(item, scenario, trace, passes, (0.5 * size, 1.2 * size))
         if item.profile is None:
@@ -334,12 +334,12 @@ def _passes(scenario: Scenario, item: Measurement) -> float:
     """Return the passes at which a groove was measured."""
     if item.at is None:
         return float(scenario.total_passes)
-    text = item.at.strip()
+    text, (unit, size) = item.at.strip(), scenario.life_unit
     try:
         if text.endswith("passes"):
             passes = float(text.removesuffix("passes"))
-        elif text.endswith("turns") and scenario.cam is not None:
-            passes = float(text.removesuffix("turns")) * scenario.operation.rollers
+        elif text.endswith(unit):
+            passes = float(text.removesuffix(unit)) * size
         else:
             passes = quantity(text, "s") * scenario.pass_rate
     except ValueError as error:

@@ -20,7 +20,7 @@ from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
-from wearsim.studies.cam.cam_wear import LIFT, CamView, Wanted, falls_of_lift, size_of
+from wearsim.studies.cam.cam_wear import CylinderView, Wanted, falls_of_lift, size_of, view_of
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, joined_problem
 from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
@@ -119,7 +119,7 @@ def time_dependence(scenario: Scenario, shared: bool) -> tuple[str, ...]:
         Whether the wear factors of both bodies have a common unknown factor.
     """
     processes = [item.name for item in scenario.random if item.role == "process"]
-    load = scenario.load.build()
+    load = scenario.load.built
     worn = factors(scenario)[1]
     random = any(item.name == ROLLER for item in scenario.random)
     reasons = (
@@ -395,8 +395,7 @@ class Grower:
         for number, draws in enumerate(ready):
             problem, stepper, _ = assemble_problem(draws, grid, models)
             runs.append(RealisationRun(number, {}, draws, problem, stepper))
-            if draws.scenario.cam is not None:
-                views[number] = CamView.of(draws.scenario, self._angles)
+            views[number] = view_of(draws.scenario, self._angles)
         failures: dict[int, Exception] = {}
         done = 0
         for group in batch_groups(runs):
@@ -430,7 +429,7 @@ def _step(
     group: Sequence[RealisationRun],
     schedule: ListedPasses,
     grid: Grid,
-    views: Mapping[int, CamView],
+    views: Mapping[int, CylinderView],
 ) -> tuple[dict[int, list[Any]], dict[int, Exception]]:
     """Step through a group of tests; return their profiles and energies at the records, and errors.
 
@@ -455,9 +454,7 @@ def _step(
                     continue
                 present, states = states_at(stepper, advance, part)
                 numbers = [runs[int(advance.numbers[place])].number for _, place, _ in part]
-                profiles = _profiles(
-                    present, states, grid, [views.get(record) for record in numbers]
-                )
+                profiles = _profiles(present, states, grid, [views[record] for record in numbers])
                 for row, number in enumerate(numbers):
                     results[number].append((profiles[row], float(states.energy[row])))
         failures.update({runs[place].number: error for place, error in tests.failures.items()})
@@ -467,29 +464,18 @@ def _step(
 
 
 def _profiles(
-    problem: WearProblem, state: WearState, grid: Grid, views: Sequence[CamView | None]
+    problem: WearProblem, state: WearState, grid: Grid, views: Sequence[CylinderView]
 ) -> list[dict[str, FloatArray]]:
     """Return the worn profiles of each test of a state by the name of their surface."""
     same = same_strips(problem.grid, grid)
     cylinder, roller = (
         depths if same else averaged(depths, problem.grid, grid) for depths in state.depths
     )
-    cam = problem.kinematics.cam
-    if cam is None:
-        return [
-            {
-                "cylinder": cylinder[:, 0, row].mean(axis=0),
-                "roller": roller[0, :, row].mean(axis=0),
-            }
-            for row in range(len(views))
-        ]
-    depth, falls = cam.at_unworn(cylinder[:, 0]), falls_of_lift(problem, state)
+    depth, falls = problem.kinematics.track.at_unworn(cylinder[:, 0]), falls_of_lift(problem, state)
     return [
         {
-            **view.grooves(depth[:, row]),
+            **view.profiles(depth[:, row], falls[:, row]),
             "roller": roller[0, :, row].mean(axis=0),
-            LIFT: view.along @ falls[:, row],
         }
         for row, view in enumerate(views)
-        if view is not None
     ]

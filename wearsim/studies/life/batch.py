@@ -258,9 +258,6 @@ class _Group:
     def _errors_by_stations(self, problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
         """Return the errors due to the stations of a cam by quantity, (tests,) [SI]."""
         extreme_values = extremes(problem, state)
-        if not extreme_values:
-            none = np.zeros(len(state.passes))
-            return {"depth": none, "lift error": none, "peak pressure": none}
         lift = extreme_values["least_wear"].error + extreme_values["greatest_wear"].error
         errors = {
             "depth": extreme_values["depth"].error,

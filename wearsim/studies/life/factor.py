@@ -107,7 +107,7 @@ def _obstacle(scenario: Scenario) -> str:
     names = [item.name for item in factors]
     if scenario.wear is None or not set(names) <= {SHARED, *OF_BODIES}:
         return f"{', '.join(names)} is not a factor of all wear"
-    law = scenario.wear.build()
+    law = scenario.wear.built
     rates = {body: law.depth_per_dissipation(body, 1.0) for body in BODIES}
     if any(rate is None for rate in rates.values()):
         return f"the wear law {scenario.wear.law} is not linear in the dissipation"
@@ -125,7 +125,7 @@ def _obstacle(scenario: Scenario) -> str:
     processes = [item.name for item in scenario.random if item.role == "process"]
     if processes:
         return f"{' and '.join(processes)} {'vary' if len(processes) > 1 else 'varies'} in time"
-    if not scenario.load.build().constant:
+    if not scenario.load.built.constant:
         return f'the load "{scenario.load.kind}" varies in time'
     if scenario.load.terms:
         return f'the load term "{scenario.load.terms[0].name}" depends on time'

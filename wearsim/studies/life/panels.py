@@ -355,8 +355,9 @@ def life_overview(result: LifeResult, lives: Mapping[str, Rows], no_effects: str
     scenario, groups, excluded = result.scenario, dict[str, Rows](), list(EXCLUDED)
     if result.raw.fatigue:
         excluded.remove(NO_FATIGUE)
-    main = life_sheet(result).first if scenario.cam is None else None
-    if scenario.cam is not None:
+    if scenario.cam is None:
+        main = life_sheet(result).first
+    else:
         groups["Loads"], main = loads(scenario), shape_panel(unchecked_turn_of(scenario))
         excluded += CAM_EXCLUDED
     if result.count:

@@ -151,9 +151,8 @@ def settings_of(
     ScenarioError
         If nothing is random.
     """
-    cam = scenario.cam is not None
-    per_unit = float(scenario.operation.rollers) if cam else 1.0
-    rate, unit = scenario.pass_rate / per_unit, "turns" if cam else "passes"
+    unit, per_unit = scenario.life_unit
+    rate = scenario.pass_rate / per_unit
     with checking_argument("target"):
         aim = None if target is None else per_unit * parse_life(target, unit, rate, "target")
     for share in shares:
@@ -172,7 +171,7 @@ def settings_of(
                 "a maximum is needed at which lives are censored, such as 1e7, since the scenario"
                 " has no length",
             )
-    span = scenario.load.build().span
+    span = scenario.load.built.span
     if span is not None:  # the log cannot be extended
         longest = min(longest, span[1] * scenario.pass_rate)
     if aim is not None and aim > longest:

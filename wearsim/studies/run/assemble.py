@@ -26,12 +26,10 @@ from wearsim.evolution.strips import Surfaces
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.stations import cam_stations
-from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.grid import growth_of, strips_of_run
-from wearsim.studies.run.inputs import contact_inputs
 from wearsim.studies.run.nodes import MAX_NODES, PassQuadrature, minimum_nodes, redrawing
-from wearsim.studies.run.setup import Setup
-from wearsim.studies.start.heights import roller_height, roller_profile, start_height
+from wearsim.studies.run.setup import CylinderTurn, Setup
+from wearsim.studies.start.heights import roller_height, start_height
 from wearsim.types import FloatArray, Grid
 from wearsim.units import in_engineers_unit
 
@@ -147,14 +145,9 @@ def _by_doubling(scenario: Scenario) -> bool:
 
 def merged_rollers(setup: Setup) -> tuple[list[int], FloatArray]:
     """Return the first roller of each group of identical ones, and the sizes of the groups."""
-    scenario = setup.scenario
-    creepage, count = scenario.creepage, scenario.operation.rollers
+    count, rows = setup.scenario.operation.rollers, setup.kinds
     if setup.rollers or any(len(item.rollers) < count for item in setup.varying):
         return list(range(count)), np.ones(count)
-    settings = scenario.roller.offset, creepage.yaw, creepage.tilt
-    columns: list[Sequence[object]] = [scenario.per_roller(value) for value in settings]
-    columns.append([roller_profile(scenario, number) for number in range(count)])
-    rows = list(zip(*columns, strict=True))
     kinds = list(dict.fromkeys(rows))
     return [rows.index(kind) for kind in kinds], np.array([float(rows.count(k)) for k in kinds])
 
@@ -184,8 +177,12 @@ def assemble_problem(
     scenario = setup.scenario
     grid = grid if grid is not None else strips_of_run(setup)
     build = models or prepared_model
-    chosen = build(scenario, grid)
     first, multiplicity = merged_rollers(setup)
+    drawn = {name: values[first][:, None] for name, values in setup.rollers.items()}
+    offsets = setup.inputs_of(first, drawn)["offset"]
+    parts = partial(build, scenario), partial(surfaces, scenario, first, offsets)
+    growth = growth_of(setup, grid, *parts)
+    chosen = build(scenario, grid)
     several = len(first) > 1 or setup.passes or scenario.cam
     name = chosen_stepper(scenario, chosen, 2 if several else 1)
     _check_spring(setup)
@@ -201,30 +198,22 @@ def assemble_problem(
             [Mistake("evolution", "nodes", "has no meaning without an expectation over passes")],
         )
     place = {number: k for k, number in enumerate(first)}
-    drawn = {name: values[first][:, None] for name, values in setup.rollers.items()}
     problem = replace(
         build_problem(
-            scenario,
+            setup,
             chosen,
             grid,
             drawn,
             rollers=first,
             multiplicity=multiplicity,
         ),
-        laws=(scenario.wear.build(),) if scenario.wear is not None else (),
+        laws=(scenario.wear.built,) if scenario.wear is not None else (),
         fatigue=_fatigue(scenario),
         varying=tuple(
             replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
             for item in setup.varying
         ),
-    )
-    offsets = contact_inputs(scenario, first, drawn)["offset"]
-
-    problem = replace(
-        problem,
-        growth=growth_of(
-            setup, grid, partial(build, scenario), partial(surfaces, scenario, first, offsets)
-        ),
+        growth=growth,
     )
     if setup.passes and stepper.pass_by_pass and scenario.fatigue is not None:
         what = "cannot follow damage by inputs drawn at every pass, which no contact represents"
@@ -309,7 +298,7 @@ def with_converged_nodes(problem: WearProblem, setup: Setup) -> WearProblem:
 
 
 def build_problem(
-    scenario: Scenario,
+    setup: Setup,
     model: ContactModel,
     grid: Grid,
     drawn: Mapping[str, FloatArray],
@@ -323,7 +312,7 @@ def build_problem(
 
     Parameters
     ----------
-    scenario : Scenario
+    setup : Setup
     model : ContactModel
         Built for the grid.
     grid : Grid
@@ -339,14 +328,14 @@ def build_problem(
     angles : ndarray, shape (stations,), optional
         Angles of a cam, instead of the stations of a run [rad].
     """
-    creepage, roller, cylinder = scenario.creepage, scenario.roller, scenario.cylinder
-    count, values = len(rollers), contact_inputs(scenario, rollers, drawn)
+    scenario, creepage, turn = setup.scenario, setup.scenario.creepage, setup.turn
+    count, values = len(rollers), setup.inputs_of(rollers, drawn)
     kinematics = Kinematics(
-        cylinder_radius=cylinder.radius,
-        roller_radius=roller.radius,
+        cylinder_radius=scenario.cylinder.radius,
+        roller_radius=scenario.roller.radius,
         rolling_speed=scenario.rolling_speed,
         multiplicity=np.ones(count) if multiplicity is None else multiplicity,
-        cam=cam_stations(turn_of(scenario), angles) if scenario.cam else None,
+        track=turn.track if isinstance(turn, CylinderTurn) else cam_stations(turn, angles),
     )
     at = kinematics.track.angles
     unworn = surfaces(scenario, rollers, values.pop("offset"), grid, at)
@@ -355,8 +344,8 @@ def build_problem(
         grid=grid,
         model=model,
         laws=(),
-        loads=(scenario.load.build(),),
-        terms={term.name: term.build() for term in scenario.load.terms},
+        loads=(scenario.load.built,),
+        terms={term.name: term.built for term in scenario.load.terms},
         kinematics=kinematics,
         flat_gap=np.broadcast_to(
             unworn.gap, (1 if at is None else len(at), count, realisations, grid.strips)
@@ -399,7 +388,8 @@ def surfaces(
     height = start_height(scenario, grid, angles)
     if form.has_crowned_cylinder:
         height = height - form.cylinder_drop(grid.y)
-    drop = form.roller_drop(s) - roller_height(scenario, rollers, s)
+    raised = roller_height(scenario, rollers, s)
+    drop = form.roller_drop(s) - raised
     # leading axes: stations, rollers, realisations
     height = height if height.ndim == 1 else height[:, None, None]
     gap = drop - height

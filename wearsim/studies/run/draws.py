@@ -46,7 +46,9 @@ def draw(scenario: Scenario) -> Setup:
         If there is a friction field, which requires the study of one contact.
     """
     require_run(scenario)
-    if scenario.sampling.plan == "latin-hypercube" and scenario.random:
+    if not scenario.random:
+        return Setup(scenario)
+    if scenario.sampling.plan == "latin-hypercube":
         raise ScenarioError(
             scenario.file,
             [

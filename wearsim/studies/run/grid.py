@@ -291,7 +291,7 @@ def growth_of(
     many = setup.turn.varies
     most = choice.strips or (STRIPS_OF_MANY_CONTACTS if many else STRIPS_BEFORE_JOINING)
     last, margin = None, 0.0
-    if setup.varying or setup.passes or not scenario.load.build().constant:
+    if setup.varying or setup.passes or not scenario.load.built.constant:
         margin = 0.5 * setup.patch.b
     margin += setup.drawn_shift
     if scenario.roller.width is not None:

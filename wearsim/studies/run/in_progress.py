@@ -29,7 +29,7 @@ from wearsim.evolution.strips import on_grid, same_strips
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario
-from wearsim.studies.cam.observables import at_every_station, station_columns
+from wearsim.studies.cam.observables import at_every_station, observables_of_track
 from wearsim.studies.contact.comparison import REFERENCE, error_above_tolerance
 from wearsim.studies.failures import explained, failures_explained, too_deep_failure
 from wearsim.studies.plausibility import plausibility_warnings
@@ -90,12 +90,6 @@ class RunInProgress:
         self.on_event: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
-        self.origin = origin_of(scenario)
-        units = units_of(scenario)
-        self.drawn: dict[str, dict[str, object]] = {
-            key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
-            for key, value in setup.values.items()
-        }
         self.warnings: list[str] = [] if data is None else earlier_warnings(data)
         self.created = (
             datetime.now(UTC).isoformat(timespec="seconds") if data is None else data.created
@@ -112,6 +106,11 @@ class RunInProgress:
             None if data is None else data.history,
             None if data is None else data.records,
         )
+        self.origin, units = origin_of(scenario), units_of(scenario)
+        self.drawn: dict[str, dict[str, object]] = {
+            key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
+            for key, value in setup.values.items()
+        }
         if data is None:
             means = setup if setup.scenario is scenario else Setup(scenario)
             for text in plausibility_warnings(means):
@@ -418,7 +417,7 @@ class RunInProgress:
                 ),
                 "start_height": start_height(scenario, problem.grid),
                 "multiplicity": kinematics.multiplicity,
-                **station_columns(problem),
+                **observables_of_track(problem).columns(),
             },
             history=self.recorder.history,
             records=self.recorder.records,

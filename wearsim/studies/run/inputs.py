@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-
-import numpy as np
+from collections.abc import Iterable, Mapping
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.models.loads import FollowerLoad
@@ -16,7 +14,7 @@ from wearsim.types import FloatArray
 
 LOAD, FRICTION, LONGITUDINAL = "load.normal_force", "friction.coefficient", "creepage.longitudinal"
 YAW, TILT, OFFSET = "creepage.yaw", "creepage.tilt", "roller.offset"
-#: Inputs of one contact: name in `contact_inputs`, by scenario key.
+#: Inputs of one contact: name in `Setup.inputs`, by scenario key.
 FIELDS = {**CONTACT_FIELDS, OFFSET: "offset"}
 
 
@@ -28,7 +26,7 @@ def origin(key: str, mean: float) -> float:
 def contact_values(
     items: Iterable[RandomInput], values: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    """Return the drawn inputs of contacts by the names of `contact_inputs`.
+    """Return the drawn inputs of contacts by the names of `Setup.inputs`.
 
     Parameters
     ----------
@@ -45,41 +43,6 @@ def contact_values(
     }
 
 
-def contact_inputs(
-    scenario: Scenario, rollers: Sequence[int], drawn: Mapping[str, FloatArray] | None = None
-) -> dict[str, FloatArray]:
-    """Return the inputs of the contacts of rollers: drawn values, or the scenario's.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    rollers : sequence of int
-        Numbers of the rollers.
-    drawn : mapping of str to ndarray, optional
-        Drawn inputs from `contact_values`; they broadcast to (rollers, realisations).
-
-    Returns
-    -------
-    dict of str to ndarray
-        By field of `ContactInputs`, and "offset" of the roller [SI]; those that are not drawn have
-        the shape (rollers, 1).
-    """
-    creepage = scenario.creepage
-    values = {
-        "offset": scenario.roller.offset,
-        "yaw": creepage.yaw,
-        "tilt": creepage.tilt,
-        "friction": scenario.friction.coefficient,
-        "longitudinal": creepage.longitudinal or 0.0,
-        "bearing_torque": creepage.bearing_torque or 0.0,
-    }
-    columns = {
-        name: np.array(scenario.per_roller(value))[list(rollers), None]
-        for name, value in values.items()
-    }
-    return {**columns, **(drawn or {})}
-
-
 def load_range(scenario: Scenario, stop: float) -> tuple[float, float]:
     """Return the least and greatest load up to `stop` [s], before any feedback [N].
 
@@ -88,7 +51,7 @@ def load_range(scenario: Scenario, stop: float) -> tuple[float, float]:
     ScenarioError
         If the load is not defined for the whole time, or is not positive outside of pauses.
     """
-    load = scenario.load.build()
+    load = scenario.load.built
     if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
         got = f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min"
         expected = f"0 to {stop / 60.0:.6g} min: a longer log or a shorter operation.duration"

@@ -141,7 +141,7 @@ def _full_slip_creepage(problem: WearProblem, setup: Setup, force: float) -> flo
     By Carter's theory it is the half-length times the curvature along rolling; of a cam, the mean
     over the stations.
     """
-    curvatures = np.maximum(np.ravel(problem.kinematics.longitudinal_curvature), 1e-3)
+    curvatures = np.maximum(np.ravel(problem.kinematics.track.longitudinal_curvature), 1e-3)
     half_lengths = [curvature * setup.fresh_patch(force, curvature).a for curvature in curvatures]
     return float(np.mean(half_lengths))
 

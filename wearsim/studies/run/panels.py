@@ -212,7 +212,7 @@ def _base_load(result: Result) -> tuple[FloatArray, FloatArray] | None:
     """Return times [s] and the load without feedback [N], or None if constant or unknown."""
     times = np.linspace(0.0, float(result.time[-1]), 2001)
     try:
-        force = result.scenario.load.build().force(times)
+        force = result.scenario.load.built.force(times)
     except WearsimError:  # a plugin of the scenario is not installed
         return None
     return (times, force) if np.ptp(force) > 1e-3 * force.max() else None

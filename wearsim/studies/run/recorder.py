@@ -25,7 +25,7 @@ from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.single_step import present_problem
 from wearsim.evolution.strips import averaged, same_strips
-from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
+from wearsim.studies.cam.observables import at_every_station, observables_of_track
 from wearsim.studies.fatigue.observables import fatigue_history, fatigue_record
 from wearsim.studies.run.schema import ALL_VARIABLES, ESTIMATED
 from wearsim.studies.schedule import Due, RecordSchedule, due_records, state_at, states_at
@@ -139,7 +139,7 @@ def history_row(
             for name in ("approach", "longitudinal_creepage", "adhesion_fraction")
         },
         **{n: problem.mean_over_turn(problem.per_roller(v))[0] for n, v in approach.items()},
-        **cam_history(problem, state),
+        **observables_of_track(problem).history(state),
         **fatigue_history(problem, state),
     }
 
@@ -255,7 +255,7 @@ def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Vari
             )
             for name in ("line_load", "half_length", "dissipation")
         },
-        **cam_record(problem, state),
+        **observables_of_track(problem).record(state),
         **fatigue_record(problem, state),
     }
 

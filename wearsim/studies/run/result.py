@@ -22,7 +22,7 @@ from wearsim.results.content import (
 )
 from wearsim.results.io.files import read_study
 from wearsim.studies.fatigue.observables import final_fatigue
-from wearsim.studies.run.schema import ALL_VARIABLES, ESTIMATED, RUN, run_schema
+from wearsim.studies.run.schema import ALL_VARIABLES, ESTIMATED, MARKS, RUN, run_schema
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ class RunData(StudyData):
     @classmethod
     def schema_of(cls, attributes: Mapping[str, Any], names: Container[str]) -> Schema:
         """Return the schema of a file by its attributes and the names of its variables."""
-        return run_schema(cam="station_angle" in names, fatigue="damage" in names)
+        return run_schema(frozenset(kind for name, kind in MARKS.items() if name in names))
 
     @classmethod
     def from_variables(

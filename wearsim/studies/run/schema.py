@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 
-from wearsim.results.content import Axis, Schema, Variable, by_name
+from wearsim.results.content import Axis, Schema, Variable, by_name, of_present
 
 # every axis except y, whose coordinate is a variable
 AXES: Mapping[str, Axis] = by_name(
@@ -276,24 +276,19 @@ CAM_FATIGUE_VARIABLES: Mapping[str, Variable] = by_name(
         ),
     )
 )
-ALL_VARIABLES: Mapping[str, Variable] = {
-    **VARIABLES,
-    **CAM_VARIABLES,
-    **FATIGUE_VARIABLES,
-    **CAM_FATIGUE_VARIABLES,
+#: What a run has, by a variable that shows it.
+MARKS = {"station_angle": "cam", "damage": "fatigue"}
+_FURTHER = {
+    "cam": CAM_VARIABLES,
+    "fatigue": FATIGUE_VARIABLES,
+    "cam fatigue": CAM_FATIGUE_VARIABLES,
 }
+ALL_VARIABLES: Mapping[str, Variable] = {**VARIABLES, **of_present(_FURTHER, {"cam", "fatigue"})}
 
 RUN = Schema("wearsim-run", 10, "a wear test, from `wearsim run`", AXES, VARIABLES)
 
 
 @cache
-def run_schema(*, cam: bool, fatigue: bool) -> Schema:
-    """Return the schema of the run of a cylinder or a cam, with fatigue or without."""
-    variables = {
-        **VARIABLES,
-        **(CAM_VARIABLES if cam else {}),
-        **(FATIGUE_VARIABLES if fatigue else {}),
-    }
-    return replace(
-        RUN, variables={**variables, **(CAM_FATIGUE_VARIABLES if cam and fatigue else {})}
-    )
+def run_schema(present: frozenset[str]) -> Schema:
+    """Return the schema of a run; with "cam" or "fatigue" present it has their variables."""
+    return replace(RUN, variables={**VARIABLES, **of_present(_FURTHER, present)})

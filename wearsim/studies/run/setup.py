@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from wearsim.evolution.quantities import Varying
+from wearsim.evolution.quantities import OneStation, Varying
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.plugins import JointDistribution, WearLaw
 from wearsim.scenario import RandomInput, Scenario
@@ -17,8 +17,8 @@ from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import CamTurn, turn_of
-from wearsim.studies.run.inputs import contact_inputs, load_range, origin
-from wearsim.studies.start.heights import StartExtent, start_extent
+from wearsim.studies.run.inputs import load_range, origin
+from wearsim.studies.start.heights import StartExtent, roller_profile, start_extent
 from wearsim.types import ContactSolution, FloatArray
 
 _BISECTIONS = 40
@@ -40,6 +40,8 @@ class CylinderTurn:
     def __init__(self, scenario: Scenario) -> None:
         self.mean_radius = scenario.cylinder.radius
         self.curvatures = (1.0 / self.mean_radius + 1.0 / scenario.roller.radius,)
+        speed = scenario.operation.speed * self.mean_radius
+        self.track = OneStation(*self.curvatures, speed, self.mean_radius)
 
     def loads_and_curvatures(self, load: float) -> list[tuple[float, float]]:
         """Return the load of a roller [N] and the relative curvature [1/m], of the one station."""
@@ -126,9 +128,48 @@ class Setup:
         return turn_of(self.scenario) if self.scenario.cam else CylinderTurn(self.scenario)
 
     @cached_property
+    def inputs(self) -> Mapping[str, FloatArray]:
+        """Inputs of the contacts of all rollers as the scenario has them, shape (rollers, 1) [SI].
+
+        By field of `ContactInputs`, and "offset" of the roller.
+        """
+        scenario, creepage = self.scenario, self.scenario.creepage
+        values: Mapping[str, float | tuple[float, ...]] = {
+            "offset": scenario.roller.offset,
+            "yaw": creepage.yaw,
+            "tilt": creepage.tilt,
+            "friction": scenario.friction.coefficient,
+            "longitudinal": creepage.longitudinal or 0.0,
+            "bearing_torque": creepage.bearing_torque or 0.0,
+        }
+        shape = scenario.operation.rollers, 1
+        return {name: np.full(shape, np.reshape(value, (-1, 1))) for name, value in values.items()}
+
+    def inputs_of(
+        self, rollers: Sequence[int], drawn: Mapping[str, FloatArray]
+    ) -> dict[str, FloatArray]:
+        """Return the inputs of some rollers, by number, and drawn ones instead of them.
+
+        Parameters
+        ----------
+        rollers : sequence of int
+        drawn : mapping of str to ndarray
+            Drawn inputs from `contact_values`; they broadcast to (rollers, realisations).
+        """
+        return {**{name: column[list(rollers)] for name, column in self.inputs.items()}, **drawn}
+
+    @cached_property
+    def kinds(self) -> list[tuple[object, ...]]:
+        """What distinguishes the rollers: offset, yaw, tilt and start profile of each."""
+        columns = [self.inputs[name][:, 0].tolist() for name in ("offset", "yaw", "tilt")]
+        numbers = range(self.scenario.operation.rollers)
+        profiles = [roller_profile(self.scenario, number) for number in numbers]
+        return list(zip(*columns, profiles, strict=True))
+
+    @cached_property
     def start_extent(self) -> StartExtent | None:
         """Extent of the start profiles, None if there is none."""
-        return start_extent(self.scenario)
+        return start_extent(self.scenario, self.inputs["offset"][:, 0].tolist())
 
     @cached_property
     def greatest_load(self) -> float:
@@ -150,8 +191,7 @@ class Setup:
     @cached_property
     def positions(self) -> FloatArray:
         """Contact positions of all rollers on an unworn cylinder, shape (rollers, 1) [m]."""
-        rollers = range(self.scenario.operation.rollers)
-        return self.positions_of(contact_inputs(self.scenario, rollers))
+        return self.positions_of(self.inputs)
 
     @cached_property
     def centre(self) -> float:
@@ -161,7 +201,7 @@ class Setup:
     @property
     def first_centre(self) -> float:
         """Middle of the first roller's contact, or the scenario's choice [m]."""
-        return self.centre_of(self.positions_of(contact_inputs(self.scenario, [0])))
+        return self.centre_of(self.positions[:1])
 
     @cached_property
     def drawn_shift(self) -> float:
@@ -191,12 +231,11 @@ class Setup:
         Parameters
         ----------
         inputs : mapping of str to ndarray
-            Among them offset [m] and tilt [rad], see `contact_inputs`.
+            Among them offset [m] and tilt [rad], see `inputs`.
         """
-        apexes = self.scenario.axial_gap.apexes(inputs["offset"])
-        if not self.scenario.creepage.tilt_shifts_contact:
-            return apexes
-        return np.asarray(apexes + self.tilt_shift(inputs["tilt"]))
+        shifts = self.scenario.creepage.tilt_shifts_contact
+        shift = self.tilt_shift(inputs["tilt"]) if shifts else 0.0
+        return np.asarray(self.scenario.axial_gap.apexes(inputs["offset"]) + shift)
 
     def centre_of(self, positions: FloatArray) -> float:
         """Return the middle of the strips for contact positions [m]."""
@@ -258,14 +297,14 @@ class Setup:
         scenario, creepage, turn = self.scenario, self.scenario.creepage, self.turn
         if scenario.wear is None:
             return 0.0
-        law, patch, roller = scenario.wear.build(), self.fresh_patch(load), scenario.roller
+        law, patch, roller = scenario.wear.built, self.fresh_patch(load), scenario.roller
         friction = self.greatest_mean("friction", scenario.friction.coefficient)
         longitudinal = self.greatest_mean("longitudinal", creepage.longitudinal or 0.0)
         saturation = friction * patch.a * turn.curvatures[-1] / scenario.friction.creep_factor
         longitudinal = max(longitudinal, saturation * turn.greatest_demand, turn.greatest_skid)
         yaw, tilt = (
-            max(abs(angle) for angle in (*self.range_of(name), *scenario.per_roller(given)))
-            for name, given in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
+            max(abs(angle) for angle in (*self.range_of(name), *self.inputs[name].ravel().tolist()))
+            for name in ("yaw", "tilt")
         )
         differs = creepage.differential_slip or (creepage.drive == "free" and not scenario.cam)
         curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius if differs else 0.0

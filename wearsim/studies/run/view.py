@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.errors import WearsimError
 from wearsim.levelling import ComputedProfile
 from wearsim.report.csv_files import computed
-from wearsim.report.surfaces import Sampling, Surface
 from wearsim.report.text import (
     ROUNDING,
     count,
@@ -46,7 +44,7 @@ _NOT_MODEL = (
 )
 
 if TYPE_CHECKING:
-    from wearsim.report.animation import Animation
+    pass
 
 _IN_OVERVIEW = {"roller depth", "width", "lift error, peak to peak"}
 #: what wear tests do not contain
@@ -62,30 +60,25 @@ _RECORDS = {
 
 
 class RunView(StudyView[Result]):
-    """End state of a run with its estimated error, of a cam also angles and lift error.
+    """End state of a run with its estimated error.
 
-    Panels: profiles, depth, dissipated power, normal force, peak pressure; of a cam also the map
-    of the depth, the worn shape and the lift error. Files: history and records; the table of pandas
-    has the history.
+    Panels: profiles, depth, dissipated power, normal force, peak pressure. Files: history and
+    records; the table of pandas has the history.
     """
 
     verb, sheet = "run", "wearsim.studies.run.panels:run_sheet"
+    body, unit, per_unit = "cylinder", "roller passes", 1.0  # of the length of a test
+    excluded: tuple[str, ...] = ()  # besides `EXCLUDED`
 
     def __init__(self, result: Result) -> None:
         super().__init__(result)
         raw, is_exact = result.raw, result.stepper == "per-pass"
-        body, length = "cylinder", f"{count(raw.total_passes)} roller passes"
-        if result.is_cam:
-            turns = raw.total_passes / raw.kinematics["physical_rollers"]
-            body, length = "cam", f"{count(turns)} turns"
+        length = f"{count(raw.total_passes / self.per_unit)} {self.unit}"
         time = simulated(raw.total_passes / raw.kinematics["pass_rate"])
-        self.question = f"How deep does the {body} wear in {length} ({time})?"
+        self.question = f"How deep does the {self.body} wear in {length} ({time})?"
         self.heading = "end state" if result.finished else "current state"
         if result.failure:
             self.heading = "state before the failure"
-        self.has_angles = result.is_cam
-        if result.is_cam:
-            self.sheet = "wearsim.studies.cam.panels:cam_run_sheet"
         self.basis = NO_STEPPING_ERROR if is_exact else _NOT_MODEL
 
     def standing(self) -> str:
@@ -128,7 +121,7 @@ class RunView(StudyView[Result]):
         width = width_row(result.width[-1], result.raw.width_threshold)
         width = stated("width", "width", "mm") if np.any(result.width[-1]) else width
         rows += [
-            *limit_rows(result),
+            *self.limit_rows(),
             width,
             stated("worn volume", "worn_volume", "mm^3"),
             stated("dissipated energy", "dissipated_energy", "J"),
@@ -137,8 +130,8 @@ class RunView(StudyView[Result]):
             stated("peak pressure", "peak_pressure", "MPa"),
             stated("worn descent", "descent", "um"),
             stated("elastic approach", "elastic_approach", "um"),
-            *self._of_cam(),
-            *fatigue_rows(result),
+            *self.along_angle(),
+            *fatigue_rows(result, self.body),
         ]
         if error is None:
             return [*rows, Row("error of depth", NO_STEPPING_ERROR)]
@@ -146,31 +139,6 @@ class RunView(StudyView[Result]):
         depth = float(max(np.max(result.depth[-1]), np.max(result.roller_depth[-1])))
         part = f", {shown(error / depth, '%', 2)}" if depth > 0.0 else ""
         return [*rows, Row("estimated error of depth", f"{shown(error, 'um', 2)}{part}")]
-
-    def _of_cam(self) -> Rows:
-        """Return rows on angles and lift error of a cam; none of a cylinder."""
-        final = self.result.final
-        if "turns" not in final:
-            return []
-
-        def stated(name: str, unit: str, key: str) -> str:
-            error = final[f"{name}_error_{key}"]
-            return with_error(np.asarray(final[f"{name}_{key}"]), float(np.max(error)), unit)
-
-        arm, greatest = self._arm_length(), float(np.max(final["lift_error_m"]))
-        of_arm = f", {shown(greatest / arm, 'deg', 3)} of the arm" if arm else ""
-        return [
-            Row("turns of the cam", count(float(np.max(final["turns"])))),
-            Row("angle of the depth", stated("depth_angle", "deg", "rad")),
-            Row("angle of the peak pressure", stated("peak_pressure_angle", "deg", "rad")),
-            Row(
-                "lift error, peak to peak",
-                stated("lift_error", "um", "m") + of_arm,
-                answers={"lift_error": (greatest, "um")},
-            ),
-            Row("least wear of the lift", f"at {stated('least_wear_angle', 'deg', 'rad')}"),
-            Row("greatest wear of the lift", f"at {stated('greatest_wear_angle', 'deg', 'rad')}"),
-        ]
 
     def study(self) -> Rows:
         """Return rows on the test, its failure, and the effort of the computation."""
@@ -207,7 +175,6 @@ class RunView(StudyView[Result]):
         result = self.result
         return {
             **result.final,
-            **self._of_arm(),
             "title": result.title,
             "model": result.model,
             "stepper": result.stepper,
@@ -229,14 +196,6 @@ class RunView(StudyView[Result]):
             "limits": result.limits,
             **fatigue_data(result),
         }
-
-    def _of_arm(self) -> dict[str, Any]:
-        """Return the lift error of an arm as an angle [rad]; nothing of another follower."""
-        final, arm = self.result.final, self._arm_length()
-        if not arm or "lift_error_m" not in final:
-            return {}
-        names = ("lift_error", "station_lift_error", "station_lift_error_from_dwell")
-        return {f"{name}_rad": (np.asarray(final[f"{name}_m"]) / arm).tolist() for name in names}
 
     def origin(self) -> dict[str, Any]:
         """Return length, records, scenario, files, plugins and software for JSON."""
@@ -274,37 +233,33 @@ class RunView(StudyView[Result]):
 
     def overview(self) -> Overview:
         """Return the worn body, its loads, and limits that are passed or not."""
-        result, excluded = self.result, [*EXCLUDED, "scatter of the inputs"]
-        if result.raw.fatigue:
+        excluded = [*EXCLUDED, "scatter of the inputs", *self.excluded]
+        if self.result.raw.fatigue:
             excluded.remove(NO_FATIGUE)
         sheet = self.panels()
-        if result.is_cam:
-            from wearsim.studies.cam.view import CAM_EXCLUDED, loads  # noqa: PLC0415
-
-            load_rows, main = loads(result.scenario), sheet.panels["shape"]
-            excluded += CAM_EXCLUDED
-        else:
-            named = {row.label: row for row in self.rows()}
-            load_rows = [named[name] for name in ("normal force", "peak pressure")]
-            main = sheet.first
-        limits = limit_rows(result, brief=True)
+        limits = self.limit_rows(brief=True)
         limits = limits or [Row("limits", "none in the scenario, table [limit]")]
         shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
-        groups = {"Loads": load_rows, "Limits": limits, "Wear": shown_rows}
-        return Overview(main, groups, excluded)
+        groups = {"Loads": self.loads(), "Limits": limits, "Wear": shown_rows}
+        return Overview(sheet.panels.get("shape", sheet.first), groups, excluded)
+
+    def loads(self) -> Rows:
+        """Return the loads of the overview."""
+        named = {row.label: row for row in self.rows()}
+        return [named[name] for name in ("normal force", "peak pressure")]
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the worn profile with which measured ones are compared, of a cam at an angle."""
         return self.result.worn_profile(angle)
 
     def columns(self) -> Mapping[str, Columns]:
-        """Return history, records, and of a cam its worn surface."""
+        """Return history and records."""
         raw = self.result.raw
         history = [
             column
             for name, variable in raw.schema.variables.items()
             if variable.kind == "history"
-            for column in _columns(name, raw.history[name], variable.dims, name, self._angles())
+            for column in _columns(name, raw.history[name], variable.dims, name, self.angles())
         ]
         scenario = fatigue_scenario(self.result)
         tables: dict[str, Columns] = {"history.csv": [with_sources(history, scenario)]}
@@ -312,70 +267,22 @@ class RunView(StudyView[Result]):
             always = not name.startswith("roller") and name in raw.records
             if always or (name in raw.records and raw.records[name].any()):
                 tables[file] = [with_sources(self._records(name), scenario)]
-        surface = self.surface(Sampling())
-        if surface is not None:
-            tables["worn_cam.csv"] = [surface.columns]
-            tables["along_angle.csv"] = [list(self._along_angle())]
         return tables
 
-    def _angles(self) -> Sequence[str]:
-        """Return the angles of the stations of a cam in words; none of a cylinder.
+    def angles(self) -> Sequence[str]:
+        """Return the angles of the stations of a cam in words; none of a cylinder."""
+        return ()
 
-        Where a part of the turn ends, another begins at the same angle.
-        """
-        if not self.result.is_cam:
-            return ()
-        degrees = [f"{angle:.6g} deg" for angle in np.degrees(self.result.values("station_angle"))]
-        following = [*degrees[1:], ""]
-        return [
-            f"before {this_angle}" if this_angle == next_angle else f"at {this_angle}"
-            for this_angle, next_angle in zip(degrees, following, strict=True)
-        ]
-
-    def _along_angle(self) -> Iterator[Column]:
-        """Yield angle, depth and lift error of a cam at every record, of an arm also its angle."""
-        from wearsim.studies.cam.grooves import along_angle  # noqa: PLC0415  (not of a cylinder)
-        from wearsim.studies.cam.observables import CURVE_ANGLES  # noqa: PLC0415
-
-        depth, lift_error = along_angle(self.result)
-        yield computed("angle", CURVE_ANGLES, "rad")
-        quantities = {"depth": (depth, "m"), "lift error": (lift_error, "m")}
-        if lever := self._arm_length():
-            quantities["lift error of the arm"] = lift_error / lever, "rad"
-        for name, (values, unit) in quantities.items():
-            for passes, column in zip(self.result.record_passes, values.T, strict=True):
-                yield computed(f"{name} at {passes:.12g} passes", column, unit)
-
-    def _arm_length(self) -> float | None:
-        """Return the length of a cam's arm [m]; None of another follower."""
-        try:
-            cam = self.result.scenario.cam
-        except WearsimError:  # a plugin of the scenario is not installed
-            return None
-        return cam.follower.arm_length if cam is not None and cam.follower.swings else None
-
-    def surface(self, sampling: Sampling) -> Surface | None:
-        """Return the surface of a cam, unworn and worn; None for a cylinder."""
-        if not self.result.is_cam:
-            return None
-        from wearsim.studies.cam.surface import worn_surface  # noqa: PLC0415  (not of a cylinder)
-
-        return worn_surface(self.result, sampling)
-
-    def animation(self) -> Animation | None:
-        """Return the turn of a worn cam with its follower; None for a cylinder."""
-        if not self.result.is_cam:
-            return None
-        from wearsim.studies.cam.drawing import turning  # noqa: PLC0415  (not of a cylinder)
-
-        return turning(self.result)
+    def along_angle(self) -> Rows:
+        """Return rows on angles and lift error of a cam; none of a cylinder."""
+        return []
 
     def _records(self, name: str) -> Iterator[Column]:
         """Yield y, and a column for every record and contact."""
         raw = self.result.raw
         yield from _columns("y", raw.static["y"], ("y",), "y")
         dims = ("y", *ALL_VARIABLES[name].dims[1:-1])
-        angles = self._angles()
+        angles = self.angles()
         quantity = {"depth_profile": "depth", "damage_profile": "damage"}.get(
             name.partition("_")[2], name
         )
@@ -392,6 +299,30 @@ class RunView(StudyView[Result]):
             if item.kind == "history"
         ]
         return Frame(columns, "step", range(len(result.passes)))
+
+    def limit_rows(self, *, brief: bool = False) -> Rows:
+        """Return a row for each limit of [limit]: reached or not, when, and by how much.
+
+        Parameters
+        ----------
+        brief : bool
+            Whether the rows say that limits are passed or failed, and leave out by how much.
+        """
+        rows = list[Row]()
+        for item in self.result.limits:
+            unit, name = limit_unit(item["quantity"]), item["quantity"].replace("_", " ")
+            side = "above" if item["excess"] >= 0.0 else "below"
+            by = "" if brief else f", {abs(100.0 * item['excess']):.3g} % {side}"
+            end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)} at the end{by}"
+            words = ("failed", "passed") if brief else ("reached", "not reached")
+            text = words[1]
+            if item["reached"]:
+                passes = item["reached_at_passes"]
+                when = f"{count(round(passes / self.per_unit))} {self.unit.split()[-1]}"
+                time = simulated(passes / self.result.raw.kinematics["pass_rate"])
+                text = f"{words[0]} after about {when}, {time}"
+            rows.append(Row(name if brief else f"limit of {name}", f"{text}: {end}"))
+        return rows
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the run."""
@@ -416,31 +347,3 @@ def _columns(
 def _last(value: Any) -> int:
     """Return the last value of a history, or the number itself."""
     return int(np.ravel(value)[-1])
-
-
-def limit_rows(result: Result, *, brief: bool = False) -> Rows:
-    """Return a row for each limit of [limit]: reached or not, when, and by how much.
-
-    Parameters
-    ----------
-    result : Result
-    brief : bool
-        Whether the rows say that limits are passed or failed, and leave out by how much.
-    """
-    rows = list[Row]()
-    for item in result.limits:
-        unit, name = limit_unit(item["quantity"]), item["quantity"].replace("_", " ")
-        side = "above" if item["excess"] >= 0.0 else "below"
-        by = "" if brief else f", {abs(100.0 * item['excess']):.3g} % {side}"
-        end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)} at the end{by}"
-        words = ("failed", "passed") if brief else ("reached", "not reached")
-        text = words[1]
-        if item["reached"]:
-            passes = item["reached_at_passes"]
-            when = f"{count(round(passes))} passes"
-            if result.is_cam:
-                when = f"{count(round(passes / result.raw.kinematics['physical_rollers']))} turns"
-            time = simulated(passes / result.raw.kinematics["pass_rate"])
-            text = f"{words[0]} after about {when}, {time}"
-        rows.append(Row(name if brief else f"limit of {name}", f"{text}: {end}"))
-    return rows

@@ -16,7 +16,6 @@ from wearsim.scenario.parse.toml import apply_overrides, flat, parse_toml
 from wearsim.studies.run.assemble import merged_rollers
 from wearsim.studies.run.continuation import stored_scenario
 from wearsim.studies.run.draws import draw
-from wearsim.studies.run.inputs import contact_inputs
 from wearsim.studies.run.result import Result, RunData
 from wearsim.studies.start.heights import roller_profile, start_height
 from wearsim.types import FloatArray, Grid, Profile
@@ -152,8 +151,7 @@ def _rollers(scenario: Scenario, data: RunData) -> list[Profile]:
     draws, count = draw(scenario), scenario.operation.rollers
     groups, _ = merged_rollers(draws)
     drawn = {name: values[:, None] for name, values in draws.rollers.items()}
-    offsets = contact_inputs(draws.scenario, range(count), drawn)["offset"]
-    settings = [_settings(draws.scenario, number) for number in range(count)]
+    offsets, settings = draws.inputs_of(range(count), drawn)["offset"], draws.kinds
     y, worn = data.static["y"], data.records["roller_depth_profile"][-1, :, 0]
     profiles = []
     for number in range(count):
@@ -163,14 +161,6 @@ def _rollers(scenario: Scenario, data: RunData) -> list[Profile]:
         start = 0.0 if earlier is None else np.interp(s, earlier.y, earlier.height)
         profiles.append(_joined(s, start - worn[place], earlier))
     return profiles
-
-
-def _settings(scenario: Scenario, number: int) -> tuple[object, ...]:
-    """Return what distinguishes rollers, as `merged_rollers` compares it."""
-    creepage = scenario.creepage
-    values = scenario.roller.offset, creepage.yaw, creepage.tilt
-    rows = (scenario.per_roller(value)[number] for value in values)
-    return (*rows, roller_profile(scenario, number))
 
 
 def _profile_text(profile: Profile) -> str:
@@ -195,7 +185,7 @@ def _surface_text(scenario: Scenario, data: RunData) -> str:
 
 def _notes(scenario: Scenario, data: RunData) -> Iterator[str]:
     """Yield what differs between the new test and the continuation of the old one."""
-    load = scenario.load.build()
+    load = scenario.load.built
     passes, total = float(data.records["record_passes"][-1]), data.total_passes
     if passes < total:
         yield f"the profiles are those after {passes:.0f} of {total:.0f} passes"

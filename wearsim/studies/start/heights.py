@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -27,8 +27,8 @@ class StartExtent(NamedTuple):
     relief: float
 
 
-def start_extent(scenario: Scenario) -> StartExtent | None:
-    """Return the extent of the start profiles, or None if there is none."""
+def start_extent(scenario: Scenario, offsets: Iterable[float]) -> StartExtent | None:
+    """Return the extent of the start profiles, or None if there is none; offsets of rollers [m]."""
     cylinder, roller = scenario.cylinder, scenario.roller
     ends, relief = [], 0.0
     if cylinder.profile is not None:
@@ -37,7 +37,7 @@ def start_extent(scenario: Scenario) -> StartExtent | None:
     if cylinder.start_surface is not None:
         ends.append((cylinder.start_surface.y, 0.0))
         relief += float(np.ptp(cylinder.start_surface.height, axis=1).max())
-    for number, offset in enumerate(scenario.per_roller(roller.offset)):
+    for number, offset in enumerate(offsets):
         profile = roller_profile(scenario, number)
         if profile is not None:
             ends.append((profile.y, offset))

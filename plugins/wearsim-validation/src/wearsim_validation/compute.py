@@ -129,7 +129,7 @@ def rigid_depth(scenario: wearsim.Scenario, passes: FloatArray) -> FloatArray:
     The groove is a parabola of the crown's radius R, and its area grows by c N in each pass with
     c = (K/H) mu xi, so that the depth is (3 c N n / (4 sqrt(2 R)))^(2/3).
     """
-    creepage, load = scenario.creepage.longitudinal, scenario.load.build()
+    creepage, load = scenario.creepage.longitudinal, scenario.load.built
     rate = wear_rate(scenario) * scenario.friction.coefficient * abs(creepage or 0.0)
     area = rate * float(load.mean(0.0, scenario.total_time)) * passes
     return np.asarray((0.75 * area / np.sqrt(2.0 * scenario.roller.crown_radius)) ** (2.0 / 3.0))
@@ -142,7 +142,7 @@ def wear_rate(scenario: wearsim.Scenario) -> float:
     """
     if scenario.wear is None:
         raise ValueError("a scenario without wear")
-    law = scenario.wear.build()
+    law = scenario.wear.built
     cylinder, roller = (law.depth_per_dissipation(body, 1.0) or 0.0 for body in BODIES)
     touches = scenario.cylinder.radius / scenario.roller.radius / scenario.operation.rollers
     return cylinder + touches * roller

@@ -249,7 +249,7 @@ class EnsembleData(StudyData):
             "y": strips,
             "kept": kept_profiles(self.requested, strips),
             "quantile": len(QUANTILES),
-            "angle": len(self.variables["angle"]) if self.cam else 0,
+            "angle": len(self.variables["angle"]) if "angle" in self.schema.variables else 0,
             "course": POINTS if self.fatigue else 0,
         }
         return {

@@ -8,7 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.results.content import Axis, Schema, Variable, by_name, with_random_inputs
+from wearsim.results.content import (
+    Axis,
+    Schema,
+    Variable,
+    by_name,
+    of_present,
+    with_random_inputs,
+)
 
 #: Variables that are stored for the first realisations only.
 KEPT = (
@@ -72,11 +79,9 @@ FATIGUE_OBSERVABLES: Mapping[str, Variable] = by_name(
 
 def observables_of(*, cam: bool = True, fatigue: bool = True) -> dict[str, Variable]:
     """Return the observables of tests, of a cam or a cylinder, with or without fatigue."""
-    return {
-        **OBSERVABLES,
-        **(CAM_OBSERVABLES if cam else {}),
-        **(FATIGUE_OBSERVABLES if fatigue else {}),
-    }
+    groups = (cam, CAM_OBSERVABLES), (fatigue, FATIGUE_OBSERVABLES)
+    further = {n: v for given, group in groups if given for n, v in group.items()}
+    return {**OBSERVABLES, **further}
 
 
 ALL_OBSERVABLES: Mapping[str, Variable] = observables_of()
@@ -256,6 +261,16 @@ ENSEMBLE = Schema(
 )
 
 
+_FURTHER = {
+    "control": by_name([_CONTROL]),
+    "life": LIFE,
+    "cam": {**by_name([ANGLE, _LIFT_ERROR]), **CAM_OBSERVABLES, **CAM_STATISTICS},
+    "fatigue": {**FATIGUE_OBSERVABLES, **_DAMAGE_PROFILES, **FATIGUE_STATISTICS},
+    "fatigue life": LIFE_FATIGUE,
+    "cam fatigue": {**by_name([_DAMAGE_CURVE]), **CAM_FATIGUE_STATISTICS},
+}
+
+
 def ensemble_schema(
     inputs: Sequence[Mapping[str, str]],
     control: Mapping[str, Any],
@@ -283,17 +298,11 @@ def ensemble_schema(
     Schema
     """
     schema = with_random_inputs(ENSEMBLE, inputs)
-    last = {**({"control": _CONTROL} if control else {}), **(LIFE if life else {})}
-    if cam:
-        last |= {"angle": ANGLE, "lift_error_curve": _LIFT_ERROR}
-        last |= {**CAM_OBSERVABLES, **CAM_STATISTICS}
-    if fatigue:
-        last |= {**FATIGUE_OBSERVABLES, **_DAMAGE_PROFILES, **FATIGUE_STATISTICS}
-        last |= LIFE_FATIGUE if life else {}
-    if cam and fatigue:
-        last |= {_DAMAGE_CURVE.name: _DAMAGE_CURVE, **CAM_FATIGUE_STATISTICS}
-    axes = {**schema.axes, **({_COURSE.name: _COURSE} if fatigue and life else {})}
-    return replace(schema, axes=axes, variables={**schema.variables, **last})
+    given = {"control": control, "life": life, "cam": cam, "fatigue": fatigue}
+    present = {name for name, value in given.items() if value}
+    axes = {**schema.axes, **({_COURSE.name: _COURSE} if {"fatigue", "life"} <= present else {})}
+    variables = {**schema.variables, **of_present(_FURTHER, present)}
+    return replace(schema, axes=axes, variables=variables)
 
 
 def is_row(variable: Variable) -> bool:

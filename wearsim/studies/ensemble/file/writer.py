@@ -36,6 +36,7 @@ from wearsim.studies.ensemble.file.parts import (
     write_part,
 )
 from wearsim.studies.ensemble.file.schema import (
+    ANGLE,
     CAM_FATIGUE_STATISTICS,
     CAM_STATISTICS,
     ENSEMBLE,
@@ -123,7 +124,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         """
         from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
-        names = {*STATIC, *(("angle",) if header.cam else ())}
+        names = STATIC.keys() | ({ANGLE.name} & header.schema.variables.keys())
         if static.keys() != names:
             raise ValueError(f"static arrays are {sorted(names)}, got {sorted(static)}")
         path = Path(path)

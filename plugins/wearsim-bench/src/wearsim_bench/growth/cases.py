@@ -108,7 +108,7 @@ def reference_workload(sizes: Sizes, model: str) -> Workload:
 def same_groove(passes: int) -> dict[str, object]:
     """Return changes of the rig so that this number of passes wears the same groove."""
     scenario = shipped_scenario(RIG)
-    law = scenario.wear.build() if scenario.wear is not None else None
+    law = scenario.wear.built if scenario.wear is not None else None
     factor = law.depth_per_dissipation("cylinder", scenario.rolling_speed) if law else None
     if factor is None:
         raise ValueError(f"the wear law of {RIG} is not linear")

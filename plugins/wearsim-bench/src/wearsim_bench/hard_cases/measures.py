@@ -37,7 +37,7 @@ def volume_balance(result: Result, scenario: Scenario) -> float | None:
     float, optional
         None if wear is not proportional to dissipation, 0 without wear.
     """
-    history, law = result.raw.history, scenario.wear.build() if scenario.wear else None
+    history, law = result.raw.history, scenario.wear.built if scenario.wear else None
     on_rollers = np.einsum("r,srn->sn", result.raw.static["multiplicity"], _roller_volume(result))
     worst = 0.0
     for body, volume in (("cylinder", history["worn_volume"]), ("roller", on_rollers)):

@@ -29,7 +29,7 @@ def rigid_depth(scenario: Scenario) -> float:
     """
     crown = scenario.roller.crown_radius
     half = 0.5 * (scenario.roller.width or math.inf)
-    load, rate = scenario.load.build(), scenario.pass_rate
+    load, rate = scenario.load.built, scenario.pass_rate
     creepage, friction = scenario.creepage.longitudinal, scenario.friction.coefficient
     assert creepage is not None
     per_load = _wear_factor(scenario) * friction * abs(creepage)

@@ -54,9 +54,8 @@ def observed_of(test: RandomTest, reference: Reference) -> dict[str, FloatArray]
 
 def _worn_state(problem: WearProblem, reference: Reference) -> WearState:
     """Return the state on the profiles of a reference, with its contacts."""
-    cylinder, cam = reference.cylinder_depth, problem.kinematics.cam
-    if cam is not None:  # equal stations are solved once
-        cylinder = cylinder[np.unique(cam.places, return_index=True)[1]]
+    solved = np.unique(problem.kinematics.track.places, return_index=True)[1]  # equal ones once
+    cylinder = reference.cylinder_depth[solved]
     state = fresh_state(problem).replaced(
         cylinder_depth=cylinder,
         roller_depth=reference.roller_depth,

@@ -214,8 +214,8 @@ def worn_of(problem: WearProblem, state: WearState) -> Worn:
 
 def at_all_stations(problem: WearProblem, state: WearState) -> Depths:
     """Return the depths of cylinder and rollers; those of a cam at all of its stations."""
-    cam, (cylinder, roller) = problem.kinematics.cam, state.depths
-    return (cylinder if cam is None else cam.at_unworn(cylinder)), roller
+    cylinder, roller = state.depths
+    return problem.kinematics.track.at_unworn(cylinder), roller
 
 
 def final_grid(test: RandomTest, until: float) -> tuple[Grid, float, float]:
