@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
@@ -233,8 +234,9 @@ class ImplicitStepper(StepDoublingStepper):
     def whole_step(
         self, problem: WearProblem, start: WearState, step: FloatArray, end: WearState, scheme: Step
     ) -> WearState:
-        """Return the solution by a whole step, about the exponents of the wear found by halves."""
-        return scheme(problem, start.replaced(wear_exponents=end.wear_exponents), step)
+        """Return the solution by a whole step, with first guesses from that by halves."""
+        start = start.replaced(wear_exponents=end.wear_exponents)
+        return implicit_step(problem, start, step, end.contacts)
 
 
 def _varies(problem: WearProblem) -> bool:
@@ -270,7 +272,12 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     )
 
 
-def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
+def implicit_step(
+    problem: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+    near: ContactBatchSolution | None = None,
+) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
     A backward differentiation formula of the order in `state`. Energy changes by the same formula
@@ -279,7 +286,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
     decrease is repeated at second order, and at first order if they still decrease; so is one in
     which contact would be lost. A step in which the load jumps is of first order. The state
-    returned has the order of its formula.
+    returned has the order of its formula. `near` is as of `step_by_formula`.
 
     Raises
     ------
@@ -297,7 +304,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:
-        end, decreased = step_by_formula(here, state, passes, conditions, order)
+        end, decreased = step_by_formula(here, state, passes, conditions, order, near)
     except (StepError, ContactError) as error:
         # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
         # on which the contact is not found; strips that are not cut are the simpler problem

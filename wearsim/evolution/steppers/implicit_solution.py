@@ -132,6 +132,7 @@ def step_by_formula(
     passes: FloatArray,
     conditions: Conditions,
     order: IntArray,
+    near: ContactBatchSolution | None = None,
 ) -> tuple[WearState, BoolArray]:
     """Return the state after an implicit step, and whether depths or energy decrease.
 
@@ -150,6 +151,8 @@ def step_by_formula(
         Length of the step.
     conditions : Conditions
     order : ndarray of int, shape (realisations,)
+    near : ContactBatchSolution, optional
+        Solutions from which the contact model starts, by default those at the start of the step.
 
     Raises
     ------
@@ -215,7 +218,8 @@ def step_by_formula(
         given: tuple[Any, ...] = (line_load, wear, exponents, about, compliance)
         linearise_step(*of_step, *given)
         batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
-        solved = solve_compliant(problem, batch, compliance, contacts, active)
+        warm = contacts if near is None or iteration > 1 else near
+        solved = solve_compliant(problem, batch, compliance, warm, active)
         iterations += active
         new, apart = wear_of(solved), solved.separation
         apart = (
