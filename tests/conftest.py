@@ -1,4 +1,7 @@
-"""Test modules that import a plugin: skipped without it, and marked `bench`."""
+"""Test modules that import a plugin: skipped without it, and marked `bench`.
+
+No example of hypothesis fails because of its run time.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("wearsim", settings(), deadline=None)
+settings.load_profile("wearsim")
 
 #: tests.benchmarks imports wearsim_bench
 PLUGINS = r"wearsim_(?:bench|chevalier2005|explore|halfspace|optimise|validation)"

@@ -44,11 +44,16 @@ PARTIAL = {"creepage__longitudinal": 1e-4}
 def begun(stepper, steps=(200.0, 300.0, 400.0), **changes):
     """Return a problem, and its state after a few steps of increasing order."""
     problem, _, _ = built(contact__strips=41, **changes)
+    return problem, after(stepper, problem, steps)
+
+
+def after(stepper, problem, steps):
+    """Return the state of a problem after a few steps of increasing order."""
     state = stepper.started(problem, fresh_state(problem))
     for number, passes in enumerate(steps):
         order = np.array([min(number + 1, 2)])
         state = implicit_step(problem, state.replaced(order=order), np.array([passes]))
-    return problem, state.replaced(order=np.array([2]))
+    return state.replaced(order=SECOND)
 
 
 def tried(stepper, problem, state, step=400.0, stop=STOP):
@@ -194,6 +199,23 @@ def test_doubled_step_has_the_greater_of_two_errors(plain, step, jumps):
     assert found.ratio == pytest.approx(np.minimum(ratio, their_ratio), rel=1e-9, abs=0.0)
     forced = tried(ImplicitStepper(TOLERANCE, 400.0), problem, state, step)
     assert forced.path[1].order == min(order[0], MAX_ORDER - 2)
+
+
+def test_error_of_the_energy_counts_in_doubled_steps_of_a_constant_load():
+    stepper, step = ImplicitStepper(TOLERANCE, by_doubling=True), np.array([6.0])
+    problem, state = begun(stepper, (2.0, 3.0, 4.0), **PARTIAL)
+    path = PiecewiseLinear(np.array([0.0, 1e9]), np.array([0.1, 0.1 + 1e-6]))
+    varying = replace(problem, varying=(Varying("friction", (0,), (path,)),))
+    later = after(stepper, varying, (2.0, 3.0, 4.0))
+    for one, start, counts in ((problem, state, True), (varying, later, False)):
+        found = tried(stepper, one, start, 6.0)
+        half, end = found.path
+        ended = end.replaced(order=SECOND)
+        (of_energy, _), _ = next_steps_of_energy(half, ended, TOLERANCE, KEEP, np.array([4]))
+        over, *_ = doubled_errors(stepper, one, start, step, found)
+        assert of_energy > 1.1 * over
+        exact = of_energy if counts else over
+        assert found.excess == pytest.approx(exact, rel=1e-9, abs=0.0)
 
 
 @pytest.mark.parametrize("case", ["constant", "rows", "friction"])

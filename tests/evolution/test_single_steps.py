@@ -187,6 +187,10 @@ def test_doubled_step_has_the_error_of_its_whole_step(rig):
         assert end.steps == number
         ratio = min(GROW, SAFETY * tried.excess[0] ** (-1.0 / 3.0))
         assert tried.ratio[0] == pytest.approx(ratio, rel=1e-12, abs=0.0)
+        if number == 1:  # half of the test
+            allowed = SHARE * 1e-3 * rig.sizes(worn, worn) / 0.5 ** np.array([0.5, 0.75, 0.0])
+            worst = (added / allowed)[:2].max()
+            assert tried.excess[0] == pytest.approx(worst, rel=1e-4, abs=0.0)
         state = end
     assert state.coarse_step_solution.passes[0] == 2.0 * count
     assert state.coarse_step_solution.coarse_step_solution is None

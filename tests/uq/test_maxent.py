@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import stats
 from scipy.integrate import quad
-from scipy.special import digamma
+from scipy.special import digamma, erfcx
 
 from wearsim.types import FloatArray
 from wearsim.uq.distributions.base import MaxentDistribution
@@ -226,6 +226,8 @@ def test_support_far_in_the_tail_is_nearly_exponential(depth: float) -> None:
     assert distribution.mean - depth == pytest.approx(1.0 / depth, rel=2.1 / depth**2)
     assert distribution.std == pytest.approx(1.0 / depth, rel=3.1 / depth**2)
     mirrored = cut_normal(-INF, -depth, 0.0, 1.0)
+    ratio = math.sqrt(2.0 / math.pi) / float(erfcx(depth / math.sqrt(2.0)))
+    assert [distribution.mean, -mirrored.mean] == pytest.approx([ratio] * 2, rel=1e-12)
     assert mirrored.quantile(np.array(0.2)) == pytest.approx(-distribution.quantile(np.array(0.8)))
 
 

@@ -139,6 +139,8 @@ def test_rest_is_where_the_roller_touches_the_base_circle(kind: str, seed: int) 
     assert abs(centre) == pytest.approx(follower.base_radius + follower.roller_radius)
     kinematics = follower.kinematics(np.zeros((3, 1)))
     force = follower.normal_force(kinematics, np.array([12.0]))
+    both = follower.kinematics(np.zeros(3), np.array([False, True]))
+    assert {np.shape(value) for value in vars(both).values()} == {(2,)}
     known = 12.0 / follower.lever / math.cos(kinematics.pressure_angle[0])
     assert force == pytest.approx([known])
 

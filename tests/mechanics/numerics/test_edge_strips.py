@@ -45,6 +45,7 @@ class Edges:
         self.part = rng.random((CONTACTS, STRIPS))
         self.part[rng.random(self.part.shape) < 0.25] = 0.0
         self.part[rng.random(self.part.shape) < 0.25] = 1.0
+        self.part[1, [0, -1]] = 0.0
         self.separation = np.where(self.part < 1.0, SIZE * rng.random(self.part.shape), 0.0)
         self.separation[:, ::2] *= 0.1  # some are far smaller than those ahead
         self.approach = SIZE * (2.0 + rng.random(CONTACTS))
@@ -207,7 +208,7 @@ def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges, p
     linear, apart = SIZE * rng.random((2, CONTACTS, STRIPS))
     level, active = edges.level.copy(), np.array([True, False, True])
     arguments = edges.strips, active, gaps, slopes, linear, apart, edges.loads, edges.wear, level
-    rest, expected = compare_edges(*arguments), np.zeros(TESTS)
+    rest, expected = compare_edges(*arguments), np.zeros((TESTS, STRIPS))
     for k, v, i in edges.each():
         moved = gaps[k, i] + linear[k, i] - apart[k, i] - edges.strips.gap[k, i]
         assert level[k, i] == pytest.approx(moved if active[v] else edges.level[k, i], rel=1e-14)
@@ -217,8 +218,14 @@ def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges, p
             differs = mean - joint
         else:
             differs = own if slopes[k, i] == np.inf else abs(mean - own - joint)
-        expected[v] = max(expected[v], differs)
-    np.testing.assert_allclose(rest, expected, rtol=1e-8)
+        expected[v, i] = max(expected[v, i], differs)
+    np.testing.assert_allclose(rest, expected.max(axis=1), rtol=1e-8)
+    for i in range(STRIPS):  # each strip by itself
+        strip = slice(i, i + 1)
+        alone = EdgeStrips(*edges.strips[:2], *(one[..., strip] for one in edges.strips[2:]))
+        arrays = (one[..., strip].copy() for one in arguments[2:])
+        rest = compare_edges(alone, active, *arrays)
+        np.testing.assert_allclose(rest, expected[:, i], rtol=1e-8, atol=1e-9 * SIZE)
     assert (level[[2, 5]] == edges.level[[2, 5]]).all()
 
 

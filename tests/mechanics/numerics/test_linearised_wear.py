@@ -111,12 +111,12 @@ def test_contacts_on_one_body_add_their_wear():
 
 
 def test_sizes_of_differences():
-    depths = np.array([[[4.0, 1.0, 3.0]], [[0.0, 1.0, 1.0]]])
-    differences = np.array([[[0.1, -9.0, -0.2]], [[5.0, 0.3, 0.0]]])
+    depths = 1e-6 * np.array([[[4.0, 1.0, 3.0]], [[0.0, 1.0, 1.0]]])
+    differences = 1e-6 * np.array([[[0.1, -9.0, -0.2]], [[5.0, 0.3, 0.0]]])
     weights = np.array([[1.0, 0.0], [2.0, 3.0]])
     sizes = difference_sizes(depths, differences, weights)[:, 0]
-    expected = [0.3, 2.0 * -9.1 + 3.0 * 5.3, np.linalg.norm(differences), np.linalg.norm(depths)]
-    assert sizes == pytest.approx(expected)
+    norms = np.linalg.norm(differences), np.linalg.norm(depths)
+    assert sizes == pytest.approx([0.3e-6, 1e-6 * (2.0 * -9.1 + 3.0 * 5.3), *norms])
 
 
 @pytest.mark.parametrize("stiffness", [0.0, 4e6])

@@ -333,6 +333,9 @@ def test_unsolvable_contacts_have_a_status(variant):
     broken[7] = np.nan
     assert solve(variant, grid, broken)[0] == NOT_FINITE
     assert solve(variant, grid, grid.y**2, load=0.0)[0] == NOT_FINITE
+    endless = np.full(41, 1e305)  # wear beyond all numbers
+    with np.errstate(over="ignore"):
+        assert solve(variant, grid, grid.y**2, compliance=endless)[0] == NOT_FINITE
     narrow = Grid.spanning(-1e-5, 1e-5, 201)
     assert solve(variant, narrow, np.zeros(201))[0] == TOO_FINE
 

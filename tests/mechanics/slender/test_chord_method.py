@@ -290,18 +290,19 @@ def test_solution_from_an_anchor_is_that_of_newtons_method(coupled: bool, crown:
 
 
 def test_number_of_failed_sets_of_contacts_is_returned() -> None:
-    known, gaps = constants(), np.stack([5.0 * Y**2, 5.0 * Y**2, 1e-3 * Y**2, 5.0 * Y**2])
+    ends = [5.0 * (Y - Y[0]) ** 2, 5.0 * (Y - Y[-1]) ** 2]
+    gaps = np.stack([5.0 * Y**2, 5.0 * Y**2, 1e-3 * Y**2, 5.0 * Y**2, *ends])
     gaps[1, 3], gaps[3, 0] = math.inf, math.nan
-    shape = 4, 1, STRIPS
-    line_load, approach, status = np.zeros(shape), np.zeros((4, 1)), np.zeros((2, 4), np.int64)
+    known, shape = constants(), (6, 1, STRIPS)
+    line_load, approach, status = np.zeros(shape), np.zeros((6, 1)), np.zeros((2, 6), np.int64)
     failed = solve_slender(
-        *(gaps.reshape(shape), np.zeros(shape), None, None, np.full((4, 1), 30.0)),
-        *(np.full((4, 1), 100.0), SPACING, MODULUS, known.table, known.curvature_influence),
+        *(gaps.reshape(shape), np.zeros(shape), None, None, np.full((6, 1), 30.0)),
+        *(np.full((6, 1), 100.0), SPACING, MODULUS, known.table, known.curvature_influence),
         *(line_load, approach, np.empty(shape), np.empty(shape), *status),
     )
-    # the second and the last gap are not finite, and the third contact reaches both ends
-    assert failed == 3
-    assert (status[0, [0, 2]] == CONVERGED).all()
+    # two gaps are not finite, and three contacts reach one end or both
+    assert failed == 5
+    assert (status[0, [0, 2, 4, 5]] == CONVERGED).all()
     assert (status[0, [1, 3]] == NOT_FINITE).all()
     assert (status[1, [1, 3]] == 0).all()
     assert line_load[2, 0, 0] > 0.0

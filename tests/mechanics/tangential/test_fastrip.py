@@ -139,6 +139,8 @@ def test_full_sliding_force_is_friction_times_load():
         assert np.hypot(*force) == pytest.approx(30.0, rel=1e-3)
         assert force / np.hypot(*force) == pytest.approx([-0.6, 0.8], rel=2e-2)
         assert power == pytest.approx(30.0 * 0.05, rel=1e-3)
+    slight = Ellipse(0.03, -0.04, mu=1e-10).totals()
+    assert np.hypot(*slight[:2]) == pytest.approx(3e-8, rel=1e-3, abs=0.0)
 
 
 SHAPE = {"a": "a_m", "b": "b_m", "load": "N_N", "mu": "mu"}

@@ -42,9 +42,9 @@ def test_induced_slip_of_a_distant_strip_falls_with_the_square_of_the_distance(s
     # W is 1/|y| far from a strip, also in a contact that is thousands of times as wide as long
     forces = np.zeros((2, 2000))
     forces[:, 0] = 3.0, 5.0
-    found = induced(*forces[:, ::sign].copy(), 1.0, 1.0)[:, ::sign]
+    found = induced(*forces[:, ::sign].copy(), 0.5, 0.5)[:, ::sign]
     for distance in (4, 20, 100, 500, 1999):
-        expected = -sign * POISSON / (np.pi * 77e9) * np.array([5.0, 3.0]) / distance**2
+        expected = -sign * POISSON / (np.pi * 77e9) * np.array([5.0, 3.0]) / (0.5 * distance**2)
         assert found[:, distance] == pytest.approx(expected, rel=0.1, abs=0.0)
 
 

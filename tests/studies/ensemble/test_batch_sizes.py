@@ -22,15 +22,15 @@ def batch_sizes(total: int, batches: int, workers: int = 1) -> list[int]:
 
 
 def test_batches_grow_to_their_duration_despite_a_slow_start():
-    assert batch_sizes(10_000, 6) == [1, 1, 4, 16, 64, round(SECONDS / EACH)]
+    assert batch_sizes(10_000, 5) == [1, 1, 8, 64, round(SECONDS / EACH)]
 
 
 def test_one_worker_takes_all_that_is_left():
-    assert batch_sizes(12, 4) == [1, 1, 4, 6]
+    assert batch_sizes(14, 4) == [1, 1, 8, 4]
 
 
 def test_several_workers_end_together_without_very_small_batches():
-    assert batch_sizes(100, 8, workers=2) == [1, 1, 4, 16, 20, LEAST_IN_BATCH, LEAST_IN_BATCH, 13]
+    assert batch_sizes(100, 8, workers=2) == [1, 1, 8, 23, 17, LEAST_IN_BATCH, LEAST_IN_BATCH, 9]
 
 
 def test_time_left_does_not_include_the_start_of_a_worker():

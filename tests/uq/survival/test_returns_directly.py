@@ -11,7 +11,7 @@ from scipy.special import log_ndtr, ndtr, ndtri
 
 from wearsim.uq.distributions.two_levels import TwoLevels, weighted_quantiles
 from wearsim.uq.survival.distributions import FactorMixture
-from wearsim.uq.survival.fleet import check_fleet, remaining_lives
+from wearsim.uq.survival.fleet import _draws, check_fleet, remaining_lives
 from wearsim.uq.survival.returns import Fleet, LifeFunctions, update
 from wearsim.uq.survival.scores import ScoreFunction, score_function
 from wearsim.uq.survival.two_levels import UncertainLives
@@ -332,3 +332,14 @@ def test_life_that_is_never_reached_is_infinite(exact: bool) -> None:
         assert given.high == math.inf
         error = math.log(given.value / given.low) / 1.96
         assert some.by_realisations == pytest.approx(error**2, rel=1e-4)
+
+
+def test_draws_of_a_posterior_have_the_shares_of_its_rows() -> None:
+    means, scatters = np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.2, 0.2, 0.3, 0.3])
+    levels = TwoLevels(means, scatters, np.array([2.0, 3.0, 1.0, 2.0]))
+    drawn = list(_draws(levels, 8))
+    assert [t for t, _, _ in drawn] == [0.2, 0.3]
+    assert np.sort(drawn[0][1]).tolist() == [1.0] * 2 + [2.0] * 3
+    assert np.sort(drawn[1][1]).tolist() == [3.0] + [4.0] * 2
+    numbers = np.concatenate([number for _, _, number in drawn])
+    assert np.sort(numbers).tolist() == list(range(8))

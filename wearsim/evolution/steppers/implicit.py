@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
@@ -233,8 +234,9 @@ class ImplicitStepper(StepDoublingStepper):
     def whole_step(
         self, problem: WearProblem, start: WearState, step: FloatArray, end: WearState, scheme: Step
     ) -> WearState:
-        """Return the solution by a whole step; its iteration starts from the contacts of `end`."""
-        return implicit_step(problem, start, step, end)
+        """Return the solution by a whole step, with first guesses from that by halves."""
+        start = start.replaced(wear_exponents=end.wear_exponents)
+        return implicit_step(problem, start, step, end.contacts)
 
 
 def _varies(problem: WearProblem) -> bool:
@@ -271,7 +273,10 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
 
 
 def implicit_step(
-    problem: WearProblem, state: WearState, passes: FloatArray, near: WearState | None = None
+    problem: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+    near: ContactBatchSolution | None = None,
 ) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
@@ -281,8 +286,7 @@ def implicit_step(
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
     decrease is repeated at second order, and at first order if they still decrease; so is one in
     which contact would be lost. A step in which the load jumps is of first order. The state
-    returned has the order of its formula. The iteration for the contacts starts from those of
-    `near`, by default of the start of the step.
+    returned has the order of its formula. `near` is as of `step_by_formula`.
 
     Raises
     ------

@@ -132,7 +132,7 @@ def step_by_formula(
     passes: FloatArray,
     conditions: Conditions,
     order: IntArray,
-    near: WearState | None = None,
+    near: ContactBatchSolution | None = None,
 ) -> tuple[WearState, BoolArray]:
     """Return the state after an implicit step, and whether depths or energy decrease.
 
@@ -151,15 +151,15 @@ def step_by_formula(
         Length of the step.
     conditions : Conditions
     order : ndarray of int, shape (realisations,)
-    near : WearState, optional
-        State from whose contacts the iteration starts, by default that at the start of the step.
+    near : ContactBatchSolution, optional
+        Solutions from which the contact model starts, by default those at the start of the step.
 
     Raises
     ------
     StepError
         If the iteration does not converge.
     """
-    past, contacts, depths = Past.of(state), (near or state).contacts, state.stacked
+    past, contacts, depths = Past.of(state), state.contacts, state.stacked
     bodies, gap = problem.body_rows, problem.contact_gap
     share = np.array(problem.cylinder_wear_share[: passes.size, 0])  # at the first station
     shape, strips = contacts.line_load.shape, problem.grid.strips
@@ -190,7 +190,7 @@ def step_by_formula(
         depths,
         bodies,
         gap,
-        kernel_input(state.contacts.approach),
+        kernel_input(contacts.approach),
         wear,
         share,
         past.separation,
@@ -208,9 +208,7 @@ def step_by_formula(
         *(bodies, resolved, gap, depths, past.part, of_bodies, of_contacts),
     )
     base, guess = of_bodies[3], of_bodies[4]
-    exponents = np.array((near or state).wear_exponents).reshape(shape)
-    if near is not None and near.past_feedback is not None:
-        feedback = near.past_feedback[0].reshape(feedback.shape)
+    exponents = np.array(state.wear_exponents).reshape(shape)
     loads = LoadsOfStep(problem, state, conditions.force, passes, feedback)
     stations, active = problem.shape[0], np.ones(realisations, dtype=np.bool_)
     iterations = np.zeros(realisations, dtype=np.int64)
@@ -220,7 +218,8 @@ def step_by_formula(
         given: tuple[Any, ...] = (line_load, wear, exponents, about, compliance)
         linearise_step(*of_step, *given)
         batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
-        solved = solve_compliant(problem, batch, compliance, contacts, active)
+        warm = contacts if near is None or iteration > 1 else near
+        solved = solve_compliant(problem, batch, compliance, warm, active)
         iterations += active
         new, apart = wear_of(solved), solved.separation
         apart = (
