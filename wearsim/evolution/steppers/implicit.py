@@ -41,7 +41,7 @@ from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, first_differen
 from wearsim.mechanics.numerics.step_errors import COVER, KEEP, OF_VOLUME, SHARE, assess_step
 from wearsim.types import FloatArray, IntArray
 
-DOUBLED_SHARE = 0.9  # part of the tolerance that a step may add to the profiles, by step doubling
+DOUBLED_SHARE = 0.7  # part of the tolerance that a step may add to the profiles, by step doubling
 # least relative error of the energy that a step aims at: no step is short enough for a smaller one,
 # as iterations are not more accurate, and by step doubling where the power changes by jumps
 LEAST_OF_ENERGY, LEAST_OF_JUMPS = 1e-5, 1e-4
