@@ -3,7 +3,7 @@
 # make test-slow       the other tests: kills of the writers, hard cases, installs, Dask, the site: 20 minutes
 # make test-coverage   how often stated intervals hold the truth, by hundreds of data sets: 10 minutes, before a release
 # make mutants         share of changed operators and constants that the quick tests notice: docs/measurements/mutants.json;
-#                      SAMPLE=300 and SEED=1 choose, SAMPLE=0 takes all 15,000, which takes hours
+#                      SAMPLE=300, a quarter of an hour, and SEED=1 choose; SAMPLE=0 takes all 14,000, hours
 # make bench-docs      measure again what the site states of steppers and whole tests: docs/measurements/; ten minutes,
 #                      and an hour of one core for the references of stated errors, which are kept in out/references
 # make bench           the same of contacts, sampling, growth and savings; a quarter of an hour
