@@ -88,10 +88,12 @@ def test_no_step_skips_a_peak_of_the_load(tmp_path, name, log, creepage):
     problem, stepper, stop = built(evolution__stepper=name, **common)
     found, _ = stepped(problem, stepper, stop)
     depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(reference)[0]
-    assert depth == pytest.approx(exact, rel=5e-3)
+    # by where steps begin and end between the jumps the error scatters by up to three tolerances;
+    # a peak that is left out changes the depth by a tenth
+    assert depth == pytest.approx(exact, rel=1e-2)
     assert abs(depth - exact) <= found.depth_error[0] + 2e-4 * exact
     volume, whole = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, reference)[0]
-    assert volume == pytest.approx(whole, rel=5e-3, abs=0.0)
+    assert volume == pytest.approx(whole, rel=1e-2, abs=0.0)
     assert abs(volume - whole) <= found.volume_error[0] + 2e-4 * whole
 
 
