@@ -230,7 +230,7 @@ def test_step_that_fails_is_not_repeated_at_the_outer_strips_or_with_others(groo
 
 
 class Noisy(Counting):
-    """Model whose power alternates between two values that differ a little."""
+    """Contact model with a power that changes slightly from call to call."""
 
     def __init__(self, model, noise):
         super().__init__(model)

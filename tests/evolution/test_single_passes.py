@@ -277,7 +277,7 @@ def test_pass_without_load_is_an_error(foundation):
 
 
 class Alternating(BlackBox):
-    """Contact model whose approach alternates, so that no load of a spring is in equilibrium."""
+    """Contact model whose approach alternates from call to call: the load does not converge."""
 
     def solve_contact(self, *arguments):
         found = super().solve_contact(*arguments)

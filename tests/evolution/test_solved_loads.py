@@ -35,7 +35,7 @@ THERMAL = {"load__thermal": {"gain": "500 N/W", "time_constant": "2 s"}}
 
 
 class Jumping(BlackBox):
-    """Contact model whose approach rises by a jump where the load exceeds 270 N."""
+    """Contact model with an approach that is discontinuous at a load of 270 N."""
 
     jump = 4e-6
 
@@ -46,7 +46,7 @@ class Jumping(BlackBox):
 
 
 class Softening(BlackBox):
-    """Contact model whose approach falls with the load, as fast as a spring loses it."""
+    """Contact model with an approach that decreases in proportion to the load."""
 
     def solve_contact(self, gap, curvature, point, *others):
         found = super().solve_contact(gap, curvature, point, *others)

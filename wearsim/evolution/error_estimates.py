@@ -110,7 +110,9 @@ def variation_bias(
     energy : ndarray, shape (realisations,)
         Energy to add [J].
     varies : ndarray of bool, shape (realisations,)
-        Whether the load or an input varies. None is returned where nothing does.
+        Whether the load or an input varies.
+
+    None is returned where nothing varies.
     """
     if problem.constant_load is not None and not problem.varying:
         return None

@@ -96,7 +96,10 @@ Item = TypeVar("Item", Axis, Variable)
 def of_present(
     groups: Mapping[str, Mapping[str, Variable]], present: Set[str]
 ) -> dict[str, Variable]:
-    """Return the variables of groups, all of whose words are present: "cam", "cam fatigue"."""
+    """Return the variables of the groups that apply.
+
+    A name such as "cam fatigue" applies where "cam" and "fatigue" are both `present`.
+    """
     chosen = (group for words, group in groups.items() if present >= set(words.split()))
     return {name: variable for group in chosen for name, variable in group.items()}
 

@@ -69,7 +69,7 @@ def jacobian(line_load: np.ndarray, g: int) -> np.ndarray:
 
 
 def chord_state(known: ContactConstants) -> ChordState:
-    """Return a state whose work space holds numbers that must not be used."""
+    """Return a state with its work space filled with numbers that a correct method ignores."""
     state = new_chord_state(known, 2, STRIPS)
     for array in (state.inverse, state.unit_load, state.guard_row, state.surface, state.matrix):
         array[:] = np.nan

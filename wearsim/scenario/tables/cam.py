@@ -170,7 +170,7 @@ class Cam:
 
 
 _NO_MEANING = "has no meaning without [cam]"
-#: Keys that go with a cam only: table, key, what is wrong without one, and what is expected.
+#: Keys that require [cam]: table, key, the message without [cam], and the remedy.
 _OF_CAMS = (
     ("operation", "turns", _NO_MEANING, None),
     ("roller", "inertia", _NO_MEANING, None),

@@ -1,4 +1,4 @@
-"""View of the run of a cam: angles and lift error besides what the run of a cylinder has."""
+"""View of the run of a cam: that of a cylinder, with angles and lift error added."""
 
 from __future__ import annotations
 

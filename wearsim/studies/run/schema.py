@@ -276,7 +276,7 @@ CAM_FATIGUE_VARIABLES: Mapping[str, Variable] = by_name(
         ),
     )
 )
-#: What a run has, by a variable that shows it.
+#: "cam" or "fatigue", by the variable that only such runs have.
 MARKS = {"station_angle": "cam", "damage": "fatigue"}
 _FURTHER = {
     "cam": CAM_VARIABLES,

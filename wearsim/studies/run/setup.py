@@ -160,7 +160,7 @@ class Setup:
 
     @cached_property
     def kinds(self) -> list[tuple[object, ...]]:
-        """What distinguishes the rollers: offset, yaw, tilt and start profile of each."""
+        """Offset, yaw, tilt and start profile of each roller; equal rows are merged."""
         columns = [self.inputs[name][:, 0].tolist() for name in ("offset", "yaw", "tilt")]
         numbers = range(self.scenario.operation.rollers)
         profiles = [roller_profile(self.scenario, number) for number in numbers]
