@@ -178,6 +178,28 @@ def test_pressure_of_whole_strips_is_close_and_its_stated_error_holds(stepper: s
     assert covered.mean() >= 0.92
 
 
+@pytest.mark.slow
+def test_pressure_of_stabilised_steps_is_close_after_strips_are_joined() -> None:
+    """The elastic approach then is a twentieth of what wears where the edge crosses a strip."""
+    result = run({"evolution.stepper": "stabilised", "operation.duration": "4500 min"})
+    late = result.time > 1000.0 * 60.0
+    pressure = result.peak_pressure[late].ravel()
+    assert late.sum() > 100
+    assert pressure == pytest.approx(rigid(result, late), rel=0.03)
+
+
+@pytest.mark.slow
+def test_pressure_of_stabilised_steps_of_different_rollers_is_that_of_small_steps() -> None:
+    changes = {**CASES["three"], **PLAIN, "operation.duration": "1500 min"}
+    stabilised, explicit = (
+        run({**changes, "evolution.stepper": name}) for name in ("stabilised", "explicit")
+    )
+    late = stabilised.time > 300.0 * 60.0
+    true, pressure = (one.peak_pressure.max(axis=1) for one in (explicit, stabilised))
+    true = np.interp(stabilised.passes[late], explicit.passes, true.ravel())
+    assert pressure[late].ravel() == pytest.approx(true, rel=0.03)
+
+
 @pytest.mark.parametrize("load", ["ramp", "wave"])
 def test_peak_pressure_under_a_load_that_varies_is_that_of_rigid_bodies(
     load: str, tmp_path: Path

@@ -36,9 +36,10 @@ from wearsim.types import FloatArray
 MIN_STAGES = 3  # with two, profiles that decay within a step are inaccurate
 SAFETY = 1.2  # on the greatest decay rate, which is estimated and may grow within the step
 
-# part of a strip by which the edges of a groove advance in a step, at most: the pressure in strips
-# that come into contact within longer steps is far too high
+# part of a strip by which the edges of a groove advance in a step, and its wear over the elastic
+# approach, at most: the pressure in strips that come into contact within longer steps is too high
 ADVANCE = 0.5
+MOST_WORN = 0.7
 
 #: change of the state in a step or in a part of it: depth of cylinder and rollers [m], and the
 #: power of every contact times the part of the step it lasted [W]
@@ -103,15 +104,24 @@ class StabilisedStepper(StepDoublingStepper):
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the step of the step-size control, limited where there is a groove.
 
-        The width of a groove grows as the cubic root of the passes. Without the separation of the
-        surfaces, the pressure at the edge is uncertain for any step.
+        The distance of an edge from the apex of its roller grows as the cubic root of the passes,
+        and the worn depth as its square. Without the separation of the surfaces, the pressure at
+        the edge is uncertain for any step.
         """
         found = super().proposed(problem, state)
         known = state.contacts.separation is not None and np.count_nonzero(state.passes) > 0
         if self.forced_step is not None or not known:
             return found
-        loaded = np.count_nonzero(problem.values_of(state.contacts, "line_load"), axis=-1)
-        longest = 6.0 * ADVANCE * state.passes / loaded.max(axis=(0, 1))
+        lowest = problem.gap(*state.depths).min(axis=-1)
+        worn = np.maximum(lowest - problem.nominal_least_gap, 0.0)
+        elastic = problem.values_of(state.contacts, "approach") - lowest
+        apex = problem.nominal_gap.argmin(axis=-1)
+        strips = np.abs(np.arange(problem.grid.strips) - apex[..., None])
+        loaded = problem.values_of(state.contacts, "line_load") > 0.0
+        growth = np.maximum(
+            (strips * loaded).max(axis=-1) / ADVANCE, 2.0 * worn / (MOST_WORN * elastic)
+        )
+        longest = 3.0 * state.passes / growth.max(axis=(0, 1))
         return np.where(have_groove(problem, state), np.minimum(found, longest), found)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
