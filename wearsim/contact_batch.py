@@ -169,9 +169,9 @@ class ContactBatch:
 
 def _unchecked(kind: type[T], values: Mapping[str, Any]) -> T:
     """Return an object with given attributes, without the assignments of a frozen dataclass."""
-    found = object.__new__(kind)
-    found.__dict__.update(values)
-    return found
+    unchecked = object.__new__(kind)
+    unchecked.__dict__.update(values)
+    return unchecked
 
 
 def _kind(point: OperatingPoint) -> tuple[object, ...]:

@@ -71,17 +71,17 @@ def greatest(stations: Stations, values: FloatArray) -> Extreme:
     first = _first_of_equal(peak, axis=0)
     largest = np.take_along_axis(peak, first, axis=0)[0]
     equal = np.abs(peak - largest) <= _EQUAL * np.abs(largest)
-    at, own, own_angle = (
+    at, error_there, angle_error_there = (
         np.take_along_axis(a, first, axis=0)[0] for a in (angle, error, angle_error)
     )
     # the greatest value may lie on another panel, except one that is the same as the first
-    twin = equal & (np.abs(error - own) <= _TWIN * own)
-    rival = ~twin & (peak + error >= largest - own)
+    twin = equal & (np.abs(error - error_there) <= _TWIN * error_there)
+    rival = ~twin & (peak + error >= largest - error_there)
     apart = np.abs(angle - at)
     apart = np.minimum(apart, math.tau - apart) + angle_error
     away = np.where(rival, apart, 0.0).max(axis=0)
     bound = np.where(twin | rival, peak + error, -np.inf).max(axis=0) - largest
-    return Extreme(largest, at, bound, np.clip(away, own_angle, math.pi))
+    return Extreme(largest, at, bound, np.clip(away, angle_error_there, math.pi))
 
 
 def greatest_value(stations: Stations, values: FloatArray) -> FloatArray:
@@ -106,10 +106,10 @@ def integral_error(stations: Stations, values: FloatArray) -> FloatArray:
         What is integrated over the angle [rad].
     """
     error = np.zeros(values.shape[1:])
-    each = zip(
+    panels = zip(
         stations.panels, stations.numbers, stations.first, _with_few(stations, 2), strict=True
     )
-    for panel, number, first, unknown in each:
+    for panel, number, first, unknown in panels:
         rows = values[first : first + number]
         part = np.abs(rows).max(axis=0) if unknown else np.zeros_like(error)
         if number > 2:
@@ -128,8 +128,8 @@ def _with_few(stations: Stations, most: int) -> BoolArray:
 def _first_of_equal(values: FloatArray, axis: int) -> IntArray:
     """Return the number of the greatest value along an axis, the first of equal ones."""
     most = values.max(axis=axis, keepdims=True)
-    found = (values >= most - _EQUAL * np.abs(most)).argmax(axis=axis)
-    return np.expand_dims(found, axis)
+    first = (values >= most - _EQUAL * np.abs(most)).argmax(axis=axis)
+    return np.expand_dims(first, axis)
 
 
 def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[FloatArray]:

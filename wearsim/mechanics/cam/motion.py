@@ -101,12 +101,12 @@ class Motion:
     @cached_property
     def panels(self) -> tuple[Panel, ...]:
         """Smooth parts, in the order of the angle."""
-        found = []
+        panels = []
         for number, part in enumerate(self.segments):
             start, stop = self.starts[number : number + 2].tolist()
             edges = [start, *(start + inner for inner in part.breaks), stop]
-            found += [Panel(number, *pair, part.dwell) for pair in itertools.pairwise(edges)]
-        return tuple(found)
+            panels += [Panel(number, *pair, part.dwell) for pair in itertools.pairwise(edges)]
+        return tuple(panels)
 
     def segment_label(self, number: int) -> str:
         """Return the number and the name of a segment, "segment 2 (cycloidal)"."""
@@ -130,11 +130,11 @@ class Motion:
     def lift(self, theta: FloatArray) -> FloatArray:
         """Return lift and derivatives at any angles [rad], shape (3, points)."""
         theta = np.mod(np.atleast_1d(np.asarray(theta, dtype=np.float64)), math.tau)
-        places, found = self.segment_at(theta), np.empty((3, len(theta)))
+        places, lift = self.segment_at(theta), np.empty((3, len(theta)))
         for number in np.unique(places):
             chosen = places == number
-            found[:, chosen] = self.lift_in(int(number), theta[chosen])
-        return found
+            lift[:, chosen] = self.lift_in(int(number), theta[chosen])
+        return lift
 
     def jerk(self, theta: FloatArray) -> FloatArray:
         """Return the third derivative of the lift at any angles [rad], shape (points,).
@@ -145,7 +145,7 @@ class Motion:
         turned = np.mod(np.atleast_1d(np.asarray(theta, dtype=np.float64)), math.tau)
         starts = np.array([panel.start for panel in self.panels])
         places = np.searchsorted(starts, turned + 1e-13, side="right") - 1
-        found = np.empty(len(turned))
+        jerk = np.empty(len(turned))
         for number in np.unique(places):
             panel, chosen = self.panels[number], places == number
             step = min(_JERK_STEP, 0.125 * (panel.stop - panel.start))
@@ -155,8 +155,8 @@ class Motion:
             polynomial = values @ np.linalg.inv(np.vander(_FIVE, increasing=True)).T
             away = (turned[chosen] - middle) / step
             powers = np.vander(away, len(_FIVE) - 1, increasing=True)
-            found[chosen] = (polynomial[:, 1:] * np.arange(1.0, 5.0) * powers).sum(axis=1) / step
-        return found
+            jerk[chosen] = (polynomial[:, 1:] * np.arange(1.0, 5.0) * powers).sum(axis=1) / step
+        return jerk
 
 
 def motion_mistakes(
@@ -170,20 +170,22 @@ def motion_mistakes(
     show : callable
         Returns a lift as text.
     """
-    found: list[tuple[int, str, str | None, str | None]] = []
+    mistakes: list[tuple[int, str, str | None, str | None]] = []
     last, motion = len(segments) - 1, Motion(tuple(segments))
     total = sum(part.angle for part in segments)
     if abs(total - math.tau) > _CLOSURE * math.tau:
         missing = math.degrees(math.tau - total + segments[-1].angle)
         remedy = f", with {missing:.6g} deg for {motion.segment_label(last)}" if missing > 0 else ""
         what = "the angles of the segments do not sum to a turn"
-        found.append((last, what, f"{math.degrees(total):.9g} deg", f"360 deg{remedy}"))
+        mistakes.append((last, what, f"{math.degrees(total):.9g} deg", f"360 deg{remedy}"))
     ends = np.array([part.ends for part in segments])
     rises = np.cumsum(ends[:, 0, 1])
     height = float(np.abs(rises).max())
     if abs(rises[-1]) > _CLOSURE * height:
         got = f"{show(float(rises[-1]))} after {motion.segment_label(last)}"
-        found.append((last, "the lift does not return to its start", got, "rises that sum to zero"))
+        mistakes.append(
+            (last, "the lift does not return to its start", got, "rises that sum to zero")
+        )
     inside = [np.abs(part.lift(np.linspace(0.0, part.angle, 65))[1]).max() for part in segments]
     greatest = float(max(inside))
     for number in range(last + 1):
@@ -192,5 +194,5 @@ def motion_mistakes(
         if abs(after - before) > _KINK * greatest:
             what = f"the slope of the lift jumps before {motion.segment_label(follower)}"
             got = f"from {show(float(before))} to {show(float(after))} per rad"
-            found.append((number, what, got, "laws with equal slopes where they meet"))
-    return found
+            mistakes.append((number, what, got, "laws with equal slopes where they meet"))
+    return mistakes

@@ -45,13 +45,13 @@ def angles_by_chord(points: Points, start: float, stop: float, tolerance: float)
     passed += 1e-9 * np.arange(_FINE)  # rises also on straight lines
     count = max(1, math.ceil(passed[-1]))
     for _ in range(_MOST_TRIALS):
-        found = np.interp(np.linspace(0.0, passed[-1], count + 1), passed, fine)
-        found[0], found[-1] = start, stop
-        away = _deviation(points, found)
+        angles = np.interp(np.linspace(0.0, passed[-1], count + 1), passed, fine)
+        angles[0], angles[-1] = start, stop
+        away = _deviation(points, angles)
         if away <= tolerance:
             break
         count = max(count + 1, math.ceil(count * min(2.0, math.sqrt(away / (_CLOSE * tolerance)))))
-    return found
+    return angles
 
 
 def _deviation(points: Points, angles: FloatArray) -> float:
@@ -82,13 +82,13 @@ def angles_by_number(parts: Sequence[tuple[Points, float, float]], number: int) 
     """
     fine = [np.linspace(start, stop, _FINE) for _, start, stop in parts]
     lengths = [
-        np.concatenate([[0.0], np.cumsum(np.abs(np.diff(points(each)[0])))])
-        for (points, _, _), each in zip(parts, fine, strict=True)
+        np.concatenate([[0.0], np.cumsum(np.abs(np.diff(points(angles)[0])))])
+        for (points, _, _), angles in zip(parts, fine, strict=True)
     ]
     ends = np.cumsum([0.0, *(length[-1] for length in lengths)])
     wanted = ends[-1] * np.arange(number) / number
     places = np.searchsorted(ends, wanted, side="right") - 1
     return [
-        np.interp(wanted[places == part] - ends[part], length, each)
-        for part, (length, each) in enumerate(zip(lengths, fine, strict=True))
+        np.interp(wanted[places == part] - ends[part], length, angles)
+        for part, (length, angles) in enumerate(zip(lengths, fine, strict=True))
     ]

@@ -190,13 +190,13 @@ class _Lift:
         turned = sense * (self.start + np.asarray(angle))
         turned = turned + (0.0 if follower.swings else 0.5 * math.pi)
         if isinstance(part, Arc):
-            found = self._on_arc(part, turned, sense)
+            lift = self._on_arc(part, turned, sense)
         else:
-            found = self._on_line(part, turned, sense)
-        if not np.isfinite(found).all():
+            lift = self._on_line(part, turned, sense)
+        if not np.isfinite(lift).all():
             raise ValueError(f"the follower loses the {part.name} of the cam")
-        found[0] -= follower.rest + self.base
-        return found
+        lift[0] -= follower.rest + self.base
+        return lift
 
     def _position(self, at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the roller's centre and its derivatives by the follower's position."""

@@ -118,7 +118,7 @@ def skid_arcs(
             if bend != 0.0 and abs(passed[2] - passed[1]) < abs(passed[1] - passed[0]):
                 before = slip = passed[2] - (passed[2] - passed[1]) ** 2 / bend
             passed.clear()
-        found: list[SkidArc] = []
+        skids: list[SkidArc] = []
         for number in range(len(panels) + 1):
             k = (first + number) % len(panels)
             low = start if number == 0 else 0
@@ -128,9 +128,9 @@ def skid_arcs(
             part = slice(low, high + 1)
             trace = _Trace(grids[k][part], Rolling(*(a[part] for a in values[k])))
             slip, arcs = trace.follow(slip)
-            found += [SkidArc(k, *arc) for arc in arcs]
+            skids += [SkidArc(k, *arc) for arc in arcs]
         if abs(slip - before) <= 1e-9 * size:
-            return sorted(found, key=lambda arc: float(arc.theta[0]))
+            return sorted(skids, key=lambda arc: float(arc.theta[0]))
     raise ValueError("the roller skids on through whole turns")
 
 

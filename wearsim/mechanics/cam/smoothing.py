@@ -45,7 +45,7 @@ def estimated_noise(angle: FloatArray, values: FloatArray) -> float:
     angle, values : ndarray, shape (points,)
         Rising angles within a turn [rad], and values.
     """
-    found = []
+    estimates = []
     for order in _ORDERS:
         around = np.append(angle, angle[:order] + math.tau)
         windows = np.lib.stride_tricks.sliding_window_view(around, order + 1)
@@ -57,8 +57,8 @@ def estimated_noise(angle: FloatArray, values: FloatArray) -> float:
         )
         difference = np.abs((weight * (near - near[:, :1])).sum(axis=1))
         known = difference[difference > 0.0]  # rounded tables do not move on their dwells
-        found.append(float(np.median(known)) / _MIDDLE if len(known) else 0.0)
-    return min(found)
+        estimates.append(float(np.median(known)) / _MIDDLE if len(known) else 0.0)
+    return min(estimates)
 
 
 def scatter_through_points(angle: FloatArray, noise: float) -> float:
@@ -108,9 +108,11 @@ class SmoothedCurve:
         """Return values and two derivatives at angles [rad], shape (3, points)."""
         from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import)
 
-        own = self.coefficients if coefficients is None else coefficients
+        chosen = self.coefficients if coefficients is None else coefficients
         knots = _extended(self.knots)
-        spline = BSpline(knots, np.take(own, range(len(knots) - DEGREE - 1), mode="wrap"), DEGREE)
+        spline = BSpline(
+            knots, np.take(chosen, range(len(knots) - DEGREE - 1), mode="wrap"), DEGREE
+        )
         place = _within(self.knots, np.asarray(angle))
         return np.stack([spline(place, nu=order) for order in range(3)])
 
@@ -126,7 +128,7 @@ class SmoothedCurve:
         if not ends:
             return []
         following = [*ends[1:], (ends[0][0] + math.tau, 0.0)]
-        return [(one[1], other[0]) for one, other in zip(ends, following, strict=True)]
+        return [(before[1], after[0]) for before, after in zip(ends, following, strict=True)]
 
 
 def smoothed(
@@ -175,19 +177,19 @@ def _basis(knots: FloatArray, angle: FloatArray, order: int) -> FloatArray:
     from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import)
 
     count = len(knots)
-    own = np.eye(count)[np.arange(count + DEGREE) % count]
-    values = BSpline(_extended(knots), own, DEGREE)(_within(knots, angle), nu=order)
+    unit_vectors = np.eye(count)[np.arange(count + DEGREE) % count]
+    values = BSpline(_extended(knots), unit_vectors, DEGREE)(_within(knots, angle), nu=order)
     return np.asarray(values)
 
 
 def _knots(dwells: Sequence[tuple[float, float]], spacing: float) -> FloatArray:
     """Return knots of the parts between dwells, triple at their ends."""
-    found: list[float] = []
+    knots: list[float] = []
     following = [*dwells[1:], (dwells[0][0] + math.tau, 0.0)]
     for (_, start), (stop, _) in zip(dwells, following, strict=True):
         inner = np.linspace(start, stop, max(2, round((stop - start) / spacing)) + 1)[1:-1]
-        found += [start] * 3 + inner.tolist() + [stop] * 3
-    return np.sort(np.mod(found, math.tau))
+        knots += [start] * 3 + inner.tolist() + [stop] * 3
+    return np.sort(np.mod(knots, math.tau))
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,29 +238,31 @@ def _fitted(
     part, vectors = eigh(penalty, gram + penalty)
     part = np.where(part < 1e-12, 0.0, np.minimum(part, 1.0))
     middle = float(values.mean())
-    own = values - middle
-    moment = vectors.T @ (design.T @ own)
+    centred = values - middle
+    moment = vectors.T @ (design.T @ centred)
     weight = np.exp(_LN_LAMBDA)[:, None]
     diagonal = (1.0 - part) + weight * part
     # the sum of squares and the penalty together
-    squares = np.maximum(own @ own - (moment**2 / diagonal).sum(axis=1), 1e-300)
+    squares = np.maximum(centred @ centred - (moment**2 / diagonal).sum(axis=1), 1e-300)
     curved = np.count_nonzero(part)
     spread = np.log(diagonal).sum(axis=1) - curved * _LN_LAMBDA
     if noise is None:
-        score = (len(own) - len(part) + curved) * np.log(squares) + spread
+        score = (len(centred) - len(part) + curved) * np.log(squares) + spread
     else:
         score = squares / noise**2 + spread
     best = int(score.argmin())
     free = moment / diagonal[best]
     freedom = float(((1.0 - part) / diagonal[best]).sum())
-    residual = own - design @ (vectors @ free)
-    found = float(np.sqrt(residual @ residual / max(len(own) - freedom, 1.0)))
-    factor = found * (tied @ (vectors / np.sqrt(diagonal[best])))
+    residual = centred - design @ (vectors @ free)
+    deviation = float(np.sqrt(residual @ residual / max(len(centred) - freedom, 1.0)))
+    factor = deviation * (tied @ (vectors / np.sqrt(diagonal[best])))
     coefficients = tied @ (vectors @ free) + middle
     along = _around()
     rows = _basis(knots, along, 2) @ factor
     error = float(np.sqrt((rows**2).sum(axis=1).mean()))
-    curve = SmoothedCurve(knots, coefficients, found, angle, residual, error, tuple(dwells), factor)
+    curve = SmoothedCurve(
+        knots, coefficients, deviation, angle, residual, error, tuple(dwells), factor
+    )
     return _Fit(curve, freedom)
 
 
@@ -289,7 +293,7 @@ def _dwells(fit: _Fit, values: FloatArray) -> tuple[tuple[float, float], ...]:
     turned = int(np.flatnonzero(~still)[0])  # an angle of motion, from which the runs are counted
     around = np.roll(still, -turned)
     changes = np.flatnonzero(np.diff(around.astype(np.int8), append=0)) + 1
-    found = []
+    dwells = []
     for start, stop in changes.reshape(-1, 2).tolist():
         low, high = (along[1] * (turned + place) for place in (start, stop - 1))
         low, high = low + _SHRINKAGE * length, high - _SHRINKAGE * length
@@ -298,5 +302,5 @@ def _dwells(fit: _Fit, values: FloatArray) -> tuple[tuple[float, float], ...]:
             continue
         scatter = float(values[inside].var(ddof=1))
         if scatter < curve.noise**2 * (1.0 + 4.0 * math.sqrt(2.0 / inside.sum())):
-            found.append((low % math.tau, low % math.tau + high - low))
-    return tuple(sorted(found))
+            dwells.append((low % math.tau, low % math.tau + high - low))
+    return tuple(sorted(dwells))

@@ -102,14 +102,14 @@ class Stations:
     @cached_property
     def angle(self) -> FloatArray:
         """Angle of each station, shape (stations,) [rad]."""
-        each = zip(self.panels, self.numbers, strict=True)
-        return np.concatenate([p.start + (p.stop - p.start) * lobatto(n)[0] for p, n in each])
+        panels = zip(self.panels, self.numbers, strict=True)
+        return np.concatenate([p.start + (p.stop - p.start) * lobatto(n)[0] for p, n in panels])
 
     @cached_property
     def weight(self) -> FloatArray:
         """Weight of each station in an integral over a turn, shape (stations,) [rad]."""
-        each = zip(self.panels, self.numbers, strict=True)
-        return np.concatenate([(p.stop - p.start) * lobatto(n)[1] for p, n in each])
+        panels = zip(self.panels, self.numbers, strict=True)
+        return np.concatenate([(p.stop - p.start) * lobatto(n)[1] for p, n in panels])
 
     def values_at(self, values: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
         """Return values between the stations.
@@ -131,21 +131,21 @@ class Stations:
 
     def values_at_angles(self, values: FloatArray, angles: FloatArray) -> FloatArray:
         """Return values at increasing angles from 0 to 2 pi [rad], shape (angles, ...)."""
-        found = np.empty((len(angles), *values.shape[1:]))
+        interpolated = np.empty((len(angles), *values.shape[1:]))
         for panel, number, first in zip(self.panels, self.numbers, self.first, strict=True):
             low, high = np.searchsorted(angles, (panel.start, panel.stop)).tolist()
             high = len(angles) if panel is self.panels[-1] else high
             places = (angles[low:high] - panel.start) / (panel.stop - panel.start)
             matrix = interpolation(number, np.clip(places, 0.0, 1.0))
-            found[low:high] = np.tensordot(matrix, values[first : first + number], axes=1)
-        return found
+            interpolated[low:high] = np.tensordot(matrix, values[first : first + number], axes=1)
+        return interpolated
 
     def values_between(self, values: FloatArray, places: FloatArray) -> FloatArray:
         """Return values at positions of every panel, from 0 to 1, (points, ...)."""
-        each = zip(self.numbers, self.first, strict=True)
+        panels = zip(self.numbers, self.first, strict=True)
         parts = [
             np.tensordot(interpolation(number, places), values[first : first + number], axes=1)
-            for number, first in each
+            for number, first in panels
         ]
         return np.concatenate(parts)
 

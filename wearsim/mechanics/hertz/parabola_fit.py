@@ -213,21 +213,21 @@ def hertz_on_profile(
         here = math.log(width)
         if status == CONVERGED:
             centre = vertex
-            found = hertz_ellipse(curvature_x, curvature, normal_force, contact_modulus)[1]
-            sufficient = found <= width and strips_within(y, centre, found) >= 3
+            half_width = hertz_ellipse(curvature_x, curvature, normal_force, contact_modulus)[1]
+            sufficient = half_width <= width and strips_within(y, centre, half_width) >= 3
             if iteration == 1 and sufficient and is_parabola(y, gap, curvature, centre, height):
-                return curvature, found, centre, height, iteration, CONVERGED
-            value = min(math.log(found / width), HOLLOW)
+                return curvature, half_width, centre, height, iteration, CONVERGED
+            value = min(math.log(half_width / width), HOLLOW)
         elif status != TOO_FEW_STRIPS and high_value != 0.0:
             # the section lies in the concave part of a groove, where no patch ends: too narrow
-            found, value = math.inf, HOLLOW
+            half_width, value = math.inf, HOLLOW
         else:
             return curvature, width, vertex, height, iteration, status
         if abs(value) <= tolerance:
-            return curvature, found, centre, height, iteration, CONVERGED
+            return curvature, half_width, centre, height, iteration, CONVERGED
         if value > 0.0:
             if high_value == 0.0:
-                return curvature, found, centre, height, iteration, LEAVES_STRIPS
+                return curvature, half_width, centre, height, iteration, LEAVES_STRIPS
             high_value *= 0.5 if side > 0 else 1.0
             low, low_value, side = here, value, 1
         else:
@@ -237,9 +237,9 @@ def hertz_on_profile(
             # b' is either a steep function of b here, or it jumps and no patch is consistent
             agrees = status == CONVERGED and abs(value) < 1e4 * tolerance
             status = CONVERGED if agrees else NO_CURVATURE
-            return curvature, found, centre, height, iteration, status
+            return curvature, half_width, centre, height, iteration, status
         if low_value == 0.0:
-            width = max(found, 0.6 * width)
+            width = max(half_width, 0.6 * width)
         else:
             width = math.exp(high - high_value * (high - low) / (high_value - low_value))
     return curvature, width, centre, height, limit, NOT_CONVERGED

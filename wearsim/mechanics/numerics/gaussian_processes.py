@@ -135,7 +135,7 @@ def squared_residuals(
     """
     count, points = columns.shape
     models, forms = lines.shape[2], lines.shape[0]
-    found = np.empty((models, count))
+    sums = np.empty((models, count))
     mean, squares, residual = np.empty(models), np.empty(models), np.empty(models)
     along = np.empty((forms, models))
     for c in range(count):
@@ -155,5 +155,5 @@ def squared_residuals(
         for m in range(models):
             for k in range(forms):
                 squares[m] -= along[k, m] * along[k, m]
-            found[m, c] = squares[m]
-    return found
+            sums[m, c] = squares[m]
+    return sums

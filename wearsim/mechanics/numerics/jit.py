@@ -281,7 +281,10 @@ def _call_elsewhere(functions: Sequence[Callable[[], None]]) -> None:
     """
     if not functions or processors() == 1 or _cache_folder() is None:
         return
-    calls = (f"from {one.__module__} import {one.__name__}; {one.__name__}()" for one in functions)
+    calls = (
+        f"from {function.__module__} import {function.__name__}; {function.__name__}()"
+        for function in functions
+    )
     code = "; ".join([f"import sys; sys.path[:] = {sys.path!r}", *calls])
     quiet: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     with suppress(OSError):
@@ -301,8 +304,8 @@ def not_cached(names: Iterable[str]) -> set[str]:
     are only considered to be missing.
     """
     folder = _cache_folder()
-    found = () if folder is None else folder.glob("*/*.nbi")
-    return set(names) - {path.name.partition(".")[2].partition("-")[0] for path in found}
+    cached = () if folder is None else folder.glob("*/*.nbi")
+    return set(names) - {path.name.partition(".")[2].partition("-")[0] for path in cached}
 
 
 def own_array(array: FloatArray) -> FloatArray:
@@ -349,14 +352,14 @@ def cache_folder(package: Path, of_user: str, home: str) -> Path | None:
     places: list[Any] = [of_user, package / "__pycache__", os.path.expanduser(home)]
     for place in filter(None, places):
         folder = Path(place, install + digest.hexdigest()[:12])
-        found = folder.is_dir()
+        writable = folder.is_dir()
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with TemporaryFile(dir=folder):
                 pass
         except OSError:
             continue
-        if not found:
+        if not writable:
             _remove_former(folder, install)
         return folder
     return None

@@ -172,9 +172,9 @@ def invert_factored(matrix: FloatArray, size: int, inverse: FloatArray) -> None:
 
 def compile_linear_systems() -> None:
     """Compile `factor_in_place` and `solve_factored` by a call for one unknown."""
-    one = np.ones((1, 1))
-    factor_in_place(one, 1)
-    solve_factored(one, 1, one[0])
+    unit = np.ones((1, 1))
+    factor_in_place(unit, 1)
+    solve_factored(unit, 1, unit[0])
 
 
 compile_alongside("solve_slender", compile_linear_systems, within=True)

@@ -249,7 +249,7 @@ def next_steps(
         ratio of the next step to it.
     """
     sizes = local_errors(differences, spans, depths, orders, parts, errors)
-    found = np.empty((2, len(part)))
+    steps = np.empty((2, len(part)))
     for v in range(len(part)):
         known, order = 0, orders[v]
         # without an estimate the order is kept
@@ -268,8 +268,8 @@ def next_steps(
         if 0 < known < order + 1 and order < most[v] and excess <= 1.0:
             best = order + 1  # the first steps have no estimate of the next order
         next_orders[v] = best
-        found[0, v], found[1, v] = excess, min(ratio, GROW[best - 1])
-    return found
+        steps[0, v], steps[1, v] = excess, min(ratio, GROW[best - 1])
+    return steps
 
 
 def first_differences(rates: FloatArray, exposure: FloatArray) -> FloatArray:

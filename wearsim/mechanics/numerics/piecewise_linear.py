@@ -52,8 +52,8 @@ class PiecewiseLinear:
         area = float(self._area[k]) + 0.5 * duration * (first + here)
         if len(self._known) >= _KNOWN:
             self._known = {}
-        found = self._known[time] = area, float(self._square[k]) + square
-        return found
+        integrals = self._known[time] = area, float(self._square[k]) + square
+        return integrals
 
     def mean(self, start: float, stop: float) -> float:
         """Return the exact mean between two times [s]."""

@@ -213,7 +213,7 @@ def contact_places(
     int
         Their number; several strips may be equally low.
     """
-    bottom, found = gap.min(), 0
+    bottom, number = gap.min(), 0
     for m in range(count):
         first, last = places[m, 0], places[m, 1]
         if gap[first] > bottom:
@@ -231,9 +231,9 @@ def contact_places(
                 total += weight
                 moment += weight * (i - first)
                 i += 2 * side - 1
-        points[found] = first + moment / total
-        found += 1
-    return found
+        points[number] = first + moment / total
+        number += 1
+    return number
 
 
 @subroutine
@@ -326,7 +326,7 @@ def solve_virtual_penetration(
     n, longest = len(gap), spacing * np.exp(HIGHEST)
     bottom, points = gap.min(), np.empty(count)
     mean_depth = even_depth(gap, load / (MEAN_STIFFNESS * contact_modulus))
-    found = contact_places(gap, places, count, TOUCHING * mean_depth, points)
+    contacts = contact_places(gap, places, count, TOUCHING * mean_depth, points)
     reach[:] = OVERLAP
     # with a smaller approach the first contact points would lie outside the contact
     low, high = TOUCHING * mean_depth / OVERLAP, np.inf
@@ -341,8 +341,8 @@ def solve_virtual_penetration(
             total += depth[i]
             deepest = max(deepest, depth[i])
         pressed = 0.0
-        for m in range(found):
-            pressed += displacement_at(points[m], depth, spacing, curvature, table) / found
+        for m in range(contacts):
+            pressed += displacement_at(points[m], depth, spacing, curvature, table) / contacts
         stiffness = approach * np.pi * contact_modulus / pressed
         error = np.log(stiffness * total / load)
         if abs(error) <= TOLERANCE or high - low <= TOLERANCE * approach:

@@ -88,10 +88,10 @@ def read_local_hertz(table: FloatArray, ratio: float) -> tuple[float, float, flo
     here = (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0
     after = -(s + 1.0) * s * (s - 2.0) / 2.0
     beyond = (s + 1.0) * s * (s - 1.0) / 6.0
-    one, two, three, four = table[node - 1], table[node], table[node + 1], table[node + 2]
-    stiffness = before * one[0] + here * two[0] + after * three[0] + beyond * four[0]
-    length = before * one[1] + here * two[1] + after * three[1] + beyond * four[1]
-    part = before * one[2] + here * two[2] + after * three[2] + beyond * four[2]
+    first, second, third, fourth = table[node - 1], table[node], table[node + 1], table[node + 2]
+    stiffness = before * first[0] + here * second[0] + after * third[0] + beyond * fourth[0]
+    length = before * first[1] + here * second[1] + after * third[1] + beyond * fourth[1]
+    part = before * first[2] + here * second[2] + after * third[2] + beyond * fourth[2]
     return np.exp(stiffness), np.exp(length), part
 
 

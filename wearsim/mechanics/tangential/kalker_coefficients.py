@@ -191,9 +191,9 @@ def coefficient(which: int, ratio: float, nu: float, table: Spline) -> float:
     total = 0.0
     for k in range(len(_NODES)):
         column = _at(table.knots, table.values, table.slopes, k, inside)
-        own, one, other = _NODES[k], _NODES[(k + 1) % 3], _NODES[(k + 2) % 3]
-        weight = (nu - one) * (nu - other) / ((own - one) * (own - other))  # Lagrange
-        total += weight * (column * (1.0 - own) if which == 3 else 1.0 / column)
+        node, second, third = _NODES[k], _NODES[(k + 1) % 3], _NODES[(k + 2) % 3]
+        weight = (nu - second) * (nu - third) / ((node - second) * (node - third))  # Lagrange
+        total += weight * (column * (1.0 - node) if which == 3 else 1.0 / column)
     value = total / (1.0 - nu) if which == 3 else 1.0 / total
     if place < low:  # continued towards the limit at a/b = 0
         edge = math.exp(low)

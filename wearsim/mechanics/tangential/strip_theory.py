@@ -89,10 +89,10 @@ def _fill_work(slip_x: FloatArray, slip_y: float, spin: float, out: StripTractio
     seen, rigid = 0.0, 0.0
     for i in range(slip_x.shape[0]):
         force_x, force_y = out.force_x[i], out.force_y[i]
-        own = -(force_x * slip_x[i] + force_y * slip_y + spin * out.moment[i])
-        out.work[i] = own - (force_x * out.induced_x[i] + force_y * out.induced_y[i])
+        work = -(force_x * slip_x[i] + force_y * slip_y + spin * out.moment[i])
+        out.work[i] = work - (force_x * out.induced_x[i] + force_y * out.induced_y[i])
         seen += out.work[i]
-        rigid += own
+        rigid += work
     scale = rigid / seen if seen > 0.0 else 1.0
     for i in range(slip_x.shape[0]):
         out.work[i] *= scale

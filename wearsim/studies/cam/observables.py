@@ -145,17 +145,21 @@ class CamObservables(CylinderObservables):
         curves: list[dict[str, Any]] = [
             {
                 "depth_profile": depth,
-                "lift_error_curve": own.values_at_angles(lifts[:, roller[v], v], CURVE_ANGLES),
+                "lift_error_curve": test_stations.values_at_angles(
+                    lifts[:, roller[v], v], CURVE_ANGLES
+                ),
             }
-            for v, (depth, own) in enumerate(
+            for v, (depth, test_stations) in enumerate(
                 zip(deepest(state.cylinder_depth[:, 0]), stations, strict=True)
             )
         ]
         if state.damage is not None:
             damage = state.damage[0, : problem.shape[0]]
             along, across = at_every_station(problem, damage.max(axis=-1)), deepest(damage)
-            for v, own in enumerate(stations):
-                at_angles = np.maximum(own.values_at_angles(along[:, v], CURVE_ANGLES), 0.0)
+            for v, test_stations in enumerate(stations):
+                at_angles = np.maximum(
+                    test_stations.values_at_angles(along[:, v], CURVE_ANGLES), 0.0
+                )
                 curves[v] |= {"cylinder_damage_profile": across[v], "damage_curve": at_angles}
         return curves
 

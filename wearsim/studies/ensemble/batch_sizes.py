@@ -50,8 +50,8 @@ class BatchSizes:
             Realisations that are not finished.
         workers : int
         """
-        each = math.ceil(left / workers)
-        together = each if workers == 1 else max(math.ceil(each / 2), min(each, LEAST_IN_BATCH))
+        share = math.ceil(left / workers)
+        together = share if workers == 1 else max(math.ceil(share / 2), min(share, LEAST_IN_BATCH))
         most = max(min(together, MOST_IN_BATCH, GROWTH * self._largest), 1)
         rate = self.rate
         if len(self._recent) > 1:

@@ -83,7 +83,7 @@ def _end(dataset: xarray.Dataset) -> xarray.Dataset:
 
 def _numbers(values: Sequence[str]) -> tuple[list[Any], str]:
     """Return the values of a key in SI with their unit, or as given where they are no numbers."""
-    found, units = [], set()
+    numbers, units = [], set()
     for value in values:
         number = NUMBER.match(value.strip())
         unit = value.strip()[number.end() :].strip() if number else ""
@@ -91,11 +91,11 @@ def _numbers(values: Sequence[str]) -> tuple[list[Any], str]:
             return list(values), ""
         try:
             si = quantity_kind(unit).unit if unit else "1"
-            found.append(quantity(value, si) if unit else float(number[0]))
+            numbers.append(quantity(value, si) if unit else float(number[0]))
         except QuantityError:
             return list(values), ""
         units.add(si)
-    return (found, units.pop()) if len(units) == 1 else (list(values), "")
+    return (numbers, units.pop()) if len(units) == 1 else (list(values), "")
 
 
 def sweep(

@@ -94,17 +94,17 @@ class RealisationsView(StudyView[Shown]):
 
         The name of an observable alone stands for its mean.
         """
-        found = super().answers()
+        answers = super().answers()
         for name in observed(self.result):
             words, unit = OBSERVABLES[name]
             estimate = self.result.estimate(name, -1, QUANTILES)
             values = {"": estimate.mean, ".mean": estimate.mean, ".std": estimate.std}
             values |= {f".p{100.0 * p:g}": interval for p, interval in estimate.quantiles}
-            found |= {
+            answers |= {
                 f"{name}{ending}": Answer(value.value, unit, words)
                 for ending, value in values.items()
             }
-        return found
+        return answers
 
     def frame(self) -> Frame:
         """Return the successful realisations, one row each, at the end of the test."""
