@@ -159,14 +159,14 @@ def refuse_if_locked(path: str | Path) -> None:
 
 
 def refuse_inputs(
-    path: str | Path, inputs: Iterable[Path], what: str = "the scenario", option: str = "-o"
+    path: str | Path | None, inputs: Iterable[Path], what: str = "the scenario", option: str = "-o"
 ) -> None:
     """Raise if an output would replace an input file.
 
     Parameters
     ----------
-    path : str or Path
-        The output.
+    path : str or Path, optional
+        The output, if there is one.
     inputs : iterable of Path
         The input files.
     what : str
@@ -180,7 +180,7 @@ def refuse_inputs(
         If the output is one of the inputs, also by another name.
     """
     for source in inputs:
-        if same_file(path, source):
+        if path is not None and same_file(path, source):
             raise ResultsFileError(
                 f"{path}: {what} is read from {source}, and no input is replaced",
                 python="choose another name",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -11,8 +11,6 @@ from wearsim.quantities import DECIMAL_COMMA, NUMBER
 from wearsim.units import measure
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from wearsim.types import FloatArray
 
 Conversion: TypeAlias = Callable[[str], float]

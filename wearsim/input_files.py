@@ -7,18 +7,14 @@ from __future__ import annotations
 
 import io
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from wearsim.csv_cells import decode
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.profiles import is_surface, read_profile
+from wearsim.profiles import ProfileChoice, is_surface, read_profile
+from wearsim.types import Profile
 from wearsim.units import QuantityError, conversion
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from wearsim.profiles import ProfileChoice
-    from wearsim.types import Profile
 
 _TDMS = b"TDSm"
 

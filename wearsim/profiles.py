@@ -5,21 +5,19 @@ from __future__ import annotations
 import io
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from wearsim.csv_cells import decode
 from wearsim.csv_tables import read_columns
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.quantities import quantity
-from wearsim.types import Profile
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from wearsim.types import FloatArray
+from wearsim.types import FloatArray, Profile
 
 _SDF = (b"aISO-", b"bISO-", b"aBCR-", b"bBCR-")
 _X3P = b"PK\x03\x04"
@@ -222,8 +220,6 @@ def load_lines(path: str | Path) -> list[Profile]:
         raise _error(str(path), f"the file cannot be read ({error.strerror})") from error
     if not is_surface(content):
         return [read_profile(content, str(path))]
-    import numpy as np  # noqa: PLC0415
-
     surface = _surface(content, str(path))
     whole = np.isfinite(surface.height).all(axis=1)
     if not whole.any():
@@ -282,8 +278,6 @@ class _Surface(NamedTuple):
 
 def _surface(content: bytes, file: str) -> _Surface:
     """Return the heights in an SDF or X3P file; NaN where the surface was not measured."""
-    import numpy as np  # noqa: PLC0415  (every command of the shell imports this module)
-
     name = "SDF" if content.startswith(_SDF) else "X3P"
     try:
         reader = import_module("sdfio" if name == "SDF" else "x3pio")
@@ -302,8 +296,6 @@ def _surface(content: bytes, file: str) -> _Surface:
 
 def _chosen_row(surface: _Surface, file: str, choice: ProfileChoice) -> Profile:
     """Return one row of a surface, or the mean of several."""
-    import numpy as np  # noqa: PLC0415
-
     if choice.columns or choice.units:
         raise _error(file, "columns and units are for CSV files; a surface has its own units")
     count, across = len(surface.height), surface.across
@@ -361,8 +353,6 @@ def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
         If the cutoff is not positive, exceeds the length of the profile or is less than twice the
         distance of its points.
     """
-    import numpy as np  # noqa: PLC0415
-
     length = float(profile.y[-1] - profile.y[0])
     if not 0.0 < cutoff <= length:
         raise ValueError(

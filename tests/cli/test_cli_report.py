@@ -26,7 +26,10 @@ def test_report_writes_a_page_and_keeps_existing_files(command: Command, finishe
     ("arguments", "message"),
     [
         (("none.h5",), "none.h5: there is no such file"),
-        (("short.h5", "-o", "page.pdf"), "'page.pdf' does not end in .html"),
+        (
+            ("short.h5", "-o", "page.pdf"),
+            "'page.pdf' has no known format of a page, expected .html",
+        ),
         (("short.h5", "-o", "nowhere/page.html"), "folder nowhere does not exist"),
     ],
 )

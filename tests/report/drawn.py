@@ -12,7 +12,7 @@ from wearsim.levelling import Measured
 from wearsim.report.figures import figure_of
 from wearsim.report.page import page as pages, plots
 from wearsim.studies.comparison.compare import Comparison
-from wearsim.studies.comparison.panels import comparison_sheet
+from wearsim.studies.comparison.view import comparison_sheet
 from wearsim.studies.opening import views_of
 
 

@@ -15,7 +15,7 @@ from tests.studies.study_examples import short
 from wearsim.report.figures import save_figure
 from wearsim.report.text import cells, part_with_interval, with_interval
 from wearsim.studies.comparison.compare import compare
-from wearsim.studies.comparison.panels import MOST_POINTS
+from wearsim.studies.comparison.view import MOST_POINTS
 from wearsim.studies.run import run as study
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 

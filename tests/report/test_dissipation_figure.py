@@ -13,8 +13,8 @@ from tests.report.drawn import dissipation_figure
 from wearsim.report.figures import save_figure
 from wearsim.scenario import load_scenario
 from wearsim.studies.dissipation.monte_carlo import dissipation
-from wearsim.studies.dissipation.panels import CLASSES, MOST_LINES
 from wearsim.studies.dissipation.result import DissipationResult
+from wearsim.studies.dissipation.view import CLASSES, MOST_LINES
 
 PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from wearsim.cli.shared import checking_arguments
 from wearsim.errors import (
     Interrupted,
     PluginError,
@@ -62,10 +63,12 @@ BUILT_IN = {
 #: modules in `wearsim.cli.commands` of the verbs that have not one of their name
 _MODULES = {
     **dict.fromkeys(("check", "schema", "new", "plugins"), "scenarios"),
-    **dict.fromkeys(("show", "plot", "compare", "export"), "results"),
-    "dissipation": "contact",
-    "resume": "run",
+    **dict.fromkeys(("show", "plot", "compare", "report", "export"), "results"),
+    **dict.fromkeys(("ensemble", "resume"), "run"),
+    **dict.fromkeys(("cam", "dissipation"), "contact"),
 }
+#: options that stand for arguments of another name
+_OPTIONS = {"limits": "--limit", "most": "--max"}
 FAILED = 1
 INTERRUPTED = 130
 TRACEBACK = "WEARSIM_TRACEBACK"
@@ -95,6 +98,8 @@ class LazyVerb(TyperCommand):
         command.params = [item for item in command.params if item.name not in completion]
         shared = kwargs["parent"].find_root().command.params
         _add_option(command, next(item for item in shared if item.name == "traceback"))
+        if command.callback is not None:
+            command.callback = checking_arguments(**_OPTIONS)(command.callback)
         return command.make_context(*args, **kwargs)
 
 

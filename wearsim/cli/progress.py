@@ -165,8 +165,8 @@ class Counter(Display):
         self.show(f"{count(done)} of {count(total)} realisations{left}")
 
 
-class PartWatcher(Display):
-    """Display of a study that is computed in parts, with a text on its present state."""
+class _Noticing(Display):
+    """Display of a study that also reports notices."""
 
     @property
     def callbacks(self) -> dict[str, Any]:
@@ -176,6 +176,10 @@ class PartWatcher(Display):
     def notice(self, text: str) -> None:
         """Show a notice, also if nothing else is shown."""
         self.write(text, also_quiet=True)
+
+
+class PartWatcher(_Noticing):
+    """Display of a study that is computed in parts, with a text on its present state."""
 
     def __call__(self, done: int, total: int, text: str) -> None:
         """Show how many parts are done, and the text."""
@@ -231,7 +235,7 @@ def _start(event: Started) -> str:
     return f"{passes}, {simulated(event.total_time)}, with {event.model}, {event.stepper}"
 
 
-class EnsembleWatcher(Display):
+class EnsembleWatcher(_Noticing):
     """Display of the progress of an ensemble.
 
     Attributes
@@ -241,15 +245,6 @@ class EnsembleWatcher(Display):
     """
 
     workers = ""
-
-    @property
-    def callbacks(self) -> dict[str, Any]:
-        """Arguments with which a study reports to this display, and asks whether to stop."""
-        return {**super().callbacks, "on_notice": self.notice}
-
-    def notice(self, text: str) -> None:
-        """Show a notice, also if nothing else is shown."""
-        self.write(text, also_quiet=True)
 
     def __call__(self, progress: EnsembleProgress) -> None:
         """Store the workers and show the progress."""

@@ -230,15 +230,15 @@ def refuse_options(given: Mapping[str, object], text: str) -> None:
         refuse(value not in (None, False), text, option)
 
 
-def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
-    """Refuse to overwrite the file named by an option.
+def refuse_existing(path: Path | None, force: bool, option: str = "-o") -> None:
+    """Refuse to overwrite the file named by an option, if one is named.
 
     Raises
     ------
     ResultsFileError
         If the file exists and `force` is false.
     """
-    if path.exists() and not force:
+    if path is not None and path.exists() and not force:
         raise ResultsFileError(f"{path} exists; choose another name with {option}, or --force")
 
 
@@ -253,7 +253,6 @@ def profile_choice(
         If an option has not its form.
     """
     from wearsim.profiles import ProfileChoice
-    from wearsim.quantities import quantity
 
     pairs = {"--columns": columns, "--units": units}
     chosen: list[tuple[str, str] | None] = []
@@ -268,9 +267,7 @@ def profile_choice(
         message = f"'{mean_rows}' is no range of rows, expected one such as 0:10"
         refuse(not (first.isdigit() and last.isdigit()), message, "--mean-rows")
         rows = int(first), int(last)
-    with checking("--at"):
-        position = quantity(at, "m") if at is not None else None
-    return ProfileChoice(chosen[0], chosen[1], row, rows, position)
+    return ProfileChoice(chosen[0], chosen[1], row, rows, quantity_of(at, "m", "--at"))
 
 
 def results_option(ending: str) -> Any:
@@ -288,6 +285,17 @@ def results_option(ending: str) -> Any:
         help=f"Results file; default: name of the scenario with {ending}, in the current folder.",
         show_default=False,
     )
+
+
+def quantity_of(text: str | None, unit: str, option: str) -> float | None:
+    """Return the quantity that an option states, in the SI unit; None if it is not given.
+
+    Errors are as of `checking`.
+    """
+    from wearsim.quantities import quantity
+
+    with checking(option):
+        return None if text is None else quantity(text, unit)
 
 
 @contextmanager
@@ -322,7 +330,7 @@ def checking_arguments(**options: str) -> Iterator[None]:
     try:
         yield
     except ArgumentError as error:
-        hint = options.get(error.argument, f"--{error.argument}")
+        hint = options.get(error.argument, f"--{error.argument.replace('_', '-')}")
         raise typer.BadParameter(str(error), param_hint=hint) from error
 
 
@@ -424,7 +432,6 @@ def check_surface(
     if path is None:
         refuse_options(given, "needs a file, --surface")
         return None
-    from wearsim.quantities import quantity
     from wearsim.report.surfaces import CHORD, ENDINGS, Sampling, dxf_library
 
     check_ending(path, force, "--surface", ENDINGS, "format of a surface")
@@ -434,13 +441,10 @@ def check_surface(
     refuse(elsewhere, f"is for a .dxf, and the surface is {path}", "--spline")
     twice = chord is not None and points is not None
     refuse(twice, "is given beside --chord; delete one of them", "--points")
-    with checking("--chord"):
-        length = CHORD if chord is None else quantity(chord, "m")
-        if length <= 0.0:
-            raise ValueError(f"'{chord}' is not above 0")
-    with checking("--position"):
-        place = None if position is None else quantity(position, "m")
-    return Sampling(length, points, place)
+    length = quantity_of(chord, "m", "--chord")
+    refuse(length is not None and length <= 0.0, f"'{chord}' is not above 0", "--chord")
+    across = quantity_of(position, "m", "--position")
+    return Sampling(CHORD if length is None else length, points, across)
 
 
 def check_new_file(path: Path, force: bool, option: str = "-o") -> None:

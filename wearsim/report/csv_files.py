@@ -43,14 +43,15 @@ def drawn(title: str, values: Any, unit: str) -> Column:
     return Column(title, values, *(_UNITS[unit] if unit == "Pa" else engineers_unit(unit)))
 
 
-def table_text(columns: Columns) -> Iterator[str]:
-    """Yield the text of a CSV file, block by block."""
+def table_text(columns: Columns, decimal: Literal[".", ","] = ".") -> Iterator[str]:
+    """Yield the text of a CSV file by blocks, with semicolons between cells for decimal commas."""
     for number, block in enumerate(columns):
         if number == 0:
             for source in dict.fromkeys(column.source for column in block if column.source):
                 yield "".join(f"{_COMMENT} {line}\n" for line in source.splitlines())
-            yield _csv([[c.name if c.unit == "1" else f"{c.name} [{c.unit}]" for c in block]])
-        yield _csv(zip(*map(_cells, block), strict=True))
+            heads = [c.name if c.unit == "1" else f"{c.name} [{c.unit}]" for c in block]
+            yield _csv([heads], decimal)
+        yield _csv(zip(*map(_cells, block), strict=True), decimal)
 
 
 def _cells(column: Column) -> Iterable[str]:
@@ -61,23 +62,13 @@ def _cells(column: Column) -> Iterable[str]:
     return [f"{value + 0.0:.12g}" for value in (values / column.size).tolist()]
 
 
-def _csv(cells: Iterable[Sequence[str]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(cells)
+def _csv(rows: Iterable[Sequence[str]], decimal: str) -> str:
+    text, delimiter = io.StringIO(), ","
+    if decimal == ",":
+        delimiter = ";"
+        rows = ([c.replace(".", ",") if _NUMBER.fullmatch(c) else c for c in row] for row in rows)
+    csv.writer(text, delimiter=delimiter, lineterminator="\n").writerows(rows)
     return text.getvalue()
-
-
-def _with_decimal_comma(pieces: Iterable[str]) -> Iterator[str]:
-    """Yield a table with decimal commas, and semicolons between the cells."""
-    for piece in pieces:
-        if piece.startswith(_COMMENT):
-            yield piece
-            continue
-        text = io.StringIO()
-        writer = csv.writer(text, delimiter=";", lineterminator="\n")
-        for cells in csv.reader(io.StringIO(piece)):
-            writer.writerow([c.replace(".", ",") if _NUMBER.fullmatch(c) else c for c in cells])
-        yield text.getvalue()
 
 
 def write_csv(
@@ -90,8 +81,7 @@ def write_csv(
     if decimal not in {".", ","}:
         raise ValueError(f"the decimal sign is {decimal!r}, expected '.' or ','")
     contents: dict[str, Iterable[str]] = {
-        name: _with_decimal_comma(table_text(columns)) if decimal == "," else table_text(columns)
-        for name, columns in view.columns().items()
+        name: table_text(columns, decimal) for name, columns in view.columns().items()
     }
     scenario, *files = view.stored_files()
     contents["scenario.toml"] = [scenario[1]]

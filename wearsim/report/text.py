@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 # One SI unit in each engineering unit.
 PER_SI = {
-    **dict.fromkeys(("1", "m/s", "m/s^2", "m/s^3", "s", "N", "N m", "W", "J"), 1.0),
+    **dict.fromkeys(("1", "turns", "m/s", "m/s^2", "m/s^3", "s", "N", "N m", "W", "J"), 1.0),
     "%": 1e2,
     "um": 1e6,
     "mm": 1e3,
@@ -190,19 +190,10 @@ OBSERVABLES: Mapping[str, Named] = {
 }
 
 
-#: units of limits of wear by their names; the others are lengths in um
-_LIMIT_UNITS = {
-    "volume": "mm^3",
-    "width": "mm",
-    "peak_pressure": "MPa",
-    "damage": "1",
-    "pitting": "1",
-}
-
-
 def limit_unit(name: str) -> str:
     """Return the unit in which a limit of wear is shown, a key of `PER_SI`."""
-    return _LIMIT_UNITS.get(name, "um")
+    limited = {"volume": "worn_volume", "clearance": "depth"}.get(name, name)
+    return OBSERVABLES[limited].unit
 
 
 def si_unit(name: str) -> str:
@@ -242,47 +233,48 @@ def cells(estimate: Interval, unit: str) -> tuple[str, str]:
     estimate, interval : str
         The interval is empty if it has no width.
     """
-    value, low, high = _numbers(estimate, unit)
-    return value, f"{low}..{high}" if high else low
+    if not math.isfinite(estimate.value):
+        return NOTHING, TOO_FEW
+    if estimate.low == estimate.high:
+        return in_unit(estimate.value, unit), ""
+    if not math.isfinite(estimate.half_width):
+        return in_unit(estimate.value, unit), TOO_FEW
+    value, low, high = (end * PER_SI[unit] for end in (estimate.value, estimate.low, estimate.high))
+    sizes = [abs(end) for end in (value, low, high) if end]
+    if min(sizes) < _WITHOUT_EXPONENT[0] or max(sizes) >= _WITHOUT_EXPONENT[1]:
+        ends = f"{in_unit(estimate.low, unit)}..{in_unit(estimate.high, unit)}"
+        return in_unit(estimate.value, unit), ends
+    place = math.floor(math.log10(abs(value))) if value else 0
+    decimals = _HALF_WIDTH_DIGITS - 1 - math.floor(math.log10(0.5 * (high - low)))
+    decimals = max(min(max(decimals, _MIN_DIGITS - 1 - place), _MAX_DIGITS - 1 - place), 0)
+    return f"{value:.{decimals}f}", f"{low:.{decimals}f}..{high:.{decimals}f}"
 
 
 def with_interval(estimate: Interval, unit: str) -> str:
     """Return "22.10 um [21.90, 22.31]"; parameters as of `cells`."""
-    value, low, high = _numbers(estimate, unit)
+    value, interval = cells(estimate, unit)
     named = value if unit == "1" or value == NOTHING else f"{value} {unit}"
-    return named + (f" [{low}, {high}]" if high else low and f" ({low} for an interval)")
+    if interval in {"", TOO_FEW}:
+        return named + (interval and f" ({interval} for an interval)")
+    return f"{named} [{interval.replace('..', ', ')}]"
 
 
-def _numbers(estimate: Interval, unit: str) -> tuple[str, str, str]:
-    """Return an estimate and the ends of its interval, or a remark instead of the ends."""
-    if not math.isfinite(estimate.value):
-        return NOTHING, TOO_FEW, ""
-    if estimate.low == estimate.high:
-        return in_unit(estimate.value, unit), "", ""
-    if not math.isfinite(estimate.half_width):
-        return in_unit(estimate.value, unit), TOO_FEW, ""
-    value, low, high = (end * PER_SI[unit] for end in (estimate.value, estimate.low, estimate.high))
-    sizes = [abs(end) for end in (value, low, high) if end]
-    if min(sizes) < _WITHOUT_EXPONENT[0] or max(sizes) >= _WITHOUT_EXPONENT[1]:
-        return (
-            in_unit(estimate.value, unit),
-            in_unit(estimate.low, unit),
-            in_unit(estimate.high, unit),
-        )
-    place = math.floor(math.log10(abs(value))) if value else 0
-    decimals = _HALF_WIDTH_DIGITS - 1 - math.floor(math.log10(0.5 * (high - low)))
-    decimals = max(min(max(decimals, _MIN_DIGITS - 1 - place), _MAX_DIGITS - 1 - place), 0)
-    return f"{value:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+def with_ends(estimate: Interval, write: Callable[[float], str], unit: str = "") -> str:
+    """Return a value with the ends of its interval, "3.1 [2.9, 3.3]", each as `write` has it.
+
+    An interval without width is left out.
+    """
+    value, low, high = map(write, (estimate.value, estimate.low, estimate.high))
+    return f"{value}{unit}" + (f" [{low}, {high}]" if estimate.low != estimate.high else "")
 
 
 def part_with_interval(part: Interval) -> str:
     """Return a fraction in per cent, "57.1 % [54.0, 60.2]"."""
     if not math.isfinite(part.value):
         return NOTHING
-    value, low, high = (f"{100.0 * end:.1f}" for end in (part.value, part.low, part.high))
-    if part.low == part.high:
-        return f"{value} %"
-    return f"{value} % " + (f"[{low}, {high}]" if math.isfinite(part.half_width) else TOO_FEW)
+    if math.isinf(part.half_width):
+        return f"{100.0 * part.value:.1f} % {TOO_FEW}"
+    return with_ends(part, lambda end: f"{100.0 * end:.1f}", " %")
 
 
 def too_few(sufficient: int) -> str:

@@ -190,6 +190,8 @@ class View(ABC):
         What the stated errors contain.
     heading : str
         Title of the rows.
+    group : str
+        Title of the rows that a page shows first.
     notes, warnings : sequence of str
     """
 
@@ -200,6 +202,7 @@ class View(ABC):
     question: str = ""
     basis: str = ""
     heading: str = "results"
+    group: str = "Results"
     notes: Sequence[str] = ()
     warnings: Sequence[str] = ()
     failures: str = ""  # remark on realisations that failed
@@ -229,7 +232,7 @@ class View(ABC):
         """Return what a page shows first; by default the main panel and the first answers."""
         sheet = self.panels()
         main = sheet.first if sheet.panels else None
-        return Overview(main, {"Results": self.rows()[1:_FIRST]})
+        return Overview(main, {self.group: self.rows()[1:_FIRST]})
 
     def line(self) -> str:
         """Return method, numerical or sampling error and time on one line, or an empty text."""

@@ -17,7 +17,6 @@ from wearsim.report.view import (
     Column,
     Columns,
     Frame,
-    Overview,
     Repetition,
     Row,
     Rows,
@@ -140,12 +139,9 @@ class DesignsView(View):
     ----------
     file : str
         Name of the CSV file.
-    group : str
-        Title of the answers that a page shows first.
     """
 
     file: str
-    group: str
 
     @abstractmethod
     def table(self) -> list[Column]:
@@ -164,10 +160,6 @@ class DesignsView(View):
         """Return the scenario of the first design and its input files."""
         view: View = self.result.designs[0].view
         return view.stored_files()
-
-    def overview(self) -> Overview:
-        """Return the main panel and the answers."""
-        return Overview(self.panels().first, {self.group: self.rows()[1:]})
 
 
 def columns_of(name: str, ends: Iterable[FloatArray], unit: str = "1") -> list[Column]:

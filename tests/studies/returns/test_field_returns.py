@@ -140,12 +140,12 @@ def test_shell_shows_and_writes_returns(folder: Path, monkeypatch: pytest.Monkey
     assert again.exit_code == 2
     (folder / "wrong.csv").write_text(HEAD + ",suspended\n")
     for arguments, words in (
-        ((*given, "--life-factor", "0.5"), "is not a factor from 1 on"),
+        ((*given, "--life-factor", "0.5"), "Invalid value for '--life-factor'"),
         (("rig.h5", "--returns", "none.csv"), "none.csv: the file cannot be read"),
         (("rig.h5", "--returns", "wrong.csv"), "is suspended without its age"),
         (("rig.h5", "--life-factor", "2"), "goes with --returns"),
         (("rig.h5", "--table", "t.csv"), "goes with --returns or --demonstrate"),
-        ((*given, "--page", "page.txt"), "does not end in .html"),
+        ((*given, "--page", "page.txt"), "has no known format of a page, expected .html"),
         (("rig.toml", "--set", KNOWN, "--returns", "returns.csv"), "give --posterior"),
     ):
         refused = run(*arguments)

@@ -25,6 +25,7 @@ from wearsim.cli.shared import (
     check_figure,
     checking,
     profile_choice,
+    quantity_of,
     read_scenario,
     refuse,
     refuse_existing,
@@ -201,17 +202,13 @@ def identify(
     inputs = [*loaded.paths, *(profiles or []), *([tests] if tests else [])]
     levels = None if posterior is None else posterior.with_suffix(".csv")
     for path in (posterior, levels):
-        if path is not None:
-            refuse_existing(path, force, "--posterior")
+        refuse_existing(path, force, "--posterior")
     for path in (figure, posterior, levels):
         refuse_same_file(path, output if output is not None else Path(), inputs)
     from wearsim.cli.progress import Counter, watching
-    from wearsim.quantities import quantity
     from wearsim.report.page.page import save_text
 
-    with checking("--shoulders"):
-        distance = None if shoulders is None else quantity(shoulders, "m")
-    bodies = _shared(share)
+    distance, bodies = quantity_of(shoulders, "m", "--shoulders"), _shared(share)
     place = "--before" if before else "T1.csv T2.csv..."
     with checking(place), watching(Counter, loaded, quiet) as counter:
         result = wearsim.identify(
@@ -260,8 +257,8 @@ def _plan(
 ) -> None:
     """Write the power of planned tests."""
     from wearsim.cli.progress import Counter, watching
-    from wearsim.studies.identify.panels import power_sheet
     from wearsim.studies.identify.planning import plan_data, plan_tables, plan_tests
+    from wearsim.studies.identify.view import power_sheet
 
     counts, stds = _sizes(numbers), _measured(measured)
     with watching(Counter, scenario, quiet) as counter:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import wearsim
-from wearsim.cli.commands.ensemble import swept
 from wearsim.cli.commands.life_use import LifeUse
+from wearsim.cli.commands.run import swept
 from wearsim.cli.render import draw_figure, show_view, show_with_figure
 from wearsim.cli.shared import (
     FigureOption,
@@ -27,7 +27,6 @@ from wearsim.cli.shared import (
     check_figure,
     checked_scheduler,
     checking,
-    checking_arguments,
     note,
     read_scenario,
     refuse,
@@ -150,6 +149,7 @@ def life(
     life_factor: Annotated[
         float | None,
         typer.Option(
+            min=1.0,
             metavar="FACTOR",
             help="Prior of the factor by which all lives of --returns differ from the computed"
             " ones: two of three within FACTOR, by default 1.5; 1 for none.",
@@ -191,12 +191,13 @@ def life(
     with checking("--b"):
         shares = _shares(b)
     files = [path.suffix.lower() in _FILES for path in designs]
-    too_many, unique = len(designs) > 2 and not all(files), {path.resolve() for path in designs}
+    too_many = len(designs) > 2 and not all(files)
     refuse(too_many, "give one design, or two to compare", "SCENARIO")
-    refuse(len(unique) < len(designs), f"{designs[0]} is given twice", "SCENARIO")
-    mixed = any(files) and not all(files)
-    refuse(mixed, "compare two scenarios or two results files, not one of each", "SCENARIO")
+    twice = len({path.resolve() for path in designs}) < len(designs)
+    refuse(twice, f"{designs[0]} is given twice", "SCENARIO")
     if any(files):
+        text = "compare two scenarios or two results files, not one of each"
+        refuse(not all(files), text, "SCENARIO")
         given: dict[str, object] = {
             "--limit": limit,
             "--max": most,
@@ -227,11 +228,10 @@ def life(
         "rare": rare,
         "rare_method": rare_method,
     }
-    with checking_arguments(limits="--limit", most="--max"):
-        checked = [
-            checked_study(scenario, realisations, limits=limit or [], **arguments)
-            for scenario in scenarios
-        ]
+    checked = [
+        checked_study(scenario, realisations, limits=limit or [], **arguments)
+        for scenario in scenarios
+    ]
     scenarios = [scenario for scenario, _, _ in checked]
     use.check_studies(labels, [(scenario, settings) for scenario, settings, _ in checked])
     paths = _paths(scenarios, labels, output)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import wearsim
 from wearsim.cli.render import write_table_file
-from wearsim.cli.shared import check_new_file, checking, refuse
+from wearsim.cli.shared import check_ending, checking, refuse
 
 if TYPE_CHECKING:
     from wearsim.report.view import View
@@ -51,19 +50,10 @@ class LifeUse:
         refuse(both, "goes without --returns", "--demonstrate")
         lacks = self.life_factor is not None and self.returns is None
         refuse(lacks, "goes with --returns", "--life-factor")
-        if self.life_factor is not None:
-            text = f"{self.life_factor:g} is not a factor from 1 on"
-            refuse(not 1.0 <= self.life_factor < math.inf, text, "--life-factor")
         lacks = self.table is not None and not self.is_special
         refuse(lacks, "goes with --returns or --demonstrate", "--table")
-        for path, option, ending in (
-            (self.page, "--page", ".html"),
-            (self.table, "--table", ".csv"),
-        ):
-            if path is not None:
-                wrong = path.suffix.lower() != ending
-                refuse(wrong, f"'{path}' does not end in {ending}", option)
-                check_new_file(path, force, option)
+        check_ending(self.page, force, "--page", (".html",), "format of a page")
+        check_ending(self.table, force, "--table", (".csv",), "format of a table")
 
     def check_studies(
         self, labels: Sequence[str], studies: Sequence[tuple[Scenario, LifeSettings]]

@@ -1,4 +1,4 @@
-"""Verbs for results files: show, plot, compare and export."""
+"""Verbs for results files: show, plot, compare, report and export."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from wearsim.cli.shared import (
     check_ending,
     check_figure,
     check_surface,
-    checking,
     note,
     profile_choice,
+    quantity_of,
     refuse,
     refuse_options,
     write_notes,
@@ -144,11 +144,9 @@ def measured_profiles(
         return []
     from wearsim.levelling import Measured, levelled
     from wearsim.profiles import load_profile, sign_note
-    from wearsim.quantities import quantity
     from wearsim.report.measured import level_hint, residual_text
 
-    with checking("--angle"):
-        at = None if angle is None else quantity(angle, "rad")
+    at = quantity_of(angle, "rad", "--angle")
     read = {file: load_profile(file, choice) for file in files}
     signs = (sign_note(profile, choice, str(file)) for file, profile in read.items())
     write_notes(filter(None, signs))
@@ -197,8 +195,7 @@ def compare(
     """Compare runs and ensembles, with confidence intervals."""
     text = f"there is one file, {files[0]}; give another one to compare"
     refuse(len(files) < 2, text, "FILE.h5")
-    if figure is not None:
-        refuse_inputs(figure, files, "the comparison")
+    refuse_inputs(figure, files, "the comparison")
     for file in files:
         refuse(files.count(file) > 1, f"{file} is given twice", "FILE.h5")
     from wearsim.studies.opening import comparison_of, labels_of
@@ -279,3 +276,46 @@ def export(
     folder = output if output is not None else Path(file.stem)
     for path in export_csv(wearsim.open_results(file), folder, force=force, decimal=sign):
         typer.echo(str(path))
+
+
+def report(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE.h5...",
+            help="Results files of any kind; several runs and ensembles are also compared.",
+            show_default=False,
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="PAGE",
+            help="Page to write, by default the name of the first file with .html.",
+            show_default=False,
+        ),
+    ] = None,
+    measured: MeasuredFiles = None,
+    angle: Angle = None,
+    level: Level = False,
+    columns: Columns = None,
+    units: Units = None,
+    row: Row = None,
+    mean_rows: MeanRows = None,
+    at: At = None,
+    force: Force = False,
+) -> None:
+    """Write one page on results for a browser: answers, interactive figures, inputs."""
+    path = output if output is not None else Path(f"{files[0].stem}.html")
+    from wearsim.studies.opening import save_report
+
+    refuse_inputs(path, files, "the page")
+    refuse_inputs(path, measured or [], "a measured profile")
+    results = [wearsim.open_results(file) for file in files]
+    check_ending(path, force, "-o", (".html", ".htm"), "format of a page")
+    choice = profile_choice(columns, units, row, mean_rows, at)
+    views = [result.view for result in results]
+    save_report(results, path, measured_profiles(measured or [], choice, views, level, angle))
+    note(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")

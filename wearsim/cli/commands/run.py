@@ -1,4 +1,4 @@
-"""Verbs for wear tests: run, and resume, which also continues ensembles."""
+"""Verbs for wear tests: run, ensemble, and resume, which continues both."""
 
 from __future__ import annotations
 
@@ -10,24 +10,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import wearsim
-from wearsim.cli.commands.ensemble import show_ensemble
-from wearsim.cli.render import show_view
+from wearsim.cli.render import show_view, show_with_figure
 from wearsim.cli.shared import (
+    FigureOption,
     Force,
     Json,
     Quiet,
+    Realisations,
     ResultsFile,
     ScenarioFile,
     Scheduler,
+    Seed,
     Settings,
     Workers,
+    check_figure,
     checked_scheduler,
     checking,
     note,
     read_scenario,
     refuse,
     refuse_options,
+    refuse_same_file,
     results_option,
+    settings_with,
     write_notes,
 )
 from wearsim.errors import ResultsFileError, SolverError, WearsimError
@@ -60,7 +65,6 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Run a wear test and write its results file."""
-    check_limit(until)
     loaded = read_scenario(scenario, settings)
     path = output if output is not None else Path(f"{scenario.stem}.h5")
     from wearsim.cli.progress import CHECKPOINT, RunWatcher, watching
@@ -134,7 +138,6 @@ def resume(
     }
     refuse_options(without, f"has no meaning for a file that holds {kind.holds}")
     refuse(failed and realisations is not None, "extend the ensemble first", "--failed")
-    check_limit(until)
     options["scheduler"] = checked_scheduler(scheduler, workers)
     before = open_study(file, kind)
     if names == of_tests and realisations is None and (text := _nothing_to_do(before, failed)):
@@ -148,21 +151,6 @@ def resume(
         show_view(result.view, json=json, files={"results file": result.path})
 
 
-def check_limit(until: str | None) -> None:
-    """Check the limit of a run, if one is given.
-
-    Raises
-    ------
-    typer.BadParameter
-        If it cannot be read.
-    """
-    if until is not None:
-        from wearsim.evolution.limits import Limit
-
-        with checking("--until"):
-            Limit.parse(until)
-
-
 def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
     """Return why there is nothing to do, or an empty text."""
     if not failed:
@@ -172,3 +160,145 @@ def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
         return ""
     rest = "" if before.finished else f"; continue the others with: wearsim resume {before.path}"
     return f"no realisation has failed{rest}"
+
+
+def ensemble(
+    scenario: ScenarioFile,
+    realisations: Realisations = 1000,
+    output: Annotated[Path | None, results_option("-ensemble.h5")] = None,
+    figure: FigureOption = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    precision: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TARGET",
+            help="Stop when the relative half-width of a 95 % confidence interval is reached,"
+            " 'depth.mean 1%'. First checked after 64 realisations.",
+            show_default=False,
+        ),
+    ] = None,
+    until: Annotated[str | None, typer.Option(metavar="TARGET", hidden=True)] = None,
+    plan: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLAN",
+            help="Sampling design: monte-carlo, latin-hypercube, sobol, saltelli or"
+            " control-variate; default: that of the scenario.",
+            show_default=False,
+        ),
+    ] = None,
+    sweep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY=V1,V2,...",
+            help="Run and compare one ensemble per value: load.normal_force=250N,300N.",
+            show_default=False,
+        ),
+    ] = None,
+    seed: Seed = None,
+    settings: Settings = None,
+    json: Json = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a wear test for each realisation of the random inputs."""
+    check_figure(figure, force, "--figure")
+    from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
+    from wearsim.studies.comparison.view import comparison_view
+    from wearsim.studies.ensemble.sweep import path_of, run_sweep
+
+    if until is not None:
+        refuse(precision is not None, "is the former name of --precision", "--until")
+        note("warning: --until of ensembles is now --precision; the old name will be removed")
+        precision = until
+    options: dict[str, Any] = {
+        "plan": plan,
+        "workers": workers,
+        "force": force,
+        "precision": precision,
+        "scheduler": checked_scheduler(scheduler, workers),
+    }
+    texts = settings_with(settings, seed=seed)
+    path = output if output is not None else Path(f"{scenario.stem}-ensemble.h5")
+    key, values = swept(sweep, texts)
+    files = {value: path_of(path, value) for value in values} if key else {"": path}
+    scenarios = {
+        value: read_scenario(scenario, [*texts, *([f"{key}={value}"] if key else [])])
+        for value in files
+    }
+    for value, file in files.items():
+        refuse_same_file(figure, file, scenarios[value].paths)
+
+    def announce(value: str, file: Path | None) -> None:
+        if not quiet:
+            note(f"{key} = {value}: {file}")
+
+    first = scenarios[next(iter(files))]
+    with watching(EnsembleWatcher, first, quiet, BATCHES) as watch:
+        options |= watch.callbacks
+        if key:
+            designs, labels = list(scenarios.values()), list(files)
+            results = run_sweep(designs, labels, realisations, path, on_value=announce, **options)
+        else:
+            result = wearsim.ensemble(first, realisations, path, **options)
+    if not key:
+        show_ensemble(result, json, figure, watch.workers)
+        return
+    for item in results:
+        _refuse_failed(item)
+    show_with_figure(comparison_view(results, labels, "depth", key), figure, json=json)
+
+
+def show_ensemble(
+    result: EnsembleResult, json: bool, figure: Path | None, workers: str = ""
+) -> None:
+    """Write an ensemble or lives to stdout and failures to stderr, and draw the figure.
+
+    Parameters
+    ----------
+    result : EnsembleResult
+    json : bool
+        Whether to write JSON instead of tables.
+    figure : Path, optional
+        Name of the figure.
+    workers : str
+        Workers that were used, "2 processes".
+
+    Raises
+    ------
+    SolverError
+        If all realisations failed.
+    """
+    from wearsim.studies.execution.processes import InProcess
+
+    if workers == InProcess.describe:
+        workers = "this process, one realisation at a time"
+    files, more = {"workers": workers, "results file": result.path}, {"workers": workers or None}
+    show_with_figure(result.view, figure, json=json, files=files, more=more)
+    _refuse_failed(result)
+
+
+def _refuse_failed(result: EnsembleResult) -> None:
+    """Raise an error if all realisations failed."""
+    if result.failed and not result.count:
+        raise SolverError(f"{result.path}: all realisations failed")
+
+
+def swept(sweep: str | None, settings: Sequence[str]) -> tuple[str, tuple[str, ...]]:
+    """Return key and values of --sweep, which are empty without it.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it cannot be read, or its key is also the key of a setting.
+    """
+    if sweep is None:
+        return "", ()
+    from wearsim.studies.ensemble.sweep import parse_sweep
+
+    with checking("--sweep"):
+        key, values = parse_sweep(sweep)
+    given = any(text.partition("=")[0].strip() == key for text in settings)
+    refuse(given, f"{key} is also the key of --sweep", "--set")
+    return key, values

@@ -3,71 +3,27 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from wearsim.atomic_write import replacement
 from wearsim.errors import PluginError
 from wearsim.levelling import Measured
 from wearsim.report.measured import residual_text
-from wearsim.report.panels import Panel
+from wearsim.report.panels import Sheet
 from wearsim.report.view import Row, Table, View
 
-if TYPE_CHECKING:
-    from wearsim.report.panels import Sheet
 
+def first_of(views: Sequence[View]) -> dict[str, Any]:
+    """Return the first screen of a page, for the person who decides.
 
-@dataclass(frozen=True)
-class PagePart:
-    """Part of a page: a view with its panels drawn.
-
-    Parameters
-    ----------
-    view : View
-    rows : list of Row
-        Answers; the first one is the answer to the question.
-    tables : list of Table
-    remarks : list of str
-        Failures, warnings and notes.
-    panels : list of (Panel, bokeh figure)
-    steps : list of str
-        Text of each position of the slider, if the panels have records.
+    Returns
+    -------
+    dict of str to object
+        Short answers by title, "groups", each from the first view that has it; "excluded", what the
+        results do not contain; "picture", a PNG file in base64, or empty, with its "caption".
     """
-
-    view: View
-    rows: list[Row]
-    tables: list[Table]
-    remarks: list[str]
-    panels: list[tuple[Panel, Any]]
-    steps: list[str]
-
-
-@dataclass(frozen=True)
-class First:
-    """First screen of a page, for the person who decides.
-
-    Parameters
-    ----------
-    groups : mapping of str to list of Row
-        Short answers by title.
-    excluded : list of str
-        What the results do not contain.
-    picture : str
-        A PNG file in base64, or empty.
-    caption : str
-        What it shows.
-    """
-
-    groups: Mapping[str, list[Row]]
-    excluded: list[str]
-    picture: str
-    caption: str
-
-
-def first_of(views: Sequence[View]) -> First:
-    """Return the first screen of views: each group from the first view that has it."""
     from wearsim.report.figures import png_of_panel  # noqa: PLC0415  (imports matplotlib)
 
     overviews = [views[0].overview()]
@@ -79,12 +35,12 @@ def first_of(views: Sequence[View]) -> First:
     # what one of the results contains is included
     lists = [overview.excluded for overview in overviews if overview.excluded]
     excluded = [text for text in lists[0] if all(text in texts for texts in lists)] if lists else []
-    panel = next((item.picture for item in overviews if item.picture is not None), None)
-    if panel is None:
-        return First(groups, excluded, "", "")
-    picture = png_of_panel(panel, 130, 5.4 if panel.equal else 3.8)
-    caption = f"{panel.title}. {panel.caption}"
-    return First(groups, excluded, b64encode(picture).decode(), caption)
+    first: dict[str, Any] = {"groups": groups, "excluded": excluded}
+    if panel := next((item.picture for item in overviews if item.picture is not None), None):
+        picture = png_of_panel(panel, 130, 5.4 if panel.equal else 3.8)
+        first["picture"] = b64encode(picture).decode()
+        first["caption"] = f"{panel.title}. {panel.caption}"
+    return first
 
 
 def save_page(views: Sequence[View], path: Path, measured: Sequence[Measured] = ()) -> None:
@@ -138,18 +94,17 @@ def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
             " pip install 'wearsim[report]'"
         ) from error
     parts = [part_of(view, measured) for view in views]
-    drawn = [figure for part in parts for _, figure in part.panels]
-    script, divisions = components(drawn) if drawn else ("", ())
-    figures = iter(divisions)
-    with_divisions = [(part, [(*item, next(figures)) for item in part.panels]) for part in parts]
+    drawn = {figure.id: figure for part in parts for _, figure in part["panels"]}
+    script, divisions = components(drawn) if drawn else ("", {})
     template = Environment(
         loader=PackageLoader("wearsim.report.page", "."), autoescape=True, trim_blocks=True
     ).get_template("page.html.jinja")
     resources = Resources(mode="inline", components=["bokeh"], log_level="fatal")
     return template.render(
-        title=parts[0].view.title,
+        title=views[0].title,
         first=first_of(views),
-        parts=with_divisions,
+        parts=parts,
+        divisions=divisions,
         script=script,
         resources=resources.render(),
     )
@@ -160,8 +115,16 @@ def page_style() -> str:
     return Path(__file__).with_name("page.css").read_text(encoding="utf-8")
 
 
-def part_of(view: View, measured: Sequence[Measured] = ()) -> PagePart:
-    """Return a view as a part of a page, with its panels drawn."""
+def part_of(view: View, measured: Sequence[Measured] = ()) -> dict[str, Any]:
+    """Return a view as a part of a page.
+
+    Returns
+    -------
+    dict of str to object
+        The "view"; its "rows", the first of which is the answer to the question, and "tables";
+        "remarks", failures, warnings and notes; "panels", each with its figure; "steps", the texts
+        of the slider.
+    """
     from wearsim.report.page.plots import plots_of  # noqa: PLC0415  (imports bokeh)
 
     sheet: Sheet = view.panels(measured)
@@ -173,4 +136,6 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> PagePart:
         ]
         tables.insert(-1, Table("Measured profiles", residuals))
     remarks = [*filter(None, [view.failures]), *view.warnings, *view.notes]
-    return PagePart(view, view.rows(), tables, remarks, *plots_of(sheet))
+    panels, steps = plots_of(sheet)
+    part = {"view": view, "rows": view.rows(), "tables": tables, "remarks": remarks}
+    return {**part, "panels": panels, "steps": steps}

@@ -26,9 +26,29 @@ if TYPE_CHECKING:
 
 #: effects that wear tests of cams neglect, besides those neglected on cylinders
 CAM_EXCLUDED = ("vibration of the follower", "uneven wear around the roller")
-# titles of the columns of the motion table, names of their values, and units
+#: heads of the columns at the stations, names of their values, and units
+_TABLE = (
+    ("angle [deg]", "angle_rad", "deg"),
+    ("lift [mm]", "lift_m", "mm"),
+    ("lift [deg]", "lift_rad", "deg"),
+    ("pressure angle [deg]", "pressure_angle_rad", "deg"),
+    ("V [m/s]", "rolling_speed_m_per_s", "m/s"),
+    ("roller/cam", "roller_speed_ratio", "1"),
+    ("N [N]", "normal_force_N", "N"),
+    ("p0 [MPa]", "peak_pressure_Pa", "MPa"),
+    ("creepage", "longitudinal_creepage", "1"),
+    ("power [W]", "power_W", "W"),
+    ("film [um]", "film_thickness_m", "um"),
+    ("pitting [turns]", "pitting_life_turns", "1"),
+    ("orthogonal shear [MPa]", "orthogonal_shear_Pa", "MPa"),
+    ("at depth [um]", "orthogonal_shear_depth_m", "um"),
+    ("von Mises [MPa]", "von_mises_Pa", "MPa"),
+    ("at depth [um]", "von_mises_depth_m", "um"),
+)
+#: titles of the columns of the motion table, names of their values, and units
 _MOTION = (
     ("angle", "angle_rad", "deg"),
+    ("lift of the arm", "lift_rad", "deg"),
     ("lift", "roller_lift_m", "mm"),
     ("velocity", "velocity_m_per_s", "m/s"),
     ("acceleration", "acceleration_m_per_s2", "m/s^2"),
@@ -41,6 +61,8 @@ _MOTION = (
     ("peak pressure", "peak_pressure_Pa", "MPa"),
     ("x", "x_m", "mm"),
     ("y", "y_m", "mm"),
+    ("film", "film_thickness_m", "um"),
+    ("pitting life", "pitting_life_turns", "turns"),
 )
 
 
@@ -137,39 +159,14 @@ class CamView(View):
 
     def tables(self) -> list[Table]:
         """Return motion, loads and contact at the stations, in engineering units."""
-        study, point, turn = self.result, self.result.point, self.result.turn
-        kinematics, lift = point.kinematics, "deg" if turn.cam.follower.swings else "mm"
-        columns = [
-            ("angle [deg]", point.angle, "deg"),
-            (f"lift [{lift}]", kinematics.lift, lift),
-            ("pressure angle [deg]", kinematics.pressure_angle, "deg"),
-            ("V [m/s]", turn.speed * kinematics.travel, "m/s"),
-            ("roller/cam", kinematics.spin, "1"),
-            ("N [N]", point.normal_force, "N"),
-            ("p0 [MPa]", study.peak_pressure, "MPa"),
-            ("creepage", study.contacts.longitudinal_creepage, "1"),
-            ("power [W]", study.contacts.power, "W"),
-        ]
-        if study.film is not None:
-            columns.append(("film [um]", study.film, "um"))
-        if (lives := lives_at(turn.scenario, study.peak_pressure)) is not None:
-            found_below = stresses_below(
-                turn.scenario, study.peak_pressure, 0.5 * study.patch_length
-            )
-            below = [values for _, values in found_below.values()]
-            columns += [
-                ("pitting [turns]", lives / turn.scenario.operation.rollers, "1"),
-                ("orthogonal shear [MPa]", below[0], "MPa"),
-                ("at depth [um]", below[1], "um"),
-                ("von Mises [MPa]", below[2], "MPa"),
-                ("at depth [um]", below[3], "um"),
-            ]
+        values = self._columns()
+        shown_columns = [column for column in _TABLE if column[1] in values]
         cells = [
-            [in_unit(value, unit) for value in _without_rounding(values)]
-            for _, values, unit in columns
+            [in_unit(value, unit) for value in _without_rounding(values[key][1])]
+            for _, key, unit in shown_columns
         ]
         names = self._segment_names()
-        heads = [*(head for head, *_ in columns), "segment"]
+        heads = [*(head for head, *_ in shown_columns), "segment"]
         return [Table("", [list(row) for row in zip(*cells, names, strict=True)], heads)]
 
     def _segment_names(self) -> list[str]:
@@ -281,19 +278,12 @@ class CamView(View):
 
     def columns(self) -> Mapping[str, Columns]:
         """Return the motion table, one row for each station."""
-        values = {name: numbers for name, (_, numbers) in self._columns().items()}
-        swings, film = self.result.turn.cam.follower.swings, "film_thickness_m" in values
-        chosen = [
-            *_MOTION[:1],
-            *([("lift of the arm", "lift_rad", "deg")] if swings else []),
-            *_MOTION[1:],
-            *([("film", "film_thickness_m", "um")] if film else []),
-        ]
+        values = self._columns()
         table = [
-            Column(title, values[key], unit, 1.0 / PER_SI[unit]) for title, key, unit in chosen
+            Column(title, values[key][1], unit, 1.0 / PER_SI[unit])
+            for title, key, unit in _MOTION
+            if key in values
         ]
-        if "pitting_life_turns" in values:
-            table.append(Column("pitting life", values["pitting_life_turns"], "turns"))
         table.append(Column("segment", self._segment_names()))
         return {"motion.csv": [with_sources(table, self.result.turn.scenario)]}
 

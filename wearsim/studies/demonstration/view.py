@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from wearsim.report.text import NOTHING, count, count_of, part_with_interval, shown
+from wearsim.levelling import Measured
+from wearsim.report.panels import (
+    Axis,
+    Band,
+    Line,
+    Mark,
+    Panel,
+    Sheet,
+    Span,
+    several_colours,
+    share_axis,
+)
+from wearsim.report.text import NOTHING, count, count_of, part_with_interval, shown, with_ends
 from wearsim.report.view import STUDY, Column, Row, Rows, Table
 from wearsim.results.study_view import DesignsView, columns_of
 from wearsim.studies.demonstration.result import Demonstration, Plan
 from wearsim.studies.life.view import limit_texts
-from wearsim.uq.estimation.intervals import Interval, arrays_of
+from wearsim.types import FloatArray
+from wearsim.uq.estimation.intervals import arrays_of
 
 _BASIS = (
     "The simulation gives the shape of the distribution of lives and the acceleration; the scale is"
@@ -32,7 +46,6 @@ class DemonstrationView(DesignsView):
     Panels: specimens, probability of passing. Files: the tests.
     """
 
-    sheet = "wearsim.studies.demonstration.panels:demonstration_sheet"
     file, group = "tests.csv", "Demonstration"
     basis = _BASIS
 
@@ -65,12 +78,6 @@ class DemonstrationView(DesignsView):
             return count(float(f"{duration:.4g}"))
         return f"{duration:.3g}"
 
-    def _between(self, interval: Interval, number: Any) -> str:
-        text = number(interval.value)
-        if interval.low == interval.high:
-            return str(text)
-        return f"{text} [{number(interval.low)}, {number(interval.high)}]"
-
     def rows(self) -> Rows:
         """Return specimens by the binomial, the simulated design, and the acceleration."""
         result, need = self.result, self.result.requirement
@@ -89,7 +96,7 @@ class DemonstrationView(DesignsView):
             ),
             Row(
                 f"simulated B{100.0 * (1.0 - need.survival):.3g}",
-                f"{self._between(result.life, self._number)} {need.unit}",
+                f"{with_ends(result.life, self._number)} {need.unit}",
             ),
             Row(
                 "probability that the design meets it",
@@ -97,7 +104,7 @@ class DemonstrationView(DesignsView):
             ),
         ]
         for number in range(1, len(result.designs)):
-            factor = self._between(result.acceleration(number), lambda value: f"{value:.3g}")
+            factor = with_ends(result.acceleration(number), "{:.3g}".format)
             duration = need.life / result.acceleration(number).value
             text = f"{factor} times shorter lives; {numbers[0]} specimens without failure take"
             rows.append(
@@ -184,6 +191,57 @@ class DemonstrationView(DesignsView):
             *columns_of("passes", arrays_of(plan.passing for plan in plans)),
         ]
 
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return specimens and the probability of passing against the duration."""
+        result = self.result
+        need = result.requirement
+        tests = [
+            (count_of(k, "failure", "no failure"), k, 0, 1.0) for k in range(need.failures + 1)
+        ]
+        tests += [
+            (f"no failure, {label}", 0, number, result.acceleration(number).value)
+            for number, label in enumerate(result.labels[1:], 1)
+        ]
+        names, *_ = zip(*tests, strict=True)
+        plans = [
+            [result.plan(need.life * ratio / factor, failures, design) for ratio in _DURATIONS]
+            for _, failures, design, factor in tests
+        ]
+
+        def panel(
+            title: str, y: Axis, caption: str, curves: Sequence[FloatArray], banded: Collection[str]
+        ) -> Panel:
+            """Return values with their ends against the duration; some curves have a band."""
+            marks, colours = list[Mark](), several_colours(len(plans))
+            for name, row, colour, ends in zip(names, plans, colours, curves, strict=True):
+                time, (value, low, high) = np.array([plan.duration for plan in row]), ends
+                marks.append(Line(time, value, colour=colour, label=name))
+                if name in banded and np.any(low < high):
+                    marks.append(Band(time, low, high, colour=colour, alpha=0.15))
+            marks.append(Span(need.life, dash=":", colour="0.4", label="life to show"))
+            return Panel(title, Axis("duration", need.unit, 1.0, log=True), y, marks, caption)
+
+        panels = {
+            "specimens": panel(
+                "Specimens",
+                Axis("specimens", log=True),
+                "Specimens that show the life, against the duration of their test.",
+                [
+                    np.array([(plan.specimens, plan.low, plan.high) for plan in row], float).T
+                    for row in plans
+                ],
+                names,
+            ),
+            "passing": panel(
+                "Probability that the design passes",
+                share_axis("passes"),
+                "Probability that the simulated design passes the test, with a 95 % band.",
+                [arrays_of(plan.passing for plan in row) for row in plans],
+                ["no failure"],
+            ),
+        }
+        return Sheet(result.title, panels, [list(panels)], (13.0, 4.8))
+
 
 def _cell(plan: Plan) -> str:
     """Return the specimens of a test, with the interval by the shape."""
@@ -193,3 +251,6 @@ def _cell(plan: Plan) -> str:
     if plan.low is None or plan.high is None or plan.low == plan.high:
         return number
     return f"{number} ({count(plan.low)}..{count(plan.high)})"
+
+
+_DURATIONS = np.geomspace(0.4, 6.0, 25)  # over the life to show

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wearsim.arguments import ArgumentError, checking_argument
 from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import CapabilityError, ResultsFileError, ScenarioError
 from wearsim.results.io.outputs import check_output
@@ -216,18 +217,17 @@ def parse_target(text: str, scenario: Scenario | None = None) -> Target:
 
     Raises
     ------
-    ValueError
+    ArgumentError
         If it cannot be read, or names no observable of an ensemble.
     """
-    target = Target.parse(text)
+    with checking_argument("precision"):
+        target = Target.parse(text)
     known = observables_of()
     if scenario is not None:
         known = observables_of(cam=bool(scenario.cam), fatigue=bool(scenario.fatigue))
     if target.observable not in known:
-        raise ValueError(
-            f"'{text}' names '{target.observable}', which is not an observable, expected one of"
-            f" {', '.join(known)}"
-        )
+        expected = f"which is not an observable, expected one of {', '.join(known)}"
+        raise ArgumentError("precision", f"'{text}' names '{target.observable}', {expected}")
     return target
 
 

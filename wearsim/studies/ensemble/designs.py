@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal, TypeAlias, get_args
 
+from wearsim.arguments import ArgumentError
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario import Scenario
 from wearsim.uq.sampling.sampler import PlanName
@@ -32,13 +33,15 @@ def parse_plan(name: str) -> EnsemblePlan:
 
     Raises
     ------
-    ValueError
+    ArgumentError
         If there is none.
     """
     for plan in ENSEMBLE_PLANS:
         if plan == name:
             return plan
-    raise ValueError(f"unknown plan '{name}', expected one of {', '.join(ENSEMBLE_PLANS)}")
+    raise ArgumentError(
+        "plan", f"unknown plan '{name}', expected one of {', '.join(ENSEMBLE_PLANS)}"
+    )
 
 
 def sources(

@@ -42,12 +42,12 @@ from wearsim.report.text import (
     shown,
     statistic_in_words,
     sufficient_for,
-    too_few,
 )
 from wearsim.studies.cam.panels import ANGLE, segment_marks
 from wearsim.studies.cam.turn import unchecked_turn_of
 from wearsim.studies.ensemble.file.data import Effect
 from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.studies.ensemble.view import known_effects, no_effects
 from wearsim.studies.fatigue.panels import DAMAGE
 from wearsim.studies.fatigue.view import with_source_lines
 from wearsim.studies.run.panels import HEIGHT, Y
@@ -262,17 +262,9 @@ def _lift_error(result: EnsembleResult) -> Panel:
 def _effects(result: EnsembleResult) -> Panel:
     """Return first-order Sobol indices of the depth, and total indices if available."""
     title = "Sobol indices of the depth at the end"
-    if result.count == 1 or not (effects := known_effects(result, "depth")):
-        return message(title, too_few(result.fewest_for_indices()))
-    if result.is_constant("depth"):
-        return message(title, "none, the depth is equal in all realisations")
-    return effects_panel(title, "the depth", effects)
-
-
-def known_effects(result: EnsembleResult, name: str) -> list[Effect]:
-    """Return the effects of the inputs on an observable, none if no index is known."""
-    effects = result.sensitivity(name)
-    return effects if any(np.isfinite(item.first.value) for item in effects) else []
+    if why := no_effects(result):
+        return message(title, why)
+    return effects_panel(title, "the depth", result.sensitivity("depth"))
 
 
 def effects_panel(title: str, of: str, effects: list[Effect]) -> Panel:
@@ -330,8 +322,7 @@ def draws_panels(
     axis : Axis
         Axis of the values.
     """
-    effects = [] if result.count < 2 else known_effects(result, name)
-    if not effects:
+    if not (effects := known_effects(result, name)):
         return {}
     item = next(item for item in result.raw.inputs if item["input"] == effects[0].name)
     unit, size = engineers_unit(item["unit"])

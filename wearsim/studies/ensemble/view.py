@@ -55,6 +55,8 @@ INTERVAL = "  95 % interval"
 _HEADS = ("at the end", "mean", "std", "5 %", "median", "95 %")
 _SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")
 _BLOCK = 16384  # realisations in memory at a time
+#: names of CSV files and of the quantity, of curves other than damage
+_CURVES = {"depth_profile": ("profile", "depth"), "lift_error_curve": ("lift_error", "lift error")}
 
 Shown = TypeVar("Shown", bound=EnsembleResult)
 
@@ -130,21 +132,14 @@ class RealisationsView(StudyView[Shown]):
         }
         if result.count:
             tables["courses.csv"] = [with_sources(_courses(result), scenario)]
-            tables["profile.csv"] = [_band("y", "m", "depth", result.band())]
-        curves = result.raw.schema.variables.keys() if result.count else ()
-        if "lift_error_curve" in curves:
-            band = result.band("lift_error_curve")
-            tables["lift_error.csv"] = [_band("angle", "rad", "lift error", band)]
-        for name in [name for name in KEPT if "damage" in name and name in curves]:
-            axis, unit = ("angle", "rad") if name == "damage_curve" else ("y", "m")
-            band = result.band(name)
-            if band.mean.any():  # of a body that may pit
-                columns = _band(axis, unit, "damage", band, "1")
-                tables[f"{name}.csv"] = [with_sources(columns, scenario)]
+        for name in [name for name in KEPT if result.count and name in result.raw.schema.variables]:
+            band, (file, what) = result.band(name), _CURVES.get(name, (name, "damage"))
+            if what != "damage" or band.mean.any():  # of a body that may pit
+                columns = _band(result.raw, name, what, band)
+                tables[f"{file}.csv"] = [with_sources(columns, scenario)]
         if result.failed:
-            numbers, errors = map(str, result.errors), result.errors.values()
-            failures = {"realisation": list(numbers), "error": list(errors)}
-            tables["failures.csv"] = [[Column(*column) for column in failures.items()]]
+            numbers = Column("realisation", list(map(str, result.errors)))
+            tables["failures.csv"] = [[numbers, Column("error", list(result.errors.values()))]]
         return tables
 
 
@@ -239,16 +234,9 @@ class EnsembleView(RealisationsView[EnsembleResult]):
     def _effects(self) -> Table:
         """Return the Sobol indices of the depth."""
         result, head = self.result, "Sobol indices of the depth"
-        constant = result.is_constant("depth")
-        effects = [] if result.count == 1 or constant else result.sensitivity("depth")
-        if not any(math.isfinite(item.first.value) for item in effects):
-            equal = result.count > 1 and constant
-            why = (
-                "none, the depth is equal in all realisations"
-                if equal
-                else too_few(result.fewest_for_indices())
-            )
+        if why := no_effects(result):
             return Table("", [[f"{head}: {why}"]], [""])
+        effects = result.sensitivity("depth")
         totals = any(item.total is not None for item in effects)
         order = sorted(effects, key=lambda item: item.without_effect)
         heads = [head, "first order", *(["total"] if totals else [])]
@@ -340,6 +328,19 @@ def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
     return [(named.label, *values), (INTERVAL, *intervals)]
 
 
+def known_effects(result: EnsembleResult, name: str) -> list[Effect]:
+    """Return the effects of the inputs on an observable, none if no index is known."""
+    effects = [] if result.count < 2 else result.sensitivity(name)
+    return effects if any(math.isfinite(item.first.value) for item in effects) else []
+
+
+def no_effects(result: EnsembleResult) -> str:
+    """Return why there are no Sobol indices of the depth, or an empty text."""
+    if result.count > 1 and result.is_constant("depth"):
+        return "none, the depth is equal in all realisations"
+    return "" if known_effects(result, "depth") else too_few(result.fewest_for_indices())
+
+
 def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
     """Return the Sobol indices of a random input as cells."""
     if not math.isfinite(item.first.value):
@@ -425,8 +426,9 @@ def _courses(result: EnsembleResult) -> Iterator[Column]:
             yield computed(f"{name} {ending}", values, unit, name)
 
 
-def _band(axis: str, unit: str, what: str, band: Band, of: str = "m") -> list[Column]:
-    """Return mean and band of a curve at the end, in the unit `of`."""
-    parts = ("mean", "std", "low", "high")
-    curves = [computed(f"{what} {part}", getattr(band, part), of) for part in parts]
-    return [computed(axis, band.y, unit), *curves]
+def _band(raw: EnsembleData, name: str, what: str, band: Band) -> list[Column]:
+    """Return mean and band of a curve at the end, under the name of its quantity."""
+    variables, parts = raw.schema.variables, ("mean", "std", "low", "high")
+    axis, unit = variables[name].dims[-1], variables[name].unit
+    curves = [computed(f"{what} {part}", getattr(band, part), unit) for part in parts]
+    return [computed(axis, band.y, variables[axis].unit), *curves]

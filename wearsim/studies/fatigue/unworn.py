@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from wearsim.evolution.fatigue import effective_damage, greatest_damages
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
 from wearsim.mechanics.fatigue import ORTHOGONAL, greatest_von_mises
 from wearsim.report.text import shown
+from wearsim.scenario import Scenario
 from wearsim.types import FloatArray
-
-if TYPE_CHECKING:
-    from wearsim.evolution.problem import WearProblem
-    from wearsim.scenario import Scenario
 
 
 def lives_at(scenario: Scenario, pressure: FloatArray) -> FloatArray | None:

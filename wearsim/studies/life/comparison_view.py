@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from wearsim.errors import ResultsFileError
 from wearsim.levelling import Measured
-from wearsim.report.text import part_with_interval
+from wearsim.report.text import part_with_interval, with_ends
 from wearsim.report.view import Row, Rows, Table, View
 from wearsim.studies.life.comparison import LifeComparison, swept_variable
 from wearsim.studies.life.result import LifeResult
@@ -103,9 +103,7 @@ def _factor(ratio: Interval) -> str:
         return "an unknown number of"
     if not math.isfinite(ratio.half_width):
         return f"{ratio.value:.3f} [unbounded]"
-    if ratio.half_width == 0.0:
-        return f"{ratio.value:.3f}"
-    return f"{ratio.value:.3f} [{ratio.low:.3f}, {ratio.high:.3f}]"
+    return with_ends(ratio, "{:.3f}".format)
 
 
 def _comparison(comparison: LifeComparison) -> dict[str, Any]:

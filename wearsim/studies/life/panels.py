@@ -32,7 +32,8 @@ from wearsim.report.view import Overview, Row, Rows
 from wearsim.studies.cam.panels import ANGLE, shape_panel
 from wearsim.studies.cam.turn import unchecked_turn_of
 from wearsim.studies.cam.view import CAM_EXCLUDED, loads
-from wearsim.studies.ensemble.panels import draws_panels, effects_panel, known_effects
+from wearsim.studies.ensemble.panels import draws_panels, effects_panel
+from wearsim.studies.ensemble.view import known_effects
 from wearsim.studies.fatigue.panels import incidence_panel
 from wearsim.studies.fatigue.view import EXCLUDED as NO_FATIGUE, source_text
 from wearsim.studies.life.comparison import swept_variable

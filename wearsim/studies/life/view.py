@@ -21,10 +21,11 @@ from wearsim.report.text import (
     rounded_lives,
     shown,
     too_few,
+    with_ends,
 )
 from wearsim.report.view import Overview, Row, Rows, Table
 from wearsim.results.study_view import SAMPLING
-from wearsim.studies.ensemble.view import RealisationsView
+from wearsim.studies.ensemble.view import RealisationsView, known_effects
 from wearsim.studies.fatigue.lives import competing_data, competing_table, fatigue_of_lives
 from wearsim.studies.life.fits_table import fit_tables, fits_data
 from wearsim.studies.life.result import LifeResult
@@ -208,12 +209,7 @@ class LifeView(RealisationsView[LifeResult]):
             return "nothing, no two lives differ"
         if result.effects_obstacle:
             return f"not stated\n{result.effects_obstacle}"
-        effects = result.sensitivity("life")
-        return (
-            ""
-            if any(math.isfinite(i.first.value) for i in effects)
-            else too_few(result.fewest_for_indices())
-        )
+        return "" if known_effects(result, "life") else too_few(result.fewest_for_indices())
 
     def data(self) -> dict[str, Any]:
         """Return the life of the design, lives in its unit."""
@@ -382,12 +378,9 @@ def life_cells(result: LifeResult, share: float) -> tuple[str, str]:
 
 def _change(factor: Interval) -> str:
     """Return a change of the life by an input, with its interval."""
-    change = [100.0 * (end - 1.0) for end in (factor.value, factor.low, factor.high)]
     if not math.isfinite(factor.half_width):
         return NOTHING
-    if factor.half_width == 0.0:
-        return f"{change[0]:+.1f} %"
-    return "{:+.1f} % [{:+.1f}, {:+.1f}]".format(*change)
+    return with_ends(factor, lambda end: f"{100.0 * (end - 1.0):+.1f}", " %")
 
 
 def study_options(result: LifeResult) -> list[str]:

@@ -1,4 +1,4 @@
-"""View of lives after returns from the field: before, after, goodness of fit, remaining lives."""
+"""View of lives after returns from the field: before, after, fit, and remaining lives."""
 
 from __future__ import annotations
 
@@ -10,13 +10,30 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.report.text import count, count_of, part_with_interval, rounded_lives
+from wearsim.levelling import Measured
+from wearsim.report.panels import (
+    Axis,
+    Band,
+    Bars,
+    Line,
+    Mark,
+    Panel,
+    Sheet,
+    Span,
+    Whiskers,
+    dots,
+    message,
+    several_colours,
+    share_axis,
+)
+from wearsim.report.text import count, count_of, part_with_interval, rounded_lives, with_ends
 from wearsim.report.view import STUDY, Column, Row, Rows, Table
 from wearsim.results.study_view import DesignsView, columns_of
 from wearsim.studies.life.view import limit_texts
-from wearsim.studies.returns.result import SHARES, FieldReturns, RunningUnit
+from wearsim.studies.returns.result import SHARES, FieldReturns
 from wearsim.uq.estimation.intervals import Interval, arrays_of
 from wearsim.uq.survival.fleet import Predicted
+from wearsim.uq.survival.lives import survival_curve
 
 _MOST = 12  # running units in a table
 _REACHED = Interval(1.0, 1.0, 1.0)  # probability of a unit that is older than the target
@@ -32,7 +49,6 @@ class FieldReturnsView(DesignsView):
     Panels: survival, failures, remaining lives. Files: the running units.
     """
 
-    sheet = "wearsim.studies.returns.panels:returns_sheet"
     file, group = "units.csv", "Life"
     basis = _BASIS
 
@@ -71,9 +87,17 @@ class FieldReturnsView(DesignsView):
         rows.append(
             Row("failures", f"{failed} observed, {_numbers(check.before, -1)} predicted before")
         )
-        rows.append(Row("agreement before", _surprise(check.surprise)))
-        rows.append(Row("goodness of fit after", _fit(check.fit)))
-        return rows
+        surprise = _judged(
+            check.surprise,
+            "the number of failures is not the one predicted",
+            "the number of failures is as predicted",
+        )
+        fit = _judged(
+            check.fit,
+            "lives of the field do not have the predicted distribution",
+            "no contradiction in the distribution of the failures",
+        )
+        return [*rows, Row("agreement before", surprise), Row("goodness of fit after", fit)]
 
     def tables(self) -> list[Table]:
         """Return the returns, lives, failures in bands, what is known, and running units."""
@@ -134,34 +158,37 @@ class FieldReturnsView(DesignsView):
         """Return wear factor and life factor before and after the returns."""
         result, posterior = self.result, self.result.posterior
         pairs = [result.wear_factor(levels) for levels in (posterior.before, posterior.after)]
-        lines = [
-            ["median of K/H over the life factor [1/Pa]", *(_range(pair[0]) for pair in pairs)],
-            ["scatter t of ln K/H", *(_range(pair[1]) for pair in pairs)],
-        ]
+        medians, scatters = zip(*pairs, strict=True)
+        known = {"median of K/H over the life factor [1/Pa]": medians}
+        known["scatter t of ln K/H"] = scatters
         if result.life_factor > 1.0:
-            lines.append(["life factor", _range(result.factor_before), _range(result.factor)])
+            known["life factor"] = result.factor_before, result.factor
+        lines = [
+            [name, *(with_ends(end, "{:.3g}".format) for end in ends)]
+            for name, ends in known.items()
+        ]
         return Table("", lines, ["what is not known", "before", "after"])
 
     def _running(self) -> Table:
         """Return the running units with the least remaining lives."""
-        result = self.result
-        ordered = sorted(result.running, key=lambda unit: unit.remaining.lives[0].value)
-        several, target = len(result.labels) > 1, result.designs[0].target
-        lines = []
-        for unit in ordered[:_MOST]:
-            lives = [_life(life) for life in unit.remaining.lives]
-            cells = [unit.name, *([result.labels[unit.design]] if several else [])]
-            cells += [count(float(f"{unit.age:.4g}")), *lives]
-            if target is not None:
-                cells.append(_reaches(unit))
-            lines.append(cells)
-        heads = ["running unit", *(["design"] if several else []), f"age [{result.unit}]"]
-        heads += [f"further life, B{share:g}" for share in SHARES]
-        heads += [f"reaches {count(target)}"] if target is not None else []
-        if len(ordered) > _MOST:
-            rest = f"and {count(len(ordered) - _MOST)} more"
-            lines.append([rest, *[""] * (len(heads) - 1)])
-        return Table("", lines, heads)
+        result, target = self.result, self.result.designs[0].target
+        units = sorted(result.running, key=lambda unit: unit.remaining.lives[0].value)[:_MOST]
+        columns = {"running unit": [unit.name for unit in units]}
+        if len(result.labels) > 1:
+            columns["design"] = [result.labels[unit.design] for unit in units]
+        columns[f"age [{result.unit}]"] = [count(float(f"{unit.age:.4g}")) for unit in units]
+        for place, share in enumerate(SHARES):
+            lives = [_life(unit.remaining.lives[place]) for unit in units]
+            columns[f"further life, B{share:g}"] = lives
+        if target is not None:
+            chances = [unit.remaining.survival for unit in units]
+            texts = ["reached" if part is None else part_with_interval(part) for part in chances]
+            columns[f"reaches {count(target)}"] = texts
+        lines = [list(line) for line in zip(*columns.values(), strict=True)]
+        if len(result.running) > _MOST:
+            rest = f"and {count(len(result.running) - _MOST)} more"
+            lines.append([rest, *[""] * (len(columns) - 1)])
+        return Table("", lines, list(columns))
 
     def data(self) -> dict[str, Any]:
         """Return all numbers, lives in their unit."""
@@ -249,9 +276,15 @@ class FieldReturnsView(DesignsView):
             columns += columns_of("reaches target", survival)
         return columns
 
-
-def _range(interval: Interval) -> str:
-    return f"{interval.value:.3g} [{interval.low:.3g}, {interval.high:.3g}]"
+    def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
+        """Return survival, failures in bands of lives, and remaining lives of running units."""
+        result = self.result
+        panels = {
+            "survival": _survival(result),
+            "failures": _failures(result),
+            "remaining": _remaining(result),
+        }
+        return Sheet(result.title, panels, [list(panels)], (15.0, 4.6))
 
 
 def _life(life: Interval, unit: str = "") -> str:
@@ -259,28 +292,14 @@ def _life(life: Interval, unit: str = "") -> str:
     return f"{value}{unit} [{low}..{high}]"
 
 
-def _reaches(unit: RunningUnit) -> str:
-    survival = unit.remaining.survival
-    return "reached" if survival is None else part_with_interval(survival)
-
-
 def _numbers(predicted: Predicted, place: int) -> str:
     ends = (predicted.low[place], predicted.high[place])
     return f"{predicted.mean[place]:.3g} [{ends[0]:.0f}, {ends[1]:.0f}]"
 
 
-def _surprise(probability: float) -> str:
-    text = f"p = {probability:.2g}"
-    if probability < 0.05:
-        return f"{text}: the number of failures is not the one predicted"
-    return f"{text}: the number of failures is as predicted"
-
-
-def _fit(probability: float) -> str:
-    text = f"p = {probability:.2f}"
-    if probability < 0.05:
-        return f"{text}: lives of the field do not have the predicted distribution"
-    return f"{text}: no contradiction in the distribution of the failures"
+def _judged(probability: float, contradicted: str, agreed: str) -> str:
+    """Return the probability of a worse agreement, and what it means."""
+    return f"p = {probability:.2g}: {contradicted if probability < 0.05 else agreed}"
 
 
 def _warnings(result: FieldReturns) -> Sequence[str]:
@@ -298,3 +317,79 @@ def _warnings(result: FieldReturns) -> Sequence[str]:
             " systematically wrong, or the units are not those of the scenario"
         )
     return warnings
+
+
+_POINTS = 80
+_PALE, _DARK = "0.6", "0.3"
+
+
+def _survival(result: FieldReturns) -> Panel:
+    """Return the survival of each design, before and after the returns."""
+    marks, colours = list[Mark](), several_colours(len(result.labels))
+    fleet, axis = result.returns.fleet, Axis("life", result.unit, 1.0, limits=(0.0, None))
+    for number, (label, colour) in enumerate(zip(result.labels, colours, strict=True)):
+        after, before = result.lives_after[number], result.lives_before[number]
+        name = f"{label}: " if len(result.labels) > 1 else ""
+        life = np.linspace(0.0, after.mixture.quantile_of_mean(0.99), _POINTS + 1)[1:]
+        for lives, shade, text, alpha in (
+            (before, _PALE, "before", 0.2),
+            (after, colour, "after", 0.25),
+        ):
+            chances = [lives.probability_before(float(end)) for end in life]
+            value, high, low = 1.0 - arrays_of(chances)
+            marks.append(Band(life, low, high, colour=shade, alpha=alpha))
+            marks.append(Line(life, value, colour=shade, label=f"{name}{text}"))
+        chosen = fleet.design == number
+        ends = np.where(fleet.failed, fleet.high, fleet.low)[chosen]
+        curve = survival_curve(ends, fleet.failed[chosen])
+        if len(curve.life):
+            # up to the oldest unit
+            steps = np.append(0.0, np.append(curve.life, ends.max()))
+            left = np.append(1.0, np.append(curve.survival, curve.survival[-1]))
+            text = f"{name}units (Kaplan-Meier)"
+            marks.append(Line(steps, left, "--", steps=True, colour=_DARK, label=text))
+    target = result.designs[0].target
+    if target is not None:
+        marks.append(Span(target, dash=":", colour="0.4", label=f"target {count(target)}"))
+    text = "Share of the machines that outlast a life, before and after the returns."
+    return Panel("Survival, with 95 % bands", axis, share_axis("survival"), marks, text)
+
+
+def _failures(result: FieldReturns) -> Panel:
+    """Return predicted and observed failures in bands of lives."""
+    check = result.check
+    bands = len(check.edges) - 1
+    place = np.arange(bands, dtype=float)
+    names = [f"to {count(float(f'{edge:.3g}'))}" for edge in check.edges[1:]]
+    colours = several_colours(2)
+    marks: list[Mark] = [
+        Bars(place - 0.3, place + 0.3, check.observed[:bands], colour=_PALE, label="observed")
+    ]
+    for shift, predicted, label, colour in (
+        (-0.12, check.before, "predicted before", colours[1]),
+        (0.12, check.after, "predicted after", colours[0]),
+    ):
+        ends = predicted.low[:bands], predicted.high[:bands]
+        marks.append(Whiskers(place + shift, *ends, colour=colour))
+        marks.append(dots(place + shift, predicted.mean[:bands], "o", colour=colour, label=label))
+    most = max(float(check.after.high[:bands].max()), float(check.observed[:bands].max()))
+    x = Axis(f"life [{result.unit}]", ticks=place.tolist(), names=names, limits=(-0.6, bands - 0.4))
+    text = "Failures observed in bands of lives, and predicted with 95 % intervals."
+    return Panel("Failures", x, Axis("units", limits=(0.0, 1.6 * most + 1.0)), marks, text)
+
+
+def _remaining(result: FieldReturns) -> Panel:
+    """Return the remaining lives of running units against their age."""
+    title = "Further life of running units"
+    if not result.running:
+        return message(title, "no unit is running")
+    marks = list[Mark]()
+    age = np.array([unit.age for unit in result.running])
+    for place, (share, colour) in enumerate(zip(SHARES, several_colours(len(SHARES)), strict=True)):
+        value, low, high = arrays_of(unit.remaining.lives[place] for unit in result.running)
+        high = np.where(np.isfinite(high), high, np.nan)
+        marks.append(Whiskers(age, low, high, colour=colour))
+        marks.append(dots(age, value, "o", colour=colour, label=f"B{share:g}"))
+    text = "Further lives that 10 % and 50 % of units of an age do not reach, with 95 % intervals."
+    x, y = (Axis(name, result.unit, 1.0, limits=(0.0, None)) for name in ("age", "further life"))
+    return Panel(title, x, y, marks, text)

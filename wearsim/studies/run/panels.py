@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -153,20 +154,12 @@ def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
 
 def _normal_force(result: Result) -> Panel:
     force = _by_roller(result.normal_force)
-    base, rollers, marks = _base_load(result), force.shape[1], list[Mark]()
+    base, marks = _base_load(result), list[Mark]()
     if base is not None:
         marks.append(Line(*base, width=0.8, colour=GREY, label="without feedback"))
     # between the steps, a line would contradict the load; at many of them, the dots are a line
-    style: dict[str, Any] = {} if base is None else {"dash": "", "marker": "o"}
-    more = {"passes": (result.passes, "1")}
-    for roller in range(rollers):
-        label = "" if rollers == 1 and base is None else f"roller {roller + 1}"
-        label = "at the steps" if rollers == 1 and base is not None else label
-        colour = COLOURS[roller % len(COLOURS)]
-        values = force[:, roller]
-        marks.append(
-            Line(result.time, values, size=2.6, label=label, colour=colour, more=more, **style)
-        )
+    style: dict[str, Any] = {} if base is None else {"dash": "", "marker": "o", "size": 2.6}
+    marks += _lines(result, force, "" if base is None else "at the steps", **style)
     y = _force_axis("normal force", "N", force if base is None else np.array([0.0, 1.0]))
     title, text = "Normal force of one roller", _first_and_last(force, "N")
     return Panel(title, Axis("time", "min", margin=(0.02, 0.02)), y, marks, text)
@@ -175,18 +168,19 @@ def _normal_force(result: Result) -> Panel:
 def pressure_panel(result: Result) -> Panel:
     """Return the peak pressure of the rollers against time."""
     values = _by_roller(result.peak_pressure)
-    marks = [
-        Line(
-            result.time,
-            values[:, number],
-            label="" if values.shape[1] == 1 else f"roller {number + 1}",
-            colour=COLOURS[number % len(COLOURS)],
-            more={"passes": (result.passes, "1")},
-        )
-        for number in range(values.shape[1])
-    ]
+    marks = _lines(result, values)
     y, text = _force_axis("peak pressure", "MPa", values), _first_and_last(values, "MPa")
     return Panel("Peak pressure of the rollers", Axis("time", "min"), y, marks, text)
+
+
+def _lines(result: Result, values: FloatArray, alone: str = "", **style: Any) -> list[Line]:
+    """Return the history of each roller, or of all if there is one column, with its label."""
+    more, rollers = {"passes": (result.passes, "1")}, values.shape[1]
+    labels = [alone] if rollers == 1 else [f"roller {number + 1}" for number in range(rollers)]
+    return [
+        Line(result.time, column, label=label, colour=colour, more=more, **style)
+        for column, label, colour in zip(values.T, labels, cycle(COLOURS), strict=False)
+    ]
 
 
 def _force_axis(name: str, unit: str, values: FloatArray) -> Axis:

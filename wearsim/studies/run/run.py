@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wearsim.arguments import checking_argument
 from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.evolution.limits import Limit
@@ -92,7 +93,8 @@ def run(
     >>> kept = wearsim.run("rig.toml", "rig.h5")  # writes the file as well
     """
     scenario = with_chosen_model(as_scenario(scenario), test=True)
-    limit = None if until is None else Limit.parse(until)
+    with checking_argument("until"):
+        limit = None if until is None else Limit.parse(until)
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
@@ -167,7 +169,8 @@ def resume(
         text = apply_overrides(data.scenario_text, str(path), {"evolution.allow_deep": True})
         data = replace(data, scenario_text=text)
     check_plugins(path, data)
-    limit = None if until is None else Limit.parse(until)
+    with checking_argument("until"):
+        limit = None if until is None else Limit.parse(until)
     if limit is None and data.until and not data.finished:
         limit = Limit.parse(data.until)
     reached = is_at_limit(path, data, limit)

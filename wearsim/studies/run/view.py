@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -42,9 +42,6 @@ _NOT_MODEL = (
     "The stated error is that of the steps in time. It does not contain the errors of the contact"
     " model, of the wear law or of the inputs."
 )
-
-if TYPE_CHECKING:
-    pass
 
 _IN_OVERVIEW = {"roller depth", "width", "lift error, peak to peak"}
 #: what wear tests do not contain
@@ -118,11 +115,11 @@ class RunView(StudyView[Result]):
             rows = [rows[0]._replace(label="depth worn since the start"), below]
         if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
             rows.insert(1, stated("roller depth", "roller_depth", "um"))
-        width = width_row(result.width[-1], result.raw.width_threshold)
-        width = stated("width", "width", "mm") if np.any(result.width[-1]) else width
         rows += [
             *self.limit_rows(),
-            width,
+            stated("width", "width", "mm")
+            if np.any(result.width[-1])
+            else width_row(result.width[-1], result.raw.width_threshold),
             stated("worn volume", "worn_volume", "mm^3"),
             stated("dissipated energy", "dissipated_energy", "J"),
             stated("dissipated power", "power", "W"),

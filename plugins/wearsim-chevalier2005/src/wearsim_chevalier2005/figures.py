@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from wearsim.report.figures import figure_style, name_axes
 from wearsim.report.panels import BLUE, GREEN, GREY, ORANGE, PRESSURE, RED
 from wearsim.report.text import PER_SI, count, shown
-from wearsim.studies.contact.panels import SLIDE, STICK
+from wearsim.studies.contact.view import SLIDE, STICK
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import figure_panels as spread, paper
 
