@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -11,8 +12,19 @@ from wearsim.contact_batch import ContactBatch
 from wearsim.evolution.problem import WearProblem
 from wearsim.types import FloatArray, IntArray
 
+T = TypeVar("T")
 GRIP = 0.98  # greatest traction of a rolling roller, of friction: at the ends of a skid
 LEAST_LOAD = 1e-3  # next to a pause, of the greatest load
+
+
+def computed_once(compute: Callable[[WearProblem], T], problem: WearProblem) -> T:
+    """Return what is constant during a test with constant inputs, computed at the first call."""
+    try:
+        found: T = problem.__dict__["constants"][compute]
+    except KeyError:
+        found = compute(problem)
+        problem.__dict__.setdefault("constants", {})[compute] = found
+    return found
 
 
 def with_contacts(problem: WearProblem, chosen: IntArray) -> WearProblem:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -15,7 +15,7 @@ from wearsim.evolution.relocation import located, relocated
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
 from wearsim.evolution.strips import grown, identical_strips, next_grids, on_grid
-from wearsim.types import BoolArray, FloatArray, IntArray
+from wearsim.types import FloatArray, IntArray
 
 T = TypeVar("T")
 
@@ -197,7 +197,7 @@ class Evolution:
 
     def _end_finished(self) -> None:
         """Leave only the tests that have neither failed nor ended."""
-        if not self.failures and not self._ended and self.state.passes.max() < self.stop:
+        if not (self.failures or self._ended) and max(self.state.passes.tolist()) < self.stop:
             return
         tests = enumerate(zip(self.numbers.tolist(), self.state.passes.tolist(), strict=True))
         over = self.failures.keys() | self._ended
@@ -216,32 +216,43 @@ class Evolution:
         lengths = self._lengths()
         if not len(self.numbers):
             return None
-        problem, state, scheme = self.problem, self.state, self._scheme
+        problem, state, scheme, count = self.problem, self.state, self._scheme, len(lengths)
+
+        def selected(places: IntArray) -> tuple[WearProblem, WearState, FloatArray]:
+            if places.size == count:
+                return problem, state, lengths
+            return problem.at(places), state.at(places), lengths[places]
 
         def attempt(places: IntArray) -> Attempt:
-            selected = problem.at(places), state.at(places), lengths[places]
-            tried = _finite(self.stepper.attempt(*selected, self.stop, scheme))
-            return self.stepper.with_damage(*selected[:2], tried) if problem.fatigue else tried
+            here, start, step = selected(places)
+            tried = _finite(self.stepper.attempt(here, start, step, self.stop, scheme))
+            return self.stepper.with_damage(here, start, tried) if problem.fatigue else tried
 
-        resting = self._resting()
-        done, failed = bisect_failures(attempt, (~resting).nonzero()[0])
-        places = resting.nonzero()[0]
+        accepted: list[tuple[IntArray, Sequence[WearState]]] = []
+        stepping = np.arange(count)
+        if self._has_pauses:
+            resting = at_rest(problem, state.passes)
+            stepping, places = (~resting).nonzero()[0], resting.nonzero()[0]
+            if places.size:
+                accepted.append((places, self.stepper.rest(*selected(places), self.stop)))
+        done, failed = bisect_failures(attempt, stepping)
         failures = self._rejected(failed, lengths) if failed else {}
-        accepted: list[tuple[IntArray, list[WearState]]] = []
-        if places.size:
-            selected = problem.at(places), state.at(places), lengths[places]
-            accepted.append((places, list(self.stepper.rest(*selected, self.stop))))
         for places, tried in done:
             numbers, ratios = self.numbers[places].tolist(), tried.ratio.tolist()
             errors = tried.excess.tolist(), lengths[places].tolist(), ratios
             tests = enumerate(zip(numbers, *errors, strict=True))
             taken = [k for k, (n, *error) in tests if self._trials[n].accepts(*error)]
-            if taken:
+            if len(taken) == len(numbers):
+                accepted.append((places, tried.path))
+            elif taken:
                 chosen = np.array(taken)
                 accepted.append((places[chosen], [item.at(chosen) for item in tried.path]))
         warning = done[0][1].warning if done else None
         advance = self._continued(accepted, warning) if accepted else None
-        self.fail(failures)
+        if failures:
+            self.fail(failures)
+        else:
+            self._end_finished()
         return advance
 
     def _relocate(self) -> None:
@@ -262,11 +273,12 @@ class Evolution:
             for number, length in zip(numbers, proposed, strict=True):
                 self._trials.setdefault(number, self.stepper.trial(length))
         failures: dict[int, Exception] = {}
-        stops = [self.stop] * len(numbers)
-        if self.problem.pauses and not self.stepper.pass_by_pass:
+        count = len(numbers)
+        stops, resting = [self.stop] * count, [False] * count
+        if self._has_pauses:
             boundaries = next_boundaries(self.problem, self.state.passes)
             stops = np.minimum(self.stop, boundaries).tolist()
-        resting = self._resting().tolist()
+            resting = at_rest(self.problem, self.state.passes).tolist()
         done = self.state.passes.tolist(), self.state.steps.tolist(), stops, resting
         for place, (number, passes, steps, stop, rests) in enumerate(
             zip(numbers, *done, strict=True)
@@ -281,11 +293,10 @@ class Evolution:
             self.fail(failures)
         return np.array(lengths)
 
-    def _resting(self) -> BoolArray:
-        """Return which tests are in a pause; a pass-by-pass stepper passes over it itself."""
-        if self.problem.pauses and not self.stepper.pass_by_pass:
-            return at_rest(self.problem, self.state.passes)
-        return np.zeros(self.numbers.size, dtype=np.bool_)
+    @property
+    def _has_pauses(self) -> bool:
+        """Whether steps end at pauses; a pass-by-pass stepper passes over them itself."""
+        return bool(self.problem.pauses) and not self.stepper.pass_by_pass
 
     def _length(self, trial: Trial, passes: float, steps: int, stop: float) -> float:
         """Return the length of the next trial step of a test, up to `stop` [passes]."""
@@ -317,31 +328,36 @@ class Evolution:
         return failures
 
     def _continued(
-        self, accepted: list[tuple[IntArray, list[WearState]]], warning: str | None
+        self, accepted: list[tuple[IntArray, Sequence[WearState]]], warning: str | None
     ) -> Advance:
         """Continue from accepted steps, given by the places of their tests and their path."""
-        places = np.concatenate([part for part, _ in accepted])
-        *middle, end = map(joined_states, zip(*(path for _, path in accepted), strict=True))
-        if len(accepted) > 1 and (np.diff(places) < 0).any():  # pauses come first
-            order = np.argsort(places)
-            places, end = places[order], end.at(order)
-            middle = [part.at(order) for part in middle]
-        numbers, start = self.numbers[places], self.state.at(places)
+        (places, (*middle, end)), *others = accepted
+        if others:
+            places = np.concatenate([part for part, _ in accepted])
+            *middle, end = map(joined_states, zip(*(path for _, path in accepted), strict=True))
+            if (np.diff(places) < 0).any():  # pauses come first
+                order = np.argsort(places)
+                places, end = places[order], end.at(order)
+                middle = [part.at(order) for part in middle]
+        problem, start, numbers = self.problem, self.state, self.numbers
+        whole = places.size == numbers.size
+        if not whole:
+            problem, start, numbers = problem.at(places), start.at(places), numbers[places]
         trials = [self._trials.pop(number) for number in numbers.tolist()]
         end = end.replaced(
             step=np.array([trial.proposed for trial in trials]),
             rejected=end.rejected + np.array([trial.rejected for trial in trials]),
         )
-        self.state = self.state.with_others(places, end)
-        return Advance(numbers, self.problem.at(places), (start, *middle, end), warning)
+        self.state = end if whole else self.state.with_others(places, end)
+        return Advance(numbers, problem, (start, *middle, end), warning)
 
 
 def _finite(tried: Attempt) -> Attempt:
     """Return a step; raise StepError if it leads to a value that is not finite."""
     end = tried.path[-1]
     for values in (end.cylinder_depth, end.energy):
-        # counted, since all() takes twice as long on short arrays
-        if np.count_nonzero(np.isfinite(values)) < values.size:
+        # reduced, since all() takes twice as long on short arrays
+        if not np.logical_and.reduce(np.isfinite(values), axis=None):
             message = f"a value is not finite after pass {end.passes[0]:.0f}"
             raise StepError(message, end.to_arrays())
     return tried

@@ -96,7 +96,8 @@ def observed_errors(
     differences, widths = [], []
     for name, values in observed.items():
         fine_values = values.reshape(len(passes), -1)
-        coarse_values = np.array([item[name].ravel() for item in coarse.observed])
+        coarse_values = np.array([item[name] for item in coarse.observed])
+        coarse_values = coarse_values.reshape(len(coarse.observed), -1)
         fine = _interpolated(at_common, at_passes, fine_values)
         difference = np.abs(_interpolated(at_common, at_steps, coarse_values) - fine)
         if name.endswith("angle"):
@@ -162,7 +163,7 @@ def _greatest_of_last(passes: FloatArray, errors: FloatArray) -> FloatArray:
     greatest = errors.copy()
     for place in range(1, len(passes)):
         last = slice(begin[place], place + 1)
-        greatest[place] = (root[last, None] * errors[last]).max(axis=0) / root[place]
+        greatest[place] = np.maximum.reduce(root[last, None] * errors[last]) / root[place]
     return greatest
 
 

@@ -34,7 +34,7 @@ UNEVEN = 3.0  # bend of a gap over its median from which it is not that of crown
 #: properties that do not depend on the inputs of contacts, or on the tilt alone
 _CONSTANTS = (
     *("shape", "body_rows", "volume_weights", "nominal_least_gap", "cylinder_share", "has_spring"),
-    *("constant_load", "pauses", "greatest_load", "_wear_coefficients"),
+    *("constant_load", "pauses", "greatest_load", "wear_coefficients"),
 )
 _OF_LOAD = {"normal_force_offset"}  # inputs on which no other constant value depends
 _OF_GAP = "nominal_gap", "contact_gap", "nominal_least_gap", "has_crowned_gap"
@@ -162,9 +162,9 @@ class WearProblem:
 
         return replace(
             self,
-            laws=tuple(self.laws[number] for number in numbers),
-            growth=tuple(self.growth[number] for number in numbers) if self.growth else (),
-            loads=tuple(self.loads[number] for number in numbers),
+            laws=tuple(map(self.laws.__getitem__, numbers)),
+            growth=tuple(map(self.growth.__getitem__, numbers)) if self.growth else (),
+            loads=tuple(map(self.loads.__getitem__, numbers)),
             kinematics=self.kinematics.at(realisations),
             flat_gap=np.take(self.flat_gap, realisations, axis=2),
             from_apex=part(self.from_apex, 1),
@@ -359,7 +359,7 @@ class WearProblem:
         found = object.__new__(WearProblem)
         before, after = vars(self.inputs), vars(inputs)
         changed = {name for name in after if after[name] is not before.get(name)}
-        lost = set() if changed <= _OF_LOAD else {"nominal_batch", "spin"}
+        lost = {"constants"} if changed <= _OF_LOAD else {"constants", "nominal_batch", "spin"}
         if "tilt" in changed and not np.array_equal(inputs.tilt, self.inputs.tilt):
             lost.update(_OF_GAP)
         found.__dict__.update({n: v for n, v in self.__dict__.items() if n not in lost})
@@ -395,13 +395,13 @@ class WearProblem:
         each = passes if isinstance(passes, float) else passes[..., None]
         if self.linear_wear:
             power = contacts.dissipation.reshape(self.shape + contacts.dissipation.shape[1:])
-            parts: FloatArray = self._wear_coefficients * each * power
+            parts: FloatArray = self.wear_coefficients * each * power
             return parts
         shares = self.wear_shares
         return self.depths_worn(contacts, {body: shares[body] * each for body in BODIES})
 
     @cached_property
-    def _wear_coefficients(self) -> FloatArray:
+    def wear_coefficients(self) -> FloatArray:
         """Contribution of each contact to the wear per roller pass and dissipation, as parts."""
         each = [(self.wear_shares[body], self.wear_factors[body]) for body in BODIES]
         return np.stack([share * np.asarray(factor)[..., None] for share, factor in each])

@@ -493,4 +493,5 @@ def sum_in_order(values: FloatArray, axis: int) -> FloatArray:
     """
     if values.shape[axis] == 1:
         return values.squeeze(axis)
-    return np.asarray(np.add.accumulate(values, axis=axis).take(-1, axis=axis))
+    total: FloatArray = np.add.accumulate(values, axis=axis).take(-1, axis=axis)
+    return total

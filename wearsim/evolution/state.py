@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from operator import is_
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +23,8 @@ HERTZ = 2.0 / 3.0  # approach of unworn bodies as a power of the load
 SIGMAS = 2.0  # standard deviations of the sampling scatter that are counted as error
 #: Depths of cylinder and rollers, shapes as in `WearState` [m].
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
-T = TypeVar("T")
 _CONTACT = "contact_"
+_STACKED = "stacked_depths"  # attribute of a state, with the depths that it has been computed of
 _AUXILIARY = ("coarse_step_solution", "half_quadrature_solution")
 #: axis of the realisations in the arrays of a `WearState`
 _AXES = {
@@ -197,21 +196,19 @@ class WearState:
     @property
     def stacked(self) -> FloatArray:
         """Worn depths of all bodies, shape (stations + rollers, realisations, strips) [m]."""
-        return self.computed_once(stacked_depths, self.cylinder_depth, self.roller_depth)
-
-    def computed_once(self, compute: Callable[..., T], *fields: Any) -> T:
-        """Return `compute` of fields of this state; again only where others have replaced them."""
-        before = self.__dict__.get(compute.__name__)
-        if before is not None and all(map(is_, before[0], fields)):
-            found: T = before[1]
-            return found
-        found = compute(*fields)
-        self.__dict__[compute.__name__] = fields, found
-        return found
+        cylinder, roller = self.cylinder_depth, self.roller_depth
+        before = self.__dict__.get(_STACKED)
+        if before is None or before[0] is not cylinder or before[1] is not roller:
+            before = cylinder, roller, np.concatenate([cylinder[:, 0], roller[0]])
+            self.__dict__[_STACKED] = before
+        stacked: FloatArray = before[2]
+        return stacked
 
     @property
     def auxiliary(self) -> dict[str, Any]:
         """The coarse-step and half-quadrature solutions that exist, by field name."""
+        if self.coarse_step_solution is None and self.half_quadrature_solution is None:
+            return {}
         states = {name: getattr(self, name) for name in _AUXILIARY}
         return {name: state for name, state in states.items() if state is not None}
 
@@ -225,7 +222,7 @@ class WearState:
         """Return the state with depths given as `stacked` [m], and with other fields replaced."""
         cylinder, roller = separated(depths, self.cylinder_depth.shape[0])
         state = self.replaced(cylinder_depth=cylinder, roller_depth=roller, **others)
-        state.__dict__[stacked_depths.__name__] = (cylinder, roller), depths
+        state.__dict__[_STACKED] = cylinder, roller, depths
         return state
 
     def with_added(self, depths: Depths) -> WearState:
@@ -317,11 +314,6 @@ def joined_states(states: Sequence[WearState]) -> WearState:
         coarse_step_solution=joined_states(coarse) if has_coarse else None,
         **{n: np.concatenate(a, axis=_AXES[n]) for n, a in arrays.items()},
     )
-
-
-def stacked_depths(cylinder: FloatArray, roller: FloatArray) -> FloatArray:
-    """Return depths of cylinder and rollers as `WearState.stacked`."""
-    return np.concatenate([cylinder[:, 0], roller[0]])
 
 
 def separated(depths: FloatArray, stations: int) -> Depths:

@@ -50,10 +50,15 @@ def failures_explained(scenario: Scenario) -> Iterator[None]:
         raise explained(error, scenario) from error.__cause__
 
 
+def greatest_valid_depth(scenario: Scenario) -> float:
+    """Return the greatest depth for which models are valid, inf if deeper ones are allowed [m]."""
+    return math.inf if scenario.evolution.allow_deep else DEEPEST * scenario.roller.radius
+
+
 def too_deep(scenario: Scenario, depth: float) -> str:
     """Return that a worn depth [m] is beyond the validity of the models, or an empty text."""
     radius = scenario.roller.radius
-    if depth <= DEEPEST * radius or scenario.evolution.allow_deep:
+    if depth <= greatest_valid_depth(scenario):
         return ""
     return (
         f"the worn depth of {depth * 1e3:.4g} mm exceeds a tenth of roller.radius ="

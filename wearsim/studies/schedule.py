@@ -139,14 +139,14 @@ def due_records(
     advance: Advance, schedule: RecordSchedule, stop: float, pass_by_pass: bool
 ) -> list[Due]:
     """Return the records of a step in order; `stop` is the end of the tests [passes]."""
-    return sorted(
-        (source + at_end, place, passes)
-        for source, (start, end) in enumerate(pairwise(advance.path))
-        for place, (first, last) in enumerate(
-            zip(start.passes.tolist(), end.passes.tolist(), strict=True)
-        )
-        for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
-    )
+    records: list[Due] = []
+    for source, (start, end) in enumerate(pairwise(advance.path)):
+        each = enumerate(zip(start.passes.tolist(), end.passes.tolist(), strict=True))
+        for place, (first, last) in each:
+            between = schedule.due_between(first, last, stop, pass_by_pass)
+            if between:
+                records += [(source + at_end, place, passes) for passes, at_end in between]
+    return sorted(records)
 
 
 def states_at(

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.evolution.contacts import at_least
+from wearsim.evolution.contacts import at_least, computed_once
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
-from wearsim.evolution.steppers.loads import mean_force, smooth_loads
+from wearsim.evolution.steppers.loads import mean_force, smooth_loads, with_feedback
 from wearsim.types import FloatArray
 
 
@@ -25,11 +25,14 @@ class Conditions:
     ----------
     force : ndarray, shape (realisations,) or (stations, 1, realisations)
         Load before feedback for the solution at the end of the step [N].
+    prescribed : ndarray, shape (stations, contacts, realisations)
+        The same at all contacts [N].
     own, mean : ndarray, shape (realisations,)
         Exposure per pass in these conditions, and its mean over the step.
     """
 
     force: FloatArray
+    prescribed: FloatArray
     own: FloatArray
     mean: FloatArray
 
@@ -42,13 +45,21 @@ def conditions_of(
     The load is that at the end of the step where it varies smoothly, and else its mean.
     """
     if problem.constant_load is not None and not problem.varying:
-        own = exposure(here, problem, problem.constant_load)
-        return Conditions(problem.constant_load, own, own)
+        return computed_once(_constant_conditions, problem)
     force = mean = mean_force(problem, state, passes)
     smooth = smooth_loads(problem, state.passes, passes)
     if smooth.any():
         force = np.where(smooth, problem.force(problem.time(state.passes + passes)), mean)
-    return Conditions(force, exposure(here, problem, force), exposure(here, problem, mean))
+    own = exposure(here, problem, force), exposure(here, problem, mean)
+    return Conditions(force, with_feedback(here, force, np.zeros(()), ()), *own)
+
+
+def _constant_conditions(problem: WearProblem) -> Conditions:
+    """Return the conditions of all steps where neither the load nor an input varies."""
+    force = problem.constant_load
+    assert force is not None
+    own = exposure(problem, problem, force)
+    return Conditions(force, with_feedback(problem, force, np.zeros(()), ()), own, own)
 
 
 def exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> FloatArray:

@@ -137,18 +137,18 @@ def _unloaded(problem: WearProblem, state: WearState) -> BoolArray | None:
 
 def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
     """Return which tests have worn to a groove, whose contacts slip."""
-    least = problem.gap(*state.depths).min(axis=-1)
-    worn, elastic = (
-        least - problem.nominal_least_gap,
-        problem.values_of(state.contacts, "approach") - least,
-    )
-    deep = sum_in_order(worn, 0).min(axis=0) >= GROOVE * sum_in_order(elastic, 0).max(axis=0)
+    least = np.minimum.reduce(problem.gap(*state.depths), axis=-1)
+    worn = np.minimum.reduce(sum_in_order(least - problem.nominal_least_gap, 0))
+    elastic = sum_in_order(state.contacts.approach.reshape(problem.shape) - least, 0)
+    deep = worn >= GROOVE * np.maximum.reduce(elastic)
     return np.asarray(deep & (_adhesion(problem, state) <= MOST_ADHESION))
 
 
 def _adhesion(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest part of a contact of each test that adheres, shape (realisations,)."""
-    return np.asarray(problem.values_of(state.contacts, "adhesion_fraction").max(axis=(0, 1)))
+    adhesion = state.contacts.adhesion_fraction.reshape(problem.shape)
+    greatest: FloatArray = np.maximum.reduce(adhesion, axis=(0, 1))
+    return greatest
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
@@ -158,7 +158,7 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
     assert state.past_sums is not None
     assert state.past_wear is not None
     begins = whole & have_groove(problem, state)
-    if not np.count_nonzero(begins):
+    if not begins.nonzero()[0].size:
         return state
     separation = state.contacts.separation.reshape(shape)
     begins &= ~np.isnan(separation).any(axis=(0, 1, 3))

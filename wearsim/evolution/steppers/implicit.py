@@ -34,6 +34,7 @@ from wearsim.evolution.steppers.loads import (
 from wearsim.evolution.steppers.single_step import (
     carried_loads,
     volumes_of,
+    wear_of_contacts,
     wear_per_pass,
 )
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
@@ -112,8 +113,11 @@ class ImplicitStepper(StepDoublingStepper):
         end = scheme(problem, state, step)
         end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
-        left = self._left(problem, state, stop, OF_STEPS)
+        left, fixed = self._left(problem, state, stop, OF_STEPS), state.irreducible
         scale, contacts, past = (passes / stop) ** PART_EXPONENT / left, end.contacts, Past.of(end)
+        assert state.stepping_error is not None
+        assert end.wear_exponents is not None
+        assert end.order is not None
         displaced = np.zeros(len(step))
         if problem.has_spring:
             aim = SHARE * self.tolerance
@@ -123,11 +127,11 @@ class ImplicitStepper(StepDoublingStepper):
             scale,
             step,
             displaced,
-            state.volume_error - state.irreducible[1],
-            end.irreducible,
-            np.asarray(state.stepping_error),
+            state.volume_error - fixed[1],
+            end.irreducible if problem.has_nodes else fixed,
+            state.stepping_error,
             end.stacked,
-            past.order,
+            end.order,
             past.spans,
             past.wear,
             past.sums,
@@ -137,8 +141,8 @@ class ImplicitStepper(StepDoublingStepper):
             problem.contact_gap,
             contacts.approach,
             contacts.line_load,
-            problem.wear_parts(contacts, 1.0).reshape(2, *contacts.line_load.shape),
-            np.asarray(end.wear_exponents).reshape(contacts.line_load.shape),
+            wear_of_contacts(problem, contacts),
+            end.wear_exponents.reshape(contacts.line_load.shape),
             problem.contact_stiffness,
             problem.grid.spacing,
             problem.volume_weights,
@@ -170,8 +174,8 @@ class ImplicitStepper(StepDoublingStepper):
         """Take a step as two halves and as a whole; choose order and length of the next one."""
         doubled = self.doubled(problem, state, step, stop, scheme)
         half, end = doubled.path
-        past, depths = Past.of(end), end.stacked
-        own, order = np.empty_like(depths), np.empty_like(past.order)
+        past, depths, orders = Past.of(end), end.stacked, np.asarray(end.order)
+        own, order = np.empty_like(depths), np.empty_like(orders)
         most = np.full_like(order, MAX_ORDER)
         left = self._left(problem, state, stop, DOUBLED)
         if not problem.varying:  # many rows of a log average out within a step
@@ -179,7 +183,7 @@ class ImplicitStepper(StepDoublingStepper):
         part = (end.passes / stop) ** PART_EXPONENT / left
         scale = part / (DOUBLED_SHARE * self.tolerance)
         over, ratio = next_steps(
-            *(past.wear, past.spans, depths, past.order, scale, 1.0, 1.0, most),
+            *(past.wear, past.spans, depths, orders, scale, 1.0, 1.0, most),
             *(np.ones_like(depths), own, order),
         )
         # local errors miss some of what an abrupt change of wear adds
@@ -217,7 +221,7 @@ class ImplicitStepper(StepDoublingStepper):
         """
         (low, high), fixed = ADDED_UP, state.irreducible
         # `assess_step` makes the error of the profile at least this part of that of the volume
-        if state.profile_error.max() < OF_VOLUME[1] * low * self.tolerance:
+        if np.maximum.reduce(state.profile_error) < OF_VOLUME[1] * low * self.tolerance:
             return np.ones(len(state.passes))
         volumes = volumes_of(problem, state.stacked)
         grown, worn = state.passes / stop, np.where(volumes > 0.0, volumes, np.inf)
@@ -316,7 +320,7 @@ def implicit_step(
         return step_by_formula(here, start, passes, conditions, np.ones_like(order))[0]
     # strips that leave the contact: their depth can decrease from the third order on
     for lower in (2, 1) if decreased.nonzero()[0].size else ():
-        again: IntArray = (decreased & (Past.of(end).order > lower)).nonzero()[0]
+        again: IntArray = (decreased & (np.asarray(end.order) > lower)).nonzero()[0]
         if again.size:
             columns = (column[..., again] for column in vars(conditions).values())
             some = here.at(again), state.at(again), passes[again], Conditions(*columns)

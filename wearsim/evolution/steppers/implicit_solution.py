@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import contact_batch
+from wearsim.evolution.contacts import computed_once, contact_batch
 from wearsim.evolution.error_estimates import ADHERING
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
@@ -23,7 +23,11 @@ from wearsim.evolution.steppers.loads import (
     fresh_approach,
     with_feedback,
 )
-from wearsim.evolution.steppers.single_step import carried_loads, energy_per_pass
+from wearsim.evolution.steppers.single_step import (
+    carried_loads,
+    energy_per_pass,
+    wear_of_contacts,
+)
 from wearsim.mechanics.numerics.implicit_step import (
     begin_step,
     compare_step,
@@ -83,7 +87,7 @@ class _Slope:
 
 
 _PAST = attrgetter(
-    *("past_wear", "past_sums", "past_feedback", "past_spans", "order"),
+    *("past_wear", "past_sums", "past_feedback", "past_spans"),
     *("separation", "part", "whole_steps"),
 )
 
@@ -99,7 +103,6 @@ class Past(NamedTuple):
     sums: FloatArray
     feedback: FloatArray
     spans: FloatArray
-    order: IntArray
     separation: FloatArray
     part: FloatArray
     whole_steps: FloatArray
@@ -107,19 +110,17 @@ class Past(NamedTuple):
     @classmethod
     def of(cls, state: WearState) -> Past:
         """Return those of a state of the implicit stepper."""
-        wear, sums, feedback, spans, order, *edges = _PAST(state)
-        realisations, contacts = order.size, state.contacts.power.size
+        wear, sums, feedback, spans, separation, part, whole_steps = _PAST(state)
+        realisations, contacts = state.passes.size, state.contacts.power.size
         if feedback is None:
             feedback = np.empty((ROWS, 0, realisations))
-        if edges[1] is None:
-            edges = [np.empty((contacts, 0))] * 3
-        separation, part, whole_steps = edges
+        if part is None or whole_steps is None:
+            separation = part = whole_steps = np.empty((contacts, 0))
         return cls(
             wear,
             sums.reshape(ROWS, -1, realisations, 1),
             feedback.reshape(ROWS, -1, realisations, 1),
             spans,
-            order,
             np.empty((contacts, 0)) if separation is None else separation.reshape(contacts, -1),
             part.reshape(contacts, -1),
             whole_steps.reshape(contacts, -1),
@@ -161,19 +162,15 @@ def step_by_formula(
     """
     past, contacts, depths = Past.of(state), state.contacts, state.stacked
     bodies, gap = problem.body_rows, problem.contact_gap
-    share = np.array(problem.cylinder_wear_share[: passes.size, 0])  # at the first station
-    shape, strips = contacts.line_load.shape, problem.grid.strips
-
-    def wear_of(contacts: ContactBatchSolution) -> FloatArray:
-        return problem.wear_parts(contacts, 1.0).reshape(2, *shape)
-
-    in_groove = np.zeros(passes.size, dtype=np.bool_)
+    share, shape = computed_once(_cylinder_share, problem), contacts.line_load.shape
+    realisations, strips = passes.size, shape[1]
+    # tests that resolve edges, whose depths or energy decrease, in a groove, and in progress
+    resolved, decreased, in_groove, active = np.zeros((4, realisations), dtype=np.bool_)
+    active[:] = True
     if past.part.size and not past.separation.size:  # strips in contact as wholes are counted
-        in_groove = have_groove(problem, state)
+        in_groove[:] = have_groove(problem, state)
     # line loads and wear about which the wear is linearised
-    line_load, wear = contacts.line_load, wear_of(contacts)
-    realisations = passes.size
-    resolved, decreased = np.empty((2, realisations), dtype=np.bool_)
+    line_load, wear = contacts.line_load, wear_of_contacts(problem, contacts)
     of_tests = np.empty((7, realisations))
     sums, feedback = np.empty(past.sums.shape[1:]), np.empty(past.feedback.shape[1:])
     work, of_contacts = np.empty((7, *depths.shape)), np.empty((3, *shape))
@@ -209,9 +206,8 @@ def step_by_formula(
     )
     base, guess = of_bodies[3], of_bodies[4]
     exponents = np.array(state.wear_exponents).reshape(shape)
-    loads = LoadsOfStep(problem, state, conditions.force, passes, feedback)
-    stations, active = problem.shape[0], np.ones(realisations, dtype=np.bool_)
-    iterations = np.zeros(realisations, dtype=np.int64)
+    loads = LoadsOfStep(problem, state, conditions, passes, feedback)
+    stations, iterations = problem.shape[0], np.zeros(realisations, dtype=np.int64)
     most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
     for iteration in range(1, MAX_FIXED_POINT + 1):
         about, compliance = np.empty((5, *shape)), np.empty((realisations, len(bodies), 2, strips))
@@ -221,7 +217,7 @@ def step_by_formula(
         warm = contacts if near is None or iteration > 1 else near
         solved = solve_compliant(problem, batch, compliance, warm, active)
         iterations += active
-        new, apart = wear_of(solved), solved.separation
+        new, apart = wear_of_contacts(problem, solved), solved.separation
         apart = (
             past.separation if apart is None or not past.separation.size else kernel_input(apart)
         )
@@ -237,7 +233,7 @@ def step_by_formula(
             change = np.maximum(change, opening * (moved / depth))
         converged = problem.iteration_tolerance * relaxation
         most_change = CONVERGED * depth
-        if solved.adhesion_fraction.max() > ADHERING:
+        if np.maximum.reduce(solved.adhesion_fraction) > ADHERING:
             adhesion = solved.adhesion_fraction.reshape(problem.shape).max(axis=(0, 1))
             of_partial_slip = np.where(adhesion > ADHERING, OF_STEP * opening, np.inf)
             most_change = np.minimum(most_change, of_partial_slip)
@@ -290,15 +286,18 @@ def step_by_formula(
     return end, decreased
 
 
+def _cylinder_share(problem: WearProblem) -> FloatArray:
+    """Return the part of the wear of a contact that is the cylinder's, (realisations,)."""
+    return np.array(problem.cylinder_wear_share[: problem.shape[2], 0])  # at the first station
+
+
 class LoadsOfStep:
     """Loads of the contacts at the end of an implicit step.
 
     Parameters
     ----------
-    problem, start, passes
+    problem, start, conditions, passes
         As of `step_by_formula`.
-    force : ndarray, shape (realisations,) or (stations, 1, realisations)
-        Load before feedback [N].
     feedback : ndarray, shape (rows, realisations, 1)
         Predicted part of the loads due to springs and load terms, without rows if there are none
         [N].
@@ -315,12 +314,12 @@ class LoadsOfStep:
         self,
         problem: WearProblem,
         start: WearState,
-        force: FloatArray,
+        conditions: Conditions,
         passes: FloatArray,
         feedback: FloatArray,
     ) -> None:
-        self._problem, self._start, self._force, self._passes = problem, start, force, passes
-        self._prescribed = with_feedback(problem, force, np.zeros(()), ())
+        self._problem, self._start, self._passes = problem, start, passes
+        self._force, self._prescribed = conditions.force, conditions.prescribed
         self.used, self.vary = checked_loads(start, self._prescribed), feedback.size > 0
         self._none = feedback
         if self.vary:
@@ -439,7 +438,8 @@ def solve_compliant(
     model, realisations = problem.model, active.size
     coupled, numbers = problem.contacts_each, active.nonzero()[0]
     if numbers.size == realisations and coupled == 1:
-        return model.solve(batch, compliance.sum(axis=2).reshape(batch.gap.shape), None, warm)
+        both = np.add.reduce(compliance, axis=2)
+        return model.solve(batch, both.reshape(batch.gap.shape), None, warm)
     if numbers.size == realisations == 1:
         return model.solve(batch, None, SharedWear(problem.bodies, compliance), warm)
     # the contacts of one realisation next to each other, which the problem has `realisations` apart

@@ -8,7 +8,6 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import HERTZ, WearState
 from wearsim.evolution.steppers.loads import elastic_approaches, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement
-from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
 from wearsim.types import FloatArray, IntArray
 
@@ -91,7 +90,7 @@ def next_steps_of_energy(
     assert sums is not None
     assert spans is not None
     assert orders is not None
-    energy = kernel_input(sums[:, -1:, :, None])
+    energy = np.array(sums[:, -1:, :, None])
     least = LEAST_ENERGY * end.energy * (1.0 - start.passes / end.passes)
     worn = np.maximum(end.energy - start.energy, least)[None, :, None]
     ones, order, own = np.ones(worn.shape), np.empty_like(orders), np.empty_like(worn)

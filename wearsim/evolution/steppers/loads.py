@@ -81,7 +81,7 @@ def advanced_terms(
 
 def checked_loads(state: WearState, loads: FloatArray) -> FloatArray:
     """Return the loads of all contacts; raise StepError unless they are positive."""
-    if (~(loads > 0.0)).nonzero()[0].size:
+    if not np.logical_and.reduce(loads > 0.0, axis=None):
         raise StepError(
             f"contact is lost at pass {state.passes[0]:.0f}: the load has fallen to"
             f" {loads.min():.4g} N",

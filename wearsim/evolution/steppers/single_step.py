@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import contact_batch
+from wearsim.evolution.contacts import computed_once, contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState
@@ -311,6 +311,21 @@ def energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> Flo
     return per_pass
 
 
+def wear_of_contacts(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
+    """Return the wear of both bodies per pass by each contact, (2, contacts, strips) [m]."""
+    if problem.linear_wear:
+        coefficients: FloatArray = computed_once(_wear_coefficients, problem)
+        return coefficients * contacts.dissipation
+    return problem.wear_parts(contacts, 1.0).reshape(2, *contacts.line_load.shape)
+
+
+def _wear_coefficients(problem: WearProblem) -> FloatArray:
+    """Return the wear of both bodies per pass and dissipation, shape (2, contacts, 1)."""
+    ones = np.ones((*problem.shape, 1))
+    return np.asarray(problem.wear_coefficients * ones).reshape(2, -1, 1)
+
+
 def volumes_of(problem: WearProblem, depths: FloatArray) -> FloatArray:
     """Return the volume of depths of all bodies, as `WearState.stacked`, (realisations,) [m^3]."""
-    return sum_in_order(problem.volume_weights[1][:, None] * depths.sum(axis=-1), axis=0)
+    sums = np.add.reduce(depths, axis=-1)
+    return sum_in_order(problem.volume_weights[1][:, None] * sums, axis=0)

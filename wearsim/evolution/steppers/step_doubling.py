@@ -68,7 +68,7 @@ class StepDoublingStepper(Stepper):
         """Return the forced step, the one proposed after the last step, or a first step."""
         if self.forced_step is not None:
             return np.full(state.passes.shape, self.forced_step)
-        if np.count_nonzero(state.step) == len(state.step):
+        if state.step.nonzero()[0].size == state.step.size:
             return state.step
         return np.where(state.step > 0.0, state.step, self.first_steps(problem, state))
 

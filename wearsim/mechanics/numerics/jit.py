@@ -318,6 +318,11 @@ def kernel_input(array: FloatArray) -> FloatArray:
     return array if array.flags.carray and array.dtype == np.float64 else own_array(array)
 
 
+def kernel_inputs(*arrays: FloatArray) -> list[FloatArray]:
+    """Return arrays as of `kernel_input`."""
+    return [a if a.flags.carray and a.dtype == np.float64 else own_array(a) for a in arrays]
+
+
 def _cache_folder() -> Path | None:
     """Return the folder of the compiled kernels of these sources; None where none is writable."""
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or "~/.cache"

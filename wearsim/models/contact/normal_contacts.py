@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from wearsim.contact_batch import NO_BODY, ContactBatch, ContactBatchSolution
-from wearsim.mechanics.numerics.jit import kernel_input
+from wearsim.mechanics.numerics.jit import kernel_input, kernel_inputs
 from wearsim.mechanics.slender import newton as kernels
 from wearsim.plugins import SharedWear
 from wearsim.types import FloatArray, IntArray
@@ -91,15 +91,16 @@ class NormalContacts(NamedTuple):
         line_load, half_length, separation = np.zeros((3, *wide))
         approach = np.zeros(shape)
         if start is not None:
-            line_load[:], approach[:] = (
-                start.line_load.reshape(wide),
-                start.approach.reshape(shape),
-            )
+            line_load[:] = start.line_load.reshape(wide)
+            approach[:] = start.approach.reshape(shape)
         status, iterations = np.zeros((2, *shape), np.int64)
+        gap, curvature, loads = kernel_inputs(
+            batch.gap, batch.longitudinal_curvature, batch.normal_force
+        )
         return cls(
-            kernel_input(batch.gap).reshape(wide),
-            kernel_input(batch.longitudinal_curvature).reshape(shape),
-            kernel_input(batch.normal_force).reshape(shape),
+            gap.reshape(wide),
+            curvature.reshape(shape),
+            loads.reshape(shape),
             line_load,
             approach,
             half_length,

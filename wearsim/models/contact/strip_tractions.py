@@ -6,10 +6,12 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.mechanics.hertz.elasticity import ElasticPair
-from wearsim.mechanics.numerics.jit import kernel_input
+from wearsim.mechanics.numerics.jit import kernel_input, kernel_inputs
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
 from wearsim.types import FloatArray, Grid
+
+_SUMS = len(SUMS)
 
 
 def strip_tractions(
@@ -39,20 +41,24 @@ def strip_tractions(
         Torques of the longitudinal tractions on the rollers [N m]; zero without rolling radii.
     """
     contacts, variation, radius = line_load.shape[0], batch.variation, batch.rolling_radius
-    dissipation, none = np.empty(line_load.shape), np.empty((contacts, 0))
-    sums, torque = np.empty((len(SUMS), contacts)), np.empty(contacts)
+    dissipation, none = np.empty(line_load.shape), line_load[:, :0]
+    of_contacts = np.empty((_SUMS + 1, contacts))
+    sums, torque = of_contacts[:_SUMS], of_contacts[_SUMS]
+    speed, longitudinal, lateral, spin, friction = kernel_inputs(
+        *(batch.rolling_speed, batch.longitudinal, batch.lateral, batch.spin, batch.friction)
+    )
     strip_contacts(
         line_load,
         half_length,
         grid.y,
         grid.spacing,
         strip_elasticity(pair.contact_modulus, pair.shear_modulus),
-        kernel_input(batch.rolling_speed),
-        kernel_input(batch.longitudinal),
-        kernel_input(batch.lateral),
-        kernel_input(batch.spin),
+        speed,
+        longitudinal,
+        lateral,
+        spin,
         none if variation is None else kernel_input(variation),
-        kernel_input(batch.friction).reshape(contacts, -1),
+        friction.reshape(contacts, -1),
         none if radius is None else kernel_input(radius),
         dissipation,
         sums,

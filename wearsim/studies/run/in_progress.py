@@ -31,7 +31,12 @@ from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, observables_of_track
 from wearsim.studies.contact.comparison import REFERENCE, error_above_tolerance
-from wearsim.studies.failures import explained, failures_explained, too_deep_failure
+from wearsim.studies.failures import (
+    explained,
+    failures_explained,
+    greatest_valid_depth,
+    too_deep_failure,
+)
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, coarse_stepper
@@ -86,8 +91,10 @@ class RunInProgress:
         if data is not None:
             grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
         self.scenario, self.setup, self.path, self.storage = scenario, setup, path, storage
+        self._valid_depth = greatest_valid_depth(scenario)
         self.problem, self.stepper, self.stepper_name = assemble_problem(setup, grid)
         self.on_event: Watcher = on_event or (lambda event: None)
+        self._watched = on_event is not None
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
         self.warnings: list[str] = [] if data is None else earlier_warnings(data)
@@ -279,23 +286,26 @@ class RunInProgress:
                 self.reached = True
                 return
             self.recorder.add(advance, self.stop)
-            state = advance.end
-            self._verify_model(float(advance.path[0].passes[0]))
+            start, state = advance.path[0].passes.item(), advance.end
+            passes = state.passes.item()
+            if self.scenario.contact.auto is not None:
+                self._verify_model(start)
             if advance.warning is not None:
                 self.warn(advance.warning)
-            self.on_event(
-                Stepped(
-                    passes=self._passes,
-                    total_passes=self.stop,
-                    time=self._passes / self.problem.kinematics.pass_rate,
-                    depth=float(state.cylinder_depth.max()),
-                    step_passes=self._passes - float(advance.path[0].passes[0]),
-                    depth_error=float(state.depth_error.max()),
-                    wall_seconds=self._wall(),
+            if self._watched:
+                self.on_event(
+                    Stepped(
+                        passes=passes,
+                        total_passes=self.stop,
+                        time=passes / self.problem.kinematics.pass_rate,
+                        depth=float(state.cylinder_depth.max()),
+                        step_passes=passes - start,
+                        depth_error=float(state.depth_error.max()),
+                        wall_seconds=self._wall(),
+                    )
                 )
-            )
             self._check_depth()
-            if self.stop_requested() and self._passes < self.stop:
+            if self.stop_requested() and passes < self.stop:
                 self._interrupt()
             self._write_in_time()
 
@@ -305,15 +315,22 @@ class RunInProgress:
         Without an interval it is that of the scenario. A short run has some too: until it is
         reached, as much time passes before a checkpoint as had passed before the last one.
         """
+        if self.path is None:
+            return
+        since = time.monotonic() - self._written
         if interval is None:
+            if since <= FIRST_CHECKPOINT <= self.scenario.outputs.checkpoint_every:
+                return
             early = max(FIRST_CHECKPOINT, self._written - self.started)
             interval = min(self.scenario.outputs.checkpoint_every, early)
-        if time.monotonic() - self._written > max(interval, self._last_write / WRITING):
+        if since > max(interval, self._last_write / WRITING):
             self._write()
 
     def _check_depth(self) -> None:
         """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
-        depth = float(self.recorder.state.stacked.max())
+        depth = float(np.maximum.reduce(self.recorder.state.stacked, axis=None))
+        if depth <= self._valid_depth:
+            return
         less = f"the limit {self.limit.text}" if self.limit else ""
         resuming = "; with the option allow_deep, resume continues" if self.path else ""
         if failure := too_deep_failure(self.scenario, depth, self._passes, less, resuming):

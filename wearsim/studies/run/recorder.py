@@ -354,7 +354,7 @@ class Recorder:
 
     @property
     def _waiting(self) -> list[tuple[WearProblem, WearState, float]]:
-        return [record for record in self._records if len(record) > 2]
+        return [record for record in self._records if record[2:]]
 
     def _row(
         self, problem: WearProblem, recorded: WearProblem, state: WearState
