@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from wearsim.studies.cam.study import study_cam
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 
+@cache
 def panels_of(name: str) -> dict[str, Axes]:
     figure = cam_figure(study_cam(load_scenario(SCENARIOS / f"cam-{name}.toml")), "a cam")
     figure.draw_without_rendering()  # places of the texts
