@@ -97,15 +97,15 @@ def inputs_of(case):
     return {"operation__passes": 30_000, "contact__strips": 71, **CASES[case]}
 
 
-@cache
-def end_by_every_pass(case):
-    """Return the state of a case at its end after every pass was solved."""
-    return stepped(*built(evolution__stepper="per-pass", **inputs_of(case)))[0]
+@pytest.fixture(scope="module")
+def end_by_every_pass():
+    """Return a function of a case that returns its end state after every pass was solved."""
+    return cache(lambda case: stepped(*built(evolution__stepper="per-pass", **inputs_of(case)))[0])
 
 
 @pytest.mark.parametrize("case", list(CASES))
 @pytest.mark.parametrize("tolerance", [1e-2, 3e-4])
-def test_slender_contacts_match_per_pass_within_estimate(case, tolerance):
+def test_slender_contacts_match_per_pass_within_estimate(end_by_every_pass, case, tolerance):
     problem, stepper, stop = boxed(evolution__tolerance=tolerance, **inputs_of(case))
     found, _ = stepped(problem, stepper, stop)
     assert_covered(problem, end_by_every_pass(case), found)
