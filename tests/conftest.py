@@ -1,17 +1,26 @@
-"""Test modules that import a plugin: skipped without it, and marked `bench`.
+"""Test modules that import a plugin, which are skipped without it and marked `bench`.
 
-No example of hypothesis fails because of its run time.
+No example of hypothesis fails because of its run time. A kernel is compiled by one of the test
+processes only, while the others wait for it.
 """
 
 from __future__ import annotations
 
+import gc
 import re
+import time
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
+
+from wearsim.mechanics.numerics.jit import Kernel, not_cached
+from wearsim.operating_system import lock_file
 
 settings.register_profile("wearsim", settings(), deadline=None)
 settings.load_profile("wearsim")
@@ -40,3 +49,50 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if plugins_of(item.path):
             item.add_marker(pytest.mark.bench)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if hasattr(config, "workerinput"):  # one of several processes
+        lock = config.cache.mkdir("kernels") / "lock"
+        Kernel.__call__ = compiled_once(Kernel.__call__, lock)
+
+
+def compiled_once(call: Any, lock: Path) -> Any:
+    """Return `call` of kernels, by which one process at a time compiles and the next ones read."""
+
+    def call_or_wait(kernel: Kernel, *arguments: Any) -> Any:
+        if kernel.is_ready or not not_cached({kernel.__name__}):
+            return call(kernel, *arguments)
+        with locked(lock):
+            return call(kernel, *arguments)
+
+    return call_or_wait
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Wait until no other process holds the lock of a file, and hold it in the context."""
+    with path.open("w") as file:
+        while True:
+            try:
+                lock_file(file.fileno())
+            except OSError:
+                time.sleep(0.1)
+            else:
+                break
+        yield
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Leave the objects of the collection of tests, which remain, out of all garbage collections.
+
+    A garbage collection would go through a million of them.
+    """
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.collect()
+        gc.freeze()
+        gc.enable()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from cli_examples import SHORT, Command
-from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.figure import Figure
 from typer.testing import CliRunner, Result
 
 from wearsim.cli.app import app
@@ -14,8 +14,8 @@ from wearsim.cli.app import app
 
 @pytest.fixture(autouse=True)
 def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let texts of figures overlap, which halves the time; those of tests/report do not."""
-    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda engine, figure: None)
+    """Let texts of figures overlap, as a layout takes most of the time; see tests/report for it."""
+    monkeypatch.setattr(Figure, "get_layout_engine", lambda figure: None)
 
 
 @pytest.fixture

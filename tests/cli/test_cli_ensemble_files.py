@@ -14,6 +14,7 @@ import wearsim
 from tests.studies.ensemble_cases import differences, small
 from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.studies.ensemble.api import ensemble
+from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.opening import open_ensemble
 
 
@@ -22,6 +23,13 @@ def done_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("ensemble") / "e.h5"
     ensemble(small(), 40, path, scheduler="serial")
     return path
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> EnsembleResult:
+    """An ensemble that is done without an interruption."""
+    path = tmp_path_factory.mktemp("whole") / "whole.h5"
+    return ensemble(small(), 12, path, scheduler="serial")
 
 
 @pytest.fixture
@@ -79,8 +87,7 @@ def test_export_writes_realisations_courses_and_profile(command: Command, done: 
         np.testing.assert_allclose(table[:, head.index(title)], values, rtol=1e-11)
 
 
-def test_resumed_ensemble_equals_unbroken_ensemble(command: Command) -> None:
-    whole = ensemble(small(), 12, "whole.h5", scheduler="serial")
+def test_resumed_ensemble_equals_unbroken_ensemble(command: Command, whole: EnsembleResult) -> None:
     with pytest.raises(Interrupted):
         ensemble(small(), 12, "part.h5", scheduler="serial", stop_requested=lambda: True)
     assert open_ensemble("part.h5").count < 12
@@ -111,8 +118,9 @@ def test_commands_open_an_ensemble_that_is_in_parts(command: Command) -> None:
 
 
 @pytest.mark.parametrize("finished", [False, True])
-def test_resume_extends_an_ensemble(command: Command, finished: bool) -> None:
-    whole = ensemble(small(), 12, "whole.h5", scheduler="serial")
+def test_resume_extends_an_ensemble(
+    command: Command, whole: EnsembleResult, finished: bool
+) -> None:
     with nullcontext() if finished else pytest.raises(Interrupted):
         ensemble(small(), 5, "part.h5", scheduler="serial", stop_requested=lambda: not finished)
     result = command("resume", "part.h5", "-n", "12", "--scheduler", "serial", "-q")

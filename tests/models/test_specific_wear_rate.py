@@ -44,7 +44,8 @@ def test_other_numbers_are_drawn_beside_a_rate(tmp_path):
     scattered = {"distribution": "uniform", "low": 0.4, "high": 0.6}
     scenario = rig(RATE, **{"friction.coefficient": scattered, "operation.duration": "10 s"})
     factor = {"distribution": "lognormal", "median": 1.0, "factor": 1.5}
-    tests = wearsim.ensemble(scenario.changed({"wear.factor": factor}), 3, tmp_path / "tests.h5")
+    scattered_rate = scenario.changed({"wear.factor": factor})
+    tests = wearsim.ensemble(scattered_rate, 3, tmp_path / "tests.h5", scheduler="serial")
     drawn = tests.drawn_numbers(["wear.factor"])["wear.factor"]
     assert len(np.unique(drawn)) == 3
 

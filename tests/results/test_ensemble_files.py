@@ -24,6 +24,7 @@ from run_examples import some_run
 from test_dissipation_files import some_study
 
 from wearsim.errors import ResultsFileError
+from wearsim.results.io import files
 from wearsim.results.io.files import write_results
 from wearsim.studies.dissipation.result import read_dissipation
 from wearsim.studies.ensemble.file.data import EnsembleData
@@ -269,6 +270,29 @@ def test_file_changed_after_opening_is_refused(any_file, tmp_path):
     any_file.unlink()
     with pytest.raises(ResultsFileError, match="there is no such file"):
         data.variables["depth"]
+
+
+def test_small_column_of_an_unchanged_file_is_read_once(any_file, monkeypatch):
+    opened = []
+
+    def counted(path, take):
+        opened.append(path)
+        return files.read_file(path, take)
+
+    data = read_ensemble(any_file)
+    expected = read_ensemble(any_file).variables["depth"]
+    monkeypatch.setattr("wearsim.studies.ensemble.file.parts.read_file", counted)
+    first = data.variables["depth"]
+    assert opened.count(any_file) == 1
+    first[:] = -1.0  # an array that is returned belongs to the caller
+    np.testing.assert_array_equal(data.variables["depth"], expected)
+    assert opened.count(any_file) == 1
+    np.testing.assert_array_equal(data.column("depth", -1), expected[:, -1])
+    np.testing.assert_array_equal(data.rows("depth", 2, 4), expected[2:4])
+    assert opened.count(any_file) == 3
+    any_file.touch()
+    np.testing.assert_array_equal(data.variables["depth"], expected)
+    assert opened.count(any_file) == 4
 
 
 def test_pending_realisations_take_no_memory_and_no_disk(tmp_path):

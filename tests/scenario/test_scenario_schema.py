@@ -94,9 +94,16 @@ def schema(small_registry: object) -> Schema:
     return scenario_schema()
 
 
+@pytest.fixture(scope="module")
+def schema_with_installed_plugins() -> Schema:
+    return scenario_schema()
+
+
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_schema_accepts_every_shipped_scenario(path: Path) -> None:
-    schema = scenario_schema()  # with the installed plugins
+def test_schema_accepts_every_shipped_scenario(
+    schema_with_installed_plugins: Schema, path: Path
+) -> None:
+    schema = schema_with_installed_plugins
     data = tomllib.loads(path.read_text(encoding="utf-8"))
     assert _fits(data, schema, schema["$defs"])
 

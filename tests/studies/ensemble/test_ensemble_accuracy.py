@@ -44,7 +44,7 @@ def test_per_pass_scatter_decreases_with_passes(tmp_path):
     scenario = scenario_of(
         passes, contact__strips=31, evolution__stepper="per-pass", outputs__records=1, **inputs
     )
-    volume = ensemble(scenario, 10, tmp_path / "e.h5").at_end("worn_volume")
+    volume = ensemble(scenario, 10, tmp_path / "e.h5", scheduler="serial").at_end("worn_volume")
     spread = volume.std(ddof=1) / volume.mean()
     # one contact of the paper scatters by 0.44; the scatter of ten tests is known to a quarter
     assert spread == pytest.approx(0.44 / np.sqrt(passes), rel=0.75)

@@ -340,7 +340,7 @@ def test_per_roller_inputs_scatter_less_than_per_test(tmp_path):
         scenario = scenario_of(
             3000, contact__strips=41, evolution__tolerance=1e-2, outputs__records=1, **inputs
         )
-        result = ensemble(scenario, 60, tmp_path / f"{persistence}.h5")
+        result = ensemble(scenario, 60, tmp_path / f"{persistence}.h5", **SERIAL)
         volume, power = result.at_end("worn_volume"), result.at_end("mean_power")
         depth = result.at_end("depth")
         spread = volume.std(ddof=1) / volume.mean()

@@ -217,6 +217,16 @@ class LifeResult(LifeValues):
         return low, high
 
     def _b(self, percent: float, name: str) -> Interval:
+        if (percent, name) not in self._quantiles:
+            self._quantiles[percent, name] = self._quantile(percent, name)
+        return self._quantiles[percent, name]
+
+    @cached_property
+    def _quantiles(self) -> dict[tuple[float, str], Interval]:
+        """Lives of percentages that were needed, or one of their numerical bounds."""
+        return {}
+
+    def _quantile(self, percent: float, name: str) -> Interval:
         if not self.count:
             return UNKNOWN
         share = percent / 100.0

@@ -16,7 +16,7 @@ LEVELS = (0.90, 0.95)
 _MEANS = 81  # values of m for each t
 _MEANS_OF_MANY = 25  # the same for simulated sets of tests
 _SPAN = 6.5  # standard errors of m that the grid covers to either side
-_VALUES = 4_000_000  # of an array
+_VALUES = 12_500  # of an array, so that it remains in the cache of a processor
 
 
 def scatters(count: int, greatest: float = GREATEST) -> FloatArray:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from wearsim.results.io.stored_file import StoredFile
     from wearsim.studies.ensemble.file.parts import Part
 
+_SMALL = 1 << 13  # largest column that is kept once it has been read [bytes]
+
 
 class StoredRows(Mapping[str, "Array"]):
     """Variables of an ensemble by name; there may be gigabytes.
@@ -41,6 +43,9 @@ class StoredRows(Mapping[str, "Array"]):
         Its schema.
     parts : list of Part
         Its parts, oldest first. A row in a later one counts.
+    is_unchanged : callable, optional
+        Returns whether the file is as it was when it was opened. Small columns are then not read
+        again, as estimates take the same ones many times; without it all are.
     """
 
     def __init__(
@@ -48,8 +53,11 @@ class StoredRows(Mapping[str, "Array"]):
         read: Callable[[Callable[[StoredFile], Array]], Array],
         schema: Schema,
         parts: list[Part],
+        is_unchanged: Callable[[], bool] = lambda: False,
     ) -> None:
         self._read, self._schema, self.parts = read, schema, parts
+        self._is_unchanged = is_unchanged
+        self._kept: dict[tuple[object, ...], Array] = {}
 
     def __len__(self) -> int:
         return len(self._schema.variables)
@@ -84,7 +92,14 @@ class StoredRows(Mapping[str, "Array"]):
         ResultsFileError
             If the file or a part is damaged, or was changed since it was opened.
         """
-        rows = self._read(lambda file: file.array(name, (slice(start, stop), *rest)))
+        places = (slice(start, stop), *rest)
+        key = (name, *((place.start, place.stop, place.step) for place in places))
+        if key in self._kept and self._is_unchanged():
+            rows = self._kept[key].copy()
+        else:
+            rows = self._read(lambda file: file.array(name, places))
+            if (start, stop) == (0, None) and rows.nbytes <= _SMALL:
+                self._kept[key] = rows.copy()
         if is_row(self._schema.variables[name]):
             for part in self.parts:
                 part.put_rows(rows, name, start, *rest)

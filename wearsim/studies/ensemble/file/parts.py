@@ -375,7 +375,8 @@ def _merged(path: Path, file: StoredFile) -> tuple[EnsembleData, StoredRows]:
         raise ValueError(f"a realisation has the status {status.max()}")
     errors = _errors_of(file, status)
     identity = os.fstat(file.handle)
-    stored = StoredRows(partial(_read_unchanged, path, identity), schema, [])
+    read = partial(_read_unchanged, path, identity)
+    stored = StoredRows(read, schema, [], partial(_is_unchanged, path, identity))
     return EnsembleData(**attributes, variables=stored, status=status, errors=errors), stored
 
 
@@ -390,3 +391,13 @@ def _read_unchanged(
         return take(file)
 
     return read_file(path, checked)
+
+
+def _is_unchanged(path: Path, identity: os.stat_result) -> bool:
+    """Return whether a file is the same one, and was not written since."""
+    try:
+        now = path.stat()
+    except OSError:
+        return False
+    ours, theirs = ((state.st_size, state.st_mtime_ns) for state in (now, identity))
+    return os.path.samestat(now, identity) and ours == theirs
