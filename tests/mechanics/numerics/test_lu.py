@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from wearsim.mechanics.numerics.lu import factor_in_place, invert_factored, solve_factored
+from wearsim.mechanics.numerics.lu import (
+    factor_in_place,
+    invert_in_place,
+    solve_factored,
+    whole_panels,
+)
 
 
 def solved(system, size, right):
@@ -30,18 +35,24 @@ def test_systems_of_any_size_are_solved_as_by_lapack(size):
     np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
 
 
-@pytest.mark.parametrize("size", [1, 4, 5, 18])
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 18, 61])
 def test_systems_are_inverted_as_by_lapack(size):
-    matrix = definite(size)
-    system, inverse = matrix.T.copy(), np.empty((size, size))
-    assert factor_in_place(system, size)
-    invert_factored(system, size, inverse)
-    np.testing.assert_allclose(inverse.T @ matrix, np.eye(size), atol=1e-11)
+    matrix, end = definite(size), whole_panels(size)
+    assert size <= end < size + 4
+    inverse = np.full((end + 1, end + 1), np.nan)
+    inverse[:size, :size] = matrix.T
+    assert invert_in_place(inverse, size)
+    np.testing.assert_allclose(inverse[:size, :size].T @ matrix, np.eye(size), atol=1e-11)
+    np.testing.assert_array_equal(inverse[size:end, :end], np.eye(end)[size:])
+    np.testing.assert_array_equal(inverse[:size, size:end], 0.0)
+    assert np.isnan(inverse[end]).all()
+    assert np.isnan(inverse[:, end]).all()
 
 
 @pytest.mark.parametrize("bad", [0.0, np.nan])
 def test_singular_or_undefined_system_is_detected(bad):
     assert solved(np.full((5, 5), bad), 5, np.ones(5)) is None
+    assert not invert_in_place(np.full((8, 8), bad), 5)
 
 
 def test_only_the_leading_block_is_changed():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wearsim.mechanics.numerics.lu import factor_in_place
 from wearsim.mechanics.slender.body_wear import (
     factor_depths,
     fill_responses,
@@ -57,19 +56,17 @@ class Contacts:
         """Return the system of the bodies' depths, and the softness of the contacts."""
         state, softness = self.state, np.full((self.count, STRIPS), -1.0)
         system = new_depth_system(self.bodies, STRIPS)
-        for array in (system.block, system.across, system.outer, system.depth, system.sums):
+        for array in (system.block, system.across, system.outer, system.depth, system.softness):
             array[:] = np.nan  # of another step
-        system.outer_depth[:], system.response[:], system.approach_slope[:] = np.nan, np.nan, np.nan
+        for array in (system.outer_depth, system.approach_slope, system.gap, system.change):
+            array[:] = np.nan
         state.fresh[:] = False
         number_depths(self.bodies, self.own, self.shared, state, system, softness)
         for k in range(self.count):
             size = int(state.size[k])
             state.matrix[k, :size, :size] = self.jacobian[k].T  # by columns
-            assert factor_in_place(state.matrix[k], size)
-            state.unit_load[k, :size] = self.unit_load[k]
-            state.unit_load_sum[k] = self.unit_load[k].sum()
             state.step[k, :size] = self.step[k]
-            fill_responses(k, state, system)
+            assert fill_responses(k, state, system)
         return system, softness
 
     def touches(self, body: int) -> np.ndarray:
@@ -123,7 +120,7 @@ def test_response_to_a_gap_keeps_the_load(contacts: Contacts) -> None:
     system, _ = contacts.system()
     for k in range(contacts.count):
         size, (expected, slope) = int(contacts.state.size[k]), contacts.response(k)
-        found = system.response[k, :size, :size].T
+        found = contacts.state.matrix[k, :size, :size].T
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-13)
         np.testing.assert_allclose(found.sum(axis=0), 0.0, atol=1e-12)
         np.testing.assert_allclose(system.approach_slope[k, :size], slope, rtol=1e-11)

@@ -71,7 +71,7 @@ def jacobian(line_load: np.ndarray, g: int) -> np.ndarray:
 def chord_state(known: ContactConstants) -> ChordState:
     """Return a state with its work space filled with numbers that a correct method ignores."""
     state = new_chord_state(known, 2, STRIPS)
-    for array in (state.inverse, state.unit_load, state.guard_row, state.surface, state.matrix):
+    for array in (state.inverse, state.unit_load, state.guard_row, state.surface):
         array[:] = np.nan
     return state
 
@@ -170,7 +170,8 @@ class Chord:
         self.places = np.sort(rng.permutation(STRIPS)[:count])
         self.state.loaded[1], self.state.active[1, :count] = count, self.places
         inverse = 1e9 * (np.eye(STRIPS) + 0.3 * rng.random((STRIPS, STRIPS)))
-        self.state.inverse[1], self.state.gap[:] = inverse, 1e-6 * rng.random(STRIPS)
+        self.state.inverse[1, :STRIPS, :STRIPS] = inverse
+        self.state.gap[:] = 1e-6 * rng.random(STRIPS)
         self.state.unit_load[1] = 1e9 * (1.0 + rng.random(STRIPS))
         self.state.remainder[1] = 1e-8 * rng.random(STRIPS)
         self.loads = Loads(*(np.zeros(shape) for _ in range(3)), np.zeros(2), np.array([1.0, 3e-6]))

@@ -86,11 +86,8 @@ class Contacts:
         state.surface[:] = 0.0
         find_factors(k, self.line_load, True, self.lengths)
         arguments = self.state.softness, self.line_load, self.lengths, state
-        assert fill_jacobian(k, TABLE, UNIT, *arguments)
-        factors = state.matrix[k, :size, :size]
-        pivots = 1.0 / np.diag(factors)
-        lower, upper = np.tril(factors, -1) + np.eye(size), np.triu(factors, 1) + np.diag(pivots)
-        found: np.ndarray = (lower @ upper).T
+        fill_jacobian(k, TABLE, UNIT, *arguments)
+        found: np.ndarray = state.matrix[k, :size, :size].T
         return found
 
     def wear(self, line_load: np.ndarray) -> np.ndarray:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from wearsim.mechanics.numerics.lu import solve_factored
 from wearsim.mechanics.slender.body_wear import add_depths
 from wearsim.mechanics.slender.half_length import (
     REACH,
@@ -30,6 +29,7 @@ from wearsim.mechanics.slender.newton_step import (
     add_missing_load,
     complete_surface,
     correct_residual,
+    factor_jacobian,
     fill_jacobian,
     fill_separation,
     new_newton_state,
@@ -86,23 +86,16 @@ def test_jacobian_is_the_slope_of_the_displacements(lengths: str) -> None:
     state = contact.state
     find_factors(0, line_load, True, contact.lengths)
     state.surface[0] = 0.0
-    assert fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
+    fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
     np.testing.assert_allclose(state.surface[0], expected, rtol=1e-12)
-    assert (state.unit_load[0, : len(inside)] == 1.0).all()
+    found = state.matrix[0, : len(inside), : len(inside)].T
     residual = np.linspace(-1e-6, 2e-6, len(inside))
-    state.step[0, : len(inside)] = residual
-    solve_factored(state.matrix[0], state.size[0], state.step[0])
-    found = slopes @ state.step[0, : len(inside)]
-    np.testing.assert_allclose(found, residual, atol=1e-4 * np.abs(residual).max())
-
-
-def unfactored(factors: np.ndarray) -> np.ndarray:
-    """Return the matrix by columns of factors as of `factor_in_place`."""
-    pivots = np.diag(1.0 / np.diag(factors))
-    found: np.ndarray = (np.tril(factors, -1) + np.eye(len(factors))) @ (
-        np.triu(factors, 1) + pivots
-    )
-    return found
+    step = np.linalg.solve(found, residual)
+    np.testing.assert_allclose(slopes @ step, residual, atol=1e-4 * np.abs(residual).max())
+    expected = np.linalg.solve(found, np.ones(len(inside)))
+    assert factor_jacobian(0, state)
+    np.testing.assert_allclose(state.unit_load[0, : len(inside)], expected, rtol=1e-9)
+    assert state.unit_load_sum[0] == pytest.approx(expected.sum(), rel=1e-9)
 
 
 @pytest.mark.parametrize("lengths", LENGTHS)
@@ -115,7 +108,7 @@ def test_jacobian_has_the_tangents_of_the_table(lengths: str, inside: list[int])
     number_strips(0, line_load, 2, state)
     find_factors(0, line_load, True, contact.lengths)
     state.surface[0], state.outer[:] = 1e-6, np.nan
-    assert fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
+    fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
     followed = slice(state.left[0], state.right[0])
     matrix, near = np.zeros((size, size)), np.zeros((REACH + 1, STRIPS))
     surface = np.full(STRIPS, 1e-6)
@@ -138,7 +131,7 @@ def test_jacobian_has_the_tangents_of_the_table(lengths: str, inside: list[int])
         add_length_slopes(0, line_load, state.rows, contact.lengths, matrix)
     matrix += np.diag(own[0, inside])
     scale = np.abs(matrix).max()
-    found = unfactored(state.matrix[0, :size, :size])
+    found = state.matrix[0, :size, :size]
     np.testing.assert_allclose(found, matrix, atol=1e-12 * scale)
 
 
@@ -181,7 +174,7 @@ def test_surface_beside_the_contact_follows_the_loads(gap_in_contact: bool) -> N
     number_strips(0, line_load, 1, state)
     find_factors(0, line_load, True, contact.lengths)
     state.surface[0] = 0.0
-    assert fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
+    fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
     state.change[0] = np.where(line_load[0] > 0.0, 1e2 * np.arange(STRIPS), 0.0)
     surface = np.zeros((1, STRIPS))
     predict_surface(0, surface, state)

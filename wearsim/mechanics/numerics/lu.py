@@ -1,4 +1,4 @@
-"""Dense LU factorisation, with results that do not depend on the BLAS library and its threads.
+"""Dense LU factorisation and inversion, with results that are independent of BLAS and its threads.
 
 The matrices of contact problems have a positive definite symmetric part, so that elimination is
 stable without pivoting, which would take a third of the time.
@@ -127,47 +127,65 @@ def solve_factored(matrix: FloatArray, size: int, solution: FloatArray) -> None:
 
 
 @subroutine
-def _combine_rows(
-    matrix: FloatArray, width: int, i: int, first: int, last: int, inverse: FloatArray
-) -> None:
-    """Subtract the inverse's rows `first` to `last`, times entries of row `i`, from its row.
-
-    Only the first `width` columns are changed; the others of those rows are zero.
-    """
-    p = first
-    while p + 3 < last:
-        f0, f1, f2, f3 = matrix[i, p], matrix[i, p + 1], matrix[i, p + 2], matrix[i, p + 3]
-        for j in range(width):
-            inverse[i, j] -= (f0 * inverse[p, j] + f1 * inverse[p + 1, j]) + (
-                f2 * inverse[p + 2, j] + f3 * inverse[p + 3, j]
-            )
-        p += PANEL
-    while p < last:
-        for j in range(width):
-            inverse[i, j] -= matrix[i, p] * inverse[p, j]
-        p += 1
+def whole_panels(size: int) -> int:
+    """Return `size` rounded up to whole panels."""
+    return (size + PANEL - 1) // PANEL * PANEL
 
 
 @subroutine
-def invert_factored(matrix: FloatArray, size: int, inverse: FloatArray) -> None:
-    """Fill the inverse of a factored system, stored by columns like the system.
+def invert_in_place(matrix: FloatArray, size: int) -> bool:
+    """Invert a linear system by Gauss-Jordan elimination without pivoting.
+
+    Where a system is solved often, the product with its inverse replaces the solution from factors.
 
     Parameters
     ----------
-    matrix, size
-        As filled by `factor_in_place`.
-    inverse : ndarray, shape (>= size, >= size)
-        Filled: row c is the derivative of the unknowns by the right-hand side of equation c.
+    matrix : ndarray, shape (>= whole_panels(size), >= whole_panels(size))
+        The system by columns; overwritten with its inverse: row c is the derivative of the unknowns
+        by the right-hand side of equation c. The last panel is completed by the identity.
+    size : int
+        Number of unknowns.
+
+    Returns
+    -------
+    bool
+        False if a pivot is zero or not a number.
     """
-    for i in range(size):
-        for j in range(size):
-            inverse[i, j] = 0.0
-        inverse[i, i] = 1.0
-        _combine_rows(matrix, i, i, 0, i, inverse)
-    for i in range(size - 1, -1, -1):
-        _combine_rows(matrix, size, i, i + 1, size, inverse)
-        for j in range(size):
-            inverse[i, j] *= matrix[i, i]
+    end = whole_panels(size)
+    for i in range(end):
+        for j in range(size if i < size else 0, end):
+            matrix[i, j] = 1.0 if i == j else 0.0
+    for start in range(0, end, PANEL):
+        for k in range(start, start + PANEL):
+            if not abs(matrix[k, k]) > 0.0:
+                return False
+            inverse, matrix[k, k] = 1.0 / matrix[k, k], 1.0
+            for j in range(end):
+                matrix[k, j] *= inverse
+            for i in range(start, start + PANEL):
+                factor = matrix[i, k]
+                if i != k:
+                    matrix[i, k] = 0.0
+                    for j in range(end):
+                        matrix[i, j] -= factor * matrix[k, j]
+        s1, s2, s3 = start + 1, start + 2, start + 3
+        for i in range(0, end, PANEL):
+            if i == start:
+                continue
+            i1, i2, i3 = i + 1, i + 2, i + 3
+            f0, f1, f2, f3 = matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3]
+            g0, g1, g2, g3 = matrix[i1, start], matrix[i1, s1], matrix[i1, s2], matrix[i1, s3]
+            h0, h1, h2, h3 = matrix[i2, start], matrix[i2, s1], matrix[i2, s2], matrix[i2, s3]
+            l0, l1, l2, l3 = matrix[i3, start], matrix[i3, s1], matrix[i3, s2], matrix[i3, s3]
+            for p in range(start, start + PANEL):
+                matrix[i, p] = matrix[i1, p] = matrix[i2, p] = matrix[i3, p] = 0.0
+            for j in range(end):
+                a, b, c, d = matrix[start, j], matrix[s1, j], matrix[s2, j], matrix[s3, j]
+                matrix[i, j] -= (f0 * a + f1 * b) + (f2 * c + f3 * d)
+                matrix[i1, j] -= (g0 * a + g1 * b) + (g2 * c + g3 * d)
+                matrix[i2, j] -= (h0 * a + h1 * b) + (h2 * c + h3 * d)
+                matrix[i3, j] -= (l0 * a + l1 * b) + (l2 * c + l3 * d)
+    return True
 
 
 def compile_linear_systems() -> None:

@@ -16,7 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.numerics.lu import factor_in_place, invert_factored, solve_factored
+from wearsim.mechanics.numerics.lu import (
+    PANEL,
+    factor_in_place,
+    invert_in_place,
+    solve_factored,
+    whole_panels,
+)
 from wearsim.mechanics.slender.newton_step import NewtonState
 from wearsim.types import FloatArray, IntArray
 
@@ -37,11 +43,12 @@ class DepthSystem(NamedTuple):
     `block` holds the coefficients of the depths of an eliminated body in its own equations,
     (bodies, strips, strips), `across` its depths per depth of the outer bodies, negative, (bodies,
     unknowns, strips), and `outer` the system of the outer bodies after elimination. `depth`
-    and `outer_depth` are the solution [m], and `sums` is work space.
+    and `outer_depth` are the solution [m].
 
-    `response` is S of each contact by columns: decrease of the line load, by row, per increase of
-    the gap, by row, at constant load (contacts, strips, strips) [N/m^2], and `approach_slope` the
-    increase of the approach per increase of the gap (contacts, strips).
+    `matrix` of the Newton state holds S of each contact by columns: decrease of the line load, by
+    row, per increase of the gap, by row, at constant load [N/m^2]. `approach_slope` is the increase
+    of the approach per increase of the gap (contacts, strips). `gap` [m], `change` [N/m], `unknown`
+    and `softness` [m/(N/m)] are work space by row, the last two for both kinds of bodies.
     """
 
     number: IntArray
@@ -53,10 +60,12 @@ class DepthSystem(NamedTuple):
     outer: FloatArray
     depth: FloatArray
     outer_depth: FloatArray
-    sums: FloatArray
     total: IntArray
-    response: FloatArray
     approach_slope: FloatArray
+    gap: FloatArray
+    change: FloatArray
+    unknown: IntArray
+    softness: FloatArray
 
 
 @subroutine
@@ -84,26 +93,71 @@ def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
         np.empty((size, size)),
         np.empty((count, n)),
         np.empty(size),
-        np.empty(n),
         np.zeros(1, np.int64),
-        np.empty((contacts, n, n)),
         np.empty((contacts, n)),
+        np.empty(whole_panels(n)),
+        np.empty(n),
+        np.empty((SIDES, n), np.int64),
+        np.empty((SIDES, n)),
     )
 
 
 @subroutine
-def fill_responses(k: int, state: NewtonState, system: DepthSystem) -> None:
-    """Fill the derivatives of contact `k`'s step and approach by its gap at constant load."""
-    size, response, approach_slope = state.size[k], system.response, system.approach_slope
-    unit_load, unit_load_sum = state.unit_load, state.unit_load_sum[k]
-    invert_factored(state.matrix[k], size, response[k])
+def fill_responses(k: int, state: NewtonState, system: DepthSystem) -> bool:
+    """Replace the Jacobian of contact `k` by S, and fill the loads and the approach per gap.
+
+    Returns False if the Jacobian is singular.
+    """
+    size, matrix, approach_slope = state.size[k], state.matrix, system.approach_slope
+    unit_load, total = state.unit_load, 0.0
+    if not invert_in_place(matrix[k], size):
+        return False
+    for row in range(size):
+        unit_load[k, row] = 0.0
     for column in range(size):
-        total = 0.0
+        s0 = s1 = s2 = s3 = 0.0
+        for row in range(0, size, PANEL):
+            s0, s1 = s0 + matrix[k, column, row], s1 + matrix[k, column, row + 1]
+            s2, s3 = s2 + matrix[k, column, row + 2], s3 + matrix[k, column, row + 3]
+        approach_slope[k, column] = (s0 + s1) + (s2 + s3)
+        total += approach_slope[k, column]
         for row in range(size):
-            total += response[k, column, row]
-        approach_slope[k, column] = total / unit_load_sum
+            unit_load[k, row] += matrix[k, column, row]
+    state.unit_load_sum[k] = total
+    for column in range(size):
+        approach_slope[k, column] /= total
         for row in range(size):
-            response[k, column, row] -= unit_load[k, row] * approach_slope[k, column]
+            matrix[k, column, row] -= unit_load[k, row] * approach_slope[k, column]
+    return True
+
+
+@subroutine
+def open_gaps(k: int, state: NewtonState, system: DepthSystem, change: FloatArray) -> float:
+    """Add the change of the line loads of contact `k`, by row, as its gaps open by `gap`.
+
+    Returns the increase of the approach [m].
+    """
+    size, matrix, gap, rise = state.size[k], state.matrix, system.gap, 0.0
+    for column in range(size, whole_panels(size)):
+        gap[column] = 0.0
+    for column in range(0, size, PANEL):
+        c1, c2, c3 = column + 1, column + 2, column + 3
+        g0, g1, g2, g3 = gap[column], gap[c1], gap[c2], gap[c3]
+        for row in range(size):
+            change[row] -= (matrix[k, column, row] * g0 + matrix[k, c1, row] * g1) + (
+                matrix[k, c2, row] * g2 + matrix[k, c3, row] * g3
+            )
+    for column in range(size):
+        rise += system.approach_slope[k, column] * gap[column]
+    return rise
+
+
+@subroutine
+def fill_separate_step(k: int, state: NewtonState, system: DepthSystem) -> float:
+    """Fill the step of contact `k` at constant load, and return its approach [m]."""
+    for row in range(state.size[k]):
+        system.gap[row], state.step[k, row] = -state.missing[k, row], 0.0
+    return open_gaps(k, state, system, state.step[k])
 
 
 @subroutine
@@ -214,8 +268,8 @@ def factor_depths(shared: FloatArray, state: NewtonState, system: DepthSystem) -
         False if the system is singular.
     """
     number, size, across, outer = system.number, system.size, system.across, system.outer
-    inner_side, outer_side = system.side[0], system.side[1]
-    response, place, block = system.response, state.place, system.block
+    response, place, block = state.matrix, state.place, system.block
+    unknown, softness = system.unknown, system.softness
     count = system.total[0]
     for u in range(count):
         for v in range(count):
@@ -230,22 +284,25 @@ def factor_depths(shared: FloatArray, state: NewtonState, system: DepthSystem) -
             for v in range(size[b]):
                 across[b, u, v] = 0.0
     for k in range(len(response)):
-        b, c = system.touched[k, 0], system.touched[k, 1]
-        for column in range(state.size[k]):
+        b, c, rows = system.touched[k, 0], system.touched[k, 1], state.size[k]
+        for kind in range(SIDES):
+            body, side = system.touched[k, kind], system.side[kind]
+            for row in range(rows):  # a strip without an unknown adds 0 to the first one
+                i = place[k, row]
+                number_here = number[body, i] if body >= 0 else -1
+                unknown[kind, row] = max(number_here, 0)
+                softness[kind, row] = shared[k, side, i] if number_here >= 0 else 0.0
+        for column in range(rows):
             j = place[k, column]
             opened = number[b, j] if b >= 0 else -1
-            opened_outer = number[c, j] if c >= 0 else -1
-            for row in range(state.size[k]):
-                i = place[k, row]
-                if b >= 0 and number[b, i] >= 0:
-                    wear = shared[k, inner_side, i] * response[k, column, row]
-                    if opened >= 0:
-                        block[b, opened, number[b, i]] += wear
-                    if opened_outer >= 0:
-                        across[b, opened_outer, number[b, i]] += wear
-                if opened_outer >= 0 and number[c, i] >= 0:
-                    wear = shared[k, outer_side, i] * response[k, column, row]
-                    outer[opened_outer, number[c, i]] += wear
+            for row in range(rows if opened >= 0 else 0):
+                wear = softness[0, row] * response[k, column, row]
+                block[b, opened, unknown[0, row]] += wear
+            opened = number[c, j] if c >= 0 else -1
+            for row in range(rows if opened >= 0 else 0):
+                outer[opened, unknown[1, row]] += softness[1, row] * response[k, column, row]
+            for row in range(rows if opened >= 0 and b >= 0 else 0):
+                across[b, opened, unknown[0, row]] += softness[0, row] * response[k, column, row]
     for b in range(len(size)):
         if not factor_in_place(block[b], size[b]):
             return False
@@ -278,22 +335,18 @@ def subtract_outer_wear(
     result : ndarray
         Wear of the outer bodies, by unknown; changed.
     """
-    b, c, size, sums = system.touched[k, 0], system.touched[k, 1], state.size[k], system.sums
-    number, response, place = system.number, system.response, state.place
-    outer_side = system.side[1]
+    b, c, size, change = system.touched[k, 0], system.touched[k, 1], state.size[k], system.change
+    number, place, outer_side = system.number, state.place, system.side[1]
     if c < 0:
         return
     for row in range(size):
-        sums[row] = 0.0
-    for column in range(size):
-        unknown = number[b, place[k, column]]
-        opening = depth[unknown] if unknown >= 0 else 0.0
-        for row in range(np.uint64(size if opening != 0.0 else 0)):
-            sums[row] += response[k, column, row] * opening
+        unknown = number[b, place[k, row]]
+        system.gap[row], change[row] = depth[unknown] if unknown >= 0 else 0.0, 0.0
+    open_gaps(k, state, system, change)
     for row in range(size):
         i = place[k, row]
         if number[c, i] >= 0:
-            result[number[c, i]] -= shared[k, outer_side, i] * sums[row]
+            result[number[c, i]] += shared[k, outer_side, i] * change[row]
 
 
 @subroutine
@@ -316,19 +369,14 @@ def solve_depths(
     approach : ndarray, shape (contacts,)
         Approach without the bodies' wear, replaced by the one with it [m].
     """
-    depth, outer_depth, number, response = (
-        system.depth,
-        system.outer_depth,
-        system.number,
-        system.response,
-    )
+    depth, outer_depth, number = system.depth, system.outer_depth, system.number
     place, step, size, count = state.place, state.step, system.size, system.total[0]
     for b in range(len(size)):
         for unknown in range(size[b]):
             depth[b, unknown] = 0.0
     for unknown in range(count):
         outer_depth[unknown] = 0.0
-    for k in range(len(response)):
+    for k in range(len(step)):
         b, c = system.touched[k, 0], system.touched[k, 1]
         for row in range(state.size[k]):
             i = place[k, row]
@@ -338,7 +386,7 @@ def solve_depths(
                 outer_depth[number[c, i]] += shared[k, system.side[1], i] * step[k, row]
     for b in range(len(size)):
         solve_factored(system.block[b], size[b], depth[b])
-    for k in range(len(response)):
+    for k in range(len(step)):
         b = system.touched[k, 0]
         if b >= 0:
             subtract_outer_wear(k, shared, state, system, depth[b], outer_depth)
@@ -347,14 +395,13 @@ def solve_depths(
         for u in range(count):
             for unknown in range(size[b]):
                 depth[b, unknown] -= system.across[b, u, unknown] * outer_depth[u]
-    for k in range(len(response)):
+    for k in range(len(step)):
         b, c = system.touched[k, 0], system.touched[k, 1]
-        for column in range(state.size[k]):
-            i, opening = place[k, column], 0.0
+        for row in range(state.size[k]):
+            i, opening = place[k, row], 0.0
             if b >= 0 and number[b, i] >= 0:
                 opening += depth[b, number[b, i]]
             if c >= 0 and number[c, i] >= 0:
                 opening += outer_depth[number[c, i]]
-            approach[k] += system.approach_slope[k, column] * opening
-            for row in range(state.size[k] if opening != 0.0 else 0):
-                step[k, row] -= response[k, column, row] * opening
+            system.gap[row] = opening
+        approach[k] += open_gaps(k, state, system, step[k])

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.numerics.lu import factor_in_place, invert_factored
+from wearsim.mechanics.numerics.lu import invert_in_place, whole_panels
 from wearsim.mechanics.slender.half_length import (
     REACH,
     HalfLengths,
@@ -100,7 +100,6 @@ class ChordState(NamedTuple):
     gap: FloatArray
     change: FloatArray
     work: FloatArray
-    matrix: FloatArray
     strip_inputs: FloatArray
     tractions: StripTractions
 
@@ -113,7 +112,7 @@ def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> Chord
     return ChordState(
         np.zeros((contacts, n), np.int64),
         np.zeros(contacts, np.int64),
-        np.empty((contacts, n, n)),
+        np.empty((contacts, whole_panels(n), whole_panels(n))),
         np.empty((contacts, n)),
         np.zeros((contacts, 4, BAND, n)),
         np.zeros((contacts, n), np.int64),
@@ -124,7 +123,6 @@ def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> Chord
         np.empty(n),
         np.empty(n),
         np.empty((6, max(n, BAND) + 4 * REACH)),
-        np.empty((n, n)),
         np.zeros((3, n)),
         new_tractions(n),
     )
@@ -173,7 +171,7 @@ def set_anchor(
     n = line_load.shape[1]
     reach, small, unit = min(BAND, n), 1e-3, constants.unit
     guards, count = _number_strips(g, line_load, state), state.loaded[g]
-    matrix, work, near = state.matrix, state.work, state.lengths.near
+    matrix, work, near = state.inverse[g], state.work, state.lengths.near
     state.surface[g] = 0.0
     for c in range(count):
         j = state.active[g, c]
@@ -203,9 +201,8 @@ def set_anchor(
         for r in range(count):
             row[g, state.active[g, r]] = r
         add_length_slopes(g, line_load, row, state.lengths, matrix)
-    if not factor_in_place(matrix, count):
+    if not invert_in_place(matrix, count):
         return False
-    invert_factored(matrix, count, state.inverse[g])
     for r in range(count):
         state.unit_load[g, r] = 0.0
         for c in range(count):

@@ -28,6 +28,7 @@ from wearsim.mechanics.slender.body_wear import (
     add_depths,
     factor_depths,
     fill_responses,
+    fill_separate_step,
     new_depth_system,
     number_depths,
     solve_depths,
@@ -47,6 +48,7 @@ from wearsim.mechanics.slender.newton_step import (
     add_missing_load,
     complete_surface,
     correct_residual,
+    factor_jacobian,
     fill_jacobian,
     fill_separation,
     new_newton_state,
@@ -305,14 +307,12 @@ def factor_contacts(
             return TOO_FINE, renewed
         if not fresh:
             add_displacement(k, these.table, unit, line_load, lengths, state)
-        elif fill_jacobian(k, these.table, unit, state.softness, line_load, lengths, state):
-            solve_factored(state.matrix[k], state.size[k], state.unit_load[k])
-            state.unit_load_sum[k] = 0.0
-            for row in range(state.size[k]):
-                state.unit_load_sum[k] += state.unit_load[k, row]
-            state.fresh[k] = False
-            if members is not None:
-                fill_responses(k, state, system)
+        else:
+            fill_jacobian(k, these.table, unit, state.softness, line_load, lengths, state)
+            if members is None:
+                state.fresh[k] = not factor_jacobian(k, state)
+            else:
+                state.fresh[k] = not fill_responses(k, state, system)
         if state.fresh[k] or not abs(state.unit_load_sum[k]) > 0.0:
             return SINGULAR, renewed
         for row in range(state.size[k]):
@@ -341,10 +341,15 @@ def fill_steps(
     for k in range(line_load.shape[0]):
         if corrected:
             correct_residual(k, these.table, these.unit, line_load, lengths, state)
-        for row in range(state.size[k]):
-            state.step[k, row] = state.missing[k, row]
-        solve_factored(state.matrix[k], state.size[k], state.step[k])
+        rise = 0.0
+        if members is None:
+            for row in range(state.size[k]):
+                state.step[k, row] = state.missing[k, row]
+            solve_factored(state.matrix[k], state.size[k], state.step[k])
+        else:
+            rise = fill_separate_step(k, state, system)
         add_approach(k, these.loads[k] / these.spacing, line_load, state, approach)
+        approach[k] += rise
     if members is not None:
         solve_depths(worn, state, system, approach)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.numerics.lu import factor_in_place
+from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored, whole_panels
 from wearsim.mechanics.slender.half_length import (
     REACH,
     HalfLengths,
@@ -27,14 +27,15 @@ class NewtonState(NamedTuple):
     A row is a strip in contact. `fresh` marks contacts that need a new Jacobian, `size` is the
     number of rows, `place` the strip of each row, `rows` the row of each strip, -1 outside the
     contact. Strips from `left` to before `right` are followed, the others only at the end. `outer`
-    is the displacement of followed strips per load of each row and `matrix` the factored Jacobian
-    by columns. `unit_load` are the loads per unit of approach [N/m^2] and
-    `unit_load_sum` is their sum. `diagonal` is the derivative of the displacement of each strip by
-    its own load, `missing` the residual [m], `step` the step by row [N/m] and `change` the applied
-    change of load by strip [N/m]. `surface` is the sum of gap and displacement above the least gap
-    `lowest` [m], complete for the followed strips. `softness` is the wear compliance of the
-    strips of each contact, including that of shared bodies where no other contact touches them
-    [m/(N/m)]; `weight` is work space.
+    is the displacement of followed strips per load of each row and `matrix` the Jacobian by
+    columns, replaced by its factors or, where contacts wear shared bodies, by S of `body_wear`.
+    `unit_load` are the loads per unit of approach [N/m^2] and `unit_load_sum` is their sum.
+    `diagonal` is the derivative of the displacement of each strip by its own load, `missing` the
+    residual [m], `step` the step by row [N/m] and `change` the applied change of load by strip
+    [N/m]. `surface` is the sum of gap and displacement above the least gap `lowest` [m], complete
+    for the followed strips. `softness` is the wear compliance of the strips of each contact,
+    including that of shared bodies where no other contact touches them [m/(N/m)]; `weight` is work
+    space.
     """
 
     fresh: BoolArray
@@ -60,6 +61,7 @@ class NewtonState(NamedTuple):
 @subroutine
 def new_newton_state(contacts: int, n: int) -> NewtonState:
     """Return an empty `NewtonState`."""
+    m = whole_panels(n)
     return NewtonState(
         np.empty(contacts, np.bool_),
         np.empty(contacts, np.int64),
@@ -68,7 +70,7 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
         np.empty(contacts, np.int64),
         np.empty(contacts, np.int64),
         np.empty((contacts, n, n)),
-        np.empty((contacts, n, n)),
+        np.empty((contacts, m, m)),
         np.empty((contacts, n)),
         np.empty(contacts),
         np.empty((contacts, n)),
@@ -200,21 +202,15 @@ def fill_jacobian(
     line_load: FloatArray,
     lengths: HalfLengths,
     state: NewtonState,
-) -> bool:
-    """Fill and factor the Jacobian of contact `k`, and add the displacement to `surface`.
+) -> None:
+    """Fill the Jacobian of contact `k`, and add the displacement to `surface`.
 
-    The displacement is that of the followed strips. `unit_load` is filled with 1, the right-hand
-    side of its equations.
+    The displacement is that of the followed strips.
 
     Parameters
     ----------
     own : ndarray, shape (contacts, strips)
         Wear compliance [m/(N/m)].
-
-    Returns
-    -------
-    bool
-        False if the Jacobian is singular.
     """
     n, size, coupled = line_load.shape[1], state.size[k], lengths.table.shape[0] > 0
     place, outer, matrix = state.place, state.outer, state.matrix[k]
@@ -247,8 +243,21 @@ def fill_jacobian(
         add_length_slopes(k, line_load, state.rows, lengths, matrix)
     for row in range(size):
         matrix[row, row] += own[k, place[k, row]]
+
+
+@subroutine
+def factor_jacobian(k: int, state: NewtonState) -> bool:
+    """Factor the Jacobian of contact `k` and fill `unit_load`; False if it is singular."""
+    size, total = state.size[k], 0.0
+    for row in range(size):
         state.unit_load[k, row] = 1.0
-    return factor_in_place(matrix, size)
+    if not factor_in_place(state.matrix[k], size):
+        return False
+    solve_factored(state.matrix[k], size, state.unit_load[k])
+    for row in range(size):
+        total += state.unit_load[k, row]
+    state.unit_load_sum[k] = total
+    return True
 
 
 @subroutine
