@@ -20,11 +20,11 @@ LEAST_LOAD = 1e-3  # next to a pause, of the greatest load
 def computed_once(compute: Callable[[WearProblem], T], problem: WearProblem) -> T:
     """Return what is constant during a test with constant inputs, computed at the first call."""
     try:
-        found: T = problem.__dict__["constants"][compute]
+        value: T = problem.__dict__["constants"][compute]
     except KeyError:
-        found = compute(problem)
-        problem.__dict__.setdefault("constants", {})[compute] = found
-    return found
+        value = compute(problem)
+        problem.__dict__.setdefault("constants", {})[compute] = value
+    return value
 
 
 def with_contacts(problem: WearProblem, chosen: IntArray) -> WearProblem:

@@ -196,9 +196,11 @@ class WearProblem:
             return [0] * self.shape[2]
         strips = self.grid.strips
         least = max(3, math.ceil(FREE * strips))
-        margins = (math.ceil(one.margin / self.grid.spacing) for one in self.growth)
+        margins = (math.ceil(growth.margin / self.grid.spacing) for growth in self.growth)
         free = (min(max(least, margin), strips) for margin in margins)
-        return [count if one.most else 0 for count, one in zip(free, self.growth, strict=True)]
+        return [
+            count if growth.most else 0 for count, growth in zip(free, self.growth, strict=True)
+        ]
 
     @cached_property
     def volume_weights(self) -> FloatArray:
@@ -319,19 +321,19 @@ class WearProblem:
     @cached_property
     def greatest_load(self) -> FloatArray:
         """Greatest load of a test with pauses, otherwise -inf, shape (realisations,) [N]."""
-        found = [-np.inf] * len(self.loads)
+        greatest = [-np.inf] * len(self.loads)
         for place, load in enumerate(self.loads):
             if len(load.pauses):
-                found[place] = load.extremes(*(load.span or (0.0, float(load.pauses.max()))))[1]
-        return np.array(found)
+                greatest[place] = load.extremes(*(load.span or (0.0, float(load.pauses.max()))))[1]
+        return np.array(greatest)
 
     def force(self, time: FloatArray) -> FloatArray:
         """Return the load before feedback at a time [s], (N,), or (S, 1, N) on a cam [N]."""
         return self._force(time) if self.constant_load is None else self.constant_load
 
     def _force(self, time: FloatArray) -> FloatArray:
-        each = zip(self.loads, time[:, None], strict=True)
-        return self.at_stations(np.array([load.force(own)[0] for load, own in each]))
+        pairs = zip(self.loads, time[:, None], strict=True)
+        return self.at_stations(np.array([load.force(moment)[0] for load, moment in pairs]))
 
     def mean_force(self, start: FloatArray, stop: FloatArray) -> FloatArray:
         """Return the exact mean of the load before feedback between two times; as `force`."""
@@ -356,15 +358,15 @@ class WearProblem:
         """Return the problem with constant inputs; values that do not depend on them are kept."""
         for name in _CONSTANTS if self.laws and self.linear_wear else ():
             getattr(self, name)  # computed once, for all problems with other inputs
-        found = object.__new__(WearProblem)
+        problem = object.__new__(WearProblem)
         before, after = vars(self.inputs), vars(inputs)
         changed = {name for name in after if after[name] is not before.get(name)}
         lost = {"constants"} if changed <= _OF_LOAD else {"constants", "nominal_batch", "spin"}
         if "tilt" in changed and not np.array_equal(inputs.tilt, self.inputs.tilt):
             lost.update(_OF_GAP)
-        found.__dict__.update({n: v for n, v in self.__dict__.items() if n not in lost})
-        found.__dict__.update(inputs=inputs, varying=())
-        return found
+        problem.__dict__.update({n: v for n, v in self.__dict__.items() if n not in lost})
+        problem.__dict__.update(inputs=inputs, varying=())
+        return problem
 
     @cached_property
     def _varying_contacts(self) -> list[BoolArray]:
@@ -392,37 +394,37 @@ class WearProblem:
         ndarray, shape (2, stations, contacts, realisations, strips)
             Wear of the cylinder and of the rollers.
         """
-        each = passes if isinstance(passes, float) else passes[..., None]
+        per_strip = passes if isinstance(passes, float) else passes[..., None]
         if self.linear_wear:
             power = contacts.dissipation.reshape(self.shape + contacts.dissipation.shape[1:])
-            parts: FloatArray = self.wear_coefficients * each * power
+            parts: FloatArray = self.wear_coefficients * per_strip * power
             return parts
         shares = self.wear_shares
-        return self.depths_worn(contacts, {body: shares[body] * each for body in BODIES})
+        return self.depths_worn(contacts, {body: shares[body] * per_strip for body in BODIES})
 
     @cached_property
     def wear_coefficients(self) -> FloatArray:
         """Contribution of each contact to the wear per roller pass and dissipation, as parts."""
-        each = [(self.wear_shares[body], self.wear_factors[body]) for body in BODIES]
-        return np.stack([share * np.asarray(factor)[..., None] for share, factor in each])
+        pairs = [(self.wear_shares[body], self.wear_factors[body]) for body in BODIES]
+        return np.stack([share * np.asarray(factor)[..., None] for share, factor in pairs])
 
     def depths_worn(
         self, contacts: ContactBatchSolution, passes: Mapping[Body, FloatArray | float]
     ) -> FloatArray:
         """Return the depth that `passes` passes of each contact wear off both bodies, as parts."""
         dissipation = self.values_of(contacts, "dissipation")
-        found = np.empty((len(BODIES), *dissipation.shape))
-        for depth, body in zip(found, BODIES, strict=True):
+        parts = np.empty((len(BODIES), *dissipation.shape))
+        for depth, body in zip(parts, BODIES, strict=True):
             factor = self.wear_factors[body]
             if factor is None:
                 speed = self.kinematics.track.rolling_speed
                 speeds = np.broadcast_to(speed, self.shape).ravel().tolist()
-                each = zip(contacts, cycle(self.laws), speeds, strict=False)
-                depths = np.array([law.depth_per_pass(body, c, v) for c, law, v in each])
+                points = zip(contacts, cycle(self.laws), speeds, strict=False)
+                depths = np.array([law.depth_per_pass(body, c, v) for c, law, v in points])
                 depth[:] = passes[body] * depths.reshape(dissipation.shape)
             else:
                 np.multiply(passes[body] * factor[..., None], dissipation, out=depth)
-        return found
+        return parts
 
     @cached_property
     def wear_factors(self) -> dict[Body, FloatArray | None]:
@@ -430,13 +432,13 @@ class WearProblem:
 
         None if wear is not linear in the dissipation.
         """
-        shape, found = (*self.kinematics.track.axes, len(self.laws)), {}
+        shape, of_bodies = (*self.kinematics.track.axes, len(self.laws)), {}
         speeds = np.broadcast_to(self.kinematics.track.rolling_speed, shape).ravel().tolist()
         for body in BODIES:
-            each = zip(cycle(self.laws), speeds, strict=False)
-            factors = [law.depth_per_dissipation(body, speed) for law, speed in each]
-            found[body] = None if None in factors else np.array(factors).reshape(shape)
-        return found
+            pairs = zip(cycle(self.laws), speeds, strict=False)
+            factors = [law.depth_per_dissipation(body, speed) for law, speed in pairs]
+            of_bodies[body] = None if None in factors else np.array(factors).reshape(shape)
+        return of_bodies
 
     @cached_property
     def linear_wear(self) -> bool:
@@ -463,8 +465,8 @@ class WearProblem:
         Broadcast to (stations, contacts, realisations, strips).
         """
         share = np.reshape(self.kinematics.roller_share, (-1, 1))
-        own = self.weight * share / self.shape[0]
-        shares: dict[Body, FloatArray] = {"cylinder": self.cylinder_share[None], "roller": own}
+        roller = self.weight * share / self.shape[0]
+        shares: dict[Body, FloatArray] = {"cylinder": self.cylinder_share[None], "roller": roller}
         return {body: share[:, :, None, None] for body, share in shares.items()}
 
     def sum_of_parts(

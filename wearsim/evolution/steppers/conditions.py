@@ -50,23 +50,23 @@ def conditions_of(
     smooth = smooth_loads(problem, state.passes, passes)
     if smooth.any():
         force = np.where(smooth, problem.force(problem.time(state.passes + passes)), mean)
-    own = exposure(here, problem, force), exposure(here, problem, mean)
-    return Conditions(force, with_feedback(here, force, np.zeros(()), ()), *own)
+    exposures = exposure(here, problem, force), exposure(here, problem, mean)
+    return Conditions(force, with_feedback(here, force, np.zeros(()), ()), *exposures)
 
 
 def _constant_conditions(problem: WearProblem) -> Conditions:
     """Return the conditions of all steps where neither the load nor an input varies."""
     force = problem.constant_load
     assert force is not None
-    own = exposure(problem, problem, force)
-    return Conditions(force, with_feedback(problem, force, np.zeros(()), ()), own, own)
+    per_pass = exposure(problem, problem, force)
+    return Conditions(force, with_feedback(problem, force, np.zeros(()), ()), per_pass, per_pass)
 
 
 def exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> FloatArray:
     """Return the exposure per pass for a load before feedback, shape (realisations,) [N]."""
     if force.ndim > 1:  # of a cam
         force = problem.mean_over_turn(force)[0, 0]
-    own = at_least(problem, force + here.inputs.mean_offset)
+    loads = at_least(problem, force + here.inputs.mean_offset)
     if problem.varying and any(item.name == "friction" for item in problem.varying):
-        own = own * here.inputs.friction.mean(axis=0)
-    return np.asarray(own)
+        loads = loads * here.inputs.friction.mean(axis=0)
+    return np.asarray(loads)

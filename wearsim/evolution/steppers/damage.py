@@ -57,7 +57,7 @@ def with_damage(
     passes = end.passes - start.passes
     varies = problem.constant_load is None or len(problem.varying) > 0
     if varies:
-        first, last = (_of_varying_load(problem, start, one, passes) for one in (start, end))
+        first, last = (_of_varying_load(problem, start, state, passes) for state in (start, end))
     else:
         first, last = damage[2], damage_per_pass(problem, end.contacts)
     if varies or problem.pauses:
@@ -119,7 +119,7 @@ def _of_varying_load(
     displacement = displacement_at(here, [state.depths], np.zeros(()))
     force = mean_force(here, start, passes)
     mean = with_feedback(here, force, displacement, state.terms)
-    found = np.zeros(np.shape(start.stacked))
+    damage = np.zeros(np.shape(start.stacked))
     for offset, weight in _load_nodes(problem, *times):
         if not weight.any():
             continue
@@ -127,8 +127,8 @@ def _of_varying_load(
         loads = np.maximum(loads, _LEAST * np.abs(mean))
         batch = contact_batch(here, here.gap(*state.depths), loads, *state.depths)
         contacts = here.model.solve(batch, warm=state.contacts)
-        found += weight[:, None] * damage_per_pass(here, contacts)
-    return found
+        damage += weight[:, None] * damage_per_pass(here, contacts)
+    return damage
 
 
 def _load_nodes(
@@ -149,8 +149,8 @@ def _load_nodes(
         three times the standard deviation away, as in Gauss's quadrature of a normal distribution,
         but within the extremes; a load of two levels has these two.
     """
-    each = zip(problem.loads, start.tolist(), stop.tolist(), strict=True)
-    values = [(load.mean(*t), load.deviation(*t), *load.extremes(*t)) for load, *t in each]
+    steps = zip(problem.loads, start.tolist(), stop.tolist(), strict=True)
+    values = [(load.mean(*t), load.deviation(*t), *load.extremes(*t)) for load, *t in steps]
     mean, deviation, low, high = np.array(values).T
     variance, below, above = np.square(deviation), mean - low, high - mean
     for item in problem.varying:

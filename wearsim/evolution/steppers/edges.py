@@ -54,10 +54,10 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     spring falls, and wear advances the edge until the spring has almost no load, see `_unloaded`.
     The rise of the gap across a strip must be that of crowned bodies.
     """
-    stations, each, _ = problem.shape
+    stations, contacts_each, _ = problem.shape
     varies = problem.constant_load is None or len(problem.varying) > 0
     varies |= stations == 1 and bool(problem.terms)
-    apart = not problem.has_nodes and (stations == 1 or each == 1)
+    apart = not problem.has_nodes and (stations == 1 or contacts_each == 1)
     possible = contacts.separation is not None and apart and not varies
     return possible and problem.has_crowned_gap
 
@@ -86,8 +86,8 @@ def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
 def unresolved(state: WearState) -> BoolArray:
     """Return which tests do not resolve edges, of a state with `FIELDS`."""
     assert state.part is not None
-    found: BoolArray = np.isnan(state.part[0, 0, :, 0])
-    return found
+    whole: BoolArray = np.isnan(state.part[0, 0, :, 0])
+    return whole
 
 
 def most(state: WearState) -> IntArray:
@@ -165,12 +165,12 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
     if not np.count_nonzero(begins):
         return state
     loaded = state.contacts.line_load.reshape(shape) > 0.0
-    found = {
+    started = {
         "separation": np.where(loaded, 0.0, separation),
         "part": np.where(loaded, 1.0, 0.0),
         "whole_steps": np.where(loaded, SETTLED, 0.0),
     }
     column, sums = begins[:, None], state.past_sums.copy()
-    fields = {n: np.where(column, one, getattr(state, n)) for n, one in found.items()}
+    fields = {n: np.where(column, values, getattr(state, n)) for n, values in started.items()}
     sums[:, :-1] = np.where(begins, state.past_wear.sum(axis=-1), sums[:, :-1])
     return state.replaced(**fields, past_sums=sums)

@@ -155,7 +155,10 @@ class ImplicitStepper(StepDoublingStepper):
         order = np.where(of_energy[1] < ratio, their_order, order)
         # the error so far shortens the next step
         over, ratio = np.maximum(over * left, of_energy[0]), np.minimum(ratio, of_energy[1])
-        others = {n: one.replaced(order=order, passes=passes) for n, one in end.auxiliary.items()}
+        others = {
+            n: solution.replaced(order=order, passes=passes)
+            for n, solution in end.auxiliary.items()
+        }
         end = end.replaced(
             passes=passes,
             steps=state.steps + 1,
@@ -175,7 +178,7 @@ class ImplicitStepper(StepDoublingStepper):
         doubled = self.doubled(problem, state, step, stop, scheme)
         half, end = doubled.path
         past, depths, orders = Past.of(end), end.stacked, np.asarray(end.order)
-        own, order = np.empty_like(depths), np.empty_like(orders)
+        errors, order = np.empty_like(depths), np.empty_like(orders)
         most = np.full_like(order, MAX_ORDER)
         left = self._left(problem, state, stop, DOUBLED)
         if not problem.varying:  # many rows of a log average out within a step
@@ -184,7 +187,7 @@ class ImplicitStepper(StepDoublingStepper):
         scale = part / (DOUBLED_SHARE * self.tolerance)
         over, ratio = next_steps(
             *(past.wear, past.spans, depths, orders, scale, 1.0, 1.0, most),
-            *(np.ones_like(depths), own, order),
+            *(np.ones_like(depths), errors, order),
         )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
@@ -199,7 +202,7 @@ class ImplicitStepper(StepDoublingStepper):
             over, ratio = np.maximum(over, of_energy[0]), np.minimum(ratio, of_energy[1])
         if self.forced_step is not None:  # fixed steps may be too long for higher orders
             order = np.minimum(order, MAX_ORDER - 2)
-        others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
+        others = {name: solution.replaced(order=order) for name, solution in end.auxiliary.items()}
         return Attempt((half, end.replaced(order=order, **others)), over, ratio)
 
     def _left(
@@ -253,7 +256,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     times = problem.time(state.passes)
     here = problem.at_time(times, times)
     force = problem.force(times)
-    own = exposure(here, problem, force)
+    per_pass = exposure(here, problem, force)
     spans = np.full((ROWS - 1, len(state.passes)), np.inf)
     spans[0] = 0.0
     feedback, error = problem.has_spring or bool(problem.terms), state.stepping_error
@@ -262,12 +265,12 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
         loads = carried_loads(here, state.contacts)
         past_feedback[0] = loads - with_feedback(here, force, np.zeros(()), ())
     if past_feedback is not None and problem.has_spring:
-        past_feedback[1] = unloading(here, state, own)
+        past_feedback[1] = unloading(here, state, per_pass)
     wear, energy = wear_per_pass(here, state.contacts)
     return state.replaced(
         **dict.fromkeys(edges.FIELDS),
-        past_wear=first_differences(wear, own),
-        past_sums=first_differences(energy[None], own),
+        past_wear=first_differences(wear, per_pass),
+        past_sums=first_differences(energy[None], per_pass),
         past_feedback=past_feedback,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),

@@ -80,8 +80,8 @@ class _Slope:
             rise = np.log(loads / self._last[0])
             usable = (np.abs(rise) > MIN_LOAD_CHANGE) & (approach > 0.0) & (self._last[1] > 0.0)
             ratio = np.divide(approach, self._last[1], out=np.ones_like(loads), where=usable)
-            found = np.log(ratio) / np.where(usable, rise, 1.0)
-            self._exponent = np.where(usable, np.clip(found, *EXPONENTS), self._exponent)
+            slope = np.log(ratio) / np.where(usable, rise, 1.0)
+            self._exponent = np.where(usable, np.clip(slope, *EXPONENTS), self._exponent)
         self._last = loads, approach
         return self._exponent
 
@@ -361,8 +361,8 @@ class LoadsOfStep:
             Factor on tolerances.
         """
         problem = self._problem
-        found = self._equilibrium(solved, base)
-        self.target = np.where(active, found, self.target)
+        nearer = self._equilibrium(solved, base)
+        self.target = np.where(active, nearer, self.target)
         moved = np.abs(self.target / self.used - 1.0).max(axis=(0, 1))
         change = np.maximum(change, opening * moved)
         if problem.has_spring:

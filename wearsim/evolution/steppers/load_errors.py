@@ -49,16 +49,16 @@ def next_steps_of_loads(
     whole = with_feedback(problem, problem.constant_load, np.zeros(()), ())
     scale = np.maximum(whole + feedback[0], LEAST_LOAD * whole)
     relative = (feedback / scale).reshape(ROWS, -1, scale.shape[-1], 1)
-    order, own = np.empty_like(orders), np.empty(relative.shape[1:])
-    ones = np.ones_like(own)
+    order, of_loads = np.empty_like(orders), np.empty(relative.shape[1:])
+    ones = np.ones_like(of_loads)
     most = np.full_like(orders, MAX_ORDER)
-    found = next_steps(relative, spans, ones, orders, part, aim, keep, most, ones, own, order)
-    errors = np.abs(own.reshape(scale.shape) * scale)
+    steps = next_steps(relative, spans, ones, orders, part, aim, keep, most, ones, of_loads, order)
+    errors = np.abs(of_loads.reshape(scale.shape) * scale)
     springs = np.broadcast_to(problem.stiffness, scale.shape)
     displaced = np.divide(errors, springs, out=np.zeros_like(errors), where=springs > 0.0)
     # after the first step the differences hang on the estimated slope of the loads at its start
     known = spans[1] > spans[0]
-    return found, order, np.where(known, displaced.max(axis=(0, 1)), 0.0)
+    return steps, order, np.where(known, displaced.max(axis=(0, 1)), 0.0)
 
 
 def next_steps_of_energy(
@@ -93,11 +93,11 @@ def next_steps_of_energy(
     energy = np.array(sums[:, -1:, :, None])
     least = LEAST_ENERGY * end.energy * (1.0 - start.passes / end.passes)
     worn = np.maximum(end.energy - start.energy, least)[None, :, None]
-    ones, order, own = np.ones(worn.shape), np.empty_like(orders), np.empty_like(worn)
-    found = next_steps(
-        *(energy, spans, worn, orders, ones[0, :, 0], tolerance, keep, most, ones, own, order)
+    ones, order, errors = np.ones(worn.shape), np.empty_like(orders), np.empty_like(worn)
+    steps = next_steps(
+        *(energy, spans, worn, orders, ones[0, :, 0], tolerance, keep, most, ones, errors, order)
     )
-    return found, order
+    return steps, order
 
 
 def unloading(here: WearProblem, state: WearState, exposure: FloatArray) -> FloatArray:

@@ -37,8 +37,8 @@ def mean_loads(
     if problem.terms:
         power = problem.per_roller(problem.values_of(contacts, "power"))
         mean_power, duration = problem.mean_over_turn(power)[0], float((stop - start)[0])
-        each = zip(problem.terms.values(), state.terms, strict=True)
-        terms = [term.mean_force(value, mean_power, duration) for term, value in each]
+        pairs = zip(problem.terms.values(), state.terms, strict=True)
+        terms = [term.mean_force(value, mean_power, duration) for term, value in pairs]
     return with_feedback(problem, mean_force(problem, state, passes), displacement, terms)
 
 
@@ -75,8 +75,8 @@ def advanced_terms(
         Mean dissipated power of each roller [W].
     """
     duration = float((problem.time(stop) - problem.time(state.passes))[0])
-    each = zip(problem.terms.values(), state.terms, strict=True)
-    return np.array([term.advance(value, power, duration) for term, value in each])
+    pairs = zip(problem.terms.values(), state.terms, strict=True)
+    return np.array([term.advance(value, power, duration) for term, value in pairs])
 
 
 def checked_loads(state: WearState, loads: FloatArray) -> FloatArray:
@@ -132,7 +132,7 @@ def displacement_at(
     """
     if not problem.has_spring:
         return np.zeros(())
-    return np.asarray(np.mean([descents(problem, one) for one in depths], axis=0) - recovered)
+    return np.asarray(np.mean([descents(problem, pair) for pair in depths], axis=0) - recovered)
 
 
 def mean_force(problem: WearProblem, state: WearState, passes: FloatArray) -> FloatArray:

@@ -100,8 +100,8 @@ def run_passes(
     """
     loop, ends = run_compiled if is_compiled(problem) else run_in_python, []
     for place, count in enumerate(np.ceil(passes).astype(np.int64).tolist()):
-        one = np.array([place])
-        ends.append(loop(problem.at(one), state.at(one), count, redraw))
+        number = np.array([place])
+        ends.append(loop(problem.at(number), state.at(number), count, redraw))
     return joined_states(ends)
 
 
@@ -261,12 +261,12 @@ def run_in_python(
     (law,) = problem.laws
     turn = kinematics.physical_rollers / kinematics.pass_rate
     for number, r in enumerate(passes.roller):
-        one = with_contacts(passes, np.array([number]))
+        single = with_contacts(passes, np.array([number]))
         multiplicity = float(kinematics.multiplicity[r])
         for s in range(stations):
             speed, part, radius = kinematics.track.station(s)
             ratio = radius / kinematics.roller_radius / multiplicity
-            unworn = one.nominal_gap[s, 0, 0]
+            unworn = single.nominal_gap[s, 0, 0]
             gap = unworn + cylinder[s, 0, 0] + roller[0, r, 0]
             free = float(force[number, s]) + float(terms[:, r, 0].sum())
             zero = float(unworn.min() + fresh[s, number])
@@ -277,7 +277,9 @@ def run_in_python(
                     terms[t, r] = term.advance(terms[t, r], np.zeros(1), turn / multiplicity)
                 continue
             place = s * problem.rollers + r
-            batch = contact_batch(one, one.nominal_gap, np.zeros(one.shape), cylinder, roller)
+            batch = contact_batch(
+                single, single.nominal_gap, np.zeros(single.shape), cylinder, roller
+            )
             curvature = float(batch.longitudinal_curvature[s])
             spring = stiffness, free, zero
             contact = _solve_pass(problem, gap, curvature, batch.point(s), spring, contacts[place])

@@ -108,10 +108,10 @@ class StabilisedStepper(StepDoublingStepper):
         and the worn depth as its square. Without the separation of the surfaces, the pressure at
         the edge is uncertain for any step.
         """
-        found = super().proposed(problem, state)
+        controlled = super().proposed(problem, state)
         known = state.contacts.separation is not None and np.count_nonzero(state.passes) > 0
         if self.forced_step is not None or not known:
-            return found
+            return controlled
         lowest = problem.gap(*state.depths).min(axis=-1)
         worn = np.maximum(lowest - problem.nominal_least_gap, 0.0)
         elastic = problem.values_of(state.contacts, "approach") - lowest
@@ -122,7 +122,7 @@ class StabilisedStepper(StepDoublingStepper):
             (strips * loaded).max(axis=-1) / ADVANCE, 2.0 * worn / (MOST_WORN * elastic)
         )
         longest = 3.0 * state.passes / growth.max(axis=(0, 1))
-        return np.where(have_groove(problem, state), np.minimum(found, longest), found)
+        return np.where(have_groove(problem, state), np.minimum(controlled, longest), controlled)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return a step for the decay rates at `state`."""
