@@ -309,6 +309,7 @@ def live_functions(modules: Iterable[str]) -> dict[tuple[str, str], list[Functio
     """Return the functions of modules by file and qualified name."""
     paths = {str(ROOT / name) for name in modules}
     found: dict[tuple[str, str], list[FunctionType]] = {}
+    gc.unfreeze()  # objects of the collection of tests would not be listed
     for item in gc.get_objects():
         if isinstance(item, FunctionType) and item.__code__.co_filename in paths:
             code: CodeType = item.__code__
