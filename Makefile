@@ -1,6 +1,7 @@
 # make demo            run the 450-minute wear test: summary, results and figure in out/
 # make test            lint, types, import contracts and the quick tests: 7 minutes on 2 cores
-# make test-slow       the other tests: kills of the writers, hard cases, installs, Dask, the site: 20 minutes
+# make test-slow       the other tests: kills of the writers, hard cases, installs, Dask, the site: 20 minutes;
+#                      BEGIN_WITHIN=600 skips those that have not begun after 600 s
 # make test-coverage   how often stated intervals hold the truth, by hundreds of data sets: 10 minutes, before a release
 # make mutants         share of changed operators and constants that the quick tests notice: docs/measurements/mutants.json;
 #                      SAMPLE=300, a quarter of an hour, and SEED=1 choose; SAMPLE=0 takes all 14,000, hours
@@ -39,7 +40,7 @@ test: style
 		wait $$types && exit $$tests
 
 test-slow: $(VENV)/.installed-dev
-	$(BIN)/pytest -n $(JOBS) --dist worksteal -m slow
+	$(BIN)/pytest -n $(JOBS) --dist worksteal -m slow $(if $(BEGIN_WITHIN),--begin-within $(BEGIN_WITHIN))
 
 test-coverage: $(VENV)/.installed-dev
 	$(BIN)/pytest -n $(JOBS) --dist worksteal -m coverage

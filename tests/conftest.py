@@ -25,6 +25,7 @@ from wearsim.operating_system import lock_file
 settings.register_profile("wearsim", settings(), deadline=None)
 settings.load_profile("wearsim")
 
+STARTED = time.monotonic()
 #: tests.benchmarks imports wearsim_bench
 PLUGINS = r"wearsim_(?:bench|chevalier2005|explore|halfspace|optimise|validation)"
 NAMES = rf"{PLUGINS}|tests\.benchmarks import"
@@ -49,6 +50,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if plugins_of(item.path):
             item.add_marker(pytest.mark.bench)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--begin-within",
+        type=float,
+        metavar="SECONDS",
+        default=float("inf"),
+        help="skip tests that have not begun after this time",
+    )
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    longest: float = item.config.getoption("--begin-within")
+    if time.monotonic() - STARTED > longest:
+        pytest.skip(f"not begun within {longest:.0f} s")
 
 
 def pytest_configure(config: pytest.Config) -> None:

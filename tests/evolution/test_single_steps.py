@@ -286,13 +286,19 @@ def test_depths_are_not_negative_and_keep_their_sum():
     np.testing.assert_allclose(_never_negative(depths), exact, rtol=1e-15)
 
 
-def test_steps_in_a_groove_advance_its_edges_by_half_a_strip():
-    problem, _, _ = built(contact__strips=41)
+@pytest.mark.parametrize("strips", [21, 201])
+def test_steps_in_a_groove_are_limited_by_strips_and_elastic_approach(strips):
+    problem, _, _ = built(contact__strips=strips)
     state, _ = stepped(problem, ImplicitStepper(1e-3, forced_step=30_000.0), 300_000.0)
     state, stepper = state.replaced(step=np.array([1e9])), StabilisedStepper(1e-3)
-    loaded = np.count_nonzero(state.contacts[0].line_load)
-    # the width grows as the cubic root of the passes, at either edge by half of it
-    longest = 3.0 * 300_000.0 / (0.5 * loaded) * 0.5
+    to_edge = np.count_nonzero(state.contacts[0].line_load) // 2
+    worn = state.cylinder_depth.max()
+    elastic = state.contacts.approach[0] - worn
+    # the distance to an edge grows as the cubic root of the passes, the depth as its square
+    by_strips = 3.0 * 300_000.0 / to_edge * 0.5
+    by_approach = 1.5 * 300_000.0 / worn * 0.7 * elastic
+    longest = min(by_strips, by_approach)
+    assert longest == (by_approach if strips == 21 else by_strips)
     assert stepper.proposed(problem, state)[0] == pytest.approx(longest, rel=1e-12, abs=0.0)
     short = state.replaced(step=np.array([100.0]))
     assert stepper.proposed(problem, short)[0] == 100.0

@@ -45,9 +45,12 @@ def test_dissipation_study_of_this_layout_opens():
     stored, known = (dict(data.attributes) for data in (found, expected))
     numbers, computed = stored.pop("statistics"), known.pop("statistics")
     assert stored == known
-    # estimates may be added within a layout
+    # estimates may be added within a layout, and sums differ in round-off between processors
     for name, estimates in numbers.items():
-        assert estimates.items() <= computed[name].items()
+        for estimate, value in estimates.items():
+            known = computed[name][estimate]
+            number = isinstance(known, float)
+            assert value == (pytest.approx(known, rel=1e-12, abs=0.0) if number else known)
     for name, array in expected.variables.items():
         assert found.variables[name].tobytes() == array.tobytes()
 
