@@ -54,7 +54,7 @@ def with_sum(
         At the end of the step.
     """
     rows, realisations, n = errors.shape
-    found = np.empty(errors.shape)
+    summed = np.empty(errors.shape)
     for b in range(rows):
         for v in range(realisations):
             total, width, product, inverse, of_sum = 0.0, 0.0, 1.0, 0.0, 0.0
@@ -63,16 +63,16 @@ def with_sum(
                 if np.isfinite(spans[k + 1, v]):
                     of_sum = product / (inverse + 1.0 / spans[k + 1, v]) * past_sums[k + 2, b, v, 0]
             for i in range(n):
-                found[b, v, i] = errors[b, v, i]
+                summed[b, v, i] = errors[b, v, i]
                 if resolved[v]:
-                    found[b, v, i] = 0.0 if crossed[b, v, i] else errors[b, v, i]
-                    total += found[b, v, i]
+                    summed[b, v, i] = 0.0 if crossed[b, v, i] else errors[b, v, i]
+                    total += summed[b, v, i]
                     width += 0.0 if crossed[b, v, i] else parts[b, v, i]
             if width > 0.0:
                 shift = (of_sum - total) / width
                 for i in range(n):
-                    found[b, v, i] += 0.0 if crossed[b, v, i] else parts[b, v, i] * shift
-    return found
+                    summed[b, v, i] += 0.0 if crossed[b, v, i] else parts[b, v, i] * shift
+    return summed
 
 
 @kernel
@@ -132,7 +132,7 @@ def assess_step(
 
     Returns
     -------
-    found : ndarray, shape (2, realisations)
+    of_next : ndarray, shape (2, realisations)
         Excess of error and ratio of the next step, as of `next_steps`.
     next_orders : ndarray of int, shape (realisations,)
     errors : ndarray, shape (bodies, realisations, strips)
@@ -154,7 +154,7 @@ def assess_step(
             for i in range(n):
                 if young[b, v, i]:
                     parts[b, v, i] *= YOUNG
-    found = next_steps(
+    of_next = next_steps(
         past_wear,
         spans,
         depths,
@@ -223,7 +223,7 @@ def assess_step(
         estimates[0, v] = depth + irreducible[0, v]
         estimates[1, v] = of_test + irreducible[1, v]
         estimates[2, v] = profile + irreducible[2, v]
-    return found, next_orders, errors, estimates
+    return of_next, next_orders, errors, estimates
 
 
 def compile_step_errors() -> None:
