@@ -26,6 +26,7 @@ settings.register_profile("wearsim", settings(), deadline=None)
 settings.load_profile("wearsim")
 
 STARTED = time.monotonic()
+LONG = {"test_site.py", "test_installs.py", "test_numba_cache.py", "test_run_kills.py"}
 #: tests.benchmarks imports wearsim_bench
 PLUGINS = r"wearsim_(?:bench|chevalier2005|explore|halfspace|optimise|validation)"
 NAMES = rf"{PLUGINS}|tests\.benchmarks import"
@@ -46,7 +47,9 @@ def pytest_ignore_collect(collection_path: Path) -> bool | None:
     return True if missing else None
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--begin-within") < float("inf"):  # those that take minutes would end late
+        items.sort(key=lambda item: item.path.name not in LONG)
     for item in items:
         if plugins_of(item.path):
             item.add_marker(pytest.mark.bench)
