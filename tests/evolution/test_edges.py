@@ -180,7 +180,7 @@ def test_pressure_of_whole_strips_is_close_and_its_stated_error_holds(stepper: s
 
 @pytest.mark.slow
 def test_pressure_of_stabilised_steps_is_close_after_strips_are_joined() -> None:
-    """The elastic approach then is a twentieth of what wears where the edge crosses a strip."""
+    """While the edge crosses one strip, twenty times the elastic approach is worn."""
     result = run({"evolution.stepper": "stabilised", "operation.duration": "4500 min"})
     late = result.time > 1000.0 * 60.0
     pressure = result.peak_pressure[late].ravel()

@@ -18,7 +18,10 @@ LEAST_LOAD = 1e-3  # next to a pause, of the greatest load
 
 
 def computed_once(compute: Callable[[WearProblem], T], problem: WearProblem) -> T:
-    """Return what is constant during a test with constant inputs, computed at the first call."""
+    """Return a quantity that no step of a test with constant inputs changes.
+
+    It is computed at the first call, and kept with the problem.
+    """
     try:
         value: T = problem.__dict__["constants"][compute]
     except KeyError:

@@ -16,6 +16,7 @@ from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.edges import have_groove
 from wearsim.evolution.steppers.forward_euler import decay_rates
 from wearsim.evolution.steppers.loads import (
+    descents,
     elastic_approaches,
     fresh_approach,
     mean_force,
@@ -112,9 +113,8 @@ class StabilisedStepper(StepDoublingStepper):
         known = state.contacts.separation is not None and np.count_nonzero(state.passes) > 0
         if self.forced_step is not None or not known:
             return controlled
-        lowest = problem.gap(*state.depths).min(axis=-1)
-        worn = np.maximum(lowest - problem.nominal_least_gap, 0.0)
-        elastic = problem.values_of(state.contacts, "approach") - lowest
+        worn = np.maximum(descents(problem, state.depths), 0.0)
+        elastic = elastic_approaches(problem, state)
         apex = problem.nominal_gap.argmin(axis=-1)
         strips = np.abs(np.arange(problem.grid.strips) - apex[..., None])
         loaded = problem.values_of(state.contacts, "line_load") > 0.0

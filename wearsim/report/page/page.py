@@ -16,7 +16,7 @@ from wearsim.report.view import Row, Table, View
 
 
 def first_of(views: Sequence[View]) -> dict[str, Any]:
-    """Return the first screen of a page, for the person who decides.
+    """Return the content of the top of a page: short answers and the main figure.
 
     Returns
     -------

@@ -298,7 +298,7 @@ def _numbers(predicted: Predicted, place: int) -> str:
 
 
 def _judged(probability: float, contradicted: str, agreed: str) -> str:
-    """Return the probability of a worse agreement, and what it means."""
+    """Return the p-value of the goodness of fit, and its meaning in words."""
     return f"p = {probability:.2g}: {contradicted if probability < 0.05 else agreed}"
 
 
