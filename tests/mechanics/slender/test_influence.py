@@ -86,11 +86,11 @@ def test_table_interpolates_the_function(tau, tabulated, function):
     value, tangent = np.empty(40), np.empty(40)
     read_influence(table, tau, 40, value, tangent)
     assert [read_value(table, tau, k) for k in range(40)] == pytest.approx(value, rel=1e-14)
-    np.testing.assert_allclose(value, expected, atol=2e-9)
+    np.testing.assert_allclose(value, expected, atol=3e-8)  # of C_0 = 4 at most
     step = 1e-4
     if LOWEST < tau < HIGHEST:
         slope = direct(tau + step, 40, function) - direct(tau - step, 40, function)
-        np.testing.assert_allclose(tangent, expected + 0.25 * slope / step, atol=2e-7)
+        np.testing.assert_allclose(tangent, expected + 0.25 * slope / step, atol=4e-6)
 
 
 def test_tables_are_shared_and_kept() -> None:

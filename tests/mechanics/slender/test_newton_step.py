@@ -91,7 +91,8 @@ def test_jacobian_is_the_slope_of_the_displacements(lengths: str) -> None:
     found = state.matrix[0, : len(inside), : len(inside)].T
     residual = np.linspace(-1e-6, 2e-6, len(inside))
     step = np.linalg.solve(found, residual)
-    np.testing.assert_allclose(slopes @ step, residual, atol=1e-4 * np.abs(residual).max())
+    # derivatives of the half-lengths of strips beyond the reach are omitted
+    np.testing.assert_allclose(slopes @ step, residual, atol=2e-4 * np.abs(residual).max())
     expected = np.linalg.solve(found, np.ones(len(inside)))
     assert factor_jacobian(0, state)
     np.testing.assert_allclose(state.unit_load[0, : len(inside)], expected, rtol=1e-9)
@@ -107,7 +108,7 @@ def test_jacobian_has_the_tangents_of_the_table(lengths: str, inside: list[int])
     state, places, size = contact.state, np.arange(STRIPS), len(inside)
     number_strips(0, line_load, 2, state)
     find_factors(0, line_load, True, contact.lengths)
-    state.surface[0], state.outer[:] = 1e-6, np.nan
+    state.surface[0] = 1e-6
     fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
     followed = slice(state.left[0], state.right[0])
     matrix, near = np.zeros((size, size)), np.zeros((REACH + 1, STRIPS))
@@ -119,7 +120,6 @@ def test_jacobian_has_the_tangents_of_the_table(lengths: str, inside: list[int])
         distance = np.abs(places - j)
         surface += UNIT * line_load[0, j] * value[distance]
         expected = UNIT * tangent[distance]
-        np.testing.assert_allclose(state.outer[0, column, followed], expected[followed], rtol=1e-11)
         matrix[column] = expected[inside]
         assert state.diagonal[0, column] == pytest.approx(UNIT * tangent[0], rel=1e-12)
         near[:, j] = UNIT * line_load[0, j] * (tangent - value)[: REACH + 1]
@@ -170,24 +170,25 @@ def test_surface_beside_the_contact_follows_the_loads(gap_in_contact: bool) -> N
     contact, line_load = Contact("coupled"), loaded()
     if gap_in_contact:
         line_load[0, 7] = 0.0
-    state, own = contact.state, np.zeros((1, STRIPS))
+    state = contact.state
     number_strips(0, line_load, 1, state)
-    find_factors(0, line_load, True, contact.lengths)
-    state.surface[0] = 0.0
-    fill_jacobian(0, contact.table, UNIT, own, line_load, contact.lengths, state)
+    find_factors(0, line_load, False, contact.lengths)
     state.change[0] = np.where(line_load[0] > 0.0, 1e2 * np.arange(STRIPS), 0.0)
-    surface = np.zeros((1, STRIPS))
-    predict_surface(0, surface, state)
+    state.surface[0] = 0.0
+    predict_surface(0, contact.table, UNIT, contact.lengths.log_ratio, state)
     size, left, right = int(state.size[0]), int(state.left[0]), int(state.right[0])
-    inside = state.place[0, :size]
-    expected = state.change[0, inside] @ state.outer[0, :size]
+    inside, expected = state.place[0, :size], np.zeros(STRIPS)
+    for j in inside:
+        value, tangent = np.empty((2, STRIPS))
+        read_influence(contact.table, contact.lengths.log_ratio[0, j], STRIPS, value, tangent)
+        expected += UNIT * state.change[0, j] * tangent[np.abs(np.arange(STRIPS) - j)]
     beside = np.zeros(STRIPS, bool)
     beside[left : inside[0]] = beside[inside[-1] + 1 : right] = True
     if gap_in_contact:
         beside[left:right] = True
     assert beside.sum() == (right - left if gap_in_contact else 2)
-    np.testing.assert_allclose(surface[0, beside], expected[beside], rtol=1e-12)
-    assert not surface[0, ~beside].any()
+    np.testing.assert_allclose(state.surface[0, beside], expected[beside], rtol=1e-12)
+    assert not state.surface[0, ~beside].any()
 
 
 def test_strips_in_tension_leave_the_contact() -> None:

@@ -340,11 +340,11 @@ def test_half_lengths_of_an_anchored_contact_follow_the_loads(size: float) -> No
     rng, line_load = np.random.default_rng(6), loop.loads.line_load
     line_load[1] = 1e5 * (1.0 + rng.random(9))
     state.loaded[1], state.active[1] = 9, np.arange(9)
-    # ln q grows by one in one strip only, on which the others depend
+    # ln q grows by one in one strip only, on which its neighbours depend
     loop.loads.anchor[1] = line_load[1]
     loop.loads.anchor[1, 4] *= np.exp(-1.0)
-    growth = size * np.linspace(-1.0, 1.0, 9)
-    for i in range(9):
+    growth = size * np.linspace(-1.0, 1.0, 9) * (np.abs(np.arange(9) - 4) <= REACH)
+    for i in range(4 - REACH, 5 + REACH):
         state.lengths.slope[1, REACH + 4 - i, i + 2 * REACH] = growth[i]
     state.lengths.factor[1] = 0.5 + rng.random(9)
     for anchored in (True, False):

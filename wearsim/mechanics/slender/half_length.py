@@ -32,7 +32,7 @@ from wearsim.types import FloatArray, IntArray
 SWEEPS = 2
 LOWEST_FACTOR = 0.1
 HIGHEST_FACTOR = 4.0
-REACH = 4  # neighbours on either side in the derivative of s with respect to the line loads
+REACH = 2  # neighbours on either side in the derivative of s with respect to the line loads
 
 
 class HalfLengths(NamedTuple):
@@ -151,15 +151,35 @@ def add_influences(
     total : ndarray, shape (strips,)
         Increased.
     """
+    nodes, middle, waiting = table.shape[0], table.shape[2] // 2, -1
+    start, stop = np.uint64(left), np.uint64(right + 1)
     for j in range(weight.shape[0]):
         if weight[j] == 0.0:
             continue
-        node, (v0, v1, w0, w1), _ = interpolation(table.shape[0], log_ratio[k, j])
-        v0, v1, w0, w1 = v0 * weight[j], v1 * weight[j], w0 * weight[j], w1 * weight[j]
-        shift = np.uint64(table.shape[2] // 2 - j)
-        for i in range(np.uint64(left), np.uint64(right + 1)):
-            low = v0 * table[node, 0, i + shift] + v1 * table[node, 1, i + shift]
-            high = w0 * table[node + 1, 0, i + shift] + w1 * table[node + 1, 1, i + shift]
+        if waiting < 0:
+            waiting = j
+            continue
+        p, (a0, a1, b0, b1), _ = interpolation(nodes, log_ratio[k, waiting])
+        q, (c0, c1, d0, d1), _ = interpolation(nodes, log_ratio[k, j])
+        u, v = weight[waiting], weight[j]
+        a0, a1, b0, b1 = a0 * u, a1 * u, b0 * u, b1 * u
+        c0, c1, d0, d1 = c0 * v, c1 * v, d0 * v, d1 * v
+        near, here = np.uint64(middle - waiting), np.uint64(middle - j)
+        for i in range(start, stop):
+            m, n = i + near, i + here
+            low = a0 * table[p, 0, m] + a1 * table[p, 1, m]
+            low += c0 * table[q, 0, n] + c1 * table[q, 1, n]
+            high = b0 * table[p + 1, 0, m] + b1 * table[p + 1, 1, m]
+            high += d0 * table[q + 1, 0, n] + d1 * table[q + 1, 1, n]
+            total[i] += low + high
+        waiting = -1
+    if waiting >= 0:
+        p, (a0, a1, b0, b1), _ = interpolation(nodes, log_ratio[k, waiting])
+        u, near = weight[waiting], np.uint64(middle - waiting)
+        a0, a1, b0, b1 = a0 * u, a1 * u, b0 * u, b1 * u
+        for i in range(start, stop):
+            low = a0 * table[p, 0, i + near] + a1 * table[p, 1, i + near]
+            high = b0 * table[p + 1, 0, i + near] + b1 * table[p + 1, 1, i + near]
             total[i] += low + high
 
 

@@ -30,7 +30,7 @@ from wearsim.types import FloatArray
 
 LOWEST = -10.0  # ln(a/dy) below which F_k does not depend on a, to 1e-9
 HIGHEST = 4.75  # greatest ln(a/dy) of the table: strips of width dy = a/115
-STEP = 1.0 / 32.0
+STEP = 1.0 / 16.0
 
 _FAR = 3.0  # t above which the series has converged to 1e-13
 _TERMS = 10

@@ -466,7 +466,7 @@ def solve_slender(
                 change, left = update_loads(total, state, iteration > CAUTIOUS)
                 stale = change if renewed else stale + change
                 for k in range(contacts):
-                    predict_surface(k, state.surface, state)
+                    predict_surface(k, table, unit, lengths.log_ratio, state)
                 if bodies is not None:
                     add_depths(members, wear, state.change, state.surface)
                 outcome, before = check_convergence(

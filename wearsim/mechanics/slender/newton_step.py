@@ -26,9 +26,9 @@ class NewtonState(NamedTuple):
 
     A row is a strip in contact. `fresh` marks contacts that need a new Jacobian, `size` is the
     number of rows, `place` the strip of each row, `rows` the row of each strip, -1 outside the
-    contact. Strips from `left` to before `right` are followed, the others only at the end. `outer`
-    is the displacement of followed strips per load of each row and `matrix` the Jacobian by
-    columns, replaced by its factors or, where contacts wear shared bodies, by S of `body_wear`.
+    contact. Strips from `left` to before `right` are followed, the others only at the end.
+    `matrix` is the Jacobian by columns, replaced by its factors or, where contacts wear shared
+    bodies, by S of `body_wear`.
     `unit_load` are the loads per unit of approach [N/m^2] and `unit_load_sum` is their sum.
     `diagonal` is the derivative of the displacement of each strip by its own load, `missing` the
     residual [m], `step` the step by row [N/m] and `change` the applied change of load by strip
@@ -44,7 +44,6 @@ class NewtonState(NamedTuple):
     rows: IntArray
     left: IntArray
     right: IntArray
-    outer: FloatArray
     matrix: FloatArray
     unit_load: FloatArray
     unit_load_sum: FloatArray
@@ -69,7 +68,6 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
         np.empty((contacts, n), np.int64),
         np.empty(contacts, np.int64),
         np.empty(contacts, np.int64),
-        np.empty((contacts, n, n)),
         np.empty((contacts, m, m)),
         np.empty((contacts, n)),
         np.empty(contacts),
@@ -213,7 +211,7 @@ def fill_jacobian(
         Wear compliance [m/(N/m)].
     """
     n, size, coupled = line_load.shape[1], state.size[k], lengths.table.shape[0] > 0
-    place, outer, matrix = state.place, state.outer, state.matrix[k]
+    place, matrix, by_load = state.place, state.matrix[k], state.weight
     surface, middle = state.surface[k], table.shape[2] // 2
     nodes, log_ratio = table.shape[0], lengths.log_ratio
     near, near_strips = lengths.near, min(n, REACH + 1) if coupled else 0
@@ -227,12 +225,12 @@ def fill_jacobian(
             a, b = table[node, 0, i + shift], table[node, 1, i + shift]
             c, e = table[node + 1, 0, i + shift], table[node + 1, 1, i + shift]
             surface[i] += push * (v0 * a + v1 * b + w0 * c + w1 * e)
-            outer[k, column, i] = unit * (d0 * a + d1 * b + e0 * c + e1 * e)
+            by_load[i] = unit * (d0 * a + d1 * b + e0 * c + e1 * e)
         if contiguous:  # without the indices, in a third of the time
             for row in range(np.uint64(0), np.uint64(size)):
-                matrix[column, row] = outer[k, column, first + row]
+                matrix[column, row] = by_load[first + row]
         for row in range(0 if contiguous else size):
-            matrix[column, row] = outer[k, column, place[k, row]]
+            matrix[column, row] = by_load[place[k, row]]
         state.diagonal[k, column] = matrix[column, column]
         for d in range(near_strips):
             a, b = table[node, 0, middle + d], table[node, 1, middle + d]
@@ -307,19 +305,26 @@ def correct_residual(
 
 
 @subroutine
-def predict_surface(k: int, surface: FloatArray, state: NewtonState) -> None:
+def predict_surface(
+    k: int, table: FloatArray, unit: float, log_ratio: FloatArray, state: NewtonState
+) -> None:
     """Add the first-order displacement by contact `k`'s load to the surface of unloaded strips."""
-    size, place, outer = state.size[k], state.place, state.outer
-    left, right = state.left[k], state.right[k]
+    size, place, surface = state.size[k], state.place, state.surface[k]
+    left, right, middle = state.left[k], state.right[k], table.shape[2] // 2
     first, last = place[k, 0], place[k, size - 1]
     if last + 1 - first != size:
         first, last = right, right  # unloaded strips between loaded ones
     for row in range(size):
-        change = state.change[k, place[k, row]]
-        for i in range(np.uint64(left), np.uint64(first)):
-            surface[k, i] += change * outer[k, row, i]
-        for i in range(np.uint64(last + 1), np.uint64(right)):
-            surface[k, i] += change * outer[k, row, i]
+        j = place[k, row]
+        node, _, (d0, d1, e0, e1) = interpolation(table.shape[0], log_ratio[k, j])
+        push, shift = unit * state.change[k, j], np.uint64(middle - j)
+        d0, d1, e0, e1 = push * d0, push * d1, push * e0, push * e1
+        for side in range(2):
+            start, stop = (last + 1, right) if side else (left, first)
+            for i in range(np.uint64(start), np.uint64(stop)):
+                low = d0 * table[node, 0, i + shift] + d1 * table[node, 1, i + shift]
+                high = e0 * table[node + 1, 0, i + shift] + e1 * table[node + 1, 1, i + shift]
+                surface[i] += low + high
 
 
 @subroutine
@@ -338,23 +343,20 @@ def complete_surface(
     the approach is not penetrated. Returns the first strip with complete `surface`, and the one
     after the last.
     """
-    surface, nodes, n = state.surface[k], table.shape[0], line_load.shape[1]
+    surface, n = state.surface[k], line_load.shape[1]
     left, right = state.left[k], state.right[k]
     first, last = left, right - 1
     for i in range(left - 1, -1, -1):
         first = i if surface[i] < approach else first
     for i in range(right, n):
         last = i if surface[i] < approach else last
-    for row in range(state.size[k] if last + 1 - first > right - left else 0):
-        j = state.place[k, row]
-        push = unit * line_load[k, j]
-        node, (v0, v1, w0, w1), _ = interpolation(nodes, lengths.log_ratio[k, j])
-        v0, v1, w0, w1 = v0 * push, v1 * push, w0 * push, w1 * push
-        for i in range(first, last + 1):
-            if i < left or i >= right:
-                d = table.shape[2] // 2 + i - j
-                low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
-                surface[i] += low + (w0 * table[node + 1, 0, d] + w1 * table[node + 1, 1, d])
+    weight = state.weight
+    for i in range(n):
+        weight[i] = unit * line_load[k, i]
+    if first < left:
+        add_influences(table, k, first, left - 1, weight, lengths.log_ratio, surface)
+    if last >= right:
+        add_influences(table, k, right, last, weight, lengths.log_ratio, surface)
     return first, last + 1
 
 

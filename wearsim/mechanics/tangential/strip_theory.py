@@ -237,46 +237,53 @@ def strip_contacts(
     contacts, n = line_load.shape
     slip_x, local_friction, tractions = np.empty(n), np.empty(n), new_tractions(n)
     for k in range(contacts):
+        first, last = 0, n - 1  # of the loaded strips, to which all sums are restricted
+        while last > 0 and not line_load[k, last] > 0.0:
+            last -= 1
+        while first < last and not line_load[k, first] > 0.0:
+            first += 1
         total, centre, mean = 0.0, 0.0, 0.0
-        for i in range(n):
-            q = line_load[k, i]
-            slip_x[i] = variation[k, i] if variation.shape[1] > 0 else -spin[k] * y[i]
-            local_friction[i] = friction[k, i if friction.shape[1] > 1 else 0]
+        for i in range(first, last + 1):
+            q, here = line_load[k, i], i - first
+            slip_x[here] = variation[k, i] if variation.shape[1] > 0 else -spin[k] * y[i]
+            local_friction[here] = friction[k, i if friction.shape[1] > 1 else 0]
             total += q
             centre += q * y[i]
-            mean += q * slip_x[i]
+            mean += q * slip_x[here]
         centre /= total
         mean = longitudinal[k] - mean / total
-        for i in range(n):
-            slip_x[i] += mean
+        for here in range(last + 1 - first):
+            slip_x[here] += mean
         solve_strips(
-            half_length[k],
-            line_load[k],
+            half_length[k, first : last + 1],
+            line_load[k, first : last + 1],
             local_friction,
-            slip_x,
+            slip_x[: last + 1 - first],
             lateral[k],
             spin[k],
             spacing,
             elasticity,
             tractions,
         )
-        peak = length = adhering = sum_x = sum_y = moment = power = 0.0
+        peak = length = adhering = sum_x = sum_y = moment = power = torque[k] = 0.0
         for i in range(n):
-            dissipation[k, i] = rolling_speed[k] * tractions.work[i]
+            dissipation[k, i] = 0.0
+        for i in range(first, last + 1):
+            here = i - first
+            dissipation[k, i] = rolling_speed[k] * tractions.work[here]
             if line_load[k, i] > 0.0:
                 peak = max(peak, 2.0 * line_load[k, i] / (np.pi * half_length[k, i]))
             length += half_length[k, i]
-            adhering += tractions.adhesion_length[i]
-            sum_x += tractions.force_x[i]
-            sum_y += tractions.force_y[i]
-            moment += tractions.moment[i] - (y[i] - centre) * tractions.force_x[i]
+            adhering += tractions.adhesion_length[here]
+            sum_x += tractions.force_x[here]
+            sum_y += tractions.force_y[here]
+            moment += tractions.moment[here] - (y[i] - centre) * tractions.force_x[here]
             power += dissipation[k, i]
+            if rolling_radius.shape[1] > 0:
+                torque[k] -= tractions.force_x[here] * rolling_radius[k, i] * spacing
         sums[0, k], sums[1, k] = sum_x * spacing, sum_y * spacing
         sums[2, k], sums[3, k] = moment * spacing, power * spacing
         sums[4, k], sums[5, k] = peak, 0.5 * adhering / length
-        torque[k] = 0.0
-        for i in range(rolling_radius.shape[1]):
-            torque[k] -= tractions.force_x[i] * rolling_radius[k, i] * spacing
 
 
 def compile_strip_contacts() -> None:
