@@ -99,7 +99,8 @@ def contents(path: Path) -> dict[str, bytes]:
     return {**arrays, **fields, **status}
 
 
-def differences(one: Path, other: Path) -> list[str]:
-    """Return the names of the fields in which two ensembles differ."""
-    first, second = contents(one), contents(other)
+def differences(one: Path, other: Path | dict[str, bytes]) -> list[str]:
+    """Return the names of the fields in which an ensemble differs from another, or its contents."""
+    first = contents(one)
+    second = contents(other) if isinstance(other, Path) else other
     return [name for name in first.keys() | second.keys() if first.get(name) != second.get(name)]

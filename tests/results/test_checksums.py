@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -52,10 +53,18 @@ CASES: dict[str, tuple[str, str, Content]] = {
 }
 
 
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a file of each kind."""
+    folder = tmp_path_factory.mktemp("files")
+    write_all(folder)
+    return folder
+
+
 @pytest.fixture(params=CASES)
-def case(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, Path, Content]:
+def case(request: pytest.FixtureRequest, files: Path, tmp_path: Path) -> tuple[Path, Path, Content]:
     name, ending, content = CASES[request.param]
-    write_all(tmp_path)
+    shutil.copytree(files, tmp_path, dirs_exist_ok=True)
     path = tmp_path / f"{name}-{LAYOUTS[name]}.h5"
     return path, Path(f"{path}{ending}"), content
 
@@ -147,9 +156,9 @@ def test_changed_byte_of_an_attribute_is_an_error_or_changes_nothing(case):
     assert refused >= 0.5 * len(places)
 
 
-def test_changed_byte_is_an_error_in_xarray_too(tmp_path):
-    write_all(tmp_path)
+def test_changed_byte_is_an_error_in_xarray_too(files, tmp_path):
     path = tmp_path / f"run-{LAYOUTS['run']}.h5"
+    shutil.copy(files / path.name, path)
     stored = path.read_bytes()
     for at in _places_of_data(path)["/cylinder_depth_profile"]:
         _flip(path, stored, at)

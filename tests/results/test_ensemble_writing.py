@@ -17,6 +17,7 @@ import pytest
 import xarray
 from ensemble_examples import (
     SCALARS,
+    contents,
     differences,
     finish,
     some_header,
@@ -104,7 +105,7 @@ def test_killed_ensemble_is_continued_bit_for_bit(tmp_path, extent):
     lines = [line.split(",") for line in done.stdout.splitlines()]
     assert {int(killed_by) for _, killed_by, _ in lines} == {signal.SIGKILL}
     assert "before remove" in {stage for _, _, stage in lines}
-    whole = tmp_path / "whole.h5"
+    whole = contents(tmp_path / "whole.h5")
     counts, exists = set(), False
     for name, _, stage in lines:
         path = tmp_path / name

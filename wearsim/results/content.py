@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from types import UnionType
 from typing import (
@@ -253,7 +253,7 @@ class StudyData:
     @classmethod
     def check_types(cls, attributes: Mapping[str, Any]) -> None:
         """Raise a ValueError unless fields that were read from a file have their types."""
-        hints = get_type_hints(cls)
+        hints = _types_of(cls)  # type: ignore[arg-type]  # a class is hashable
         for name, value in attributes.items():
             if not _has_type(value, hints[name]):
                 raise ValueError(f"{name} is a {type(value).__name__} of unknown content")
@@ -290,6 +290,12 @@ class StudyData:
     def attributes(self) -> dict[str, Any]:
         """Fields by name, without those stored separately."""
         return {name: getattr(self, name) for name in self.attribute_names()}
+
+
+@cache
+def _types_of(data: type[StudyData]) -> dict[str, Any]:
+    """Return the types of the fields of a class."""
+    return get_type_hints(data)
 
 
 def _has_type(value: Any, hint: Any) -> bool:

@@ -38,6 +38,7 @@ class StoredFile:
         self._file = file
         self._size: int = file.id.get_filesize()
         self._read = 0  # [bytes]
+        self._checked: dict[str, h5py.Dataset] = {}  # arrays that have not been read yet
 
     @property
     def handle(self) -> int:
@@ -91,6 +92,8 @@ class StoredFile:
         import h5py  # noqa: PLC0415  (takes 0.2 s to import)
         from h5py import h5d, h5z  # noqa: PLC0415
 
+        if name in self._checked:
+            return self._checked[name]
         folder, last = self._folder(name)
         _check_link(folder, last, name)
         stored = h5d.open(folder, last)
@@ -102,7 +105,8 @@ class StoredFile:
             raise ValueError(f"{name} is compressed or changed by a filter")
         if not _is_plain(stored.get_type()):
             raise ValueError(f"{name} holds neither numbers nor texts of fixed length")
-        return h5py.Dataset(stored)
+        self._checked[name] = h5py.Dataset(stored, readonly=True)  # keeps its shape
+        return self._checked[name]
 
     def array(self, name: str, chosen: tuple[slice, ...] | int = ()) -> Array:
         """Read an array.
@@ -121,7 +125,10 @@ class StoredFile:
         ValueError
             As `dataset`; or if it is too long.
         """
+        from h5py import h5a  # noqa: PLC0415  (takes 0.2 s to import)
+
         dataset = self.dataset(name)
+        del self._checked[name]  # an open array keeps what was read in a buffer
         chosen = (slice(chosen, chosen + 1),) if isinstance(chosen, int) else chosen
         lengths = [
             len(range(*part.indices(length)))
@@ -132,7 +139,7 @@ class StoredFile:
         least = math.prod(dataset.chunks) if dataset.chunks and numbers else 0
         self._claim(name, max(numbers, least) * dataset.dtype.itemsize, SPARE)
         values = np.asarray(dataset[chosen])
-        if dataset.chunks and numbers and ZEROS not in dataset.attrs:
+        if least and not h5a.exists(dataset.id, ZEROS.encode()):
             _check_zeros(name, dataset, chosen, values)
         return values
 
@@ -165,23 +172,23 @@ class StoredFile:
 
     def _folder(self, name: str) -> tuple[Any, bytes]:
         """Return the folder of an object in the file, and the last part of its name."""
-        from h5py import h5g  # noqa: PLC0415  (takes 0.2 s to import)
+        import h5py  # noqa: PLC0415  (takes 0.2 s to import)
 
         *parents, last = name.encode("utf-8", ERRORS).split(b"/")
-        folder = h5g.open(self._file.id, b"/")
+        folder = self._file.id  # of the root
         for parent in parents:
             _check_link(folder, parent, name)
-            folder = h5g.open(folder, parent)
+            folder = h5py.h5g.open(folder, parent)
         return folder, last
 
 
 def _check_link(folder: Any, last: bytes, name: str) -> None:
     """Raise an error unless a name in a folder leads to an object in the file itself."""
-    from h5py import h5l  # noqa: PLC0415  (takes 0.2 s to import)
+    import h5py  # noqa: PLC0415  (takes 0.2 s to import)
 
     if not folder.links.exists(last):
         raise KeyError(f"lacks {name}")
-    if folder.links.get_info(last).type != h5l.TYPE_HARD:
+    if folder.links.get_info(last).type != h5py.h5l.TYPE_HARD:
         raise ValueError(f"{name} is a link to another place")
 
 

@@ -146,7 +146,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
             if is_new:
                 folder.rmdir()
             raise
-        return cls.open(path, storage)
+        return cls._locked(path, storage)
 
     @classmethod
     def open(cls, path: str | Path, storage: Storage = DISK) -> EnsembleFile:
@@ -166,6 +166,11 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         """
         path = Path(path)
         read_ensemble(path)  # refused before a folder is made
+        return cls._locked(path, storage)
+
+    @classmethod
+    def _locked(cls, path: Path, storage: Storage) -> EnsembleFile:
+        """Open an ensemble, whose file exists, after locking it; raises as `open`."""
         with os_errors_converted(path):
             parts_folder(path).mkdir(exist_ok=True)
             lock = lock_path(path).open("a+b")
