@@ -298,21 +298,16 @@ class Recorder:
         #: strips and row of each record, and after them those that wait: problem, state and passes
         self._records: list[Any] = [(problem.grid, row) for row in _rows(first)]
         self._kept = len(self._history), len(self._records), state, problem.grid
-        self._next_record = schedule.due_after(float(state.passes[0]), stepper.pass_by_pass)
 
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
         stepper, end = self.stepper, advance.end
-        passes = end.passes.item()
-        if passes >= min(self._next_record, stop):
-            for due in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
-                self._record(advance, due)
+        for due in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
+            self._record(advance, due)
         self._history.add(advance.problem, end, advance.path[0])
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end, advance.problem.grid
-        if passes >= self._next_record:
-            self._next_record = self.schedule.due_after(passes, stepper.pass_by_pass)
-        self._thin(passes)
+        self._thin(float(end.passes[0]))
 
     def end_at(self, advance: Advance, state: WearState, stop: float) -> None:
         """Record a state within a step as the end of the run, which resumes from the step's start.
