@@ -20,14 +20,13 @@ from wearsim.evolution.steppers.base import GROW, Attempt
 from wearsim.evolution.steppers.damage import damage_excess, with_damage
 from wearsim.evolution.steppers.forward_euler import OSCILLATING, ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.implicit import (
-    ADDED_UP,
-    LEAST_AIM,
     OF_STEPS,
     ImplicitStepper,
 )
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_passes
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
+from wearsim.mechanics.numerics.step_errors import ADDED_UP, LEAST_AIM
 
 # from PASSES to STOP, the sum of passes and step differs from the stop by round-off
 PASSES, STOP = 438.4497060569215, 5462.310172436656
@@ -206,11 +205,13 @@ def test_steps_aim_at_less_where_errors_have_added_up(rig):
         volume_error=fixed[1] + OF_STEPS[0] * of_volume,
         profile_error=fixed[2] + OF_STEPS[1] * of_profile,
     )
-    found = ImplicitStepper(tolerance)._left(problem, worn, stop, OF_STEPS)
+    found = ImplicitStepper(tolerance)._left(problem, worn, stop, OF_STEPS, worn.irreducible)
     np.testing.assert_allclose(found, [0.5, LEAST_AIM, 0.5, 0.5, 1.0], rtol=1e-9)
     young = worn.replaced(profile_error=np.full(5, 0.49 * low * tolerance))
-    assert (ImplicitStepper(tolerance)._left(problem, young, stop, OF_STEPS) == 1.0).all()
+    assert (ImplicitStepper(tolerance)._left(problem, young, stop, OF_STEPS, fixed) == 1.0).all()
     errors = {"profile_error": np.array([0.45 * tolerance]), "volume_error": of_volume[:1]}
     both = worn.at(np.array([0])).replaced(quadrature=0.0 * fixed[:, :1], **errors)
-    found = ImplicitStepper(tolerance)._left(problem.at(np.array([0])), both, stop, OF_STEPS)
+    found = ImplicitStepper(tolerance)._left(
+        problem.at(np.array([0])), both, stop, OF_STEPS, both.irreducible
+    )
     np.testing.assert_allclose(found, 0.5, rtol=1e-9)

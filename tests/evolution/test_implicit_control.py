@@ -16,7 +16,6 @@ from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import GROW, SAFETY
 from wearsim.evolution.steppers.implicit import (
     DOUBLED_SHARE,
-    LEAST_AIM,
     LEAST_AIM_OF_ROWS,
     LEAST_OF_ENERGY,
     PART_EXPONENT,
@@ -32,7 +31,7 @@ from wearsim.evolution.steppers.load_errors import (
 from wearsim.evolution.steppers.single_step import volumes_of, wear_per_pass
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
-from wearsim.mechanics.numerics.step_errors import KEEP, SHARE
+from wearsim.mechanics.numerics.step_errors import KEEP, LEAST_AIM, SHARE
 
 TOLERANCE, TIGHT, STOP = 1e-3, 1e-6, 1e5
 SECOND = np.array([2])  # order

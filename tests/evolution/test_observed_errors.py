@@ -70,7 +70,7 @@ def test_error_is_the_greatest_of_the_last_differences() -> None:
     passes = np.array([0.0, 10.0, 20.0, 40.0, 80.0])
     pressure = np.array([3.0, 2.0, 2.0, 2.0, 2.0])
     other = pressure * np.array([1.0, 1.1, 1.0, 1.0, 1.0])
-    course = Course(passes[1:].tolist(), observed=[{"peak_pressure": v} for v in other])
+    course = Course(passes[1:].tolist(), observed={"peak_pressure": other})
     found = of_exact_sizes(course, passes, {"peak_pressure": pressure})["peak_pressure"]
     np.testing.assert_allclose(found[[0, 1]], [0.0, COVER * 0.2], atol=1e-12)
     np.testing.assert_allclose(found[3:], 0.0, atol=1e-12)  # it is no longer recent
@@ -79,7 +79,7 @@ def test_error_is_the_greatest_of_the_last_differences() -> None:
 def test_power_laws_are_compared_without_error_of_interpolation() -> None:
     passes = np.geomspace(1.0, 1e6, 40)
     steps = np.geomspace(2.0, 1e6, 13)
-    course = Course(steps.tolist(), observed=[{"descent": np.asarray(n**0.6)} for n in (0, *steps)])
+    course = Course(steps.tolist(), observed={"descent": np.append(0.0, steps) ** 0.6})
     observed = {"descent": np.append(0.0, passes) ** 0.6}
     found = of_exact_sizes(course, np.append(0.0, passes), observed)["descent"]
     assert (found[2:] <= 2e-2 * observed["descent"][2:]).all()
@@ -87,7 +87,7 @@ def test_power_laws_are_compared_without_error_of_interpolation() -> None:
 
 
 def test_roller_has_at_least_the_error_of_both_bodies() -> None:
-    course = Course([1.0], observed=[{"descent": np.asarray(1.0)}] * 2)
+    course = Course([1.0], observed={"descent": np.ones(2)})
     sizes, errors = np.full((3, 2), 2.0), np.full((3, 2), 0.1)
     ones = np.ones(2)
     found = observed_errors(course, np.array([0.0, 1.0]), {"descent": ones}, sizes, errors)
@@ -95,7 +95,7 @@ def test_roller_has_at_least_the_error_of_both_bodies() -> None:
 
 
 def test_angles_differ_by_less_than_half_a_turn() -> None:
-    course = Course([1.0], observed=[{"depth_angle": np.asarray(6.2)}] * 2)
+    course = Course([1.0], observed={"depth_angle": np.full(2, 6.2)})
     found = of_exact_sizes(course, np.array([0.0, 1.0]), {"depth_angle": np.array([0.1, 0.1])})
     assert found["depth_angle"][-1] == pytest.approx(COVER * (0.1 + 2.0 * np.pi - 6.2))
 

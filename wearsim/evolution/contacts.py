@@ -10,6 +10,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.evolution.problem import WearProblem
+from wearsim.mechanics.numerics.jit import kernel_input
 from wearsim.types import FloatArray, IntArray
 
 T = TypeVar("T")
@@ -138,4 +139,4 @@ def _creepage_variation(
 def _of_contacts(problem: WearProblem, values: FloatArray) -> FloatArray:
     """Return values that broadcast to all contacts as (all contacts, strips)."""
     shape = (*problem.shape, problem.grid.strips)
-    return np.broadcast_to(values, shape).reshape(-1, shape[-1])
+    return kernel_input(np.broadcast_to(values, shape).reshape(-1, shape[-1]))

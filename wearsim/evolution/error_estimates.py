@@ -15,11 +15,10 @@ from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.loads import smooth_loads
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
 from wearsim.mechanics.numerics.linearised_wear import difference_sizes
+from wearsim.mechanics.numerics.step_errors import DEPTH_EXPONENT, VOLUME_EXPONENT
 from wearsim.plugins import BODIES
 from wearsim.types import BoolArray, FloatArray
 
-# lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
-DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 COVER = 1.5  # safety factor on an error estimate
 UNCERTAIN = 0.3  # part of the bias by variation within a step that may be wrong
 VARYING_COVER = 2.0  # further safety factor where inputs vary, so that errors change irregularly
@@ -114,7 +113,7 @@ def variation_bias(
 
     None is returned where nothing varies.
     """
-    if problem.constant_load is not None and not problem.varying:
+    if not problem.varies:
         return None
     start, stop = problem.time(first), problem.time(first + passes)
     deviations = [item for item in _deviations(problem, start, stop) if np.count_nonzero(item[2])]
@@ -276,8 +275,6 @@ def with_pass_errors(
     passes : ndarray, shape (realisations,)
         Length of the step.
     """
-    if not problem.has_nodes:
-        return end
     halved, first = half_quadrature(problem, start)
     half = step(halved, start.half_quadrature_solution or first, passes)
     volume = volume_of(problem, end.depths)

@@ -166,17 +166,17 @@ class Evolution:
             outgrown = {place for place, number in tests if number in self._outgrown}
             self._outgrown = set()
         grids = next_grids(self.problem, self.state, outgrown)
-        moving = [place for place, grid in enumerate(grids) if grid is not None]
-        if not moving:
+        if not grids:
             return
+        moving = [*grids]
         while moving:
             grid = grids[moving[0]]
-            assert grid is not None
-            places = np.array([k for k in moving if identical_strips(grids[k] or grid, grid)])
+            places = np.array([k for k in moving if identical_strips(grids[k], grid)])
             moving = [place for place in moving if place not in places]
             growing = self.problem.at(places), self.state.at(places)
             self._waiting.append((self.numbers[places], *grown(*growing, grid)))
-        kept = np.array([k for k, grid in enumerate(grids) if grid is None], dtype=np.int64)
+        count = len(self.numbers)
+        kept = np.array([k for k in range(count) if k not in grids], dtype=np.int64)
         self.numbers = self.numbers[kept]
         if kept.size:
             self.problem, self.state = self.problem.at(kept), self.state.at(kept)

@@ -96,8 +96,7 @@ def observed_errors(
     differences, widths = [], []
     for name, values in observed.items():
         fine_values = values.reshape(len(passes), -1)
-        coarse_values = np.array([item[name] for item in coarse.observed])
-        coarse_values = coarse_values.reshape(len(coarse.observed), -1)
+        coarse_values = np.reshape(coarse.observed[name], (len(steps), -1))
         fine = _interpolated(at_common, at_passes, fine_values)
         difference = np.abs(_interpolated(at_common, at_steps, coarse_values) - fine)
         if name.endswith("angle"):

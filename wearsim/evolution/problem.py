@@ -157,8 +157,7 @@ class WearProblem:
         numbers = realisations.tolist()
 
         def part(values: FloatArray, axis: int) -> FloatArray:
-            shared = values.shape[axis] == 1  # by all realisations
-            return values if shared else values.take(realisations, axis=axis)
+            return values if values.shape[axis] == 1 else values.take(realisations, axis=axis)
 
         return replace(
             self,
@@ -192,15 +191,12 @@ class WearProblem:
     @cached_property
     def free_strips(self) -> list[int]:
         """Strips without load on each side below which strips grow; 0 where they do not."""
-        if not self.growth:
-            return [0] * self.shape[2]
-        strips = self.grid.strips
+        strips, spacing = self.grid.strips, self.grid.spacing
         least = max(3, math.ceil(FREE * strips))
-        margins = (math.ceil(growth.margin / self.grid.spacing) for growth in self.growth)
-        free = (min(max(least, margin), strips) for margin in margins)
         return [
-            count if growth.most else 0 for count, growth in zip(free, self.growth, strict=True)
-        ]
+            min(max(least, math.ceil(growth.margin / spacing)), strips) if growth.most else 0
+            for growth in self.growth
+        ] or [0] * self.shape[2]
 
     @cached_property
     def volume_weights(self) -> FloatArray:
@@ -304,6 +300,11 @@ class WearProblem:
         return self._force(np.zeros(len(self.loads))) if constant else None
 
     @cached_property
+    def varies(self) -> bool:
+        """Whether load or inputs vary in time."""
+        return self.constant_load is None or len(self.varying) > 0
+
+    @cached_property
     def has_spring(self) -> bool:
         """Whether a load falls as its roller descends."""
         return bool(self.stiffness.any()) or self.kinematics.track.inertia.size > 0
@@ -361,7 +362,7 @@ class WearProblem:
         problem = object.__new__(WearProblem)
         before, after = vars(self.inputs), vars(inputs)
         changed = {name for name in after if after[name] is not before.get(name)}
-        lost = {"constants"} if changed <= _OF_LOAD else {"constants", "nominal_batch", "spin"}
+        lost = {"constants", "varies", *(() if changed <= _OF_LOAD else ("nominal_batch", "spin"))}
         if "tilt" in changed and not np.array_equal(inputs.tilt, self.inputs.tilt):
             lost.update(_OF_GAP)
         problem.__dict__.update({n: v for n, v in self.__dict__.items() if n not in lost})
@@ -396,17 +397,18 @@ class WearProblem:
         """
         per_strip = passes if isinstance(passes, float) else passes[..., None]
         if self.linear_wear:
-            power = contacts.dissipation.reshape(self.shape + contacts.dissipation.shape[1:])
-            parts: FloatArray = self.wear_coefficients * per_strip * power
-            return parts
+            coefficients = self.wear_coefficients.reshape(2, *self.shape, 1)
+            return np.asarray(coefficients * per_strip * self.values_of(contacts, "dissipation"))
         shares = self.wear_shares
         return self.depths_worn(contacts, {body: shares[body] * per_strip for body in BODIES})
 
     @cached_property
     def wear_coefficients(self) -> FloatArray:
-        """Contribution of each contact to the wear per roller pass and dissipation, as parts."""
+        """Wear of both bodies by a contact per roller pass and dissipation, (2, contacts, 1)."""
+        ones = np.ones((*self.shape, 1))
         pairs = [(self.wear_shares[body], self.wear_factors[body]) for body in BODIES]
-        return np.stack([share * np.asarray(factor)[..., None] for share, factor in pairs])
+        parts = [share * np.asarray(factor)[..., None] * ones for share, factor in pairs]
+        return np.stack(parts).reshape(2, -1, 1)
 
     def depths_worn(
         self, contacts: ContactBatchSolution, passes: Mapping[Body, FloatArray | float]
@@ -447,16 +449,16 @@ class WearProblem:
 
     @cached_property
     def cylinder_wear_share(self) -> FloatArray:
-        """Part of the wear of a contact that is the cylinder's, shape (realisations, 1).
+        """Part of the wear of a contact that is the cylinder's, at the first station, (N,).
 
         A half where wear is not linear in the dissipation.
         """
         if not self.linear_wear:
-            return np.full((self.shape[2], 1), 0.5)
+            return np.full(self.shape[2], 0.5)
         factors, shares = self.wear_factors, self.wear_shares
         cylinder, rollers = (shares[body].sum() * np.asarray(factors[body]) for body in BODIES)
         every = np.maximum(cylinder + rollers / self.rollers, np.finfo(float).tiny)
-        return np.asarray(cylinder / every).reshape(-1, 1)
+        return np.array(np.ravel(cylinder / every)[: self.shape[2]])
 
     @cached_property
     def wear_shares(self) -> dict[Body, FloatArray]:
@@ -485,8 +487,7 @@ class WearProblem:
         """Return the sum over each roller's contacts, (S, C, ...) to (S, R, ...)."""
         if self._one_contact_per_roller:
             return values
-        sums = [values[:, self.roller == r].sum(axis=1) for r in range(self.rollers)]
-        return np.stack(sums, axis=1)
+        return np.stack([values[:, self.roller == r].sum(axis=1) for r in range(self.rollers)], 1)
 
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,7 +25,6 @@ SIGMAS = 2.0  # standard deviations of the sampling scatter that are counted as 
 #: Depths of cylinder and rollers, shapes as in `WearState` [m].
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
 _CONTACT = "contact_"
-_STACKED = "stacked_depths"  # attribute of a state, with the depths that it has been computed of
 _AUXILIARY = ("coarse_step_solution", "half_quadrature_solution")
 #: axis of the realisations in the arrays of a `WearState`
 _AXES = {
@@ -193,16 +193,10 @@ class WearState:
         """Worn depths of cylinder and rollers [m]."""
         return self.cylinder_depth, self.roller_depth
 
-    @property
+    @cached_property
     def stacked(self) -> FloatArray:
         """Worn depths of all bodies, shape (stations + rollers, realisations, strips) [m]."""
-        cylinder, roller = self.cylinder_depth, self.roller_depth
-        before = self.__dict__.get(_STACKED)
-        if before is None or before[0] is not cylinder or before[1] is not roller:
-            before = cylinder, roller, np.concatenate([cylinder[:, 0], roller[0]])
-            self.__dict__[_STACKED] = before
-        stacked: FloatArray = before[2]
-        return stacked
+        return np.concatenate([self.cylinder_depth[:, 0], self.roller_depth[0]])
 
     @property
     def auxiliary(self) -> dict[str, Any]:
@@ -215,14 +209,17 @@ class WearState:
     def replaced(self, **others: Any) -> WearState:
         """Return the state with some fields replaced, in a tenth of the time of `replace`."""
         state = object.__new__(WearState)
-        state.__dict__.update(self.__dict__ | others)
+        values = self.__dict__ | others
+        if "cylinder_depth" in others or "roller_depth" in others:
+            values.pop("stacked", None)
+        state.__dict__.update(values)
         return state
 
     def with_stacked(self, depths: FloatArray, **others: Any) -> WearState:
         """Return the state with depths given as `stacked` [m], and with other fields replaced."""
         cylinder, roller = separated(depths, self.cylinder_depth.shape[0])
         state = self.replaced(cylinder_depth=cylinder, roller_depth=roller, **others)
-        state.__dict__[_STACKED] = cylinder, roller, depths
+        state.__dict__["stacked"] = depths
         return state
 
     def with_added(self, depths: Depths) -> WearState:

@@ -23,7 +23,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -74,8 +74,8 @@ class Course:
         Strips at the end.
     approach : float
         Greatest elastic approach of the contacts at the end [m].
-    observed : list of dict of str to ndarray
-        Observables at the start and after each step, if they are asked for.
+    observed : dict of str to sequence of ndarray
+        Observables by name, at the start and after each step, if they are asked for.
     """
 
     passes: list[float] = field(default_factory=list)
@@ -83,7 +83,7 @@ class Course:
     profiles: FloatArray | None = None
     grid: Grid | None = None
     approach: float = 0.0
-    observed: list[dict[str, FloatArray]] = field(default_factory=list)
+    observed: dict[str, Any] = field(default_factory=dict)
 
 
 def sizes_of(problem: WearProblem, depths: FloatArray, between: bool = False) -> FloatArray:
@@ -162,8 +162,8 @@ def add_observed(
 ) -> None:
     """Add the observables of some tests, realisations last, to their courses by number."""
     for place, number in enumerate(numbers):
-        of_test = {name: np.asarray(values[..., place]) for name, values in observed.items()}
-        courses[number].observed.append(of_test)
+        for name, values in observed.items():
+            courses[number].observed.setdefault(name, []).append(values[..., place])
 
 
 def coarse_courses(
@@ -204,16 +204,16 @@ def coarse_courses(
             add_observed(courses, range(len(courses)), observe(coarse, state))
         steps: list[Worn] = []
         for advance in tests:
+            end, numbers = advance.end, advance.numbers
             steps.append(worn_by(advance))
             if observe is not None:
-                numbers = advance.numbers.tolist()
-                add_observed(courses, numbers, observe(advance.problem, advance.end))
-            done = advance.end.passes >= needed[advance.numbers]
-            if done.any():
-                approaches = elastic_approaches(advance.problem, advance.end).max(axis=(0, 1))
-                for place in np.flatnonzero(done).tolist():
-                    courses[advance.numbers[place]].approach = float(approaches[place])
-                tests.end(advance.numbers[done].tolist())
+                add_observed(courses, numbers.tolist(), observe(advance.problem, end))
+            done = (end.passes >= needed[numbers]).nonzero()[0]
+            if done.size:
+                approaches = elastic_approaches(advance.problem, end).max(axis=(0, 1))
+                for place in done.tolist():
+                    courses[numbers[place]].approach = float(approaches[place])
+                tests.end(numbers[done].tolist())
         add_steps(courses, steps, between=True)
     except Exception:  # a test fails for its own reasons, and the others are repeated without it
         if len(needed) == 1:

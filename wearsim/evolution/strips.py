@@ -85,26 +85,27 @@ class Growth:
 
 def next_grids(
     problem: WearProblem, state: WearState, outgrown: Collection[int]
-) -> list[Grid | None]:
-    """Return the wider strips of each realisation that needs them, else None.
+) -> dict[int, Grid]:
+    """Return the wider strips of the realisations that need them, by place.
 
     Strips grow if a contact is loaded close to the outer strips. They also grow for the
     realisations at the places `outgrown`, whose contacts reach these in a step from the state.
     """
-    realisations, strips = state.passes.size, problem.grid.strips
     free, load = problem.free_strips, state.contacts.line_load
-    widest = max(free, default=0)
+    widest = max(free)
     # any() takes ten times as long on short arrays
     if not widest or not (
         outgrown or load[:, :widest].nonzero()[0].size or load[:, -widest:].nonzero()[0].size
     ):
-        return [None] * realisations
-    loaded = (load > 0.0).reshape(-1, realisations, strips)
+        return {}
+    loaded = (load > 0.0).reshape(-1, state.passes.size, problem.grid.strips)
     counts = loaded.sum(axis=2).min(axis=0).tolist()
-    grids = []
+    grids = {}
     for v, (growth, width, count) in enumerate(zip(problem.growth, free, counts, strict=True)):
         near = v in outgrown or loaded[:, v, :width].any() or loaded[:, v, -width:].any()
-        grids.append(_next(problem.grid, growth, count) if width and near else None)
+        grid = _next(problem.grid, growth, count) if width and near else None
+        if grid is not None:
+            grids[v] = grid
     return grids
 
 

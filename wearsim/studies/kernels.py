@@ -74,6 +74,7 @@ def kernels_of(
     compliant, implicit = model in {"slender", "semi-hertzian"}, name in {"auto", "implicit"}
     if steps and compliant and (implicit or coarse):
         names |= {"begin_step", "linearise_step", "compare_step", "end_step", "next_steps"}
+        names |= {"parts_of_aim"}
         by_doubling = varies or theory == "fastsim"
         names |= {"difference_sizes" if by_doubling else "assess_step"}
     names |= {"damage_of_step"} if steps and scenario.fatigue is not None else set()

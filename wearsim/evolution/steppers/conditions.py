@@ -44,7 +44,7 @@ def conditions_of(
 
     The load is that at the end of the step where it varies smoothly, and else its mean.
     """
-    if problem.constant_load is not None and not problem.varying:
+    if not problem.varies:
         return computed_once(_constant_conditions, problem)
     force = mean = mean_force(problem, state, passes)
     smooth = smooth_loads(problem, state.passes, passes)

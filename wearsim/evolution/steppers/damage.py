@@ -55,12 +55,11 @@ def with_damage(
     assert damage is not None
     assert points is not None
     passes = end.passes - start.passes
-    varies = problem.constant_load is None or len(problem.varying) > 0
-    if varies:
+    if problem.varies:
         first, last = (_of_varying_load(problem, start, state, passes) for state in (start, end))
     else:
         first, last = damage[2], damage_per_pass(problem, end.contacts)
-    if varies or problem.pauses:
+    if problem.varies or problem.pauses:
         points = np.stack([np.full_like(points[0], np.nan), points[1]])
     if problem.pauses:
         passes = np.where(at_rest(problem, start.passes), 0.0, passes)

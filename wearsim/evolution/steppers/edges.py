@@ -55,8 +55,7 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
     The rise of the gap across a strip must be that of crowned bodies.
     """
     stations, contacts_each, _ = problem.shape
-    varies = problem.constant_load is None or len(problem.varying) > 0
-    varies |= stations == 1 and bool(problem.terms)
+    varies = problem.varies or (stations == 1 and bool(problem.terms))
     apart = not problem.has_nodes and (stations == 1 or contacts_each == 1)
     possible = contacts.separation is not None and apart and not varies
     return possible and problem.has_crowned_gap
@@ -115,9 +114,10 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
         fields, sums = dict.fromkeys(FIELDS), kernel_input(state.past_sums[:, -1:])
         return state.replaced(**fields, past_sums=sums, order=np.ones_like(state.order))
     whole, ceases = unresolved(state), _adhesion(problem, state) > CEASING_ADHESION
-    low = _unloaded(problem, state)
-    if low is not None:
-        ceases |= low
+    if problem.has_spring and problem.shape[0] == 1:
+        ceases |= _unloaded(problem, state)
+    if not (whole != ceases).nonzero()[0].size:
+        return state
     ended = ceases & ~whole
     if ended.nonzero()[0].size:
         fields = {n: np.where(ended[:, None], np.nan, getattr(state, n)) for n in FIELDS}
@@ -126,10 +126,8 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
     return _with_new_edges(problem, state, begins) if begins.nonzero()[0].size else state
 
 
-def _unloaded(problem: WearProblem, state: WearState) -> BoolArray | None:
-    """Return which tests have a roller whose spring has lost most of its load, None if none can."""
-    if not problem.has_spring or problem.shape[0] > 1:
-        return None
+def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
+    """Return which tests have a roller whose spring has lost most of its load."""
     force = problem.force(problem.time(state.passes))
     free = with_feedback(problem, force, np.zeros(()), ())
     return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))

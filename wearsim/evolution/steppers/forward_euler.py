@@ -165,7 +165,8 @@ class ExplicitStepper(Stepper):
         end = scheme(problem, state, step)
         added = _errors(problem, state, end, step)
         over = excess(self.tolerance, problem, state, end, added, stop)
-        end = with_pass_errors(problem, state, end, end, scheme, step)
+        if problem.has_nodes:
+            end = with_pass_errors(problem, state, end, end, scheme, step)
         added = added + end.irreducible - state.irreducible
         passes = np.where(step == stop - state.passes, stop, end.passes)
         end = end.replaced(

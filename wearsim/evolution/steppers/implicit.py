@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,8 +10,6 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.error_estimates import (
     COVER as COVER_OF_DOUBLING,
-    DEPTH_EXPONENT,
-    VOLUME_EXPONENT,
     greatest_depth,
     with_pass_errors,
 )
@@ -33,13 +30,12 @@ from wearsim.evolution.steppers.loads import (
 )
 from wearsim.evolution.steppers.single_step import (
     carried_loads,
-    volumes_of,
     wear_of_contacts,
     wear_per_pass,
 )
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, first_differences, next_steps
-from wearsim.mechanics.numerics.step_errors import COVER, KEEP, OF_VOLUME, SHARE, assess_step
+from wearsim.mechanics.numerics.step_errors import COVER, KEEP, SHARE, assess_step, parts_of_aim
 from wearsim.types import FloatArray, IntArray
 
 DOUBLED_SHARE = 0.7  # part of the tolerance that a step may add to the profiles, by step doubling
@@ -50,10 +46,8 @@ PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power o
 # factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
 # of the volume, which do not add up
 OF_STEPS, DOUBLED = (1.0, COVER[2]), (math.inf, COVER_OF_DOUBLING)
-# the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
-# number, to a least part of itself at the second one
-ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
-LEAST_AIM_OF_ROWS = 0.7  # the same where rows of a log are shorter than a step
+# least part of its usual error that a step aims at, where rows of a log are shorter than a step
+LEAST_AIM_OF_ROWS = 0.7
 
 
 class ImplicitStepper(StepDoublingStepper):
@@ -92,7 +86,7 @@ class ImplicitStepper(StepDoublingStepper):
         if not doubled and edges.resolves_edges(problem, state.contacts):
             return edges.without_edges(problem, state)
         # local errors do not find those of a lower order in single strips
-        counted = _varies(problem) and not problem.has_nodes
+        counted = problem.varies and not problem.has_nodes
         return edges.with_whole_strips(problem, state) if counted else state
 
     def first_steps(self, problem: WearProblem, state: WearState) -> FloatArray:
@@ -104,16 +98,18 @@ class ImplicitStepper(StepDoublingStepper):
     ) -> Attempt:
         """Take a step, estimate its error, and choose order and length of the next one."""
         # local errors miss peaks of a load
-        if _varies(problem) or self.by_doubling or self.forced_step is not None:
+        if problem.varies or self.by_doubling or self.forced_step is not None:
             return self._attempt_doubled(problem, state, step, stop, scheme)
         # counted as wholes beside tests that vary, which have left the batch
         whole = state.separation is None and state.part is not None
         if whole and edges.resolves_edges(problem, state.contacts):
             state = edges.without_edges(problem, state)
         end = scheme(problem, state, step)
-        end = with_pass_errors(problem, state, end, end, scheme, step)
+        if problem.has_nodes:
+            end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
-        left, fixed = self._left(problem, state, stop, OF_STEPS), state.irreducible
+        fixed = state.irreducible
+        left = self._left(problem, state, stop, OF_STEPS, fixed)
         scale, contacts, past = (passes / stop) ** PART_EXPONENT / left, end.contacts, Past.of(end)
         assert state.stepping_error is not None
         assert end.wear_exponents is not None
@@ -180,7 +176,7 @@ class ImplicitStepper(StepDoublingStepper):
         past, depths, orders = Past.of(end), end.stacked, np.asarray(end.order)
         errors, order = np.empty_like(depths), np.empty_like(orders)
         most = np.full_like(order, MAX_ORDER)
-        left = self._left(problem, state, stop, DOUBLED)
+        left = self._left(problem, state, stop, DOUBLED, state.irreducible)
         if not problem.varying:  # many rows of a log average out within a step
             left = np.where(doubled.varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
         part = (end.passes / stop) ** PART_EXPONENT / left
@@ -195,7 +191,7 @@ class ImplicitStepper(StepDoublingStepper):
         over = np.maximum(over, added)
         ratio = np.where(added > 1.0, np.minimum(ratio, self.ratio(added)), ratio)
         over = over * left
-        if self.by_doubling and not _varies(problem):
+        if self.by_doubling and not problem.varies:
             least = max(self.tolerance, LEAST_OF_JUMPS)
             of_energy, their_order = next_steps_of_energy(half, end, least, KEEP, most)
             order = np.where(of_energy[1] < ratio, their_order, order)
@@ -206,11 +202,14 @@ class ImplicitStepper(StepDoublingStepper):
         return Attempt((half, end.replaced(order=order, **others)), over, ratio)
 
     def _left(
-        self, problem: WearProblem, state: WearState, stop: float, cover: Sequence[float]
+        self,
+        problem: WearProblem,
+        state: WearState,
+        stop: float,
+        cover: tuple[float, float],
+        fixed: FloatArray,
     ) -> FloatArray:
         """Return the part of its usual error that a step aims at, by the errors before it, (N,).
-
-        Errors of the volume add up during a test if they have the same sign.
 
         Parameters
         ----------
@@ -219,20 +218,14 @@ class ImplicitStepper(StepDoublingStepper):
             State at the start of the step.
         stop : float
             Passes at the end of the test.
-        cover : sequence of float
+        cover : tuple of float
             Safety factors that the errors of volume and profile of the state contain.
+        fixed : ndarray, shape (3, realisations)
+            `irreducible` of the state.
         """
-        (low, high), fixed = ADDED_UP, state.irreducible
-        # `assess_step` makes the error of the profile at least this part of that of the volume
-        if np.maximum.reduce(state.profile_error) < OF_VOLUME[1] * low * self.tolerance:
-            return np.ones(len(state.passes))
-        volumes = volumes_of(problem, state.stacked)
-        grown, worn = state.passes / stop, np.where(volumes > 0.0, volumes, np.inf)
-        of_volume = (state.volume_error - fixed[1]) / cover[0] / worn * grown**VOLUME_EXPONENT
-        of_profile = (state.profile_error - fixed[2]) / cover[1] * grown**DEPTH_EXPONENT
-        worst = np.maximum(of_volume, np.where(volumes > 0.0, of_profile, 0.0))
-        left: FloatArray = (high - worst / self.tolerance) / (high - low)
-        return np.minimum(np.maximum(left, LEAST_AIM), 1.0)
+        errors = state.volume_error, state.profile_error, fixed
+        bodies = state.stacked, problem.volume_weights
+        return parts_of_aim(self.tolerance, state.passes / stop, *cover, *errors, *bodies)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
@@ -244,11 +237,6 @@ class ImplicitStepper(StepDoublingStepper):
         """Return the solution by a whole step, with first guesses from that by halves."""
         start = start.replaced(wear_exponents=end.wear_exponents)
         return implicit_step(problem, start, step, end.contacts)
-
-
-def _varies(problem: WearProblem) -> bool:
-    """Return whether load or inputs vary in time."""
-    return problem.constant_load is None or len(problem.varying) > 0
 
 
 def with_rates(problem: WearProblem, state: WearState) -> WearState:
@@ -307,7 +295,8 @@ def implicit_step(
     if problem.varying:
         here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = conditions_of(here, problem, state, passes)
-    order = np.asarray(state.order)
+    order = state.order
+    assert order is not None
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import computed_once, contact_batch
+from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.error_estimates import ADHERING
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, separated
@@ -118,7 +118,7 @@ class Past(NamedTuple):
             separation = part = whole_steps = np.empty((contacts, 0))
         return cls(
             wear,
-            sums.reshape(ROWS, -1, realisations, 1),
+            sums[..., None],
             feedback.reshape(ROWS, -1, realisations, 1),
             spans,
             np.empty((contacts, 0)) if separation is None else separation.reshape(contacts, -1),
@@ -162,7 +162,7 @@ def step_by_formula(
     """
     past, contacts, depths = Past.of(state), state.contacts, state.stacked
     bodies, gap = problem.body_rows, problem.contact_gap
-    share, shape = computed_once(_cylinder_share, problem), contacts.line_load.shape
+    share, shape = problem.cylinder_wear_share, contacts.line_load.shape
     realisations, strips = passes.size, shape[1]
     # tests that resolve edges, whose depths or energy decrease, in a groove, and in progress
     resolved, decreased, in_groove, active = np.zeros((4, realisations), dtype=np.bool_)
@@ -284,11 +284,6 @@ def step_by_formula(
         order=order,
     )
     return end, decreased
-
-
-def _cylinder_share(problem: WearProblem) -> FloatArray:
-    """Return the part of the wear of a contact that is the cylinder's, (realisations,)."""
-    return np.array(problem.cylinder_wear_share[: problem.shape[2], 0])  # at the first station
 
 
 class LoadsOfStep:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import computed_once, contact_batch
+from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
 from wearsim.evolution.state import WearState
@@ -160,8 +160,8 @@ def solve_at_record(
     cold : bool
         Whether the solver starts without the contacts of the state.
     """
-    constant = problem.constant_load is not None and not problem.varying
-    if on_profile and constant and problem.has_spring and state.past_spans is not None:
+    constant = on_profile and not problem.varies
+    if constant and problem.has_spring and state.past_spans is not None:
         # an implicit step has found contacts and loads in equilibrium
         return state.contacts, carried_loads(problem, state.contacts)
     solve = contacts_at if on_profile else partial(solve_present, cold=cold)
@@ -314,15 +314,8 @@ def energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> Flo
 def wear_of_contacts(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
     """Return the wear of both bodies per pass by each contact, (2, contacts, strips) [m]."""
     if problem.linear_wear:
-        coefficients: FloatArray = computed_once(_wear_coefficients, problem)
-        return coefficients * contacts.dissipation
+        return problem.wear_coefficients * contacts.dissipation
     return problem.wear_parts(contacts, 1.0).reshape(2, *contacts.line_load.shape)
-
-
-def _wear_coefficients(problem: WearProblem) -> FloatArray:
-    """Return the wear of both bodies per pass and dissipation, shape (2, contacts, 1)."""
-    ones = np.ones((*problem.shape, 1))
-    return np.asarray(problem.wear_coefficients * ones).reshape(2, -1, 1)
 
 
 def volumes_of(problem: WearProblem, depths: FloatArray) -> FloatArray:

@@ -30,6 +30,11 @@ EDGES, OF_EDGES = 8.0, 3.0
 # strips that the edge has just crossed is not smooth, and pressures would overshoot
 EDGE_ORDER = 3
 YOUNG = 0.2  # part of the difference in young strips that counts as error of a step
+# lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
+DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
+# the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
+# number, to a least part of itself at the second one
+ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
 
 
 @subroutine
@@ -226,8 +231,62 @@ def assess_step(
     return of_next, next_orders, errors, estimates
 
 
+@kernel
+def parts_of_aim(
+    tolerance: float,
+    done: FloatArray,
+    of_volume: float,
+    of_profile: float,
+    volume_error: FloatArray,
+    profile_error: FloatArray,
+    irreducible: FloatArray,
+    depths: FloatArray,
+    volume_weights: FloatArray,
+) -> FloatArray:
+    """Return the part of its usual error that a step aims at, by the errors before it.
+
+    Errors of the volume add up during a test if they have the same sign.
+
+    Parameters
+    ----------
+    tolerance : float
+    done : ndarray, shape (realisations,)
+        Passes done over those of the test.
+    of_volume, of_profile : float
+        Safety factors that the errors contain.
+    volume_error, profile_error : ndarray, shape (realisations,)
+        Before the step [m^3], and relative.
+    irreducible, depths, volume_weights
+        As of `assess_step`, before the step.
+
+    Returns
+    -------
+    ndarray, shape (realisations,)
+    """
+    bodies, realisations, n = depths.shape
+    low, high = ADDED_UP
+    parts = np.ones(realisations)
+    for v in range(realisations):
+        # `assess_step` makes the error of the profile at least this part of that of the volume
+        if profile_error[v] < OF_VOLUME[1] * low * tolerance:
+            continue
+        volume = 0.0
+        for b in range(bodies):
+            total = 0.0
+            for i in range(n):
+                total += depths[b, v, i]
+            volume += volume_weights[1, b] * total
+        if volume > 0.0:
+            relative_size = (volume_error[v] - irreducible[1, v]) / of_volume / volume
+            profile = (profile_error[v] - irreducible[2, v]) / of_profile
+            relative_size *= done[v] ** VOLUME_EXPONENT
+            worst = max(relative_size, profile * done[v] ** DEPTH_EXPONENT) / tolerance
+            parts[v] = min(max((high - worst) / (high - low), LEAST_AIM), 1.0)
+    return parts
+
+
 def compile_step_errors() -> None:
-    """Compile `assess_step`, and then the other kernels of a step, for one contact of one strip."""
+    """Compile the kernels of a step's error, and then those of the step, for one strip."""
     one, order, errors = np.ones(1), np.ones(1, np.int64), np.ones((3, 1))
     strip, wear, rows = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     past, sums, spans = np.ones((ROWS, 2, 1, 1)), np.ones((ROWS, 3, 1, 1)), np.ones((ROWS - 1, 1))
@@ -235,6 +294,7 @@ def compile_step_errors() -> None:
         *(1e-3, one, one, one, one, errors, rows, rows, order, spans, past, sums, strip, strip),
         *(np.array([[0, 1]]), strip, one, strip, wear, strip, one, 1.0, np.ones((2, 2))),
     )
+    parts_of_aim(1e-3, one, 1.0, 1.0, one, one, errors, rows, np.ones((2, 2)))
     compile_implicit_step()
 
 

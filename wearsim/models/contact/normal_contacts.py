@@ -134,10 +134,13 @@ class NormalContacts(NamedTuple):
         for numbers, compliance, members, shared in wear.groups:
             for coupled, bodies in _coupled_contacts(members.tobytes(), contacts):
                 chosen, size = coupled.ravel(), coupled.shape[1]
-                whole = len(numbers) == sets and np.array_equal(chosen, np.arange(contacts))
+                every = size == contacts or np.array_equal(chosen, np.arange(contacts))
+                whole = len(numbers) == sets and every
                 places = numbers[:, None], chosen
                 taken = self if whole else NormalContacts._make(array[places] for array in self)
-                systems = NormalContacts._make(a.reshape(-1, size, *a.shape[2:]) for a in taken)
+                systems = taken
+                if size < contacts:
+                    systems = NormalContacts._make(a.reshape(-1, size, *a.shape[2:]) for a in taken)
                 softness = compliance if whole else compliance[:, chosen]
                 worn = None
                 if bodies is not None:

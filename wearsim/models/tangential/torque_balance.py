@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -115,7 +114,7 @@ def with_balanced_creepage(
         lambda creepage: torque_of(batch.replaced(longitudinal=creepage)),
         batch.bearing_torque,
         batch.longitudinal,
-        np.nan_to_num(guesses),
+        np.where(np.isfinite(guesses), guesses, 0.0),
         full_slip / pair.creep_factor,
         added_creepage,
         lambda k: {
@@ -124,7 +123,7 @@ def with_balanced_creepage(
             "half_length": half_length[k],
         },
     )
-    return replace(batch, longitudinal=creepage)
+    return batch.replaced(longitudinal=creepage)
 
 
 def _skidding(torque: float, carried: float, state: Mapping[str, Any]) -> ContactError:

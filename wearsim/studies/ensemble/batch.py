@@ -346,10 +346,7 @@ def add_strip_errors(
         by_strips = strip_errors(other, passes, sizes, course)
         errors = by_strips[:, -1]
         if isinstance(result, RunObservations) and np.isfinite(errors).all():
-            observed = {
-                name: np.array([item[name] for item in course.observed])
-                for name in (course.observed[0] if course.observed else ())
-            }
+            observed = {name: np.array(values) for name, values in course.observed.items()}
             fresh, crown = np.zeros((3, 1)), relative_crown_radius(problem)
             assert course.grid is not None
             stated = observed_errors(

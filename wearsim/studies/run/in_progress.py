@@ -202,7 +202,7 @@ class RunInProgress:
         ]
         last, most = passes[-1:], self.scenario.evolution.max_steps
 
-        history = History(stepper, self.recorder.threshold)
+        history = History(stepper, self.recorder.threshold, {})
 
         def observe(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
             history.add(problem, state, state)
@@ -271,7 +271,7 @@ class RunInProgress:
             )
 
     def _step_to_end(self) -> None:
-        self._check_depth()
+        self._check_depth(self.recorder.state)
         for advance in evolve(
             self.problem,
             self.recorder.state,
@@ -304,7 +304,7 @@ class RunInProgress:
                         wall_seconds=self._wall(),
                     )
                 )
-            self._check_depth()
+            self._check_depth(state)
             if self.stop_requested() and passes < self.stop:
                 self._interrupt()
             self._write_in_time()
@@ -326,9 +326,9 @@ class RunInProgress:
         if since > max(interval, self._last_write / WRITING):
             self._write()
 
-    def _check_depth(self) -> None:
+    def _check_depth(self, state: WearState) -> None:
         """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
-        depth = float(np.maximum.reduce(self.recorder.state.stacked, axis=None))
+        depth = float(np.maximum.reduce(state.stacked, axis=None))
         if depth <= self._valid_depth:
             return
         less = f"the limit {self.limit.text}" if self.limit else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -155,90 +155,83 @@ class History:
     stepper : Stepper
     threshold : float
         Depth that bounds the groove's width [m].
-    rows : iterable of mapping
-        Rows of an earlier part of the test.
+    columns : mapping of str to ndarray
+        Observables of an earlier part of the test, first axis step.
     """
 
-    def __init__(self, stepper: Stepper, threshold: float, rows: Iterable[Variables] = ()) -> None:
+    def __init__(self, stepper: Stepper, threshold: float, columns: Variables) -> None:
         self._stepper, self._threshold = stepper, threshold
-        #: rows, and after them states that wait: problem, state and passes of the step
-        self._rows: list[Any] = [*rows]
-        self._computed = len(self._rows)
+        #: parts of the history, first axis step, and states after them that wait to be observed:
+        #: problem, state, and passes of the step before it
+        self._parts: tuple[list[Variables], list[Any]] = [columns] if columns else [], []
 
     def __len__(self) -> int:
-        return len(self._rows)
+        computed, waiting = self._parts
+        return sum([len(columns["passes"]) for columns in computed]) + len(waiting)
 
     def add(self, problem: WearProblem, state: WearState, before: WearState) -> None:
         """Add a state after a step from the state `before`, at the start of the test itself."""
-        waiting = self._rows[self._computed :]
-        if waiting and (waiting[0][0] is not problem or _is_full(problem, len(waiting))):
+        step, waiting = state.passes - before.passes, self._parts[1]
+        waits = _carries_loads(self._stepper, problem, state)
+        full = waiting and (waiting[0][0] is not problem or _is_full(state, len(waiting)))
+        if full or (waiting and not waits):
             self.compute()
-        step = state.passes - before.passes
-        if _carries_loads(self._stepper, problem, state):
-            self._rows.append((problem, state.replaced(**_NOT_OBSERVED), step))
+        if waits:
+            self._parts[1].append((problem, state.replaced(**_NOT_OBSERVED), step))
         else:
-            self.compute()
-            self._rows.append(_rows_of(self._stepper, problem, state, step, self._threshold)[0])
-            self._computed = len(self._rows)
+            self._parts[0].append(self._observed(problem, state, step))
 
-    def compute(self) -> list[Variables]:
-        """Return all rows, computed; an interrupt leaves them as they are or computed."""
-        waiting = self._rows[self._computed :]
+    def compute(self) -> Variables:
+        """Return the history, first axis step; an interrupt leaves it as it is or computed."""
+        computed, waiting = self._parts
         if waiting:
             problems, states, steps = zip(*waiting, strict=True)
             several = problems[0].at(np.zeros(len(waiting), dtype=np.int64))
             state, step = joined_states(states), np.concatenate(steps)
-            rows = _rows_of(self._stepper, several, state, step, self._threshold)
-            self._rows[self._computed :] = rows
-            self._computed = len(self._rows)
-        return self._rows
+            computed = [*computed, self._observed(several, state, step)]
+        if len(computed) > 1:
+            names = computed[0]
+            computed = [{n: np.concatenate([part[n] for part in computed]) for n in names}]
+        self._parts = computed, []
+        return computed[0] if computed else {}
+
+    def _observed(self, problem: WearProblem, state: WearState, step: FloatArray) -> Variables:
+        row = history_row(self._stepper, problem, state, self._threshold)
+        return _with_tests_first(row | {"step_passes": step})
 
     def shorten(self, count: int) -> None:
         """Keep the first rows only."""
-        del self._rows[count:]
-        self._computed = min(self._computed, count)
+        waiting = self._parts[1]
+        del waiting[max(count + len(waiting) - len(self), 0) :]
+        if len(self) > count:
+            self._parts = [{n: v[:count] for n, v in self.compute().items()}], []
 
 
 def _carries_loads(stepper: Stepper, problem: WearProblem, state: WearState) -> bool:
     """Return whether nothing is solved for the observables: the end of a step at constant load."""
-    constant = problem.constant_load is not None and not problem.varying
     plain = not (problem.terms or problem.pauses or problem.has_nodes)
     track = problem.kinematics.track
     # the round-off of products of matrices depends on the number of realisations
-    plain &= track.recorded is None and not track.inertia.size
-    return constant and plain and state.past_spans is not None and not stepper.pass_by_pass
+    plain &= track.recorded is None and not track.inertia.size and not problem.varies
+    return plain and state.past_spans is not None and not stepper.pass_by_pass
 
 
-def _is_full(problem: WearProblem, waiting: int) -> bool:
+def _is_full(state: WearState, waiting: int) -> bool:
     """Return whether as many states wait as are observed together."""
-    return (waiting + 1) * problem.contacts_each * problem.grid.strips > MOST_WAITING
+    return (waiting + 1) * state.contacts.line_load.size > MOST_WAITING
 
 
-def _rows_of(
-    stepper: Stepper,
-    problem: WearProblem,
-    state: WearState,
-    step: FloatArray,
-    threshold: float,
-) -> list[Variables]:
-    """Return the row of each realisation of a state in the form of the results file."""
-    row = history_row(stepper, problem, state, threshold) | {"step_passes": step}
-    return _each(row, len(step))
-
-
-def _each(row: Variables, realisations: int) -> list[Variables]:
-    """Return the row of each of some realisations in the form of the results file."""
-    rows: list[Variables] = [{} for _ in range(realisations)]
+def _with_tests_first(row: Variables) -> Variables:
+    """Return values of several realisations in the form of the results file, one after another."""
+    tests = {}
     for name, values in row.items():
-        dims = ALL_VARIABLES[name].dims
-        for place, single in enumerate(rows):
-            if name in _WITHOUT_REALISATION:
-                single[name] = values[place]
-            elif dims[-1] == "y":
-                single[name] = values[..., place : place + 1, :]
-            else:
-                single[name] = values[..., place : place + 1]
-    return rows
+        along_y = ALL_VARIABLES[name].dims[-1] == "y"
+        axes = [*range(values.ndim)]
+        first = axes.pop(-2 if along_y else -1)
+        tests[name] = values.transpose(first, *axes)
+        if name not in _WITHOUT_REALISATION:
+            tests[name] = tests[name][..., None, :] if along_y else tests[name][..., None]
+    return tests
 
 
 def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Variables:
@@ -294,16 +287,16 @@ class Recorder:
         sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
         sums |= {f"{name}_error" for name in ESTIMATED}
         steps = {name: column for name, column in (history or {}).items() if name not in sums}
-        self._history = History(stepper, threshold, _rows(steps))
+        self._history = History(stepper, threshold, steps)
         if not steps:
             self._history.add(problem, state, state)
         #: errors of the finished test due to its strips, see `strip_errors.strip_errors`
         self.strip_errors: FloatArray | None = None
         #: errors of observables of the finished test, see `observed_errors`
         self.observed_errors: Mapping[str, FloatArray] = {}
-        rows = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
+        first = records or _with_tests_first(record_row(stepper, problem, state))
         #: strips and row of each record, and after them those that wait: problem, state and passes
-        self._records: list[Any] = [(problem.grid, row) for row in rows]
+        self._records: list[Any] = [(problem.grid, row) for row in _rows(first)]
         self._kept = len(self._history), len(self._records), state, problem.grid
 
     def add(self, advance: Advance, stop: float) -> None:
@@ -342,7 +335,7 @@ class Recorder:
         source, _, passes = due
         problem, state = advance.problem, advance.path[source]
         waiting = self._waiting
-        if waiting and (waiting[0][0] is not problem or _is_full(problem, len(waiting))):
+        if waiting and (waiting[0][0] is not problem or _is_full(state, len(waiting))):
             self._compute_records()
         if _carries_loads(self.stepper, problem, state):
             kept = state.replaced(coarse_step_solution=None, half_quadrature_solution=None)
@@ -359,7 +352,8 @@ class Recorder:
     def _row(
         self, problem: WearProblem, recorded: WearProblem, state: WearState
     ) -> tuple[Grid, Variables]:
-        return problem.grid, _single(record_row(self.stepper, recorded, state))
+        (row,) = _rows(_with_tests_first(record_row(self.stepper, recorded, state)))
+        return problem.grid, row
 
     def _compute_records(self) -> list[tuple[Grid, Variables]]:
         """Return all records, computed; an interrupt leaves them as they are or computed."""
@@ -376,8 +370,8 @@ class Recorder:
             except (StepError, ContactError):  # a step that fails is halved for a single test
                 singles = zip(starts, passes[:, None], strict=True)
                 state = joined_states([state_at(stepper, problem, *record) for record in singles])
-            contents = _each(record_row(stepper, several, state), len(waiting))
-            rows = [(problem.grid, row) for row in contents]
+            contents = _with_tests_first(record_row(stepper, several, state))
+            rows = [(problem.grid, row) for row in _rows(contents)]
             self._records[-len(waiting) :] = rows
         return self._records
 
@@ -419,7 +413,7 @@ class Recorder:
         Errors are sums of those due to steps, to the stations of a cam and, where they are known,
         to strips.
         """
-        columns = _columns(self._history.compute())
+        columns = dict(self._history.compute())
         for name, part in zip(ERRORS, self.errors_by_strips, strict=True):
             by_steps = columns[f"{name}_by_steps"]
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
@@ -450,11 +444,12 @@ class Recorder:
     @property
     def observed(self) -> dict[str, FloatArray]:
         """The observables that have an estimated error besides depth and volume."""
-        return {name: self.column(name) for name in ESTIMATED if name in self._history.compute()[0]}
+        columns = self._history.compute()
+        return {name: columns[name] for name in ESTIMATED if name in columns}
 
     def column(self, name: str) -> FloatArray:
         """Return a variable of the history except errors, first axis step."""
-        return np.array([row[name] for row in self._history.compute()])
+        return self._history.compute()[name]
 
     @property
     def last_record(self) -> Variables:
@@ -477,11 +472,6 @@ class Recorder:
         return _columns([_on_grid(row, grid, self.grid) for grid, row in self._compute_records()])
 
 
-def _single(row: Variables) -> Variables:
-    """Return the row of a single test in the form of the results file."""
-    return {n: v[0] if n in _WITHOUT_REALISATION else v for n, v in row.items()}
-
-
 def _on_grid(row: Variables, old: Grid, new: Grid) -> Variables:
     """Return a record on the strips of a later one."""
     if old is new or same_strips(old, new):
@@ -491,9 +481,11 @@ def _on_grid(row: Variables, old: Grid, new: Grid) -> Variables:
 
 
 def _rows(columns: Mapping[str, FloatArray]) -> list[Variables]:
-    count = len(next(iter(columns.values()))) if columns else 0
+    """Return the rows of columns."""
+    count = len(next(iter(columns.values())))
     return [{name: column[k] for name, column in columns.items()} for k in range(count)]
 
 
-def _columns(rows: list[Variables]) -> dict[str, FloatArray]:
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
+def _columns(rows: list[Variables]) -> Variables:
+    """Return rows as columns."""
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
