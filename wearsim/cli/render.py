@@ -14,7 +14,7 @@ from wearsim.errors import printable
 if TYPE_CHECKING:
     from wearsim.report.panels import Sheet
     from wearsim.report.surfaces import Surface
-    from wearsim.report.view import Columns, View
+    from wearsim.report.view import View
 
 
 def show_view(
@@ -76,10 +76,9 @@ def _write_tables(view: View, files: Mapping[str, object], stored: bool, brief: 
 
     tables = [] if brief else [table for table in view.tables() if stored or table.title != ORIGIN]
     written = [Row(name, str(item)) for name, item in files.items()]
-    results = Table(view.heading, [*view.rows(), *written])
-    first = [tables.pop(0)] if tables and tables[0].title == STUDY else []
-    title = view.title
-    for table in (*first, results, *tables):
+    place, title = int(bool(tables) and tables[0].title == STUDY), view.title
+    tables.insert(place, Table(view.heading, [*view.rows(), *written]))
+    for table in tables:
         if table.heads:
             write_list(table.heads, table.rows)
             typer.echo("")
@@ -97,11 +96,14 @@ def draw_figure(sheet: Sheet, path: Path | None) -> None:
     save_figure(figure_of(sheet), path)
 
 
-def write_table_file(columns: Columns, path: Path) -> None:
+def write_table_file(view: View, path: Path | None) -> None:
     """Write columns as a CSV file."""
+    if path is None:
+        return
     from wearsim.atomic_write import replacement
     from wearsim.report.csv_files import table_text
 
+    (columns,) = view.columns().values()
     with replacement(path) as file:
         file.writelines(text.encode("utf-8") for text in table_text(columns))
 
@@ -111,6 +113,6 @@ def write_surface(surface: Surface, path: Path, *, spline: bool) -> None:
     from wearsim.report.text import count, shown
 
     surface.save(path, spline=spline)
-    away = shown(surface.deviation, "um", 2)
     form = "chords" if not spline else "chords between the points of the spline"
-    note(f"surface: {path}, {count(surface.count)} points, {form} within {away}")
+    within = f"{form} within {shown(surface.deviation, 'um', 2)}"
+    note(f"surface: {path}, {count(surface.count)} points, {within}")

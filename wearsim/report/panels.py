@@ -419,8 +419,7 @@ def histogram(values: FloatArray, classes: int | None = None) -> tuple[Bars, Flo
     number, edges = np.histogram(values, classes)
     density = number / (len(values) * np.diff(edges))
     more = {"realisations": (number, "1")}
-    bars = Bars(edges[:-1], edges[1:], density, label="realisations", alpha=0.45, more=more)
-    return bars, edges
+    return Bars(edges[:-1], edges[1:], density, label="realisations", alpha=0.45, more=more), edges
 
 
 def convergence(

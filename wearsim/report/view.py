@@ -89,15 +89,6 @@ class Answer(NamedTuple):
     label: str
 
 
-def answers_of(rows: Rows) -> dict[str, Answer]:
-    """Return the numbers that rows state, by name."""
-    return {
-        name: Answer(math.nan if value is None else float(value), unit, row.label)
-        for row in rows
-        for name, (value, unit) in row.answers.items()
-    }
-
-
 def width_row(width: Any, threshold: float) -> Row:
     """Return the row of the widths [m], or of the depth that a groove has not reached [m]."""
     answers = {"width": (float(np.max(width)), "mm")}
@@ -208,6 +199,10 @@ class View(ABC):
     failures: str = ""  # remark on realisations that failed
     has_angles: bool = False  # whether the worn profile depends on the angle of a cam
 
+    def __init__(self, result: Any) -> None:
+        self.result, self.title = result, result.title
+        self.notes, self.warnings = result.notes, result.warnings
+
     @abstractmethod
     def rows(self) -> Rows:
         """Return the answers with their errors, the most important first."""
@@ -221,7 +216,11 @@ class View(ABC):
 
         Studies that choose a design ask for them, as objectives and constraints.
         """
-        return answers_of(self.rows())
+        return {
+            name: Answer(math.nan if value is None else float(value), unit, row.label)
+            for row in self.rows()
+            for name, (value, unit) in row.answers.items()
+        }
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over computed ones."""
@@ -231,8 +230,7 @@ class View(ABC):
     def overview(self) -> Overview:
         """Return what a page shows first; by default the main panel and the first answers."""
         sheet = self.panels()
-        main = sheet.first if sheet.panels else None
-        return Overview(main, {self.group: self.rows()[1:_FIRST]})
+        return Overview(sheet.first if sheet.panels else None, {self.group: self.rows()[1:_FIRST]})
 
     def line(self) -> str:
         """Return method, numerical or sampling error and time on one line, or an empty text."""

@@ -53,11 +53,6 @@ class StudyView(View, Generic[Shown]):
     verb = ""  # that repeats the study
     basis = SAMPLING
 
-    def __init__(self, result: Shown) -> None:
-        self.result = result
-        self.title = result.title
-        self.notes, self.warnings = result.notes, result.warnings
-
     def study(self) -> Rows:
         """Return rows on the study: how many, with which method, how long."""
         return []
@@ -126,10 +121,9 @@ class StudyView(View, Generic[Shown]):
 
     def repetition(self) -> Repetition:
         """Return command and files that repeat the study."""
-        files = {Path(name).name: text for name, text in self.stored_files()}
-        scenario = Path(self.result.raw.scenario_file).name
+        (scenario, text), *files = [(Path(name).name, text) for name, text in self.stored_files()]
         command = shlex.join(["wearsim", self.verb, scenario, *self.options()])
-        return Repetition(command, files, SAME_NUMBERS)
+        return Repetition(command, {scenario: text, **dict(files)}, SAME_NUMBERS)
 
 
 class DesignsView(View):

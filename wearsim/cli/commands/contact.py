@@ -132,8 +132,8 @@ def contact(
             cylinder, profile=measured, profile_file=str(profile), profile_filter=wavelength
         )
     start = profile_data(cylinder, files)
-    automatic = loaded.contact.model == "auto"  # all models that it takes have fields
-    has_fields = automatic or loaded.contact.spec.capabilities.fields
+    # all models that "auto" takes have fields
+    has_fields = loaded.contact.model == "auto" or loaded.contact.spec.capabilities.fields
     with_fields = figure is not None and has_fields
     with watching(Display, loaded, kind="contact", fields=with_fields):
         study = wearsim.study_contact(loaded, cylinder.profile, with_fields, True, against)
@@ -242,9 +242,7 @@ def cam(
         study = wearsim.study_cam(loaded, angles)
     view = study.view
     draw_figure(view.panels(), figure)
-    if table is not None:
-        (columns,) = view.columns().values()
-        write_table_file(columns, table)
+    write_table_file(view, table)
     if surface is not None and sampling is not None:
         write_surface(view.surface(sampling), surface, spline=spline)
     show_view(view, json=json, files=files, more=files, brief=table is not None)

@@ -191,8 +191,7 @@ def life(
     with checking("--b"):
         shares = _shares(b)
     files = [path.suffix.lower() in _FILES for path in designs]
-    too_many = len(designs) > 2 and not all(files)
-    refuse(too_many, "give one design, or two to compare", "SCENARIO")
+    refuse(len(designs) > 2 and not all(files), "give one design, or two to compare", "SCENARIO")
     twice = len({path.resolve() for path in designs}) < len(designs)
     refuse(twice, f"{designs[0]} is given twice", "SCENARIO")
     if any(files):

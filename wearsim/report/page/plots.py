@@ -99,7 +99,9 @@ def draw(panel: Panel) -> Any:
         axis.update(major_label_text_font_size="13px", **_TEXT)
     plot.grid.grid_line_color = "#e4e4e4"
     draw_marks(plot, panel)
-    _set_legend(plot)
+    for legend in plot.legend:
+        plot.add_layout(legend, "below")
+        legend.update(**_LEGEND)
     return plot
 
 
@@ -164,13 +166,6 @@ def _set_axis(plot: Any, along: str, axis: Axis) -> None:
         ticks.formatter = BasicTickFormatter(
             power_limit_low=-4, power_limit_high=8, precision="auto"
         )
-
-
-def _set_legend(plot: Any) -> None:
-    """Move the legend below the axes; a click on an entry hides its line."""
-    for legend in plot.legend:
-        plot.add_layout(legend, "below")
-        legend.update(**_LEGEND)
 
 
 def _source(plot: Any, columns: Mapping[str, Any], name: str | None = None) -> Any:

@@ -314,10 +314,9 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     fresh = surface_points(follower, kinematics, point.angle)[1]
     cut = surface_points(follower, kinematics, point.angle, factor * worn)[1]
     marks: list[Mark] = [] if turn.cam.groove else [Patch(*cut, alpha=0.12)]
-    label = f"worn, depth x {factor:g}"
     marks += [
         _curve(between_flanks(fresh, point), width=0.9, colour=GREY, label="unworn"),
-        _curve(between_flanks(cut, point), width=1.4, label=label),
+        _curve(between_flanks(cut, point), width=1.4, label=f"worn, depth x {factor:g}"),
     ]
     starts = np.asarray(turn.cam.motion.starts[:-1])
     edges = fresh[:, np.abs(point.angle - starts[:, None]).argmin(axis=1)]
@@ -349,8 +348,7 @@ def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
 def _groove(result: Result, measured: Sequence[Measured]) -> Panel:
     given = measured[0].angle if measured else None
     worn, angle = grooves_at(result, given)
-    points = [profile.y for profile in measured]
-    limits = worn_limits(result.y, worn.max(axis=0), *points)
+    limits = worn_limits(result.y, worn.max(axis=0), *(profile.y for profile in measured))
     which = "Deepest groove, at" if given is None else "Groove at"
     profiles = Records(result.y, result.start_height - worn, result.record_passes)
     return Panel(

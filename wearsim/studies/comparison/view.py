@@ -113,11 +113,10 @@ class ComparisonView(View):
     def overview(self) -> Overview:
         """Return the comparison, and the limits of each of the results."""
         compared = super().overview()
-        labels = [row.label for row in self.comparison.rows]
         groups, excluded = dict(compared.groups), list[str]()
-        for label, view in zip(labels, self._views, strict=True):
+        for row, view in zip(self.comparison.rows, self._views, strict=True):
             overview = view.overview()
-            groups[f"Limits of {label}"] = overview.groups.get("Limits", [])
+            groups[f"Limits of {row.label}"] = overview.groups.get("Limits", [])
             excluded += [text for text in overview.excluded if text not in excluded]
         return Overview(compared.picture, groups, excluded, alone=True)
 
@@ -147,10 +146,9 @@ class ComparisonView(View):
         shared = titles.pop() if len(titles) == 1 else ""
         suffix = f"for values of {self.key}" if self.key else ""
         heading = ", ".join(text for text in (shared, suffix) if text)
-        labels = (row.label for row in self.comparison.rows)
         profiles = {
-            label: result.worn_profile()
-            for label, result in zip(labels, self.results, strict=False)
+            row.label: result.worn_profile()
+            for row, result in zip(self.comparison.rows, self.results, strict=False)
         }
         return comparison_sheet(self.comparison, heading, profiles)
 
@@ -291,9 +289,8 @@ def _of_runs(
 
 def _of_tests(first: Compared, row: Compared, deeper: Interval) -> str:
     """Return the probability that a test of one ensemble exceeds a test of the other."""
-    low = min(first.values[0], row.values[0])
-    high = max(first.values[-1], row.values[-1])
-    if low == high and row.count + first.count > 2:
+    ends = {first.values[0], row.values[0], first.values[-1], row.values[-1]}
+    if len(ends) == 1 and row.count + first.count > 2:
         return EQUAL
     if not math.isfinite(deeper.value):
         return f"too few realisations, {FEWEST} of each are sufficient"
@@ -345,12 +342,11 @@ def comparison_sheet(
     if all(row.course is not None for row in rows):
         left = _courses(pairs, named)
     else:
-        marks = [mark for row, colour in pairs for mark in _distribution(row, colour)]
         left = Panel(
             "Cumulative distribution",
             at_end,
             Axis("cumulative probability", "%", limits=(0.0, 1.0)),
-            marks,
+            [mark for row, colour in pairs for mark in _distribution(row, colour)],
             "Share of the tests that are below a value.",
             legend="",
         )
@@ -407,8 +403,7 @@ def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
         if quantiles:
             marks.append(dots([quantiles[0.5].value], [place], "|", size=13.0, colour=colour))
         if np.isfinite([row.value.low, row.value.high]).all():
-            interval = _interval(place, row.value.low, row.value.high, colour, _THICK, 0.45)
-            marks.append(interval)
+            marks.append(_interval(place, row.value.low, row.value.high, colour, _THICK, 0.45))
         marks.append(dots([row.value.value], [place], size=4.5, colour=colour))
         marks += _labels(comparison, row, place, colour)
     title, legend = "Value and estimated error", ""
@@ -417,9 +412,8 @@ def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
         legend = "\ndot: mean; thick line: 95 % interval; bar: median"
         legend += "; line: 5 % to 95 %" if any(_has_range(row) for row in rows) else ""
     low = min([0.0, *(row.value.value for row in rows)])
-    scale = axis.scale
     x = Axis(
-        f"{axis.label}{legend}", per_si=scale, margin=(0.0, 0.03), limits=(min(low, 0.0), None)
+        f"{axis.label}{legend}", per_si=axis.scale, margin=(0.0, 0.03), limits=(min(low, 0.0), None)
     )
     y = Axis(limits=(len(rows) - 0.6, -0.8), ticks=())
     return Panel(title, x, y, marks, "Every row is one of the compared results.", legend="")
@@ -466,10 +460,8 @@ def _profiles(profiles: dict[str, ComputedProfile]) -> Panel:
     """Return the worn profiles of several results in one panel."""
     y = np.sort(np.concatenate([profile.y for profile in profiles.values()]))
     worn = [np.interp(y, item.y, item.start - item.low) for item in profiles.values()]
-    marks: list[Mark] = []
-    for colour, (label, profile) in zip(
-        several_colours(len(profiles)), profiles.items(), strict=True
-    ):
+    marks, colours = list[Mark](), several_colours(len(profiles))
+    for colour, (label, profile) in zip(colours, profiles.items(), strict=True):
         if profile.label:
             marks.append(Band(profile.y, profile.low, profile.high, colour=colour))
         marks.append(Line(profile.y, profile.height, colour=colour, label=label))

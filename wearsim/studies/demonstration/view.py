@@ -74,9 +74,7 @@ class DemonstrationView(DesignsView):
 
     @staticmethod
     def _number(duration: float) -> str:
-        if duration >= 1000.0:
-            return count(float(f"{duration:.4g}"))
-        return f"{duration:.3g}"
+        return count(float(f"{duration:.4g}")) if duration >= 1000.0 else f"{duration:.3g}"
 
     def rows(self) -> Rows:
         """Return specimens by the binomial, the simulated design, and the acceleration."""
@@ -86,10 +84,9 @@ class DemonstrationView(DesignsView):
             f"{number} with {count_of(k, 'failure', 'no failure')}"
             for k, number in enumerate(numbers)
         )
-        plain = result.plan(need.life)
         rows = [
             Row("specimens", f"{allowed}, for {self._amount(need.life)}"),
-            Row("probability of passing", self._passing(plain)),
+            Row("probability of passing", self._passing(result.plan(need.life))),
             Row(
                 f"simulated survival of {self._amount(need.life)}",
                 part_with_interval(result.survival),

@@ -92,9 +92,9 @@ class DissipationView(StudyView[DissipationResult]):
             values = " to ".join(in_unit(end.value, "W") for end in ends)
             # with the digits of the quantile, so that rounding does not put it outside its interval
             pairs = [(in_unit(end.low, "W"), in_unit(end.high, "W")) for end in ends]
-            intervals = [
+            intervals = (
                 TOO_FEW_REALISATIONS if NOTHING in pair else "..".join(pair) for pair in pairs
-            ]
+            )
             confidence = " and ".join(dict.fromkeys(intervals))
             name = f"dissipated power, {100.0 * (high - low):g} %"
             rows.append(Row(name, f"{values} W (95 % confidence: {confidence})"))
@@ -145,8 +145,7 @@ class DissipationView(StudyView[DissipationResult]):
 
     def random_inputs(self) -> Rows:
         """Return the draws of the random inputs, and those that vary over the contact."""
-        varying = varying_rows(varying_inputs(self.result, None))
-        return [*drawn_rows(self.result), *varying]
+        return [*drawn_rows(self.result), *varying_rows(varying_inputs(self.result, None))]
 
     def data(self) -> dict[str, Any]:
         """Return the estimates of the study in SI units."""
@@ -187,10 +186,9 @@ class DissipationView(StudyView[DissipationResult]):
 
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, drawn values first, and strips."""
-        raw = self.result.raw
         numbers = Column("realisation", np.arange(self.result.count, dtype=np.float64))
         by_name = self._along("realisation")
-        first = {item["key"]: by_name[item["key"]] for item in raw.inputs}
+        first = {key: by_name[key] for key in self.result.inputs}
         realisations = [numbers, *(first | by_name).values()]
         return {"realisations.csv": [realisations], "strips.csv": [[*self._along("y").values()]]}
 
@@ -289,14 +287,15 @@ def _density(result: DissipationResult) -> Panel:
     normal = np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau))
     label = "normal distribution, same mean and std"
     marks = [bars, Line(across, normal, colour=ORANGE, label=label)]
-    reach = 1.0 / (1.0 + HEADROOM)
-    for place, colour, style, label in (
-        (summary.mean, BLACK, "-", f"mean: {shown(summary.mean, 'W')}"),
-        (result.mean_problem_power, GREEN, "--", at_means),
-        (summary.quantile(0.025).value, GREY, ":", "2.5 % and 97.5 % quantile"),
-        (summary.quantile(0.975).value, GREY, ":", ""),
-    ):
-        marks.append(Span(place, colour=colour, dash=style, label=label, reach=reach))
+    marks += [
+        Span(place, colour=colour, dash=dash, label=label, reach=1.0 / (1.0 + HEADROOM))
+        for place, colour, dash, label in (
+            (summary.mean, BLACK, "-", f"mean: {shown(summary.mean, 'W')}"),
+            (result.mean_problem_power, GREEN, "--", at_means),
+            (summary.quantile(0.025).value, GREY, ":", "2.5 % and 97.5 % quantile"),
+            (summary.quantile(0.975).value, GREY, ":", ""),
+        )
+    ]
     ends = f"from {shown(float(power.min()), 'W')} to {shown(float(power.max()), 'W')}"
     return Panel(
         title,
@@ -314,12 +313,11 @@ def _realisations(result: DissipationResult) -> Panel:
     title = number_of_realisations(len(rows))
     if len(kept) > 1 and float(np.ptp(kept, axis=0).max()) <= _EQUAL * float(kept.max()):
         rows, title = rows[:1], "equal in all"
-    opacity = float(np.clip(15.0 / len(rows), 0.12, 1.0))
     return Panel(
         f"Dissipated power per length, {title}",
         _across(result),
         _PER_LENGTH,
-        [Line(result.y, rows, width=0.6, alpha=opacity)],
+        [Line(result.y, rows, width=0.6, alpha=float(np.clip(15.0 / len(rows), 0.12, 1.0)))],
         "Dissipated power across the track in single realisations.",
     )
 

@@ -142,8 +142,7 @@ def _course(result: EnsembleResult) -> Panel:
 
 def _some(x: FloatArray, rows: FloatArray) -> Line:
     """Return some realisations as thin lines."""
-    label = number_of_realisations(len(rows))
-    return Line(x, rows, width=0.6, alpha=0.6, colour=GREY, label=label)
+    return Line(x, rows, width=0.6, alpha=0.6, colour=GREY, label=number_of_realisations(len(rows)))
 
 
 def _curves(x: FloatArray, curves: FloatArray, mean: FloatArray) -> list[Mark]:
@@ -170,9 +169,8 @@ def _density(result: EnsembleResult) -> Panel:
     ]
     if sufficient_for(result.count, NINETY_PERCENT[0]):
         lines += [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", "")]
-    reach = 1.0 / (1.0 + HEADROOM)
     marks = [
-        Span(place, colour=colour, dash=dash, label=label, width=1.1, reach=reach)
+        Span(place, colour=colour, dash=dash, label=label, width=1.1, reach=1.0 / (1.0 + HEADROOM))
         for place, colour, dash, label in lines
     ]
     ends = f"from {shown(float(depth.min()), 'um')} to {shown(float(depth.max()), 'um')}"
@@ -246,8 +244,7 @@ def _lift_error(result: EnsembleResult) -> Panel:
     curves = result.kept_values("lift_error_curve")
     # the last angle is the first one
     curves = curves - curves[:, :-1].mean(axis=1, keepdims=True)
-    angle = np.asarray(result.raw.variables["angle"])
-    marks = _curves(angle, curves, curves.mean(axis=0))
+    marks = _curves(np.asarray(result.raw.variables["angle"]), curves, curves.mean(axis=0))
     mean = shown(result.estimate("lift_error", -1, ()).mean.value, "um")
     return Panel(
         "Lift error at the end",
@@ -329,8 +326,7 @@ def draws_panels(
     drawn = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1)
     finite = np.flatnonzero(np.isfinite(values))
     every = finite[evenly_spaced(len(finite), MOST_POINTS)]
-    more = {"realisation": (every, "1")}
-    points = dots(drawn[every], values[every], alpha=0.5, more=more)
+    points = dots(drawn[every], values[every], alpha=0.5, more={"realisation": (every, "1")})
     title = f"{name.capitalize()} against {item['key']}"
     text = f"One point for each of {count(len(every))} tests."
     return {"draws": Panel(title, Axis(item["key"], unit, 1.0 / size), axis, [points], text)}

@@ -226,10 +226,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
     def details(self) -> list[Table]:
         """Return the estimates of all observables, and the Sobol indices of the depth."""
-        result = self.result
-        if not result.count:
-            return []
-        return [self.observables_table(_HEADS[0]), self._effects()]
+        return [self.observables_table(_HEADS[0]), self._effects()] if self.result.count else []
 
     def _effects(self) -> Table:
         """Return the Sobol indices of the depth."""

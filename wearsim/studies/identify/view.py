@@ -162,9 +162,13 @@ class IdentificationView(StudyView[IdentificationResult]):
     def columns(self) -> Mapping[str, Columns]:
         """Return the tests, and all traces below each other."""
         tests, names = self._tests(), ("height", "fitted", "low", "high")
-        table = {name: [test[name] for test in tests] for name in ("file", "specimen")}
-        for title, name, size, _ in _NUMBERS:
-            table[title] = [_number(test[name], size) for test in tests]
+        table = {
+            **{name: [test[name] for test in tests] for name in ("file", "specimen")},
+            **{
+                title: [_number(test[key], size) for test in tests]
+                for title, key, size, _ in _NUMBERS
+            },
+        }
         traces = [self.result.values(f"trace_{name}") for name in ("y", *names)]
         known = np.isfinite(traces[0])
         numbers = np.broadcast_to(np.arange(1.0, len(known) + 1.0)[:, None], known.shape)
@@ -249,13 +253,11 @@ class IdentificationView(StudyView[IdentificationResult]):
         ]
         for place in traced[:MOST_TRACES]:
             panels[f"trace {place}"], panels[f"residual {place}"] = _trace(result, place)
-        columns = max(len(traced[:_IN_FIGURE]), 1)
-        rows, heights = [["factors", "density"]], [1.0]
+        drawn, rows, heights = traced[:_IN_FIGURE], [["factors", "density"]], [1.0]
         if traced:
-            drawn = traced[:_IN_FIGURE]
             upper = ([f"{name} {place}" for place in drawn] for name in ("trace", "residual"))
             rows, heights = [*upper, *rows], [0.75, 0.35, 1.0]
-        size = (max(4.2 * columns, 9.6), 8.6 if traced else 4.2)
+        size = (max(4.2 * len(drawn), 9.6), 8.6 if traced else 4.2)
         title = f"{result.title}\n{result.verdict_words}"
         return Sheet(title, panels, rows, size, heights=heights)
 
@@ -423,12 +425,11 @@ def _density(result: IdentificationResult) -> Panel:
     inside = (density > levels[0]) & (rows < top)
     limits = (0.9 * float(median[inside].min()), 1.1 * float(median[inside].max()))
     areas = Contours(median, rows, density, [*levels, density.max()], _SHADES, outlined=True)
-    negligible = Span(result.summary["negligible"], across="y", dash="--", width=0.8, colour=GREY)
     return Panel(
         "Median and scatter of K/H: 50, 90 and 95 %",
         Axis("median of K/H", log=True, limits=limits, **_UNIT),
         Axis("scatter t of ln K/H (dashed: negligible)", limits=(0.0, top)),
-        [areas, negligible],
+        [areas, Span(result.summary["negligible"], across="y", dash="--", width=0.8, colour=GREY)],
         figure_only=True,
     )
 
@@ -460,5 +461,4 @@ def power_sheet(designs: Sequence[PlannedDesign], title: str = "") -> Sheet:
             "Rates of the verdicts by the number of tests.",
             legend="" if number else "best",
         )
-    size = (4.9 * len(designs) + 0.4, 4.2)
-    return Sheet(title, panels, [list(panels)], size)
+    return Sheet(title, panels, [list(panels)], (4.9 * len(designs) + 0.4, 4.2))

@@ -41,6 +41,7 @@ from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.view import EXCLUDED
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
+from wearsim.uq.estimation.intervals import arrays_of
 from wearsim.uq.survival.fits import FAMILIES, Family, FittedLives, standard_score
 from wearsim.uq.survival.lives import cumulative_incidence, median_positions
 
@@ -138,9 +139,7 @@ def _against(designs: Sequence[_Design]) -> Panel:
         if not known:
             continue
         values, lives = zip(*known, strict=True)
-        value, low, high = (
-            np.array([getattr(life, name) for life in lives]) for name in ("value", "low", "high")
-        )
+        value, low, high = arrays_of(lives)
         low, high = (np.where(np.isfinite(end), end, np.nan) for end in (low, high))
         marks += [
             Whiskers(values, low, high, colour=colour),
@@ -186,8 +185,7 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
             ]
             text += f" Dotted: the target of {count(target)} {axis.unit}."
     x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
-    y = share_axis("survival")
-    return Panel("Survival, with 95 % band", x, y, marks, text)
+    return Panel("Survival, with 95 % band", x, share_axis("survival"), marks, text)
 
 
 def _scale(family: Family) -> Callable[[FloatArray], FloatArray]:
@@ -270,8 +268,7 @@ def _tornado(designs: Sequence[_Design]) -> Panel:
         places = np.array([names.index(name) for name in by_input], dtype=float) + middle
         for end, alpha in enumerate((0.35, 0.8)):
             ends = [effect.factors[end] for effect in by_input.values()]
-            value = [factor.value for factor in ends]
-            low, high = ([getattr(factor, side) for factor in ends] for side in ("low", "high"))
+            value, low, high = arrays_of(ends)
             label = design.named if end else ""
             bars = (places - 0.5 * height, places + 0.5 * height, value, 1.0, True)
             marks += [

@@ -83,8 +83,7 @@ class LifeView(RealisationsView[LifeResult]):
             rows.append(Row(name, target_text(result), answers={"probability": (chance, "%")}))
             obstacle = result.probability_obstacle(result.target)
             if obstacle and result.rare is None and not result.settings.alone:
-                command = f"`{rare_command(result)}`"
-                rows.append(Row("tests that sample the other inputs", command))
+                rows.append(Row("tests that sample the other inputs", f"`{rare_command(result)}`"))
         for method, estimate in result.rare_estimates.items():
             rows.append(Row(f"by {method}", rare_text(estimate)))
         if result.rare is not None and not result.rare.is_reliable:
@@ -175,8 +174,7 @@ class LifeView(RealisationsView[LifeResult]):
         """Return where on a cam a limit was reached, empty for other limits."""
         if name not in self.result.angles:
             return ""
-        angles = self.result.angles[name]
-        low, middle, high = np.degrees(np.quantile(angles, (0.05, 0.5, 0.95)))
+        low, middle, high = np.degrees(np.quantile(self.result.angles[name], (0.05, 0.5, 0.95)))
         where = f"at {middle:.1f} deg"
         return where + (f" (90 % in {low:.1f} to {high:.1f} deg)" if high - low > 0.05 else "")
 

@@ -129,16 +129,14 @@ class FieldReturnsView(DesignsView):
         result, lines = self.result, []
         for number, label in enumerate(result.labels):
             for share in result.designs[number].settings.shares:
-                name = f"{label} B{share:g}" if len(result.labels) > 1 else f"B{share:g}"
-                cells = [name]
+                cells = [f"{label} B{share:g}" if len(result.labels) > 1 else f"B{share:g}"]
                 for life in (result.before(share, number), result.after(share, number)):
                     low, value, high = rounded_lives(life.low, life.predictive, life.high)
                     deviation = math.sqrt(life.by_tests + life.by_realisations)
                     cells += [value, f"{low}..{high}", f"{deviation:.2g}"]
                 lines.append(cells)
         columns = ["95 % credible", "sd of ln life"]
-        heads = [f"life [{result.unit}]", "before", *columns, "after", *columns]
-        return Table("", lines, heads)
+        return Table("", lines, [f"life [{result.unit}]", "before", *columns, "after", *columns])
 
     def _bands(self) -> Table:
         """Return predicted and observed failures in bands of lives."""
@@ -148,9 +146,8 @@ class FieldReturnsView(DesignsView):
         for place, name in enumerate([*names, "in all"]):
             if len(names) == 1 and place == 1:
                 continue
-            observed = f"{check.observed[place]:.3g}"
             predicted = (_numbers(item, place) for item in (check.before, check.after))
-            lines.append([name, observed, *predicted])
+            lines.append([name, f"{check.observed[place]:.3g}", *predicted])
         heads = [f"failures at [{self.result.unit}]", "observed", "predicted before", "after"]
         return Table("", lines, heads)
 

@@ -167,10 +167,9 @@ def _normal_force(result: Result) -> Panel:
 
 def pressure_panel(result: Result) -> Panel:
     """Return the peak pressure of the rollers against time."""
-    values = _by_roller(result.peak_pressure)
-    marks = _lines(result, values)
+    values, x = _by_roller(result.peak_pressure), Axis("time", "min")
     y, text = _force_axis("peak pressure", "MPa", values), _first_and_last(values, "MPa")
-    return Panel("Peak pressure of the rollers", Axis("time", "min"), y, marks, text)
+    return Panel("Peak pressure of the rollers", x, y, _lines(result, values), text)
 
 
 def _lines(result: Result, values: FloatArray, alone: str = "", **style: Any) -> list[Line]:
