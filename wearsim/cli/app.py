@@ -186,8 +186,9 @@ class Shell(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        for name, line in BUILT_IN.items():
-            self.commands[name] = LazyVerb(name, line, partial(_built_in, name))
+        self.commands |= {
+            name: LazyVerb(name, line, partial(_built_in, name)) for name, line in BUILT_IN.items()
+        }
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, built-in ones first."""

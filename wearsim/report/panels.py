@@ -383,8 +383,10 @@ def worn_limits(y: FloatArray, worn: FloatArray, *others: FloatArray) -> tuple[f
     """Return the range of y in which something is worn, with a margin, that includes others [m]."""
     inside = y[worn > 1e-3 * worn.max()] if worn.max() > 0.0 else y
     margin = 0.08 * float(inside[-1] - inside[0])
-    ends = [float(inside[0]) - margin, float(inside[-1]) + margin]
-    ends += [float(end) for other in others for end in (other.min(), other.max())]
+    ends = [
+        *(float(inside[0]) - margin, float(inside[-1]) + margin),
+        *(float(end) for other in others for end in (other.min(), other.max())),
+    ]
     return min(ends), max(ends)
 
 

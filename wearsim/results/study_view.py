@@ -67,8 +67,12 @@ class StudyView(View, Generic[Shown]):
 
     def tables(self) -> list[Table]:
         """Return the study, its details, random inputs and origin."""
-        tables = [Table(STUDY, self.study()), *self.details()]
-        tables += [Table("Random inputs", self.random_inputs()), Table(ORIGIN, self._sources())]
+        tables = [
+            Table(STUDY, self.study()),
+            *self.details(),
+            Table("Random inputs", self.random_inputs()),
+            Table(ORIGIN, self._sources()),
+        ]
         return [table for table in tables if table.rows]
 
     def _sources(self) -> Rows:

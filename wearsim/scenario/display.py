@@ -30,8 +30,10 @@ def scenario_html(scenario: Scenario) -> str:
     random = {key: item.describe() for item in scenario.random for key in item.keys}
     inner = {key for key in given for name in random if key.startswith(f"{name}.")}
     rows = [(key, _value(value)) for key, value in given.items() if key not in inner]
-    rows = [(key, random.get(key, text)) for key, text in rows if key != "title"]
-    rows += [(key, text) for key, text in random.items() if key not in given]
+    rows = [
+        *((key, random.get(key, text)) for key, text in rows if key != "title"),
+        *((key, text) for key, text in random.items() if key not in given),
+    ]
     panel = None if scenario.cam else _bodies(scenario)
     return table_html(scenario.title, [Row(*row) for row in rows], panel)
 

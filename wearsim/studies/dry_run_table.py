@@ -192,8 +192,11 @@ def _random_rows(data: Data) -> TableRows:
     if table is None:
         return []
     pairs = [f"{first} with {second} {rank:g}" for first, second, rank in table["correlation"]]
-    words = [table["plan"], f"realisation {table['realisation']}"]
-    words += [f"rank correlation of {', '.join(pairs)}"] if pairs else []
+    words = [
+        table["plan"],
+        f"realisation {table['realisation']}",
+        *([f"rank correlation of {', '.join(pairs)}"] if pairs else []),
+    ]
     return [*rows, ("sampling", ", ".join(words))]
 
 

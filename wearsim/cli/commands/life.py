@@ -420,7 +420,9 @@ def _going_on(
             swept = ["--set", f"{key}={label}"] if key else []
             options = [*swept, "--seed", str(scenario.seed), "-o", str(file)]
             commands.append(shlex.join(["wearsim", "life", scenario.file, *options]))
-        steps = [f"`{command}` with the other options" for command in commands]
-        steps.append(f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`")
+        steps = [
+            *(f"`{command}` with the other options" for command in commands),
+            f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`",
+        ]
         text = f"{error.at_shell}; the comparison is finished by {', then '.join(steps)}"
         raise type(error)(text) from error

@@ -282,9 +282,12 @@ def _draw_line(
     elif mark.dash:
         pointed = plot.line("x", "y", **line, **style, **named)
     if mark.marker and not mark.at_end:
-        look = {"marker": _MARKERS[mark.marker], "size": max(mark.size, 2.0) * 1.3}
-        look |= {"fill_color": "white"} if mark.open else {}
-        look |= {"angle": 0.5 * np.pi} if mark.marker == "|" else {}
+        look = {
+            "marker": _MARKERS[mark.marker],
+            "size": max(mark.size, 2.0) * 1.3,
+            **({"fill_color": "white"} if mark.open else {}),
+            **({"angle": 0.5 * np.pi} if mark.marker == "|" else {}),
+        }
         points = plot.scatter("x", "y", source=source, **look, **style, **named)
         pointed = pointed if mark.dash else points
     _hover(plot, [pointed], *tips, line=bool(mark.dash))
@@ -323,14 +326,14 @@ def _draw_bars(
     plot: Any, mark: Bars, x: Axis, y: Axis, style: dict[str, Any], named: dict[str, Any]
 ) -> None:
     place, size = (y, x) if mark.horizontal else (x, y)
+    further, more_tips = _more(mark)
     columns: dict[str, Any] = {
         "low": np.asarray(mark.low, dtype=float) * place.scale,
         "high": np.asarray(mark.high, dtype=float) * place.scale,
         "value": np.asarray(mark.value, dtype=float) * size.scale,
+        "start": np.full(len(mark.low), mark.start * size.scale),
+        **further,
     }
-    columns["start"] = np.full(len(columns["low"]), mark.start * size.scale)
-    further, more_tips = _more(mark)
-    columns |= further
     if isinstance(mark.colour, list):
         columns["colour"] = mark.colour
         style = {**style, "color": "colour"}
@@ -382,10 +385,13 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
     greatest = float(np.nanmax(values)) or 1.0
     mapper = LinearColorMapper(palette=_PALETTES[mark.colours], low=0.0, high=greatest)
     mapper.nan_color = "rgba(0, 0, 0, 0)"
-    extent = {"x": float(across[0] * x.scale), "y": float(up[0] * y.scale)}
-    extent |= {"dw": float(np.ptp(across) * x.scale), "dh": float(np.ptp(up) * y.scale)}
-    drawn: dict[str, Any] = {"image": [values.astype(np.float32)]}
-    drawn |= {name: [place] for name, place in extent.items()}
+    drawn: dict[str, Any] = {
+        "image": [values.astype(np.float32)],
+        "x": [float(across[0] * x.scale)],
+        "y": [float(up[0] * y.scale)],
+        "dw": [float(np.ptp(across) * x.scale)],
+        "dh": [float(np.ptp(up) * y.scale)],
+    }
     names = dict(zip(drawn, drawn, strict=True))
     picture = plot.image(**names, source=_source(plot, drawn), color_mapper=mapper)
     bar = ColorBar(color_mapper=mapper, width=12, title=plain_label(mark.axis.label))

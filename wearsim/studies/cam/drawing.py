@@ -136,8 +136,7 @@ def turning(result: Result) -> Animation:
             if not turn.cam.groove:
                 marks.append(Patch(cut.real, cut.imag, alpha=0.12))
             marks.append(Line(fresh.real, fresh.imag, width=0.9, colour=GREY, label="unworn"))
-            label = f"worn, wear x {factor:g}"
-            marks.append(Line(cut.real, cut.imag, width=1.5, label=label))
+            marks.append(Line(cut.real, cut.imag, width=1.5, label=f"worn, wear x {factor:g}"))
         for ray in rays * turned:
             ends = [0.0, ray.real], [0.0, ray.imag]
             marks.append(Line(*ends, dash=":", width=0.6, colour=GREY))

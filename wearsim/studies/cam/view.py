@@ -278,11 +278,13 @@ class CamView(View):
         """Return the motion table, one row for each station."""
         values = self._columns()
         table = [
-            Column(title, values[key][1], unit, 1.0 / PER_SI[unit])
-            for title, key, unit in _MOTION
-            if key in values
+            *(
+                Column(title, values[key][1], unit, 1.0 / PER_SI[unit])
+                for title, key, unit in _MOTION
+                if key in values
+            ),
+            Column("segment", self._segment_names()),
         ]
-        table.append(Column("segment", self._segment_names()))
         return {"motion.csv": [with_sources(table, self.result.turn.scenario)]}
 
     def surface(self, sampling: Sampling) -> Surface:

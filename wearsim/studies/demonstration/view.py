@@ -193,11 +193,11 @@ class DemonstrationView(DesignsView):
         result = self.result
         need = result.requirement
         tests = [
-            (count_of(k, "failure", "no failure"), k, 0, 1.0) for k in range(need.failures + 1)
-        ]
-        tests += [
-            (f"no failure, {label}", 0, number, result.acceleration(number).value)
-            for number, label in enumerate(result.labels[1:], 1)
+            *((count_of(k, "failure", "no failure"), k, 0, 1.0) for k in range(need.failures + 1)),
+            *(
+                (f"no failure, {label}", 0, number, result.acceleration(number).value)
+                for number, label in enumerate(result.labels[1:], 1)
+            ),
         ]
         names, *_ = zip(*tests, strict=True)
         plans = [

@@ -82,8 +82,10 @@ class DissipationView(StudyView[DissipationResult]):
     def rows(self) -> Rows:
         """Return mean, ranges and standard deviation of the power, the mean first."""
         power = self.result.summaries["power"]
-        rows = [Row("mean dissipated power", power.mean, "W", power.mean_interval.half_width)]
-        rows.append(Row("inputs at their means", self.result.mean_problem_power, "W"))
+        rows = [
+            Row("mean dissipated power", power.mean, "W", power.mean_interval.half_width),
+            Row("inputs at their means", self.result.mean_problem_power, "W"),
+        ]
         if power.count == 1 or power.is_constant:
             equal = "" if power.count == 1 else ", equal in all realisations"
             return [*rows, Row("dissipated power", shown(power.mean, "W") + equal)]
@@ -179,8 +181,12 @@ class DissipationView(StudyView[DissipationResult]):
     def line(self) -> str:
         """Return the footer of the study, with its sampling error."""
         result, power = self.result, self.result.summaries["power"]
-        used = [result.described_model, f"{len(result.y)} strips", result.raw.plan]
-        used.append(f"{count(result.count)} realisations")
+        used = [
+            result.described_model,
+            f"{len(result.y)} strips",
+            result.raw.plan,
+            f"{count(result.count)} realisations",
+        ]
         error = within("mean dissipated power", power.mean_interval.half_width, power.mean)
         return footer(used, f"{error} (95 % interval)", lapse(result.raw.wall_seconds))
 
@@ -219,8 +225,11 @@ class DissipationView(StudyView[DissipationResult]):
         """Return convergence of mean and deviation, density of the power, power per length."""
         result = self.result
         course, constant = result.convergence(), result.summaries["power"].is_constant
-        panels = {"density": _density(result)}
-        panels |= {"band": _band(result), "realisations": _realisations(result)}
+        panels = {
+            "density": _density(result),
+            "band": _band(result),
+            "realisations": _realisations(result),
+        }
         for name, title in _LABELS:
             value, error = getattr(course, name), getattr(course, f"{name}_error")
             if constant:  # a constant power has rounding errors only
@@ -285,16 +294,19 @@ def _density(result: DissipationResult) -> Panel:
     across = np.linspace(low, high, 400)
     score = (across - summary.mean) / summary.std
     normal = np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau))
-    label = "normal distribution, same mean and std"
-    marks = [bars, Line(across, normal, colour=ORANGE, label=label)]
-    marks += [
-        Span(place, colour=colour, dash=dash, label=label, reach=1.0 / (1.0 + HEADROOM))
-        for place, colour, dash, label in (
-            (summary.mean, BLACK, "-", f"mean: {shown(summary.mean, 'W')}"),
-            (result.mean_problem_power, GREEN, "--", at_means),
-            (summary.quantile(0.025).value, GREY, ":", "2.5 % and 97.5 % quantile"),
-            (summary.quantile(0.975).value, GREY, ":", ""),
-        )
+    lines = (
+        (summary.mean, BLACK, "-", f"mean: {shown(summary.mean, 'W')}"),
+        (result.mean_problem_power, GREEN, "--", at_means),
+        (summary.quantile(0.025).value, GREY, ":", "2.5 % and 97.5 % quantile"),
+        (summary.quantile(0.975).value, GREY, ":", ""),
+    )
+    marks = [
+        bars,
+        Line(across, normal, colour=ORANGE, label="normal distribution, same mean and std"),
+        *(
+            Span(place, colour=colour, dash=dash, label=label, reach=1.0 / (1.0 + HEADROOM))
+            for place, colour, dash, label in lines
+        ),
     ]
     ends = f"from {shown(float(power.min()), 'W')} to {shown(float(power.max()), 'W')}"
     return Panel(

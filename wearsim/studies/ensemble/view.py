@@ -100,8 +100,12 @@ class RealisationsView(StudyView[Shown]):
         for name in observed(self.result):
             words, unit = OBSERVABLES[name]
             estimate = self.result.estimate(name, -1, QUANTILES)
-            values = {"": estimate.mean, ".mean": estimate.mean, ".std": estimate.std}
-            values |= {f".p{100.0 * p:g}": interval for p, interval in estimate.quantiles}
+            values = {
+                "": estimate.mean,
+                ".mean": estimate.mean,
+                ".std": estimate.std,
+                **{f".p{100.0 * p:g}": interval for p, interval in estimate.quantiles},
+            }
             answers |= {
                 f"{name}{ending}": Answer(value.value, unit, words)
                 for ending, value in values.items()
@@ -282,8 +286,13 @@ class EnsembleView(RealisationsView[EnsembleResult]):
     def line(self) -> str:
         """Return the footer of the ensemble, with its sampling errors."""
         result, raw, error = self.result, self.result.raw, ""
-        used = [result.described_model, raw.stepper, f"tolerance {raw.tolerance:g}", raw.plan]
-        used.append(f"{count(result.count)} realisations")
+        used = [
+            result.described_model,
+            raw.stepper,
+            f"tolerance {raw.tolerance:g}",
+            raw.plan,
+            f"{count(result.count)} realisations",
+        ]
         if result.count:
             depth = result.estimate("depth", -1, (0.95,))
             items = ("mean depth", depth.mean), ("its 95 % quantile", depth.quantiles[0][1])

@@ -56,8 +56,10 @@ def damage_panel(result: Result) -> Panel:
     """Return the damage of the cylinder across the track at every record, and of the rollers."""
     records = result.raw.records
     cylinder = np.asarray(records["cylinder_damage_profile"])[:, 0, 0]
-    marks: list[Mark] = [Records(result.y, cylinder, result.record_passes)]
-    marks += rollers_at_end(result.y, np.asarray(records["roller_damage_profile"])[-1, :, 0])
+    marks: list[Mark] = [
+        Records(result.y, cylinder, result.record_passes),
+        *rollers_at_end(result.y, np.asarray(records["roller_damage_profile"])[-1, :, 0]),
+    ]
     x = Axis("y", "mm", limits=worn_limits(result.y, cylinder.max(axis=0)))
     text = f"At the end the cylinder has a damage of {shown(float(cylinder[-1].max()), '1')}."
     title = "Damage of the cylinder by fatigue"

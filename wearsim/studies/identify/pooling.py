@@ -72,8 +72,7 @@ def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
             before = [(test.passes, test.item.surface) for test in tests[-1]] if tests else []
             later = bool(before) and row.passes >= before[-1][0]
             continues = later and (row.passes, row.item.surface) not in before
-            same = continues and _same_inputs(row, tests[-1][-1])
-            if same:
+            if continues and _same_inputs(row, tests[-1][-1]):
                 tests[-1].append(row)
             else:
                 tests.append([row])

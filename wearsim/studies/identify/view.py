@@ -239,15 +239,20 @@ class IdentificationView(StudyView[IdentificationResult]):
         if not raw.measured:
             return [_name(test["file"]) for test in self.result.tests]
         negligible = f"{self.result.summary['negligible']!r}"
-        options = ["--tests", self._tests_file, "--negligible", negligible]
-        options += ["--draws", str(raw.draws)] if raw.draws is not None else []
-        return [*options, *(["--share", "k=cylinder,roller"] if raw.shared else [])]
+        return [
+            *("--tests", self._tests_file, "--negligible", negligible),
+            *(["--draws", str(raw.draws)] if raw.draws is not None else []),
+            *(["--share", "k=cylinder,roller"] if raw.shared else []),
+        ]
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return K/H of each specimen, density of m and t, and traces with their residuals."""
         result = self.result
-        panels = {"factors": _factors(result), "scatter": _density_of_scatter(result)}
-        panels["density"] = _density(result)
+        panels = {
+            "factors": _factors(result),
+            "scatter": _density_of_scatter(result),
+            "density": _density(result),
+        }
         traced = [
             k for k in range(len(result.tests)) if np.isfinite(result.values("trace_y")[k, 0])
         ]
@@ -370,8 +375,10 @@ def _factors(result: IdentificationResult) -> Panel:
     """Return K/H of each specimen with its density, and the distribution of the next one."""
     k, following = np.exp(result.ln_k), result.summary["next_specimen"]
     std, middle = np.log(following["factor"]), np.log(following["median_per_Pa"])
-    named: list[tuple[str, Any]] = [*zip(result.raw.specimens, result.test_density, strict=True)]
-    named.append(("next specimen", np.exp(-0.5 * ((result.ln_k - middle) / std) ** 2)))
+    named: list[tuple[str, Any]] = [
+        *zip(result.raw.specimens, result.test_density, strict=True),
+        ("next specimen", np.exp(-0.5 * ((result.ln_k - middle) / std) ** 2)),
+    ]
     marks: list[Mark] = []
     for row, (name, density) in enumerate(named):
         colour, alpha = (BLUE, 0.35) if row < len(named) - 1 else (ORANGE, 0.5)
@@ -443,10 +450,10 @@ def power_sheet(designs: Sequence[PlannedDesign], title: str = "") -> Sheet:
             for t in (0.0, *SCATTERS)
         }
         marks: list[Mark] = [
-            Line(design.tests, rate, marker="o", size=3.5, colour=colour, label=label)
-            for (label, rate), colour in zip(rates.items(), (GREY, *COLOURS), strict=False)
-        ]
-        marks += [
+            *(
+                Line(design.tests, rate, marker="o", size=3.5, colour=colour, label=label)
+                for (label, rate), colour in zip(rates.items(), (GREY, *COLOURS), strict=False)
+            ),
             Line(
                 design.tests, design.explained[0.0], dash="--", marker="s", size=3.5, colour=RED,
                 label="'explained', t = 0",

@@ -98,10 +98,13 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
     designs = [_Design(*pair, len(results) > 1) for pair in pairs]
     titles = {result.title for result in results}
     axis = Axis("life", results[0].unit, 1.0)
-    panels = {"survival": _survival(designs, axis)}
-    panels |= {family: _probabilities(designs, family, axis) for family in FAMILIES}
-    panels |= {"tornado": _tornado(designs), "incidence": _incidence(designs, axis)}
-    panels["limits"] = _limits(designs)
+    panels = {
+        "survival": _survival(designs, axis),
+        **{family: _probabilities(designs, family, axis) for family in FAMILIES},
+        "tornado": _tornado(designs),
+        "incidence": _incidence(designs, axis),
+        "limits": _limits(designs),
+    }
     rows: list[list[str]] = [["survival", *FAMILIES], ["tornado", "incidence", "limits"]]
     if swept_variable(results) is not None:
         panels["against"] = _against(designs)

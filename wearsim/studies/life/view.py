@@ -301,12 +301,13 @@ class LifeView(RealisationsView[LifeResult]):
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""
-        settings, options = self.result.settings, study_options(self.result)
-        if self.result.raw.until:
-            options += ["--precision", self.result.raw.until]
-        if settings.rare:
-            options += ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
-        return options
+        settings, until = self.result.settings, self.result.raw.until
+        rare = ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
+        return [
+            *study_options(self.result),
+            *(["--precision", until] if until else []),
+            *(rare if settings.rare else []),
+        ]
 
 
 def _three_digits(result: LifeResult, share: float) -> str:
@@ -384,11 +385,11 @@ def _change(factor: Interval) -> str:
 def study_options(result: LifeResult) -> list[str]:
     """Return the options of a study of lives but for precision and rare events."""
     shares = ",".join(f"{share:g}" for share in result.settings.shares)
-    options = ["-n", str(result.settings.plain), "--seed", str(result.raw.seed), "--b", shares]
-    options += ["--max", f"{result.most:.17g}"]
-    if result.target is not None:
-        options += ["--target", f"{result.target:.17g}"]
-    return options
+    return [
+        *("-n", str(result.settings.plain), "--seed", str(result.raw.seed), "--b", shares),
+        *("--max", f"{result.most:.17g}"),
+        *(["--target", f"{result.target:.17g}"] if result.target is not None else []),
+    ]
 
 
 def rare_command(result: LifeResult) -> str:

@@ -156,10 +156,12 @@ class FieldReturnsView(DesignsView):
         result, posterior = self.result, self.result.posterior
         pairs = [result.wear_factor(levels) for levels in (posterior.before, posterior.after)]
         medians, scatters = zip(*pairs, strict=True)
-        known = {"median of K/H over the life factor [1/Pa]": medians}
-        known["scatter t of ln K/H"] = scatters
-        if result.life_factor > 1.0:
-            known["life factor"] = result.factor_before, result.factor
+        factors = {"life factor": (result.factor_before, result.factor)}
+        known = {
+            "median of K/H over the life factor [1/Pa]": medians,
+            "scatter t of ln K/H": scatters,
+            **(factors if result.life_factor > 1.0 else {}),
+        }
         lines = [
             [name, *(with_ends(end, "{:.3g}".format) for end in ends)]
             for name, ends in known.items()

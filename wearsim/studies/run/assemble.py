@@ -388,8 +388,7 @@ def surfaces(
     height = start_height(scenario, grid, angles)
     if form.has_crowned_cylinder:
         height = height - form.cylinder_drop(grid.y)
-    raised = roller_height(scenario, rollers, s)
-    drop = form.roller_drop(s) - raised
+    drop = form.roller_drop(s) - roller_height(scenario, rollers, s)
     # leading axes: stations, rollers, realisations
     height = height if height.ndim == 1 else height[:, None, None]
     gap = drop - height

@@ -42,8 +42,7 @@ def with_end(scenario: Scenario, limit: Limit | None) -> tuple[Scenario, Limit |
     override: dict[str, object] = {"operation.duration": f"{limit.value!r} s"}
     if limit.quantity == "passes":
         override = {"operation.passes": round(limit.value)}
-    files = scenario.files.__getitem__
-    ended = parse_scenario(scenario.text, scenario.file, files, override)
+    ended = parse_scenario(scenario.text, scenario.file, scenario.files.__getitem__, override)
     if ended.total_passes < scenario.total_passes:
         # a time is rounded to whole passes, as the duration of a scenario
         return scenario, Limit("passes", float(ended.total_passes), limit.text)

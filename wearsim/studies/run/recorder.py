@@ -222,8 +222,7 @@ def _rows_of(
     threshold: float,
 ) -> list[Variables]:
     """Return the row of each realisation of a state in the form of the results file."""
-    row = history_row(stepper, problem, state, threshold) | {"step_passes": step}
-    return _each(row, len(step))
+    return _each(history_row(stepper, problem, state, threshold) | {"step_passes": step}, len(step))
 
 
 def _each(row: Variables, realisations: int) -> list[Variables]:
@@ -349,8 +348,7 @@ class Recorder:
             self._records.append((problem, kept, passes))
         else:
             self._compute_records()
-            there = states_at(self.stepper, advance, [due])
-            self._records.append(self._row(problem, *there))
+            self._records.append(self._row(problem, *states_at(self.stepper, advance, [due])))
 
     @property
     def _waiting(self) -> list[tuple[WearProblem, WearState, float]]:
@@ -377,8 +375,7 @@ class Recorder:
                 singles = zip(starts, passes[:, None], strict=True)
                 state = joined_states([state_at(stepper, problem, *record) for record in singles])
             contents = _each(record_row(stepper, several, state), len(waiting))
-            rows = [(problem.grid, row) for row in contents]
-            self._records[-len(waiting) :] = rows
+            self._records[-len(waiting) :] = [(problem.grid, row) for row in contents]
         return self._records
 
     def _thin(self, passes: float) -> None:

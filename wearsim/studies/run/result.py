@@ -452,8 +452,7 @@ class Result(StudyResult[RunData]):
         for name in ESTIMATED:
             error = last.get(f"{name}_error")
             if error is not None and ALL_VARIABLES[name].unit != "1":
-                over_rollers = "roller" in ALL_VARIABLES[name].dims
-                greatest = error.max(axis=0) if over_rollers else error
+                greatest = error.max(axis=0) if "roller" in ALL_VARIABLES[name].dims else error
                 errors[_key(name, "_error")] = _number(greatest)
         return errors
 

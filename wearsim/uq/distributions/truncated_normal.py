@@ -275,8 +275,7 @@ class QuadraticExponent(MaxentDistribution):
         stop = -0.5 * fall / bend if from_above > 0.0 else (high - low) / scale
         pieces = [Piece(low, scale, exponent(fall, 0.0), stop)]
         if from_above > 0.0:
-            upper = exponent(-from_above, top)
-            pieces.append(Piece(high, scale, upper, 0.5 * from_above / bend))
+            pieces.append(Piece(high, scale, exponent(-from_above, top), 0.5 * from_above / bend))
         self._table = table = InverseTable(pieces)
         self.mean, self.std = table.mean, table.std
         log_total = math.log(scale) + table.log_total
