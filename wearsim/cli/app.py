@@ -186,9 +186,12 @@ class Shell(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        self.commands |= {
-            name: LazyVerb(name, line, partial(_built_in, name)) for name, line in BUILT_IN.items()
-        }
+        self.commands.update(
+            {
+                name: LazyVerb(name, line, partial(_built_in, name))
+                for name, line in BUILT_IN.items()
+            }
+        )
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, built-in ones first."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -165,12 +166,14 @@ def _creepage_rows(creepage: Data) -> TableRows:
     if "longitudinal" in creepage:
         words.append(f"longitudinal {creepage['longitudinal']:.4g}")
     if creepage["drive"] == "free":
-        torque = creepage.get("bearing_torque_N_m")
-        words, friction = ["free"], creepage["bearing_friction"]
-        if torque or (torque is not None and not friction):
-            words.append(f"bearing torque {torque * 1e3:.4g} N mm")
-        if friction:
-            words.append(f"bearing friction {friction:g}")
+        torque: Any = creepage.get("bearing_torque_N_m")
+        friction = creepage["bearing_friction"]
+        stated = torque or (torque is not None and not friction)
+        words = [
+            "free",
+            *([f"bearing torque {torque * 1e3:.4g} N mm"] if stated else []),
+            *([f"bearing friction {friction:g}"] if friction else []),
+        ]
     words += _fields(creepage, "yaw_rad", "tilt_rad")
     words += ["differential slip"] if creepage["differential_slip"] else []
     return [("creepage", ", ".join(words))] if words else []

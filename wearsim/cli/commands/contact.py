@@ -153,10 +153,11 @@ def _notes_on_means(scenario: Scenario) -> list[str]:
     """Return notes that name the random inputs, which are set to their means."""
     fields = [item.name for item in scenario.random if item.role == "field"]
     others = [item.name for item in scenario.random if item.role != "field"]
-    notes = [f"random inputs are set to their means: {', '.join(others)}"] if others else []
-    if fields:
-        notes.append(f"random fields are set to the means of their marginals: {', '.join(fields)}")
-    return notes
+    named = {
+        "random inputs are set to their means": others,
+        "random fields are set to the means of their marginals": fields,
+    }
+    return [f"{text}: {', '.join(names)}" for text, names in named.items() if names]
 
 
 def dissipation(

@@ -412,9 +412,11 @@ def _regular(places: Any) -> Any:
 
 
 def _draw_text(plot: Any, mark: Text, x: Axis, y: Axis) -> None:
-    places: dict[str, Any] = {"x": float(mark.x * x.scale), "y": float(mark.y * y.scale)}
-    if mark.parts:
-        places |= {mark.parts: 3, f"{mark.parts}_units": "screen"}
+    places: dict[str, Any] = {
+        "x": float(mark.x * x.scale),
+        "y": float(mark.y * y.scale),
+        **({mark.parts: 3, f"{mark.parts}_units": "screen"} if mark.parts else {}),
+    }
     plot.add_layout(
         Label(
             text=plain_label(mark.text), text_color=_colour(mark.colour), text_align=mark.anchor,

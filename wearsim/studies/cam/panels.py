@@ -313,16 +313,16 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     follower, kinematics = turn.cam.follower, point.kinematics
     fresh = surface_points(follower, kinematics, point.angle)[1]
     cut = surface_points(follower, kinematics, point.angle, factor * worn)[1]
-    marks: list[Mark] = [] if turn.cam.groove else [Patch(*cut, alpha=0.12)]
-    marks += [
-        _curve(between_flanks(fresh, point), width=0.9, colour=GREY, label="unworn"),
-        _curve(between_flanks(cut, point), width=1.4, label=f"worn, depth x {factor:g}"),
-    ]
     starts = np.asarray(turn.cam.motion.starts[:-1])
     edges = fresh[:, np.abs(point.angle - starts[:, None]).argmin(axis=1)]
-    marks += [Line([0.0, x], [0.0, y], dash=":", width=0.6, colour=GREY) for x, y in edges.T]
+    marks: list[Mark] = [
+        *([] if turn.cam.groove else [Patch(*cut, alpha=0.12)]),
+        _curve(between_flanks(fresh, point), width=0.9, colour=GREY, label="unworn"),
+        _curve(between_flanks(cut, point), width=1.4, label=f"worn, depth x {factor:g}"),
+        *(Line([0.0, x], [0.0, y], dash=":", width=0.6, colour=GREY) for x, y in edges.T),
+        axis_mark(),
+    ]
     text = f"The cam before wear, and at the end with its depth magnified {factor:g} times."
-    marks.append(axis_mark())
     return Panel("Worn cam", *_PLANE, marks, text, legend="below", columns=2, equal=True)
 
 

@@ -213,9 +213,8 @@ class CamView(View):
             "patch_width_m": ("m", study.patch_width),
             "longitudinal_creepage": ("1", study.contacts.longitudinal_creepage),
             "power_W": ("W", study.contacts.power),
+            **({} if study.weight is None else {"weight_rad": ("rad", study.weight)}),
         }
-        if study.weight is not None:
-            columns["weight_rad"] = ("rad", study.weight)
         lubricant = turn.scenario.lubricant
         if lubricant is not None and study.film is not None:
             columns["film_thickness_m"] = ("m", study.film)

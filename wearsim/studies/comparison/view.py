@@ -265,12 +265,12 @@ def against(comparison: Comparison, row: Compared) -> list[tuple[str, str]]:
         errors = (first.value.half_width, row.value.half_width)
         text = _of_runs(row.difference, errors, unit, more, less)
         return [(f"{row.label} against {first.label}", text)]
-    rows = []
-    if row.deeper is not None:
-        rows.append((f"{row.label} {more} than {first.label}", _of_tests(first, row, row.deeper)))
-    if row.paired is not None:
-        rows.append(("  with the same draws", _of_pairs(row.paired, unit, more, less)))
-    return rows
+    deeper, paired = row.deeper, row.paired
+    name = f"{row.label} {more} than {first.label}"
+    return [
+        *([(name, _of_tests(first, row, deeper))] if deeper is not None else []),
+        *([("  with the same draws", _of_pairs(paired, unit, more, less))] if paired else []),
+    ]
 
 
 def _of_runs(
@@ -350,9 +350,11 @@ def comparison_sheet(
             "Share of the tests that are below a value.",
             legend="",
         )
-    panels = {"ranges": _ranges(comparison, colours, at_end), "values": left}
-    if profiles:
-        panels["profiles"] = _profiles(profiles)
+    panels = {
+        "ranges": _ranges(comparison, colours, at_end),
+        "values": left,
+        **({"profiles": _profiles(profiles)} if profiles else {}),
+    }
     size = (13.0, max(4.6, 1.8 + _ROW_HEIGHT * len(rows)))
     return Sheet(fill(title, _LINE_LENGTH), panels, [["values", "ranges"]], size)
 

@@ -216,15 +216,19 @@ def _fields(fields: ContactFields, solution: ContactSolution) -> dict[str, Panel
 
     pick = np.ix_(_spread_out(y.shape[0], 8), _spread_out(y.shape[1], 12))
     percent = 100.0 * solution.adhesion_fraction
-    areas: list[Mark] = [Patch(*outline, colour=SLIDE) for outline in outlines]
-    if min(y.shape) > 1:
-        adhesion = fields.adhesion[:, inside].astype(float)
-        areas.append(Contours(y, x, adhesion, (-0.5, 0.5, 1.5), (SLIDE, STICK)))
-    for colour, label in (
-        (STICK, f"adhesion, {percent:.1f} % of the area"),
-        (SLIDE, f"slip, {100.0 - percent:.1f} %"),
-    ):
-        areas.append(Patch(np.full(3, y[0, 0]), np.zeros(3), colour=colour, label=label))
+    labels = {
+        STICK: f"adhesion, {percent:.1f} % of the area",
+        SLIDE: f"slip, {100.0 - percent:.1f} %",
+    }
+    adhesion = y, x, fields.adhesion[:, inside].astype(float)
+    areas: list[Mark] = [
+        *(Patch(*outline, colour=SLIDE) for outline in outlines),
+        *([Contours(*adhesion, (-0.5, 0.5, 1.5), (SLIDE, STICK))] if min(y.shape) > 1 else []),
+        *(
+            Patch(np.full(3, y[0, 0]), np.zeros(3), colour=colour, label=label)
+            for colour, label in labels.items()
+        ),
+    ]
     return {
         "pressure": panel(
             "Pressure",
@@ -289,9 +293,8 @@ def _strips(study: ContactStudy) -> dict[str, Panel]:
         if reference is not None and errors is not None:
             theirs: FloatArray = getattr(reference, key)
             near = _touching(reference.line_load)
-            text = reference.model
-            if key == "dissipation":
-                text += f"; difference {shown(errors.dissipation, '%', 2)} (L2)"
+            difference = f"; difference {shown(errors.dissipation, '%', 2)} (L2)"
+            text = reference.model + (difference if key == "dissipation" else "")
             curve = reference.y[near], theirs[near]
             marks.append(Line(*curve, dash="--", width=1.0, colour=BLACK, label=text))
             top = 1.25 * 1.05 * max(float(values.max()), float(theirs.max()))

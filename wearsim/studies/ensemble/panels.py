@@ -77,18 +77,15 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
         "convergence": _convergence(result),
         "profile": _profile(result, measured),
     }
-    lower = ["profile"]
-    curves = (
-        ("lift", "lift_error_curve", _lift_error),
-        ("damage", "cylinder_damage_profile", _damage),
-    )
-    for name, curve, panel in curves:
-        if len(result.profiles) and curve in result.raw.schema.variables:
-            panels[name] = panel(result)
-            lower.append(name)
-    panels["effects"] = _effects(result)
+    curves = {
+        "lift": ("lift_error_curve", _lift_error),
+        "damage": ("cylinder_damage_profile", _damage),
+    }
+    known = result.raw.schema.variables if len(result.profiles) else ()
+    drawn = {name: panel(result) for name, (curve, panel) in curves.items() if curve in known}
+    panels |= {**drawn, "effects": _effects(result)}
     panels |= draws_panels(result, "depth", result.at_end("depth"), Axis("depth at the end", "um"))
-    lower.append("effects")
+    lower = ["profile", *drawn, "effects"]
     rows = [["course", "density", "convergence"], lower]
     return Sheet(title, panels, rows, (13.0 if len(lower) < 4 else 17.0, 7.5), main="course")
 
@@ -163,23 +160,23 @@ def _density(result: EnsembleResult) -> Panel:
         return message(title, f"{shown(float(depth.mean()), 'um')} in {where}: no density to draw")
     estimate = result.estimate("depth", -1, (0.05, 0.5, 0.95))
     low, median, high = (estimate.quantile(p).value for p in (0.05, 0.5, 0.95))
+    ends = [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", "")]
     lines: list[tuple[float, str, str, str]] = [
         (estimate.mean.value, BLACK, "--", f"mean {shown(estimate.mean.value, 'um')}"),
         (median, BLUE, "-", f"median {shown(median, 'um')}"),
+        *(ends if sufficient_for(result.count, NINETY_PERCENT[0]) else []),
     ]
-    if sufficient_for(result.count, NINETY_PERCENT[0]):
-        lines += [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", "")]
     marks = [
         Span(place, colour=colour, dash=dash, label=label, width=1.1, reach=1.0 / (1.0 + HEADROOM))
         for place, colour, dash, label in lines
     ]
-    ends = f"from {shown(float(depth.min()), 'um')} to {shown(float(depth.max()), 'um')}"
+    extremes = f"from {shown(float(depth.min()), 'um')} to {shown(float(depth.max()), 'um')}"
     return Panel(
         title,
         Axis("depth", "um"),
         Axis("probability density", "1/um", 1e-6, margin=(0.0, HEADROOM), limits=(0.0, None)),
         [histogram(depth)[0], *marks],
-        f"Depths of {count(len(depth))} tests, {ends}.",
+        f"Depths of {count(len(depth))} tests, {extremes}.",
         legend="upper right",
         columns=2,
     )
@@ -203,12 +200,13 @@ def _convergence(result: EnsembleResult) -> Panel:
 def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
     """Return the mean worn profile with its 95 % range, and measured profiles over it."""
     profile = result.worn_profile()
-    marks: list[Mark] = [Line(profile.y, profile.height, colour=BLACK, label="mean")]
-    if profile.label:
-        marks.insert(0, Band(profile.y, profile.low, profile.high, label=profile.label))
-    if profile.start.any():
-        label = "start of the tests"
-        marks.append(Line(profile.y, profile.start, dash="--", width=1.0, colour=GREY, label=label))
+    y, text = profile.y, "start of the tests"
+    start = Line(y, profile.start, dash="--", width=1.0, colour=GREY, label=text)
+    marks: list[Mark] = [
+        *([Band(y, profile.low, profile.high, label=profile.label)] if profile.label else []),
+        Line(y, profile.height, colour=BLACK, label="mean"),
+        *([start] if profile.start.any() else []),
+    ]
     limits = worn_limits(profile.y, profile.start - profile.low, *(item.y for item in measured))
     title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
     title += "" if profile.kept == result.count else f", of the first {count(profile.kept)}"

@@ -132,10 +132,9 @@ class RealisationsView(StudyView[Shown]):
         scenario = fatigue_scenario(result)
         blocks = _realisations(result.raw)
         tables: dict[str, Columns] = {
-            "realisations.csv": (with_sources(block, scenario) for block in blocks)
+            "realisations.csv": (with_sources(block, scenario) for block in blocks),
+            **({"courses.csv": [with_sources(_courses(result), scenario)]} if result.count else {}),
         }
-        if result.count:
-            tables["courses.csv"] = [with_sources(_courses(result), scenario)]
         for name in [name for name in KEPT if result.count and name in result.raw.schema.variables]:
             band, (file, what) = result.band(name), _CURVES.get(name, (name, "damage"))
             if what != "damage" or band.mean.any():  # of a body that may pit
@@ -195,7 +194,8 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         effort = lapse(wall)
         if wall and ended:
             effort += f", {shown(ended / wall, '1', 3)} realisations per second"
-        rows = [
+        intervals = result.count and result.plan != "monte-carlo"
+        return [
             Row("realisations", done),
             Row("sampling design", f"{raw.plan}, seed {raw.seed}"),
             Row(
@@ -205,10 +205,14 @@ class EnsembleView(RealisationsView[EnsembleResult]):
             *source_rows(fatigue_scenario(result)),
             Row("contact model", result.described_model),
             Row("stepper", f"{raw.stepper}, tolerance {raw.tolerance:g}"),
+            *(
+                [Row("95 % intervals", result.estimate("depth", -1, ()).method)]
+                if intervals
+                else []
+            ),
+            *self._precision(),
+            Row("wall time", effort),
         ]
-        if result.count and result.plan != "monte-carlo":
-            rows.append(Row("95 % intervals", result.estimate("depth", -1, ()).method))
-        return [*rows, *self._precision(), Row("wall time", effort)]
 
     def _precision(self) -> Rows:
         """Return rows on the target and on the variance removed by a control variate."""

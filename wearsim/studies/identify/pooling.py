@@ -26,6 +26,11 @@ FEW_DRAWS = 25.0
 _CURVE = 601  # values of ln K/H of a stored density
 _NODES = 81  # parts of the likelihood of a specimen that joins several tests
 _FIVE = (0.025, 0.05, 0.5, 0.95, 0.975)
+_NOTHING_RANDOM = (
+    "no input of the scenario is random: differences of load, friction, creepage or slack"
+    " between the tests count as scatter of K/H; give their distributions in the scenario,"
+    " or measured values with std in a tests file"
+)
 
 
 @dataclass(frozen=True)
@@ -302,7 +307,6 @@ def _to_decide(
 
 def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list[str]:
     """Return remarks on fits, on the number of draws and on missing random inputs."""
-    texts = [text for row in rows if row.fit is not None for text in row.fit.warnings]
     few = [
         specimen.name
         for specimen in specimens
@@ -310,18 +314,16 @@ def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list
         and specimen.kernel.effective_size < FEW_DRAWS
         and len(specimen.tests) == 1
     ]
-    if few:
-        texts.append(
-            f"{', '.join(few)}: fewer than {FEW_DRAWS:.0f} draws describe the shape of the groove;"
-            " give more with --draws"
-        )
-    if len(specimens) > 1 and all(len(row.likelihood.mean) == 1 for row in rows):
-        texts.append(
-            "no input of the scenario is random: differences of load, friction, creepage or slack"
-            " between the tests count as scatter of K/H; give their distributions in the scenario,"
-            " or measured values with std in a tests file"
-        )
-    return texts
+    too_few = (
+        f"{', '.join(few)}: fewer than {FEW_DRAWS:.0f} draws describe the shape of the groove;"
+        " give more with --draws"
+    )
+    certain = len(specimens) > 1 and all(len(row.likelihood.mean) == 1 for row in rows)
+    return [
+        *(text for row in rows if row.fit is not None for text in row.fit.warnings),
+        *([too_few] if few else []),
+        *([_NOTHING_RANDOM] if certain else []),
+    ]
 
 
 def _traces(rows: Sequence[Identified]) -> dict[str, FloatArray]:

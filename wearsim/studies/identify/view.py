@@ -312,20 +312,19 @@ def deciding(decision: Mapping[str, Any], tests: int) -> str:
         Number of tests at hand.
     """
     measure = ", ".join(decision["measure"]) or "all inputs"
-    many = decision["tests"]
+    many = decision["tests"] or f"more than {decision['most_tests']}"
     now = f"{decision['power']:.2f} by these {tests} tests" if tests > 1 else "0 by one test"
-    lines = [
-        f"a scatter of {decision['scatter']:g} is seen with probability {now}, and 0.8 by "
-        + (f"{many}" if many else f"more than {decision['most_tests']}")
-        + " such tests"
-    ]
+    text = (
+        f"a scatter of {decision['scatter']:g} is seen with probability {now}, and 0.8 by {many}"
+        " such tests"
+    )
     if decision["tests_if_measured"] and decision["power_if_measured"] > decision["power"]:
-        lines.append(
-            f"with {measure} measured, so that inputs leave 0.1:"
+        text += (
+            f"\nwith {measure} measured, so that inputs leave 0.1:"
             f" {decision['power_if_measured']:.2f}, and 0.8 by"
             f" {decision['tests_if_measured']} tests"
         )
-    return "\n".join(lines)
+    return text
 
 
 _IN_FIGURE, MOST_TRACES, MOST_POINTS = 6, 12, 1200

@@ -98,7 +98,7 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
     designs = [_Design(*pair, len(results) > 1) for pair in pairs]
     titles = {result.title for result in results}
     axis = Axis("life", results[0].unit, 1.0)
-    panels = {
+    panels: dict[str, Panel] = {
         "survival": _survival(designs, axis),
         **{family: _probabilities(designs, family, axis) for family in FAMILIES},
         "tornado": _tornado(designs),
@@ -248,10 +248,9 @@ def _fit_marks(fit: FittedLives, life: FloatArray, colour: str, *, is_best: bool
     inside = (score > low) & (score < high)
     life, score, reach = life[inside], score[inside], reach[inside]
     dash, label = ("-", "fit, lower AIC") if is_best else ("--", "fit")
-    marks: list[Mark] = [Line(life, score, dash=dash, width=1.4, colour=colour, label=label)]
-    if reach.any():
-        marks.append(Band(life, score - reach, score + reach, colour=colour, alpha=0.15))
-    return marks
+    band = Band(life, score - reach, score + reach, colour=colour, alpha=0.15)
+    line = Line(life, score, dash=dash, width=1.4, colour=colour, label=label)
+    return [line, band] if reach.any() else [line]
 
 
 def _tornado(designs: Sequence[_Design]) -> Panel:

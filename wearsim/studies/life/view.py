@@ -84,8 +84,7 @@ class LifeView(RealisationsView[LifeResult]):
             obstacle = result.probability_obstacle(result.target)
             if obstacle and result.rare is None and not result.settings.alone:
                 rows.append(Row("tests that sample the other inputs", f"`{rare_command(result)}`"))
-        for method, estimate in result.rare_estimates.items():
-            rows.append(Row(f"by {method}", rare_text(estimate)))
+        rows += [Row(f"by {name}", rare_text(item)) for name, item in result.rare_estimates.items()]
         if result.rare is not None and not result.rare.is_reliable:
             rows.append(Row("small probability", "not stated; give a greater --rare"))
         if not result.observed.any() and not result.is_exact:
@@ -107,10 +106,11 @@ class LifeView(RealisationsView[LifeResult]):
                 factor += f", with its posterior given {_tests_of(result)}"
             alone = "; nothing else is random, so that one test is sufficient"
             factor += alone if settings.alone else ""
-        ends = f"{count(int(result.observed.sum()))} ended by a limit"
-        ends += f", {count(result.censored)} censored at {count(result.most)} {result.unit}"
-        if result.at_once:
-            ends += f"; {count(result.at_once)} reached a limit at once, when fresh"
+        fresh = f"; {count(result.at_once)} reached a limit at once, when fresh"
+        ends = (
+            f"{count(int(result.observed.sum()))} ended by a limit, {count(result.censored)}"
+            f" censored at {count(result.most)} {result.unit}{fresh if result.at_once else ''}"
+        )
         return [
             Row("life", f"{result.unit} until the first of: {limits}"),
             Row("realisations", done if result.finished else f"{done}, unfinished"),
@@ -430,10 +430,9 @@ def rare_text(estimate: RareProbability) -> str:
     if not estimate.is_reliable:
         return f"refused, {estimate.obstacle}"
     chance = estimate.probability
-    text = (
-        f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(estimate.tests)} tests"
+    size = estimate.effective_size
+    return (
+        f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(estimate.tests)} tests,"
+        f" variation {shown(estimate.variation, '%', 2)}"
+        + ("" if size is None else f", effective sample size {size:.0f}")
     )
-    text += f", variation {shown(estimate.variation, '%', 2)}"
-    if estimate.effective_size is not None:
-        text += f", effective sample size {estimate.effective_size:.0f}"
-    return text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
@@ -105,9 +105,11 @@ class FieldReturnsView(DesignsView):
         fleet = result.returns.fleet
         failed = int(fleet.failed.sum())
         known = int((fleet.failed & (fleet.low < fleet.high)).sum())
-        units = f"{count_of(len(fleet), 'unit')}: {count(failed)} failed"
-        units += f", {count(known)} of them at an inspection" if known else ""
-        units += f", {count(len(result.running))} running"
+        inspected = f", {count(known)} of them at an inspection" if known else ""
+        units = (
+            f"{count_of(len(fleet), 'unit')}: {count(failed)} failed{inspected},"
+            f" {count(len(result.running))} running"
+        )
         factor = result.life_factor
         prior = f"median 1, two of three within {factor:g} times" if factor > 1.0 else "1"
         limits = ", ".join(limit_texts(result.designs[0].scenario.limit.given))
@@ -172,13 +174,16 @@ class FieldReturnsView(DesignsView):
         """Return the running units with the least remaining lives."""
         result, target = self.result, self.result.designs[0].target
         units = sorted(result.running, key=lambda unit: unit.remaining.lives[0].value)[:_MOST]
-        columns = {"running unit": [unit.name for unit in units]}
-        if len(result.labels) > 1:
-            columns["design"] = [result.labels[unit.design] for unit in units]
-        columns[f"age [{result.unit}]"] = [count(float(f"{unit.age:.4g}")) for unit in units]
-        for place, share in enumerate(SHARES):
-            lives = [_life(unit.remaining.lives[place]) for unit in units]
-            columns[f"further life, B{share:g}"] = lives
+        designs = {"design": [result.labels[unit.design] for unit in units]}
+        columns = {
+            "running unit": [unit.name for unit in units],
+            **(designs if len(result.labels) > 1 else {}),
+            f"age [{result.unit}]": [count(float(f"{unit.age:.4g}")) for unit in units],
+            **{
+                f"further life, B{share:g}": [_life(unit.remaining.lives[place]) for unit in units]
+                for place, share in enumerate(SHARES)
+            },
+        }
         if target is not None:
             chances = [unit.remaining.survival for unit in units]
             texts = ["reached" if part is None else part_with_interval(part) for part in chances]
@@ -192,7 +197,7 @@ class FieldReturnsView(DesignsView):
     def data(self) -> dict[str, Any]:
         """Return all numbers, lives in their unit."""
         result, posterior, check = self.result, self.result.posterior, self.result.check
-        designs = []
+        designs: list[dict[str, Any]] = []
         for number, label in enumerate(result.labels):
             design = result.designs[number]
             b = {
@@ -202,16 +207,15 @@ class FieldReturnsView(DesignsView):
                 }
                 for share in design.settings.shares
             }
-            entry: dict[str, Any] = {"label": label, "b": b, "target": design.target}
+            designs.append({"label": label, "b": b, "target": design.target})
             if design.target is not None:
-                entry["probability_before_target"] = {
+                designs[-1]["probability_before_target"] = {
                     name: asdict(lives[number].probability_before(design.target))
                     for name, lives in (
                         ("before", result.lives_before),
                         ("after", result.lives_after),
                     )
                 }
-            designs.append(entry)
         before, after = (
             dict(zip(("k_over_h", "scatter"), map(asdict, result.wear_factor(levels)), strict=True))
             for levels in (posterior.before, posterior.after)
@@ -301,21 +305,19 @@ def _judged(probability: float, contradicted: str, agreed: str) -> str:
     return f"p = {probability:.2g}: {contradicted if probability < 0.05 else agreed}"
 
 
-def _warnings(result: FieldReturns) -> Sequence[str]:
+def _warnings(result: FieldReturns) -> Iterator[str]:
     """Return what speaks against the model."""
-    check, warnings = result.check, []
-    if check.fit < 0.05:
-        warnings.append(
-            f"the lives in the field do not have the predicted distribution (p = {check.fit:.2g}):"
+    fit, factor, prior = result.check.fit, result.factor, result.factor_before
+    if fit < 0.05:
+        yield (
+            f"the lives in the field do not have the predicted distribution (p = {fit:.2g}):"
             " another limit or another scatter of the inputs than in the scenario"
         )
-    factor, prior = result.factor, result.factor_before
     if result.life_factor > 1.0 and not prior.low < factor.value < prior.high:
-        warnings.append(
+        yield (
             f"the life factor of {factor.value:.2g} is outside its prior: the computed life is"
             " systematically wrong, or the units are not those of the scenario"
         )
-    return warnings
 
 
 _POINTS = 80

@@ -405,9 +405,11 @@ class RunInProgress:
         """Return the content of the results file."""
         scenario, problem = self.scenario, self.present
         kinematics = problem.kinematics
-        checkpoint = self.recorder.state.to_arrays()
-        checkpoint["record_base"] = np.asarray(self.record_base)
-        checkpoint["spacing"] = np.asarray(problem.grid.spacing)
+        checkpoint = {
+            **self.recorder.state.to_arrays(),
+            "record_base": np.asarray(self.record_base),
+            "spacing": np.asarray(problem.grid.spacing),
+        }
         return RunData(
             **self.origin,
             drawn=self.drawn,

@@ -154,12 +154,13 @@ def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
 
 def _normal_force(result: Result) -> Panel:
     force = _by_roller(result.normal_force)
-    base, marks = _base_load(result), list[Mark]()
-    if base is not None:
-        marks.append(Line(*base, width=0.8, colour=GREY, label="without feedback"))
+    base = _base_load(result)
     # between the steps, a line would contradict the load; at many of them, the dots are a line
     style: dict[str, Any] = {} if base is None else {"dash": "", "marker": "o", "size": 2.6}
-    marks += _lines(result, force, "" if base is None else "at the steps", **style)
+    marks = [
+        *([Line(*base, width=0.8, colour=GREY, label="without feedback")] if base else []),
+        *_lines(result, force, "" if base is None else "at the steps", **style),
+    ]
     y = _force_axis("normal force", "N", force if base is None else np.array([0.0, 1.0]))
     title, text = "Normal force of one roller", _first_and_last(force, "N")
     return Panel(title, Axis("time", "min", margin=(0.02, 0.02)), y, marks, text)

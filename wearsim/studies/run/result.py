@@ -421,9 +421,7 @@ class Result(StudyResult[RunData]):
         last.update({name: last[name].max(axis=0) for name in per_roller})
         deepest = np.maximum(last["depth"], last["roller_depth"])
         rollers = self.raw.static["multiplicity"] @ self.raw.history["roller_worn_volume"][-1]
-        below: dict[str, Number] = {}
-        if self.start_height.any():
-            below["depth_below_nominal_m"] = _number(np.asarray(self.depth_below_nominal[-1]))
+        below = {"depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1]))}
 
         def with_units(*names: str) -> dict[str, Number]:
             return {_key(name): _number(last[name]) for name in names}
@@ -432,7 +430,7 @@ class Result(StudyResult[RunData]):
             "passes": _number(last["passes"]),
             **self._final_of_cam(last),
             **with_units("time", "depth"),
-            **below,
+            **(below if self.start_height.any() else {}),
             **with_units("width", "worn_volume", "roller_depth", "roller_worn_volume"),
             **with_units("dissipated_energy", "power", "normal_force", "peak_pressure"),
             **with_units("descent", "elastic_approach"),

@@ -203,12 +203,15 @@ class RunView(StudyView[Result]):
     def line(self) -> str:
         """Return the footer of the run, with the estimated errors of its steps and strips."""
         result = self.result
-        used = [result.described_model, f"{len(result.y)} strips", result.stepper]
-        error = "no stepping error"
+        error, has_steps = "no stepping error", result.stepper != "per-pass"
+        used = [
+            result.described_model,
+            f"{len(result.y)} strips",
+            result.stepper,
+            *([f"tolerance {result.raw.tolerance:g}"] if has_steps else []),
+        ]
         known = bool(np.isfinite(result.profile_error_by_strips[-1]).all())
-        if result.stepper != "per-pass":
-            used.append(f"tolerance {result.raw.tolerance:g}")
-        if result.stepper != "per-pass" or known:
+        if has_steps or known:
             depth = max(np.max(result.depth[-1]), np.max(result.roller_depth[-1]))
             volume = np.max(result.worn_volume[-1])
             text, parts = within("depth", np.max(result.depth_error[-1]), depth), "steps"
