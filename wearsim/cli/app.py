@@ -251,8 +251,12 @@ def _message(error: BaseException) -> str:
         from wearsim.cli.solver_state import solver_state
 
         state = solver_state(error.state)
-        lines = [f"error: {error.at_shell}", *([f"state at the failure: {state}"] if state else [])]
-        return "\n".join([*lines, *getattr(error, "__notes__", ())])
+        lines = [
+            f"error: {error.at_shell}",
+            *([f"state at the failure: {state}"] if state else []),
+            *getattr(error, "__notes__", ()),
+        ]
+        return "\n".join(lines)
     if isinstance(error, ScenarioError | Interrupted):  # their messages start with file or progress
         return error.at_shell
     if isinstance(error, WearsimError):

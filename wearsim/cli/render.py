@@ -75,8 +75,8 @@ def _write_tables(view: View, files: Mapping[str, object], stored: bool, brief: 
     from wearsim.report.view import ORIGIN, STUDY, Row, Table
 
     tables = [] if brief else [table for table in view.tables() if stored or table.title != ORIGIN]
-    written = [Row(name, str(item)) for name, item in files.items()]
     place, title = int(bool(tables) and tables[0].title == STUDY), view.title
+    written = (Row(name, str(item)) for name, item in files.items())
     tables.insert(place, Table(view.heading, [*view.rows(), *written]))
     for table in tables:
         if table.heads:

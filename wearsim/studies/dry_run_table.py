@@ -106,12 +106,12 @@ def _form(body: Data) -> list[str]:
 
 def station_table(stations: Data) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows of the table of a cam's stations, in engineering units."""
-    heads = ["angle [deg]", "weight [deg]", "V [m/s]", "curvature [1/mm]", "N [N]"]
+    heads = ["angle [deg]", "weight [deg]", "V [m/s]", "curvature [1/mm]", "N [N]", "segment"]
     sizes = [np.degrees(1.0), np.degrees(1.0), 1.0, 1e-3, 1.0]
     columns = [values * size for values, size in zip([*stations.values()][1:], sizes, strict=True)]
     rows = [[f"{value:.4g}" for value in row] for row in zip(*columns, strict=True)]
     named = [[*row, name] for row, name in zip(rows, stations["segment"], strict=True)]
-    return [*heads, "segment"], named
+    return heads, named
 
 
 def _range(bounds: Sequence[float], unit: str, size: float) -> str:

@@ -417,9 +417,12 @@ def _going_on(
         for label, scenario, file in zip(labels, scenarios, paths, strict=True):
             if file.exists():
                 continue
-            swept = ["--set", f"{key}={label}"] if key else []
-            options = [*swept, "--seed", str(scenario.seed), "-o", str(file)]
-            commands.append(shlex.join(["wearsim", "life", scenario.file, *options]))
+            words = [
+                *("wearsim", "life", scenario.file),
+                *(["--set", f"{key}={label}"] if key else []),
+                *("--seed", str(scenario.seed), "-o", str(file)),
+            ]
+            commands.append(shlex.join(words))
         steps = [
             *(f"`{command}` with the other options" for command in commands),
             f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`",

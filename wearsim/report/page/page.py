@@ -134,5 +134,11 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> dict[str, Any]:
         tables.insert(-1, Table("Measured profiles", residuals))
     remarks = [*filter(None, [view.failures]), *view.warnings, *view.notes]
     panels, steps = plots_of(view.panels(measured))
-    part = {"view": view, "rows": view.rows(), "tables": tables, "remarks": remarks}
-    return {**part, "panels": panels, "steps": steps}
+    return {
+        "view": view,
+        "rows": view.rows(),
+        "tables": tables,
+        "remarks": remarks,
+        "panels": panels,
+        "steps": steps,
+    }

@@ -79,18 +79,7 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
 
     right: dict[str, Any] = {"dash": "--", "right": True, "colour": ORANGE}
 
-    motion = [
-        Line(angle, kinematics.lift, label=f"{lift} [{unit}]"),
-        Line(angle, kinematics.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
-        Line(angle, kinematics.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
-    ]
     pressures = peak_pressures(Setup(turn.scenario), fine)
-    load: list[Mark] = [
-        Line(angle, fine.normal_force),
-        dots(point.angle, point.normal_force, "."),
-        over_angle(pressures, **right),
-        dots(point.angle, study.peak_pressure, ".", colour=ORANGE, right=True),
-    ]
     skids = [Span(skid.start, skid.stop, colour=RED, alpha=0.12) for skid in study.skids]
     names, edges = segment_marks(turn.cam.motion), segment_marks(turn.cam.motion, names=False)
     margin = (0.1, 0.0)  # the names of the segments lie below
@@ -101,7 +90,17 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
             "Motion of the follower",
             inner,
             Axis(f"{lift} and its derivatives", per_si=PER_SI[unit], margin=(0.18, 0.18)),
-            [*motion, *names],
+            [
+                Line(angle, kinematics.lift, label=f"{lift} [{unit}]"),
+                Line(angle, kinematics.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
+                Line(
+                    angle,
+                    kinematics.lift_per_rad2,
+                    label=f"acceleration [{unit}/rad$^2$]",
+                    colour=GREEN,
+                ),
+                *names,
+            ],
             "Lift, velocity and acceleration of the follower over a turn.",
             legend="upper right",
             columns=3,
@@ -122,7 +121,14 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
             f"Normal force, and peak pressure{shaded}",
             ANGLE,
             Axis("normal force", "N", margin=margin),
-            [*load, *names, *skids],
+            [
+                Line(angle, fine.normal_force),
+                dots(point.angle, point.normal_force, "."),
+                over_angle(pressures, **right),
+                dots(point.angle, study.peak_pressure, ".", colour=ORANGE, right=True),
+                *names,
+                *skids,
+            ],
             "Force between roller and cam, and peak pressure of the fresh contact.",
             right=_right("peak pressure", "MPa", pressures, PER_SI["MPa"], margin),
         ),

@@ -84,24 +84,27 @@ class ComparisonView(View):
     def rows(self) -> Rows:
         """Return the comparisons with the first, and the value of each."""
         rows, unit = self.comparison.rows, OBSERVABLES[self.comparison.observable].unit
-        differences = [Row(*pair) for row in rows[1:] for pair in against(self.comparison, row)]
-        values = [Row(row.label, f"{with_interval(row.value, unit)}, {kind(row)}") for row in rows]
-        return [*differences, *values]
+        return [
+            *(Row(*pair) for row in rows[1:] for pair in against(self.comparison, row)),
+            *(Row(row.label, f"{with_interval(row.value, unit)}, {kind(row)}") for row in rows),
+        ]
 
     def tables(self) -> list[Table]:
         """Return what is compared, and the estimates with their intervals."""
         comparison, named = self.comparison, OBSERVABLES[self.comparison.observable]
         what = f"{named.words} at the end" + (f", for values of {self.key}" if self.key else "")
-        described = [
-            Row(row.label, f"{kind(row)}; {length(row)}; {file}")
-            for row, file in zip(comparison.rows, self.files, strict=True)
-        ]
         estimated = next((row.quantiles for row in comparison.rows if row.quantiles), ())
         quantiles = (f"{100 * probability:g} %" for probability, _ in estimated)
         heads = ["[" + named.unit + "]", "mean", "std", *quantiles]
         lines = [line for row in comparison.rows for line in _lines(row, named.unit, len(heads))]
-        study = Table(STUDY, [Row("compared", what), *described])
-        return [study, Table("", lines, heads), self._side_by_side()]
+        study = [
+            Row("compared", what),
+            *(
+                Row(row.label, f"{kind(row)}; {length(row)}; {file}")
+                for row, file in zip(comparison.rows, self.files, strict=True)
+            ),
+        ]
+        return [Table(STUDY, study), Table("", lines, heads), self._side_by_side()]
 
     def _side_by_side(self) -> Table:
         """Return all answers of the results, one column for each of them."""
@@ -136,9 +139,11 @@ class ComparisonView(View):
     def frame(self) -> Frame:
         """Return the compared results, one row each."""
         rows, unit = self.comparison.rows, si_unit(self.comparison.observable)
-        ends = [(end, unit, np.array([getattr(row.value, end) for row in rows])) for end in _ENDS]
-        labels = ("label", "", np.array([row.label for row in rows]))
-        return Frame([labels, *ends], "result", range(1, len(rows) + 1))
+        columns = [
+            ("label", "", np.array([row.label for row in rows])),
+            *((end, unit, np.array([getattr(row.value, end) for row in rows])) for end in _ENDS),
+        ]
+        return Frame(columns, "result", range(1, len(rows) + 1))
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels, with the worn profiles for a page."""

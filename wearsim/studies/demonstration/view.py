@@ -136,8 +136,9 @@ class DemonstrationView(DesignsView):
         heads = [
             f"duration of the {what} [{need.unit}]",
             *(f"specimens, {text}" for text in allowed),
+            "passes without failure",
         ]
-        return Table("", lines, [*heads, "passes without failure"])
+        return Table("", lines, heads)
 
     def _passing(self, plan: Plan) -> str:
         return NOTHING if plan.specimens is None else part_with_interval(plan.passing)

@@ -152,13 +152,6 @@ class DissipationView(StudyView[DissipationResult]):
     def data(self) -> dict[str, Any]:
         """Return the estimates of the study in SI units."""
         result, raw = self.result, self.result.raw
-        estimates = {
-            f"{name}_{_SI[named.unit]}": raw.statistics[name] for name, named in QUANTITIES.items()
-        }
-        strips = {
-            f"dissipation_{part}_W_per_m": result.values(f"dissipation_{part}")
-            for part in ("mean", "std", "low", "high")
-        }
         return {
             "title": result.title,
             "model": raw.model,
@@ -168,11 +161,19 @@ class DissipationView(StudyView[DissipationResult]):
             "requested": raw.requested,
             "finished": result.finished,
             "mean_problem_power_W": result.mean_problem_power,
-            **estimates,
+            **{
+                f"{key}_{_SI[named.unit]}": raw.statistics[key] for key, named in QUANTITIES.items()
+            },
             "inputs": drawn_data(result),
             "random": varying_inputs(result, None),
             "friction_grid": raw.friction_grid or None,
-            "strips": {"y_m": result.y, **strips},
+            "strips": {
+                "y_m": result.y,
+                **{
+                    f"dissipation_{part}_W_per_m": result.values(f"dissipation_{part}")
+                    for part in ("mean", "std", "low", "high")
+                },
+            },
             "solve_seconds": raw.solve_seconds,
             "wall_seconds": raw.wall_seconds,
             **self.ending(),

@@ -311,8 +311,10 @@ class EnsembleView(RealisationsView[EnsembleResult]):
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the ensemble."""
         raw = self.result.raw
-        options = ["-n", str(self.result.requested), "--plan", raw.plan, "--seed", str(raw.seed)]
-        return [*options, *(["--precision", raw.until] if raw.until else [])]
+        return [
+            *("-n", str(self.result.requested), "--plan", raw.plan, "--seed", str(raw.seed)),
+            *(["--precision", raw.until] if raw.until else []),
+        ]
 
 
 def observed(result: EnsembleResult) -> list[str]:
@@ -440,5 +442,7 @@ def _band(raw: EnsembleData, name: str, what: str, band: Band) -> list[Column]:
     """Return mean and band of a curve at the end, under the name of its quantity."""
     variables, parts = raw.schema.variables, ("mean", "std", "low", "high")
     axis, unit = variables[name].dims[-1], variables[name].unit
-    curves = [computed(f"{what} {part}", getattr(band, part), unit) for part in parts]
-    return [computed(axis, band.y, variables[axis].unit), *curves]
+    return [
+        computed(axis, band.y, variables[axis].unit),
+        *(computed(f"{what} {part}", getattr(band, part), unit) for part in parts),
+    ]

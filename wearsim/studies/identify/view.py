@@ -174,11 +174,16 @@ class IdentificationView(StudyView[IdentificationResult]):
         numbers = np.broadcast_to(np.arange(1.0, len(known) + 1.0)[:, None], known.shape)
         y, *heights = (trace[known] for trace in traces)
         curves = [
-            Column(name, height, "um", 1e-6) for name, height in zip(names, heights, strict=True)
+            Column("test", numbers[known]),
+            Column("y", y, "mm", 1e-3),
+            *(
+                Column(name, height, "um", 1e-6)
+                for name, height in zip(names, heights, strict=True)
+            ),
         ]
         return {
             "tests.csv": [[Column(name, cells) for name, cells in table.items()]],
-            "traces.csv": [[Column("test", numbers[known]), Column("y", y, "mm", 1e-3), *curves]],
+            "traces.csv": [curves],
         }
 
     def frame(self) -> Frame:

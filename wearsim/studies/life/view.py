@@ -166,9 +166,12 @@ class LifeView(RealisationsView[LifeResult]):
             deviation = f"{math.sqrt(total):.2g}" if known else NOTHING
             cells = (predictive, plug_in, f"{low}..{high}", deviation)
             lines.append([f"B{share:g}", *cells, *(of_total if known else [NOTHING, NOTHING])])
-        head = f"life [{result.unit}], given {_tests_of(result)}"
-        parts_of = ["sd of ln life", "by more tests", "by more realisations"]
-        return Table("", lines, [head, "predictive", "plug-in", "95 % credible", *parts_of])
+        heads = [
+            f"life [{result.unit}], given {_tests_of(result)}",
+            *("predictive", "plug-in", "95 % credible"),
+            *("sd of ln life", "by more tests", "by more realisations"),
+        ]
+        return Table("", lines, heads)
 
     def _angle(self, name: str) -> str:
         """Return where on a cam a limit was reached, empty for other limits."""
@@ -395,11 +398,13 @@ def study_options(result: LifeResult) -> list[str]:
 def rare_command(result: LifeResult) -> str:
     """Return the command for a small probability of a life before the target."""
     given = _limits_in_si(result.scenario.limit.given)
-    limits = [text for limit in given for text in ("--limit", limit)]
-    options = [*study_options(result), *limits, "--rare", str(RARE_TESTS)]
     stem = Path(result.raw.scenario_file).stem.removesuffix("-life")
-    output = ["-o", f"{stem}-rare-life.h5"]
-    return shlex.join(["wearsim", "life", result.raw.scenario_file, *options, *output])
+    words = [
+        *("wearsim", "life", result.raw.scenario_file, *study_options(result)),
+        *(text for limit in given for text in ("--limit", limit)),
+        *("--rare", str(RARE_TESTS), "-o", f"{stem}-rare-life.h5"),
+    ]
+    return shlex.join(words)
 
 
 def _limits_in_si(limits: Mapping[str, float]) -> list[str]:

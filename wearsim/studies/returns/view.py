@@ -119,8 +119,10 @@ class FieldReturnsView(DesignsView):
             Row("wear factor", f"posterior given {self._tests()}, integrated exactly"),
             Row("prior of the life factor", prior),
         ]
-        tables = [Table(STUDY, study), self._lives(), self._bands(), self._known()]
-        return [*tables, *([self._running()] if result.running else [])]
+        return [
+            *(Table(STUDY, study), self._lives(), self._bands(), self._known()),
+            *([self._running()] if result.running else []),
+        ]
 
     def _tests(self) -> str:
         levels = self.result.posterior.before

@@ -124,8 +124,8 @@ def wider_grid(setup: Setup, grid: Grid, load: float, shift: float = 0.0) -> Gri
     if added <= 0:
         return None
     margin = added * grid.spacing
-    edges = grid.edges[0] - margin, grid.edges[1] + margin
-    return Grid.spanning(*edges, grid.strips + 2 * added)
+    low, high = grid.edges
+    return Grid.spanning(low - margin, high + margin, grid.strips + 2 * added)
 
 
 def strips_over(width: float, half_width: float, tolerance: float, groove: float = 0.0) -> int:

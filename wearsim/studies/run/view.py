@@ -197,8 +197,11 @@ class RunView(StudyView[Result]):
     def origin(self) -> dict[str, Any]:
         """Return length, records, scenario, files, plugins and software for JSON."""
         result = self.result
-        length = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
-        return {**length, **super().origin()}
+        return {
+            "total_passes": result.raw.total_passes,
+            "record_passes": result.record_passes,
+            **super().origin(),
+        }
 
     def line(self) -> str:
         """Return the footer of the run, with the estimated errors of its steps and strips."""
