@@ -465,9 +465,13 @@ def convergence(
     is_log = last > _LINEAR_UP_TO
     ends = (0.5 * _SCALED_FROM if is_log else 1.0, max(2.0, 1.05 * last))
     whole = None if is_log else np.unique(np.linspace(1, last, min(last, 10)).round()).tolist()
-    x = Axis("realisations", log=is_log, limits=ends, ticks=whole)
-    caption = f"The estimate from the first realisations, up to {count(last)} of them."
-    return Panel(title, x, Axis(name, unit, limits=limits), [*drawn, *marks], caption)
+    return Panel(
+        title,
+        Axis("realisations", log=is_log, limits=ends, ticks=whole),
+        Axis(name, unit, limits=limits),
+        [*drawn, *marks],
+        f"The estimate from the first realisations, up to {count(last)} of them.",
+    )
 
 
 def several_colours(number: int) -> list[str]:

@@ -57,10 +57,13 @@ def _bodies(scenario: Scenario) -> Panel:
     y = np.linspace(-half, half, 201)
     ground = np.zeros_like(y) if profile is None else np.interp(y, profile.y, profile.height)
     ground = ground - gap.cylinder_drop(y)
-    marks = [
-        Line(y, gap.roller_drop(y), colour="#0072b2", label="roller"),
-        Line(y, ground, colour="#b35900", label="cylinder"),
-    ]
-    caption = "Heights of cylinder and roller across the track before wear."
     axes = Axis("y", "mm"), Axis("height", "um")
-    return Panel("Bodies before wear", *axes, marks, caption)
+    return Panel(
+        "Bodies before wear",
+        *axes,
+        [
+            Line(y, gap.roller_drop(y), colour="#0072b2", label="roller"),
+            Line(y, ground, colour="#b35900", label="cylinder"),
+        ],
+        "Heights of cylinder and roller across the track before wear.",
+    )

@@ -206,17 +206,22 @@ def shape_panel(turn: CamTurn) -> Panel:
     centre, surface = surface_points(follower, point.kinematics, point.angle)
     reach = 1.25 * float(np.hypot(*centre).max())
     start = float(turn.at_angles(np.zeros(1)).kinematics.lift[0])
-    marks = [
-        _curve(between_flanks(surface, point), width=1.6, label="cam"),
-        _curve(centre, width=0.8, dash="--", colour=GREY, label="pitch curve"),
-        Line(*circle(base), width=0.6, dash=":", colour=GREY, label="base circle"),
-        *follower_marks(follower, start, turn.scenario.roller.radius, reach, "roller at 0 deg"),
-        axis_mark(),
-        *rotation_marks(0.5 * base),
-    ]
-    text = "The cam, the path of the roller's centre, and the follower at the start of a turn."
-    title = "Cam, turning clockwise"
-    return Panel(title, *_PLANE, marks, text, legend="below", columns=3, equal=True)
+    return Panel(
+        "Cam, turning clockwise",
+        *_PLANE,
+        [
+            _curve(between_flanks(surface, point), width=1.6, label="cam"),
+            _curve(centre, width=0.8, dash="--", colour=GREY, label="pitch curve"),
+            Line(*circle(base), width=0.6, dash=":", colour=GREY, label="base circle"),
+            *follower_marks(follower, start, turn.scenario.roller.radius, reach, "roller at 0 deg"),
+            axis_mark(),
+            *rotation_marks(0.5 * base),
+        ],
+        "The cam, the path of the roller's centre, and the follower at the start of a turn.",
+        legend="below",
+        columns=3,
+        equal=True,
+    )
 
 
 def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
@@ -302,11 +307,16 @@ def _map(
     # interpolation overshoots next to an edge
     image = Image(angle, result.y, np.maximum(values, 0.0).T, axis, "magma_r")
     limits = (1.25 * extent[0], 1.05 * extent[-1])  # the names of the segments lie below
-    y = Axis("y across the track", "mm", limits=limits)
     place = float(np.max(result.final[f"{quantity}_angle_rad"])) * DEG
     text = f"At the end {where} at {place:.4g} deg: "
     text += f"{shown(float(np.max(course[-1])), axis.unit)}."
-    return Panel(title, ANGLE, y, [image, *segment_marks(turn.cam.motion)], text)
+    return Panel(
+        title,
+        ANGLE,
+        Axis("y across the track", "mm", limits=limits),
+        [image, *segment_marks(turn.cam.motion)],
+        text,
+    )
 
 
 def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
@@ -328,8 +338,15 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
         *(Line([0.0, x], [0.0, y], dash=":", width=0.6, colour=GREY) for x, y in edges.T),
         axis_mark(),
     ]
-    text = f"The cam before wear, and at the end with its depth magnified {factor:g} times."
-    return Panel("Worn cam", *_PLANE, marks, text, legend="below", columns=2, equal=True)
+    return Panel(
+        "Worn cam",
+        *_PLANE,
+        marks,
+        f"The cam before wear, and at the end with its depth magnified {factor:g} times.",
+        legend="below",
+        columns=2,
+        equal=True,
+    )
 
 
 def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
@@ -375,9 +392,13 @@ def _residuals(motion: Motion, measured: MeasuredPoints) -> Panel:
         dots(measured.angle, measured.residual, ".", size=3.0),
         *segment_marks(motion, names=False),
     ]
-    title = f"Residuals of the {measured.quantity}, and twice its noise (shaded)"
-    text = "What was measured, less the spline that smooths it."
-    return Panel(title, ANGLE, Axis("measured less spline", unit), marks, text)
+    return Panel(
+        f"Residuals of the {measured.quantity}, and twice its noise (shaded)",
+        ANGLE,
+        Axis("measured less spline", unit),
+        marks,
+        "What was measured, less the spline that smooths it.",
+    )
 
 
 def _roller(result: Result) -> Panel:
@@ -387,5 +408,11 @@ def _roller(result: Result) -> Panel:
     if not profiles.any():
         marks.append(Line([], [], colour=ORANGE, label="the roller does not wear"))
         text = "The roller does not wear."
-    x = Axis(Y, "mm", limits=worn_limits(result.y, profiles.max(axis=0)))
-    return Panel("Worn profile of the roller", x, HEIGHT, marks, text, legend="lower center")
+    return Panel(
+        "Worn profile of the roller",
+        Axis(Y, "mm", limits=worn_limits(result.y, profiles.max(axis=0))),
+        HEIGHT,
+        marks,
+        text,
+        legend="lower center",
+    )

@@ -294,8 +294,11 @@ class CamView(View):
 
     def frame(self) -> Frame:
         """Return the stations, one row each."""
-        columns = [(name, unit, values) for name, (unit, values) in self._columns().items()]
-        return Frame(columns, "station", range(len(self.result.point.angle)))
+        return Frame(
+            [(name, unit, values) for name, (unit, values) in self._columns().items()],
+            "station",
+            range(len(self.result.point.angle)),
+        )
 
 
 def _without_rounding(values: FloatArray) -> list[float]:

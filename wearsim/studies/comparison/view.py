@@ -110,8 +110,11 @@ class ComparisonView(View):
         """Return all answers of the results, one column for each of them."""
         answers = [{row.label: row.text for row in view.rows()} for view in self._views]
         labels = list(dict.fromkeys(label for texts in answers for label in texts))
-        lines = [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels]
-        return Table("", lines, ["at the end", *(row.label for row in self.comparison.rows)])
+        return Table(
+            "",
+            [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels],
+            ["at the end", *(row.label for row in self.comparison.rows)],
+        )
 
     def overview(self) -> Overview:
         """Return the comparison, and the limits of each of the results."""
@@ -355,13 +358,16 @@ def comparison_sheet(
             "Share of the tests that are below a value.",
             legend="",
         )
-    panels = {
-        "ranges": _ranges(comparison, colours, at_end),
-        "values": left,
-        **({"profiles": _profiles(profiles)} if profiles else {}),
-    }
-    size = (13.0, max(4.6, 1.8 + _ROW_HEIGHT * len(rows)))
-    return Sheet(fill(title, _LINE_LENGTH), panels, [["values", "ranges"]], size)
+    return Sheet(
+        fill(title, _LINE_LENGTH),
+        {
+            "ranges": _ranges(comparison, colours, at_end),
+            "values": left,
+            **({"profiles": _profiles(profiles)} if profiles else {}),
+        },
+        [["values", "ranges"]],
+        (13.0, max(4.6, 1.8 + _ROW_HEIGHT * len(rows))),
+    )
 
 
 def _courses(pairs: list[tuple[Compared, str]], named: Named) -> Panel:
@@ -381,9 +387,14 @@ def _courses(pairs: list[tuple[Compared, str]], named: Named) -> Panel:
         if row.course is not None
     ]
     words = named.words[:1].upper() + named.words[1:]
-    x = pass_axis(max(row.passes for row, _ in pairs))
-    y, text = Axis(named.words, named.unit), "The course of each run."
-    return Panel(f"{words} against roller passes", x, y, marks, text, legend="")
+    return Panel(
+        f"{words} against roller passes",
+        pass_axis(max(row.passes for row, _ in pairs)),
+        Axis(named.words, named.unit),
+        marks,
+        "The course of each run.",
+        legend="",
+    )
 
 
 def _distribution(row: Compared, colour: str) -> list[Mark]:
@@ -419,11 +430,19 @@ def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
         legend = "\ndot: mean; thick line: 95 % interval; bar: median"
         legend += "; line: 5 % to 95 %" if any(_has_range(row) for row in rows) else ""
     low = min([0.0, *(row.value.value for row in rows)])
-    x = Axis(
-        f"{axis.label}{legend}", per_si=axis.scale, margin=(0.0, 0.03), limits=(min(low, 0.0), None)
+    return Panel(
+        title,
+        Axis(
+            f"{axis.label}{legend}",
+            per_si=axis.scale,
+            margin=(0.0, 0.03),
+            limits=(min(low, 0.0), None),
+        ),
+        Axis(limits=(len(rows) - 0.6, -0.8), ticks=()),
+        marks,
+        "Every row is one of the compared results.",
+        legend="",
     )
-    y = Axis(limits=(len(rows) - 0.6, -0.8), ticks=())
-    return Panel(title, x, y, marks, "Every row is one of the compared results.", legend="")
 
 
 def _interval(
@@ -473,6 +492,10 @@ def _profiles(profiles: dict[str, ComputedProfile]) -> Panel:
             marks.append(Band(profile.y, profile.low, profile.high, colour=colour))
         marks.append(Line(profile.y, profile.height, colour=colour, label=label))
     banded = any(profile.label for profile in profiles.values())
-    text = "Profiles at the end" + (", of ensembles the mean with a band." if banded else ".")
-    x = Axis(Y, "mm", limits=worn_limits(y, np.max(worn, axis=0)))
-    return Panel("Worn profiles", x, HEIGHT, marks, text)
+    return Panel(
+        "Worn profiles",
+        Axis(Y, "mm", limits=worn_limits(y, np.max(worn, axis=0))),
+        HEIGHT,
+        marks,
+        "Profiles at the end" + (", of ensembles the mean with a band." if banded else "."),
+    )

@@ -171,23 +171,28 @@ class ContactView(View):
         """Return the strips, one row each."""
         solution = self.result.solution
         units = {"y": "m", "half_length": "m", "line_load": "N/m", "dissipation": "W/m"}
-        columns = [(name, unit, getattr(solution, name)) for name, unit in units.items()]
-        return Frame(columns, "strip", range(len(solution.y)))
+        return Frame(
+            [(name, unit, getattr(solution, name)) for name, unit in units.items()],
+            "strip",
+            range(len(solution.y)),
+        )
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the fields, if there are any, line load and dissipated power per length."""
         study = self.result
-        title = (
-            f"{study.title}\n{study.described_model}\n"
-            f"normal force {shown(study.point.normal_force, 'N')},"
-            f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
-            f" dissipated power {shown(study.solution.power, 'W')}"
-        )
         panels = {} if study.fields is None else _fields(study.fields, study.solution)
         rows = [["pressure", "traction"], ["areas", "power"]] if panels else []
         panels |= _strips(study)
         rows.append(["line load", "dissipation"])
-        return Sheet(title, panels, rows, (10.0, 8.2 if study.fields is not None else 3.4))
+        return Sheet(
+            f"{study.title}\n{study.described_model}\n"
+            f"normal force {shown(study.point.normal_force, 'N')},"
+            f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
+            f" dissipated power {shown(study.solution.power, 'W')}",
+            panels,
+            rows,
+            (10.0, 8.2 if study.fields is not None else 3.4),
+        )
 
 
 def _times(error: float | None, value: float) -> float | None:

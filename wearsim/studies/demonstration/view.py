@@ -133,12 +133,15 @@ class DemonstrationView(DesignsView):
             )
         what = "test" if design == 0 else f"test at {result.labels[design]}"
         allowed = (count_of(k, "failure", "no failure") for k in range(need.failures + 1))
-        heads = [
-            f"duration of the {what} [{need.unit}]",
-            *(f"specimens, {text}" for text in allowed),
-            "passes without failure",
-        ]
-        return Table("", lines, heads)
+        return Table(
+            "",
+            lines,
+            [
+                f"duration of the {what} [{need.unit}]",
+                *(f"specimens, {text}" for text in allowed),
+                "passes without failure",
+            ],
+        )
 
     def _passing(self, plan: Plan) -> str:
         return NOTHING if plan.specimens is None else part_with_interval(plan.passing)

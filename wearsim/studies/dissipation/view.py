@@ -210,12 +210,15 @@ class DissipationView(StudyView[DissipationResult]):
 
     def frame(self) -> Frame:
         """Return the realisations, one row each."""
-        columns = [
-            (name, item.unit, self.result.values(name))
-            for name, item in self.result.raw.schema.variables.items()
-            if item.dims[0] == "realisation"
-        ]
-        return Frame(columns, "realisation", range(self.result.count))
+        return Frame(
+            [
+                (name, item.unit, self.result.values(name))
+                for name, item in self.result.raw.schema.variables.items()
+                if item.dims[0] == "realisation"
+            ],
+            "realisation",
+            range(self.result.count),
+        )
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""
@@ -301,20 +304,19 @@ def _density(result: DissipationResult) -> Panel:
         (summary.quantile(0.025).value, GREY, ":", "2.5 % and 97.5 % quantile"),
         (summary.quantile(0.975).value, GREY, ":", ""),
     )
-    marks = [
-        bars,
-        Line(across, normal, colour=ORANGE, label="normal distribution, same mean and std"),
-        *(
-            Span(place, colour=colour, dash=dash, label=label, reach=1.0 / (1.0 + HEADROOM))
-            for place, colour, dash, label in lines
-        ),
-    ]
     ends = f"from {shown(float(power.min()), 'W')} to {shown(float(power.max()), 'W')}"
     return Panel(
         title,
         Axis("$P_d$", "W", limits=(low, high)),
         Axis("probability density", "1/W", 1.0, limits=(0.0, None), margin=(0.0, HEADROOM)),
-        marks,
+        [
+            bars,
+            Line(across, normal, colour=ORANGE, label="normal distribution, same mean and std"),
+            *(
+                Span(place, colour=colour, dash=dash, label=label, reach=1.0 / (1.0 + HEADROOM))
+                for place, colour, dash, label in lines
+            ),
+        ],
         f"{count(len(power))} realisations, {ends}.",
         legend="upper right",
     )

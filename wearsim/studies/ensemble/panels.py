@@ -86,8 +86,13 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
     panels |= {**drawn, "effects": _effects(result)}
     panels |= draws_panels(result, "depth", result.at_end("depth"), Axis("depth at the end", "um"))
     lower = ["profile", *drawn, "effects"]
-    rows = [["course", "density", "convergence"], lower]
-    return Sheet(title, panels, rows, (13.0 if len(lower) < 4 else 17.0, 7.5), main="course")
+    return Sheet(
+        title,
+        panels,
+        [["course", "density", "convergence"], lower],
+        (13.0 if len(lower) < 4 else 17.0, 7.5),
+        main="course",
+    )
 
 
 def _caption(result: EnsembleResult) -> str:
@@ -133,8 +138,14 @@ def _course(result: EnsembleResult) -> Panel:
         marks.append(Line(passes, median, label="median"))
         mean = course.mean[drawn]
         marks.append(Line(passes, mean, dash="--", width=1.0, colour=BLACK, label="mean"))
-    text = f"The median of the depth is {shown(float(median[-1]), 'um')} at the end."
-    return Panel("Depth against roller passes", x, y, marks, text, legend="upper left")
+    return Panel(
+        "Depth against roller passes",
+        x,
+        y,
+        marks,
+        f"The median of the depth is {shown(float(median[-1]), 'um')} at the end.",
+        legend="upper left",
+    )
 
 
 def _some(x: FloatArray, rows: FloatArray) -> Line:
@@ -227,14 +238,16 @@ def _damage(result: EnsembleResult) -> Panel:
     body, name = ("cam", "damage_curve") if result.raw.cam else of_cylinder
     band, curves = result.band(name), result.kept_values(name)
     mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
-    text = (
-        f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests."
-    )
     x = ANGLE
     if body == "cylinder":
         x = Axis(Y, "mm", limits=worn_limits(band.y, curves.max(axis=0)))
-    marks = _curves(band.y, curves, band.mean)
-    return Panel(f"Damage of the {body} at the end", x, DAMAGE, marks, text)
+    return Panel(
+        f"Damage of the {body} at the end",
+        x,
+        DAMAGE,
+        _curves(band.y, curves, band.mean),
+        f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests.",
+    )
 
 
 def _lift_error(result: EnsembleResult) -> Panel:

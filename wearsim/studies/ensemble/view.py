@@ -88,8 +88,9 @@ class RealisationsView(StudyView[Shown]):
     def observables_table(self, title: str) -> Table:
         """Return the estimates of all observables at the end, with intervals."""
         names = observed(self.result)
-        lines = [line for name in names for line in _lines(self.result, name)]
-        return Table("", lines, (title, *_HEADS[1:]))
+        return Table(
+            "", [line for name in names for line in _lines(self.result, name)], (title, *_HEADS[1:])
+        )
 
     def answers(self) -> dict[str, Answer]:
         """Return the numbers of the rows and of the table of observables, ``depth.p95``.
@@ -115,16 +116,19 @@ class RealisationsView(StudyView[Shown]):
     def frame(self) -> Frame:
         """Return the successful realisations, one row each, at the end of the test."""
         result = self.result
-        columns = [
-            (
-                name,
-                item.unit,
-                result.at_end(name) if name in result.observables else result.values(name),
-            )
-            for name, item in result.raw.schema.variables.items()
-            if item.dims[0] == "realisation" and name not in {"status", "error"}
-        ]
-        return Frame(columns, "realisation", result.numbers)
+        return Frame(
+            [
+                (
+                    name,
+                    item.unit,
+                    result.at_end(name) if name in result.observables else result.values(name),
+                )
+                for name, item in result.raw.schema.variables.items()
+                if item.dims[0] == "realisation" and name not in {"status", "error"}
+            ],
+            "realisation",
+            result.numbers,
+        )
 
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, courses, and profile and lift error at the end."""
@@ -244,8 +248,11 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         effects = result.sensitivity("depth")
         totals = any(item.total is not None for item in effects)
         order = sorted(effects, key=lambda item: item.without_effect)
-        heads = [head, "first order", *(["total"] if totals else [])]
-        return Table("", [_effect(result, item, totals) for item in order], heads)
+        return Table(
+            "",
+            [_effect(result, item, totals) for item in order],
+            [head, "first order", *(["total"] if totals else [])],
+        )
 
     def data(self) -> dict[str, Any]:
         """Return the estimates in SI units."""

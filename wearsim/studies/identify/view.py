@@ -190,11 +190,18 @@ class IdentificationView(StudyView[IdentificationResult]):
         """Return the tests, one row for each groove."""
         tests = self._tests()
         units = {"file": "", "specimen": "", **{name: unit for _, name, _, unit in _NUMBERS}}
-        columns = [
-            (name, unit, np.array([np.nan if test[name] is None else test[name] for test in tests]))
-            for name, unit in {**units, "energy_J": "J"}.items()
-        ]
-        return Frame(columns, "groove", range(1, len(tests) + 1))
+        return Frame(
+            [
+                (
+                    name,
+                    unit,
+                    np.array([np.nan if test[name] is None else test[name] for test in tests]),
+                )
+                for name, unit in {**units, "energy_J": "J"}.items()
+            ],
+            "groove",
+            range(1, len(tests) + 1),
+        )
 
     def _tests(self) -> list[dict[str, Any]]:
         """Return the tests with one entry for each end of an interval."""
@@ -267,9 +274,13 @@ class IdentificationView(StudyView[IdentificationResult]):
         if traced:
             upper = ([f"{name} {place}" for place in drawn] for name in ("trace", "residual"))
             rows, heights = [*upper, *rows], [0.75, 0.35, 1.0]
-        size = (max(4.2 * len(drawn), 9.6), 8.6 if traced else 4.2)
-        title = f"{result.title}\n{result.verdict_words}"
-        return Sheet(title, panels, rows, size, heights=heights)
+        return Sheet(
+            f"{result.title}\n{result.verdict_words}",
+            panels,
+            rows,
+            (max(4.2 * len(drawn), 9.6), 8.6 if traced else 4.2),
+            heights=heights,
+        )
 
 
 def _name(file: str) -> str:

@@ -187,8 +187,13 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
                 Text(target, 0.02, "target", colour=BLACK, offset=(3.0, 0.0), size=9.0),
             ]
             text += f" Dotted: the target of {count(target)} {axis.unit}."
-    x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
-    return Panel("Survival, with 95 % band", x, share_axis("survival"), marks, text)
+    return Panel(
+        "Survival, with 95 % band",
+        Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None)),
+        share_axis("survival"),
+        marks,
+        text,
+    )
 
 
 def _scale(family: Family) -> Callable[[FloatArray], FloatArray]:
@@ -302,9 +307,13 @@ def _incidence(designs: Sequence[_Design], axis: Axis) -> Panel:
                 marks.append(Line(*curve, dash, steps=True, colour=design.colour, label=label))
     if not marks:
         return message(title, "no limit was reached")
-    x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
-    text = "Share of the machines whose life has ended at each limit."
-    return Panel(title, x, share_axis("ended"), marks, text)
+    return Panel(
+        title,
+        Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None)),
+        share_axis("ended"),
+        marks,
+        "Share of the machines whose life has ended at each limit.",
+    )
 
 
 def _limits(designs: Sequence[_Design]) -> Panel:

@@ -166,12 +166,15 @@ class LifeView(RealisationsView[LifeResult]):
             deviation = f"{math.sqrt(total):.2g}" if known else NOTHING
             cells = (predictive, plug_in, f"{low}..{high}", deviation)
             lines.append([f"B{share:g}", *cells, *(of_total if known else [NOTHING, NOTHING])])
-        heads = [
-            f"life [{result.unit}], given {_tests_of(result)}",
-            *("predictive", "plug-in", "95 % credible"),
-            *("sd of ln life", "by more tests", "by more realisations"),
-        ]
-        return Table("", lines, heads)
+        return Table(
+            "",
+            lines,
+            [
+                f"life [{result.unit}], given {_tests_of(result)}",
+                *("predictive", "plug-in", "95 % credible"),
+                *("sd of ln life", "by more tests", "by more realisations"),
+            ],
+        )
 
     def _angle(self, name: str) -> str:
         """Return where on a cam a limit was reached, empty for other limits."""
@@ -187,17 +190,24 @@ class LifeView(RealisationsView[LifeResult]):
         if why := self._no_effects():
             return Table("", [[f"{_EFFECTS}: {why}"]], [""])
         changes = result.tornado()
-        lines = [
+        return Table(
+            "",
             [
-                item.name,
-                f"not significant, at most {shown(item.first.high, '%', 2)}"
-                if item.without_effect
-                else part_with_interval(item.first),
-                *(map(_change, changes[item.name].factors) if item.name in changes else _UNKNOWN),
-            ]
-            for item in result.sensitivity("life")
-        ]
-        return Table("", lines, [_EFFECTS, "first order", "life, input at 10 %", "input at 90 %"])
+                [
+                    item.name,
+                    f"not significant, at most {shown(item.first.high, '%', 2)}"
+                    if item.without_effect
+                    else part_with_interval(item.first),
+                    *(
+                        map(_change, changes[item.name].factors)
+                        if item.name in changes
+                        else _UNKNOWN
+                    ),
+                ]
+                for item in result.sensitivity("life")
+            ],
+            [_EFFECTS, "first order", "life, input at 10 %", "input at 90 %"],
+        )
 
     def _no_effects(self) -> str:
         """Return why there are no effects, or an empty text."""
@@ -342,8 +352,9 @@ def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
             low, high = rounded_lives(*ends)
             error = f"{low}..{high}" if all(map(math.isfinite, ends)) else NOTHING
             lines.append([f"{label} B{share:g}".strip(), *life_cells(result, share), error])
-    heads = [f"life [{results[0].unit}]", "estimate", "95 % interval", "numerical error"]
-    return Table("", lines, heads)
+    return Table(
+        "", lines, [f"life [{results[0].unit}]", "estimate", "95 % interval", "numerical error"]
+    )
 
 
 def limit_texts(limits: Mapping[str, float]) -> list[str]:

@@ -152,8 +152,11 @@ class FieldReturnsView(DesignsView):
                 continue
             predicted = (_numbers(item, place) for item in (check.before, check.after))
             lines.append([name, f"{check.observed[place]:.3g}", *predicted])
-        heads = [f"failures at [{self.result.unit}]", "observed", "predicted before", "after"]
-        return Table("", lines, heads)
+        return Table(
+            "",
+            lines,
+            [f"failures at [{self.result.unit}]", "observed", "predicted before", "after"],
+        )
 
     def _known(self) -> Table:
         """Return wear factor and life factor before and after the returns."""
@@ -166,11 +169,14 @@ class FieldReturnsView(DesignsView):
             "scatter t of ln K/H": scatters,
             **(factors if result.life_factor > 1.0 else {}),
         }
-        lines = [
-            [name, *(with_ends(end, "{:.3g}".format) for end in ends)]
-            for name, ends in known.items()
-        ]
-        return Table("", lines, ["what is not known", "before", "after"])
+        return Table(
+            "",
+            [
+                [name, *(with_ends(end, "{:.3g}".format) for end in ends)]
+                for name, ends in known.items()
+            ],
+            ["what is not known", "before", "after"],
+        )
 
     def _running(self) -> Table:
         """Return the running units with the least remaining lives."""
@@ -376,9 +382,15 @@ def _failures(result: FieldReturns) -> Panel:
         marks.append(Whiskers(place + shift, *ends, colour=colour))
         marks.append(dots(place + shift, predicted.mean[:bands], "o", colour=colour, label=label))
     most = max(float(check.after.high[:bands].max()), float(check.observed[:bands].max()))
-    x = Axis(f"life [{result.unit}]", ticks=place.tolist(), names=names, limits=(-0.6, bands - 0.4))
-    text = "Failures observed in bands of lives, and predicted with 95 % intervals."
-    return Panel("Failures", x, Axis("units", limits=(0.0, 1.6 * most + 1.0)), marks, text)
+    return Panel(
+        "Failures",
+        Axis(
+            f"life [{result.unit}]", ticks=place.tolist(), names=names, limits=(-0.6, bands - 0.4)
+        ),
+        Axis("units", limits=(0.0, 1.6 * most + 1.0)),
+        marks,
+        "Failures observed in bands of lives, and predicted with 95 % intervals.",
+    )
 
 
 def _remaining(result: FieldReturns) -> Panel:
@@ -393,6 +405,11 @@ def _remaining(result: FieldReturns) -> Panel:
         high = np.where(np.isfinite(high), high, np.nan)
         marks.append(Whiskers(age, low, high, colour=colour))
         marks.append(dots(age, value, "o", colour=colour, label=f"B{share:g}"))
-    text = "Further lives that 10 % and 50 % of units of an age do not reach, with 95 % intervals."
     x, y = (Axis(name, result.unit, 1.0, limits=(0.0, None)) for name in ("age", "further life"))
-    return Panel(title, x, y, marks, text)
+    return Panel(
+        title,
+        x,
+        y,
+        marks,
+        "Further lives that 10 % and 50 % of units of an age do not reach, with 95 % intervals.",
+    )

@@ -243,8 +243,11 @@ class RunView(StudyView[Result]):
         limits = self.limit_rows(brief=True)
         limits = limits or [Row("limits", "none in the scenario, table [limit]")]
         shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
-        groups = {"Loads": self.loads(), "Limits": limits, "Wear": shown_rows}
-        return Overview(sheet.panels.get("shape", sheet.first), groups, excluded)
+        return Overview(
+            sheet.panels.get("shape", sheet.first),
+            {"Loads": self.loads(), "Limits": limits, "Wear": shown_rows},
+            excluded,
+        )
 
     def loads(self) -> Rows:
         """Return the loads of the overview."""
@@ -296,12 +299,15 @@ class RunView(StudyView[Result]):
     def frame(self) -> Frame:
         """Return the history, one row for each step."""
         result = self.result
-        columns = [
-            (name, item.unit, result.values(name))
-            for name, item in result.raw.schema.variables.items()
-            if item.kind == "history"
-        ]
-        return Frame(columns, "step", range(len(result.passes)))
+        return Frame(
+            [
+                (name, item.unit, result.values(name))
+                for name, item in result.raw.schema.variables.items()
+                if item.kind == "history"
+            ],
+            "step",
+            range(len(result.passes)),
+        )
 
     def limit_rows(self, *, brief: bool = False) -> Rows:
         """Return a row for each limit of [limit]: reached or not, when, and by how much.
