@@ -14,7 +14,7 @@ from wearsim.errors import printable
 if TYPE_CHECKING:
     from wearsim.report.panels import Sheet
     from wearsim.report.surfaces import Surface
-    from wearsim.report.view import View
+    from wearsim.report.view import Columns, View
 
 
 def show_view(
@@ -96,14 +96,11 @@ def draw_figure(sheet: Sheet, path: Path | None) -> None:
     save_figure(figure_of(sheet), path)
 
 
-def write_table_file(view: View, path: Path | None) -> None:
+def write_table_file(columns: Columns, path: Path) -> None:
     """Write columns as a CSV file."""
-    if path is None:
-        return
     from wearsim.atomic_write import replacement
     from wearsim.report.csv_files import table_text
 
-    (columns,) = view.columns().values()
     with replacement(path) as file:
         file.writelines(text.encode("utf-8") for text in table_text(columns))
 

@@ -89,6 +89,15 @@ class Answer(NamedTuple):
     label: str
 
 
+def answers_of(rows: Rows) -> dict[str, Answer]:
+    """Return the numbers that rows state, by name."""
+    return {
+        name: Answer(math.nan if value is None else float(value), unit, row.label)
+        for row in rows
+        for name, (value, unit) in row.answers.items()
+    }
+
+
 def width_row(width: Any, threshold: float) -> Row:
     """Return the row of the widths [m], or of the depth that a groove has not reached [m]."""
     answers = {"width": (float(np.max(width)), "mm")}
@@ -216,11 +225,7 @@ class View(ABC):
 
         Studies that choose a design ask for them, as objectives and constraints.
         """
-        return {
-            name: Answer(math.nan if value is None else float(value), unit, row.label)
-            for row in self.rows()
-            for name, (value, unit) in row.answers.items()
-        }
+        return answers_of(self.rows())
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over computed ones."""

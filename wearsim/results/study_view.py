@@ -126,8 +126,11 @@ class StudyView(View, Generic[Shown]):
     def repetition(self) -> Repetition:
         """Return command and files that repeat the study."""
         (scenario, text), *files = [(Path(name).name, text) for name, text in self.stored_files()]
-        command = shlex.join(["wearsim", self.verb, scenario, *self.options()])
-        return Repetition(command, {scenario: text, **dict(files)}, SAME_NUMBERS)
+        return Repetition(
+            shlex.join(["wearsim", self.verb, scenario, *self.options()]),
+            {scenario: text, **dict(files)},
+            SAME_NUMBERS,
+        )
 
 
 class DesignsView(View):

@@ -45,10 +45,13 @@ class _Cam(_Cylinder):
 
     def body(self) -> list[str]:
         """Return radius, form, follower and number of stations."""
-        kind = f"{self.cam['follower']} follower" + (" in a groove" if self.cam["groove"] else "")
-        stations = f"{len(self.cam['stations']['angle_rad'])} stations"
         radius, form = _fields(self.cam, "base_radius_m", digits=6), _form(self.data["cylinder"])
-        return [*radius, *form, kind, stations]
+        return [
+            *radius,
+            *form,
+            f"{self.cam['follower']} follower" + (" in a groove" if self.cam["groove"] else ""),
+            f"{len(self.cam['stations']['angle_rad'])} stations",
+        ]
 
     def speed(self) -> str:
         """Return the range of the rolling speed."""
@@ -110,8 +113,7 @@ def station_table(stations: Data) -> tuple[list[str], list[list[str]]]:
     sizes = [np.degrees(1.0), np.degrees(1.0), 1.0, 1e-3, 1.0]
     columns = [values * size for values, size in zip([*stations.values()][1:], sizes, strict=True)]
     rows = [[f"{value:.4g}" for value in row] for row in zip(*columns, strict=True)]
-    named = [[*row, name] for row, name in zip(rows, stations["segment"], strict=True)]
-    return heads, named
+    return heads, [[*row, name] for row, name in zip(rows, stations["segment"], strict=True)]
 
 
 def _range(bounds: Sequence[float], unit: str, size: float) -> str:

@@ -71,11 +71,14 @@ def bytes_per_realisation(scenario: Scenario) -> int:
 
 def nothing_random(what: str) -> Mistake:
     """Return the mistake of a scenario without effective random inputs."""
-    expected = (
+    return Mistake(
+        "",
+        "",
+        what,
+        None,
         "a distribution instead of a value, such as friction.coefficient ="
-        ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}'
+        ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}',
     )
-    return Mistake("", "", what, None, expected)
 
 
 @cache

@@ -243,7 +243,9 @@ def cam(
         study = wearsim.study_cam(loaded, angles)
     view = study.view
     draw_figure(view.panels(), figure)
-    write_table_file(view, table)
+    if table is not None:
+        (columns,) = view.columns().values()
+        write_table_file(columns, table)
     if surface is not None and sampling is not None:
         write_surface(view.surface(sampling), surface, spline=spline)
     show_view(view, json=json, files=files, more=files, brief=table is not None)

@@ -100,5 +100,7 @@ class LifeUse:
             from wearsim.report.page.page import save_page
 
             save_page(views, self.page)
-        write_table_file(views[0], self.table)
+        if self.table is not None:
+            (columns,) = views[0].columns().values()
+            write_table_file(columns, self.table)
         return {"page": self.page, "table": self.table}

@@ -132,13 +132,12 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> dict[str, Any]:
             for profile in measured
         ]
         tables.insert(-1, Table("Measured profiles", residuals))
-    remarks = [*filter(None, [view.failures]), *view.warnings, *view.notes]
     panels, steps = plots_of(view.panels(measured))
     return {
         "view": view,
         "rows": view.rows(),
         "tables": tables,
-        "remarks": remarks,
+        "remarks": [*filter(None, [view.failures]), *view.warnings, *view.notes],
         "panels": panels,
         "steps": steps,
     }

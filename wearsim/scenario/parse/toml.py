@@ -338,19 +338,18 @@ def parse_fields(
     check_contained(mistakes)
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)
-    notes = (
-        *dundurs_note(sections["roller"], sections["cylinder"], sections["contact"]),
-        *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
-        *_unused_sampling_note(data, random),
-        *mistakes.notes,
-    )
     return {
         "file": name,
         "title": top.title or PurePath(name).stem,
         "seed": top.seed,
         "text": text,
         "files": files,
-        "notes": notes,
+        "notes": (
+            *dundurs_note(sections["roller"], sections["cylinder"], sections["contact"]),
+            *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
+            *_unused_sampling_note(data, random),
+            *mistakes.notes,
+        ),
         "random": random,
         "tables": owned,
         **sections,

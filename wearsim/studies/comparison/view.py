@@ -209,10 +209,6 @@ def _lines(row: Compared, unit: str, columns: int) -> list[list[str]]:
 
 def _data(row: Compared, file: str) -> dict[str, Any]:
     """Return one of the compared results in SI units."""
-    paired = row.paired and {
-        "share_with_more": asdict(row.paired.share),
-        "mean_difference": asdict(row.paired.difference),
-    }
     return {
         "label": row.label,
         "file": file,
@@ -228,7 +224,11 @@ def _data(row: Compared, file: str) -> dict[str, Any]:
         "std": asdict(row.std) if row.std is not None else None,
         "quantiles": [{"probability": p, **asdict(quantile)} for p, quantile in row.quantiles],
         "probability_of_more_than_first": asdict(row.deeper) if row.deeper else None,
-        "paired_with_first": paired,
+        "paired_with_first": row.paired
+        and {
+            "share_with_more": asdict(row.paired.share),
+            "mean_difference": asdict(row.paired.difference),
+        },
         "difference_from_first": asdict(row.difference) if row.difference else None,
     }
 
@@ -432,12 +432,7 @@ def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
     low = min([0.0, *(row.value.value for row in rows)])
     return Panel(
         title,
-        Axis(
-            f"{axis.label}{legend}",
-            per_si=axis.scale,
-            margin=(0.0, 0.03),
-            limits=(min(low, 0.0), None),
-        ),
+        Axis(f"{axis.label}{legend}", per_si=axis.scale, margin=(0.0, 0.03), limits=(low, None)),
         Axis(limits=(len(rows) - 0.6, -0.8), ticks=()),
         marks,
         "Every row is one of the compared results.",

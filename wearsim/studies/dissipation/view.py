@@ -182,14 +182,17 @@ class DissipationView(StudyView[DissipationResult]):
     def line(self) -> str:
         """Return the footer of the study, with its sampling error."""
         result, power = self.result, self.result.summaries["power"]
-        used = [
-            result.described_model,
-            f"{len(result.y)} strips",
-            result.raw.plan,
-            f"{count(result.count)} realisations",
-        ]
         error = within("mean dissipated power", power.mean_interval.half_width, power.mean)
-        return footer(used, f"{error} (95 % interval)", lapse(result.raw.wall_seconds))
+        return footer(
+            [
+                result.described_model,
+                f"{len(result.y)} strips",
+                result.raw.plan,
+                f"{count(result.count)} realisations",
+            ],
+            f"{error} (95 % interval)",
+            lapse(result.raw.wall_seconds),
+        )
 
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, drawn values first, and strips."""

@@ -200,12 +200,19 @@ def _convergence(result: EnsembleResult) -> Panel:
     counts, intervals = result.convergence(target)
     value, low, high = arrays_of(intervals)
     labels = {-target.width: "", target.width: f"target: ±{100 * target.width:g} %"}
-    marks = [
-        Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
-        for part, label in (labels.items() if result.until else ())
-    ]
-    title = f"{statistic_in_words(target).capitalize()}, with 95 % interval"
-    return convergence(title, named.words, named.unit, counts, value, low, high, marks)
+    return convergence(
+        f"{statistic_in_words(target).capitalize()}, with 95 % interval",
+        named.words,
+        named.unit,
+        counts,
+        value,
+        low,
+        high,
+        [
+            Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
+            for part, label in (labels.items() if result.until else ())
+        ],
+    )
 
 
 def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:

@@ -225,8 +225,12 @@ class RealisationRunner:
             New number of realisations; by default that of the file.
         """
         data = result.raw
-        grid = Grid(data.variables["y"], data.strip_width)
-        return cls(result.scenario, parse_plan(data.plan), total or data.requested, grid)
+        return cls(
+            result.scenario,
+            parse_plan(data.plan),
+            total or data.requested,
+            Grid(data.variables["y"], data.strip_width),
+        )
 
     @property
     def state(self) -> dict[str, object]:

@@ -297,19 +297,22 @@ class EnsembleView(RealisationsView[EnsembleResult]):
     def line(self) -> str:
         """Return the footer of the ensemble, with its sampling errors."""
         result, raw, error = self.result, self.result.raw, ""
-        used = [
-            result.described_model,
-            raw.stepper,
-            f"tolerance {raw.tolerance:g}",
-            raw.plan,
-            f"{count(result.count)} realisations",
-        ]
         if result.count:
             depth = result.estimate("depth", -1, (0.95,))
             items = ("mean depth", depth.mean), ("its 95 % quantile", depth.quantiles[0][1])
             errors = [within(name, item.half_width, item.value) for name, item in items]
             error = f"{', '.join(errors)} (95 % intervals)"
-        return footer(used, error, lapse(raw.wall_seconds))
+        return footer(
+            [
+                result.described_model,
+                raw.stepper,
+                f"tolerance {raw.tolerance:g}",
+                raw.plan,
+                f"{count(result.count)} realisations",
+            ],
+            error,
+            lapse(raw.wall_seconds),
+        )
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the mean profile, with which measured ones are compared."""

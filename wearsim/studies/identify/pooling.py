@@ -152,7 +152,6 @@ def content(
     kernels = [specimen.kernel for specimen in specimens]
     posterior = Posterior.of(kernels)
     centres = np.array([kernel.mean for kernel in kernels])
-    summary = _summary(scenario, specimens, posterior, negligible)
     spread = float(np.sqrt(max(kernel.variance for kernel in kernels)))
     ends = centres.min() - 4.0 * spread, centres.max() + 4.0 * spread
     grid = np.linspace(*ends, _CURVE)
@@ -166,7 +165,7 @@ def content(
         warnings=_warnings(specimens, rows),
         tests=[_test(row, specimen) for specimen in specimens for t in specimen.tests for row in t],
         specimens=[specimen.name for specimen in specimens],
-        summary=summary,
+        summary=_summary(scenario, specimens, posterior, negligible),
         **given,
         variables={
             "scatter": posterior.t,
@@ -227,7 +226,6 @@ def _summary(
     centres = np.array([kernel.mean for kernel in kernels])
     count = len(kernels)
     variance = float(np.mean([kernel.variance for kernel in kernels]))
-    seen = float(centres.std(ddof=1)) if count > 1 else None
     ratio = limit = None
     random = False
     if count > 1:
@@ -244,7 +242,7 @@ def _summary(
     }
     low, middle, high = posterior.next((0.025, 0.5, 0.975))
     return {
-        "scatter_seen": seen,
+        "scatter_seen": float(centres.std(ddof=1)) if count > 1 else None,
         "scatter_from_inputs": variance**0.5,
         "scatter_of_k": _three(posterior.scatter(_FIVE)),
         "scatter_upper_95": upper,

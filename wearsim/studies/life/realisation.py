@@ -130,8 +130,13 @@ class LifeRunner(RealisationRunner):
         """Return the runner of the tests in a file; parameters as of `RealisationRunner`."""
         data, settings = result.raw, result.settings
         plain = total or settings.plain
-        grid = Grid(data.variables["y"], data.strip_width)
-        return cls(result.scenario, plain, grid, replace(settings, plain=plain), data.life["base"])
+        return cls(
+            result.scenario,
+            plain,
+            Grid(data.variables["y"], data.strip_width),
+            replace(settings, plain=plain),
+            data.life["base"],
+        )
 
     @property
     def state(self) -> dict[str, object]:
@@ -144,9 +149,13 @@ class LifeRunner(RealisationRunner):
 
         if not (stages := next_stages(result)):
             return None
-        settings = replace(self.settings, stages=(*self.settings.stages, *stages))
-        total = stages[-1]["first"] + stages[-1]["count"]
-        return LifeRunner(self.scenario, total, self.grid, settings, self.base)
+        return LifeRunner(
+            self.scenario,
+            stages[-1]["first"] + stages[-1]["count"],
+            self.grid,
+            replace(self.settings, stages=(*self.settings.stages, *stages)),
+            self.base,
+        )
 
     def result(self, data: EnsembleData, path: Path | None) -> LifeResult:
         """Return the result of the realisations in a file."""

@@ -445,5 +445,7 @@ class LifeResult(LifeValues):
         >>> lives.final_estimates()["life"]["b10"]["value"] == lives.b(10).value
         True
         """
-        lives = {f"b{share:g}": asdict(self.b(share)) for share in self.settings.shares}
-        return {**super().final_estimates(), "life": lives}
+        return {
+            **super().final_estimates(),
+            "life": {f"b{share:g}": asdict(self.b(share)) for share in self.settings.shares},
+        }

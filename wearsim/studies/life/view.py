@@ -410,12 +410,13 @@ def rare_command(result: LifeResult) -> str:
     """Return the command for a small probability of a life before the target."""
     given = _limits_in_si(result.scenario.limit.given)
     stem = Path(result.raw.scenario_file).stem.removesuffix("-life")
-    words = [
-        *("wearsim", "life", result.raw.scenario_file, *study_options(result)),
-        *(text for limit in given for text in ("--limit", limit)),
-        *("--rare", str(RARE_TESTS), "-o", f"{stem}-rare-life.h5"),
-    ]
-    return shlex.join(words)
+    return shlex.join(
+        [
+            *("wearsim", "life", result.raw.scenario_file, *study_options(result)),
+            *(text for limit in given for text in ("--limit", limit)),
+            *("--rare", str(RARE_TESTS), "-o", f"{stem}-rare-life.h5"),
+        ]
+    )
 
 
 def _limits_in_si(limits: Mapping[str, float]) -> list[str]:

@@ -233,8 +233,13 @@ def _fatigue(scenario: Scenario) -> Fatigue | None:
     if choice is None:
         return None
     modulus = scenario.pair.contact_modulus
-    laws = {body: law.build(modulus) for body, law in choice.laws.items()}
-    return Fatigue(laws, choice.slope, choice.probability, choice.reference_area, choice.remove)
+    return Fatigue(
+        {body: law.build(modulus) for body, law in choice.laws.items()},
+        choice.slope,
+        choice.probability,
+        choice.reference_area,
+        choice.remove,
+    )
 
 
 def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:

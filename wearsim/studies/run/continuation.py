@@ -28,8 +28,12 @@ _DEPTHS = ("depth", "roller depth", "lift error", "clearance")
 
 def stored_scenario(data: RunData, passes: float | None = None) -> Scenario:
     """Return the scenario of a file, with another number of passes if given."""
-    overrides = None if passes is None else {"operation.passes": round(passes)}
-    return parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__, overrides)
+    return parse_scenario(
+        data.scenario_text,
+        data.scenario_file,
+        data.files.__getitem__,
+        None if passes is None else {"operation.passes": round(passes)},
+    )
 
 
 def with_end(scenario: Scenario, limit: Limit | None) -> tuple[Scenario, Limit | None]:

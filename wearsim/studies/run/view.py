@@ -207,12 +207,6 @@ class RunView(StudyView[Result]):
         """Return the footer of the run, with the estimated errors of its steps and strips."""
         result = self.result
         error, has_steps = "no stepping error", result.stepper != "per-pass"
-        used = [
-            result.described_model,
-            f"{len(result.y)} strips",
-            result.stepper,
-            *([f"tolerance {result.raw.tolerance:g}"] if has_steps else []),
-        ]
         known = bool(np.isfinite(result.profile_error_by_strips[-1]).all())
         if has_steps or known:
             depth = max(np.max(result.depth[-1]), np.max(result.roller_depth[-1]))
@@ -232,7 +226,16 @@ class RunView(StudyView[Result]):
                 f"{text}, {profile}, {volume_text} (estimated numerical error of the {parts}, not"
                 " of model or inputs)"
             )
-        return footer(used, error, lapse(result.raw.wall_seconds))
+        return footer(
+            [
+                result.described_model,
+                f"{len(result.y)} strips",
+                result.stepper,
+                *([f"tolerance {result.raw.tolerance:g}"] if has_steps else []),
+            ],
+            error,
+            lapse(result.raw.wall_seconds),
+        )
 
     def overview(self) -> Overview:
         """Return the worn body, its loads, and limits that are passed or not."""

@@ -107,8 +107,7 @@ def export_running_in(result: Result, folder: str | Path, *, force: bool = False
     text = apply_overrides(data.scenario_text, data.scenario_file, overrides, removed)
     scenario_name = f"{Path(data.scenario_file).stem}-worn.toml"
     pieces = {name: [content] for name, content in {scenario_name: text, **contents}.items()}
-    paths = write_files(Path(folder), pieces, force=force)
-    return RunningIn(paths, list(_notes(scenario, data)))
+    return RunningIn(write_files(Path(folder), pieces, force=force), list(_notes(scenario, data)))
 
 
 def _keys_of_texts(text: str) -> dict[str, str]:
@@ -130,8 +129,10 @@ def _joined(y: FloatArray, height: FloatArray, earlier: Profile | None) -> Profi
     if earlier is None:
         return Profile(y, height)
     before, after = earlier.y < y[0], earlier.y > y[-1]
-    places = np.concatenate([earlier.y[before], y, earlier.y[after]])
-    return Profile(places, np.concatenate([earlier.height[before], height, earlier.height[after]]))
+    return Profile(
+        np.concatenate([earlier.y[before], y, earlier.y[after]]),
+        np.concatenate([earlier.height[before], height, earlier.height[after]]),
+    )
 
 
 def _cylinder(scenario: Scenario, data: RunData) -> Profile:
