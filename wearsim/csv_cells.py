@@ -77,9 +77,7 @@ def conversion_of(cells: Iterable[str], separator: str, unit: str) -> Conversion
             return clock_time
         if _DATE.fullmatch(known[0]):
             return iso_time
-    if separator != "," and any(map(DECIMAL_COMMA.fullmatch, known)):
-        return comma_number
-    return None
+    return comma_number if separator != "," and any(map(DECIMAL_COMMA.fullmatch, known)) else None
 
 
 def in_order(values: FloatArray, conversion: Conversion | None) -> FloatArray:

@@ -152,8 +152,7 @@ def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None =
             raise _error(file, f"this is a results file; {_EXPORT}")
         content = decode(content)
     if choice.rows:
-        what = f"{choice.rows[0]} is for the rows of a surface, and this is a CSV file"
-        raise _error(file, what)
+        raise _error(file, f"{choice.rows[0]} is for the rows of a surface, and this is a CSV file")
     y, height = choice.columns or ("y", "height")
     # a column chosen by the name "depth" has the sign of one found by that name
     downwards = choice.columns and (height.startswith("-") or height.casefold() == "depth")

@@ -129,14 +129,21 @@ class Quantity:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        write = core_schema.plain_serializer_function_ser_schema(self.write, when_used="json")
-        return core_schema.with_info_plain_validator_function(self._read, serialization=write)
+        return core_schema.with_info_plain_validator_function(
+            self._read,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                self.write, when_used="json"
+            ),
+        )
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        pattern = _PATTERN if self.bound == "any" else _PATTERN.replace("[+-]?", "[+]?", 1)
-        return {"type": "string", "pattern": pattern, "examples": [self.kind.example]}
+        return {
+            "type": "string",
+            "pattern": _PATTERN if self.bound == "any" else _PATTERN.replace("[+-]?", "[+]?", 1),
+            "examples": [self.kind.example],
+        }
 
 
 def _within(
@@ -357,10 +364,12 @@ class InputFile:
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        write = core_schema.plain_serializer_function_ser_schema(
-            lambda file: file.path, when_used="json"
+        return core_schema.with_info_plain_validator_function(
+            cls._read,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda file: file.path, when_used="json"
+            ),
         )
-        return core_schema.with_info_plain_validator_function(cls._read, serialization=write)
 
     @classmethod
     def __get_pydantic_json_schema__(

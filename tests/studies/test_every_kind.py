@@ -130,6 +130,13 @@ def test_every_kind_in_every_display(case: Any, check: Any) -> None:
     check(StudyKindFixture(kind, made(kind.name, number)))
 
 
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0].name}-{case[1]}")
+def test_every_kind_as_a_table_of_pandas(case: Any) -> None:
+    table = made(case[0].name, case[1]).to_dataframe()
+    assert len(table)
+    assert list(table.attrs["units"]) == list(table.columns)
+
+
 def json_of_every_kind() -> list[str]:
     """Return the keys of the JSON of every kind of study; computes the samples."""
     names = sorted({kind.name for kind, _ in CASES})

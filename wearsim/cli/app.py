@@ -186,8 +186,12 @@ class Shell(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        for name, line in BUILT_IN.items():
-            self.commands[name] = LazyVerb(name, line, partial(_built_in, name))
+        self.commands.update(
+            {
+                name: LazyVerb(name, line, partial(_built_in, name))
+                for name, line in BUILT_IN.items()
+            }
+        )
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, built-in ones first."""
@@ -247,8 +251,12 @@ def _message(error: BaseException) -> str:
         from wearsim.cli.solver_state import solver_state
 
         state = solver_state(error.state)
-        lines = [f"error: {error.at_shell}", *([f"state at the failure: {state}"] if state else [])]
-        return "\n".join([*lines, *getattr(error, "__notes__", ())])
+        lines = [
+            f"error: {error.at_shell}",
+            *([f"state at the failure: {state}"] if state else []),
+            *getattr(error, "__notes__", ()),
+        ]
+        return "\n".join(lines)
     if isinstance(error, ScenarioError | Interrupted):  # their messages start with file or progress
         return error.at_shell
     if isinstance(error, WearsimError):

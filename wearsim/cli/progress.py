@@ -283,8 +283,7 @@ def _estimate(progress: EnsembleProgress) -> str:
     name = progress.what.split(".", maxsplit=1)[0]
     if name not in OBSERVABLES:  # a life, "b10"
         return f"{progress.what.upper()} {progress.estimate.value:,.0f}"
-    unit = OBSERVABLES[name].unit
-    return f"{progress.what} {with_interval(progress.estimate, unit)}"
+    return f"{progress.what} {with_interval(progress.estimate, OBSERVABLES[name].unit)}"
 
 
 @contextmanager

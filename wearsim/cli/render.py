@@ -75,11 +75,10 @@ def _write_tables(view: View, files: Mapping[str, object], stored: bool, brief: 
     from wearsim.report.view import ORIGIN, STUDY, Row, Table
 
     tables = [] if brief else [table for table in view.tables() if stored or table.title != ORIGIN]
-    written = [Row(name, str(item)) for name, item in files.items()]
-    results = Table(view.heading, [*view.rows(), *written])
-    first = [tables.pop(0)] if tables and tables[0].title == STUDY else []
-    title = view.title
-    for table in (*first, results, *tables):
+    place, title = int(bool(tables) and tables[0].title == STUDY), view.title
+    written = (Row(name, str(item)) for name, item in files.items())
+    tables.insert(place, Table(view.heading, [*view.rows(), *written]))
+    for table in tables:
         if table.heads:
             write_list(table.heads, table.rows)
             typer.echo("")
@@ -111,6 +110,6 @@ def write_surface(surface: Surface, path: Path, *, spline: bool) -> None:
     from wearsim.report.text import count, shown
 
     surface.save(path, spline=spline)
-    away = shown(surface.deviation, "um", 2)
     form = "chords" if not spline else "chords between the points of the spline"
-    note(f"surface: {path}, {count(surface.count)} points, {form} within {away}")
+    within = f"{form} within {shown(surface.deviation, 'um', 2)}"
+    note(f"surface: {path}, {count(surface.count)} points, {within}")

@@ -443,8 +443,9 @@ def check_surface(
     refuse(twice, "is given beside --chord; delete one of them", "--points")
     length = quantity_of(chord, "m", "--chord")
     refuse(length is not None and length <= 0.0, f"'{chord}' is not above 0", "--chord")
-    across = quantity_of(position, "m", "--position")
-    return Sampling(CHORD if length is None else length, points, across)
+    return Sampling(
+        CHORD if length is None else length, points, quantity_of(position, "m", "--position")
+    )
 
 
 def check_new_file(path: Path, force: bool, option: str = "-o") -> None:

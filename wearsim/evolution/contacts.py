@@ -111,8 +111,7 @@ def unworn_contacts(problem: WearProblem) -> ContactBatch:
 def _rolling_radius(problem: WearProblem, roller_depth: FloatArray) -> FloatArray:
     """Return the rolling radius of free rollers, shape (all contacts, strips) [m]."""
     assert problem.roller_drop is not None  # of free rollers
-    drop = problem.roller_drop[problem.roller]
-    radius = problem.kinematics.roller_radius - drop - roller_depth
+    radius = problem.kinematics.roller_radius - problem.roller_drop[problem.roller] - roller_depth
     return _of_contacts(problem, radius)
 
 

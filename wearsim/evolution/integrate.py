@@ -276,8 +276,7 @@ class Evolution:
         count = len(numbers)
         stops, resting = [self.stop] * count, [False] * count
         if self._has_pauses:
-            boundaries = next_boundaries(self.problem, self.state.passes)
-            stops = np.minimum(self.stop, boundaries).tolist()
+            stops = np.minimum(self.stop, next_boundaries(self.problem, self.state.passes)).tolist()
             resting = at_rest(self.problem, self.state.passes).tolist()
         done = self.state.passes.tolist(), self.state.steps.tolist(), stops, resting
         for place, (number, passes, steps, stop, rests) in enumerate(

@@ -126,8 +126,7 @@ def roller_depth(problem: WearProblem, state: WearState) -> FloatArray:
 def volume(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the worn volume of the cylinder, shape (realisations,) [m^3]."""
     radius, spacing = problem.kinematics.track.track_radius, problem.grid.spacing
-    volumes = worn_volume(state.cylinder_depth, spacing, radius)
-    return np.asarray(mean_along(volumes, axis=0)[0, 0])
+    return np.asarray(mean_along(worn_volume(state.cylinder_depth, spacing, radius), axis=0)[0, 0])
 
 
 def groove_width(problem: WearProblem, state: WearState, threshold: float) -> FloatArray:

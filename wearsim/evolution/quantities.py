@@ -326,9 +326,8 @@ class CamStations:
     def free_rolling(self, inputs: ContactInputs) -> dict[str, FloatArray]:
         """Return torque [N m] and creepage of free rollers; a torque of nan where they skid."""
         skids = np.isfinite(self.skid)
-        torque = inputs.bearing_torque + self.inertia_torque
         return {
-            "bearing_torque": np.where(skids, np.nan, torque),
+            "bearing_torque": np.where(skids, np.nan, inputs.bearing_torque + self.inertia_torque),
             "longitudinal": np.where(skids, self.skid, inputs.longitudinal),
         }
 

@@ -168,8 +168,7 @@ class Logarithmic(AxialProfile):
         self.length = length
         self._start = 0.5 * length * (1.0 - options.k2)
         self._crowned = 0.5 * length * options.k2
-        line_load = options.design_load / length
-        unit = line_load / (math.pi * pair.contact_modulus)
+        unit = options.design_load / length / (math.pi * pair.contact_modulus)
         self.scale = options.k1 * unit
         self.end_drop = math.inf
         if options.variant == "johns-gohar":

@@ -221,8 +221,7 @@ def _read_log(
         load = np.insert(load, before + 1, load[before])
     zero = np.concatenate([[0], (load == 0.0).astype(np.int8), [0]])
     starts, stops = (np.flatnonzero(np.diff(zero) == sign) for sign in (1, -1))
-    pauses = np.stack([time[starts], time[stops - 1]], axis=1)
-    return PiecewiseLinear(time, load), pauses, missing
+    return PiecewiseLinear(time, load), np.stack([time[starts], time[stops - 1]], axis=1), missing
 
 
 def gap_text(gaps: FloatArray, interval: float | None = None) -> str:

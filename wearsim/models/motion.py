@@ -139,8 +139,7 @@ def _constant_velocity(
         )
     wave = math.pi / blend
     middle = [] if blend == 0.5 else [(blend, 0.0, 0.0, 0.0)]
-    pieces = [(0.0, 1.0, wave, 0.0), *middle, (1.0 - blend, -1.0, wave, 0.0)]
-    return Sinusoidal(angle, rise, pieces)
+    return Sinusoidal(angle, rise, [(0.0, 1.0, wave, 0.0), *middle, (1.0 - blend, -1.0, wave, 0.0)])
 
 
 def _pieces(*pieces: Piece) -> Callable[[Options, float, float, str], Sinusoidal]:
@@ -230,8 +229,7 @@ def _derivative(value: str | float, order: int, unit: str) -> float:
         value = str(value)
     number, _, unit_given = value.strip().partition(" ")
     expected = f'a derivative such as "5 {"mm" if unit == "m" else "deg"}{target[len(unit) :]}"'
-    factor = conversion(unit_given, target, as_written(value), expected)
-    return float(number) * float(factor)
+    return float(number) * float(conversion(unit_given, target, as_written(value), expected))
 
 
 def _boundary(options: EndOptions, angle: float, rise: float, unit: str) -> Polynomial:

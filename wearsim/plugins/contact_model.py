@@ -360,9 +360,12 @@ def solved_one_by_one(
 def naming_contact(error: ContactError, number: int, batch: ContactBatch) -> ContactError:
     """Return the error of a contact with its place in the batch."""
     place, text = batch.place(number)
-    message = f"{text}: {error.message}" if text else error.message
-    state = error.state | {"contact": place}
-    return ContactError(message, state, remedy=error.remedy, cause=error.cause)
+    return ContactError(
+        f"{text}: {error.message}" if text else error.message,
+        error.state | {"contact": place},
+        remedy=error.remedy,
+        cause=error.cause,
+    )
 
 
 def refuse_unclaimed(

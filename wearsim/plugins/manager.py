@@ -58,8 +58,7 @@ class Registered:
         spec = self.spec
         if spec.protocol == PROTOCOL:
             return None
-        older = spec.protocol < PROTOCOL
-        remedy = "a newer version of the plugin" if older else "a newer wearsim"
+        remedy = "a newer version of the plugin" if spec.protocol < PROTOCOL else "a newer wearsim"
         return (
             f"{spec.kind} '{spec.name}' of {self.distribution} {self.version} is written for plugin"
             f" protocol {spec.protocol}, and this wearsim has {PROTOCOL}; install {remedy},"

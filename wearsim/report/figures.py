@@ -249,10 +249,8 @@ def _draw(axes: Axes, mark: Mark, x: Axis, y: Axis) -> None:
         case Bars():
             place, size = (x, y) if not mark.horizontal else (y, x)
             low, start = np.asarray(mark.low) * place.scale, mark.start * size.scale
-            width, length = (
-                np.asarray(mark.high) * place.scale - low,
-                np.asarray(mark.value) * size.scale - start,
-            )
+            width = np.asarray(mark.high) * place.scale - low
+            length = np.asarray(mark.value) * size.scale - start
             if mark.horizontal:
                 axes.barh(low, length, width, left=start, align="edge", **named)
             else:
@@ -324,8 +322,7 @@ def _draw_span(axes: Axes, mark: Span, scale: float, style: dict[str, Any]) -> N
 
 
 def _draw_image(axes: Axes, mark: Image, x: Axis, y: Axis) -> None:
-    flat = np.ndim(mark.x) == 1
-    shading: Any = "nearest" if flat else "gouraud"
+    shading: Any = "nearest" if np.ndim(mark.x) == 1 else "gouraud"
     mesh = axes.pcolormesh(
         mark.x * x.scale, mark.y * y.scale, mark.value * mark.axis.scale,
         shading=shading, cmap=mark.colours, vmin=0.0, rasterized=True,
@@ -356,8 +353,7 @@ class _Colours:
 def _draw_scale(figure: Figure, sheet: Sheet, beside: list[Axes]) -> None:
     """Draw the scale of the colours of the records beside panels."""
     marks = sheet.panels[sheet.scale_beside[0]].marks
-    passes = next(mark.passes for mark in marks if isinstance(mark, Records))
-    colours = _Colours(passes)
+    colours = _Colours(next(mark.passes for mark in marks if isinstance(mark, Records)))
     mapped = ScalarMappable(colours.norm, colours.map)
     figure.colorbar(mapped, ax=beside, label=colours.name, aspect=45, pad=0.02)
 
@@ -369,7 +365,6 @@ def name_axes(axes: Axes, title: str, x: str, y: str) -> None:
 
 def write_message(axes: Axes, title: str, lines: Sequence[str]) -> None:
     """Write lines of text into a panel that has nothing to draw."""
-    text = "\n".join(lines)
-    axes.text(0.5, 0.5, text, ha="center", va="center", transform=axes.transAxes)
+    axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)
     axes.set_title(title)
     axes.set_axis_off()

@@ -92,7 +92,7 @@ def as_frame(
     units: dict[str, str] = {}
     for name, unit, values in columns:
         parts = {name: values}
-        if values.ndim > 1:
+        if np.ndim(values) > 1:
             parts = {f"{name}.{number}": part for number, part in enumerate(values.T, 1)}
         arrays |= parts
         units |= dict.fromkeys(parts, unit)

@@ -34,9 +34,10 @@ class MaxentView(View):
         self.mean = self._without_rounding(distribution.mean)
         parent = distribution.parent
         self.parent = parent and (self._without_rounding(parent[0]), parent[1])
-        values = distribution.quantile(np.array(PROBABILITIES)).tolist()
-        rounded = map(self._without_rounding, values)
-        self.quantiles = dict(zip(PROBABILITIES, rounded, strict=True))
+        values = map(
+            self._without_rounding, distribution.quantile(np.array(PROBABILITIES)).tolist()
+        )
+        self.quantiles = dict(zip(PROBABILITIES, values, strict=True))
 
     def _without_rounding(self, number: float) -> float:
         """Return a value, or 0 if it is a rounding error near 0 inside the support."""

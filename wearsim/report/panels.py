@@ -383,8 +383,10 @@ def worn_limits(y: FloatArray, worn: FloatArray, *others: FloatArray) -> tuple[f
     """Return the range of y in which something is worn, with a margin, that includes others [m]."""
     inside = y[worn > 1e-3 * worn.max()] if worn.max() > 0.0 else y
     margin = 0.08 * float(inside[-1] - inside[0])
-    ends = [float(inside[0]) - margin, float(inside[-1]) + margin]
-    ends += [float(end) for other in others for end in (other.min(), other.max())]
+    ends = [
+        *(float(inside[0]) - margin, float(inside[-1]) + margin),
+        *(float(end) for other in others for end in (other.min(), other.max())),
+    ]
     return min(ends), max(ends)
 
 
@@ -419,8 +421,7 @@ def histogram(values: FloatArray, classes: int | None = None) -> tuple[Bars, Flo
     number, edges = np.histogram(values, classes)
     density = number / (len(values) * np.diff(edges))
     more = {"realisations": (number, "1")}
-    bars = Bars(edges[:-1], edges[1:], density, label="realisations", alpha=0.45, more=more)
-    return bars, edges
+    return Bars(edges[:-1], edges[1:], density, label="realisations", alpha=0.45, more=more), edges
 
 
 def convergence(
@@ -464,9 +465,13 @@ def convergence(
     is_log = last > _LINEAR_UP_TO
     ends = (0.5 * _SCALED_FROM if is_log else 1.0, max(2.0, 1.05 * last))
     whole = None if is_log else np.unique(np.linspace(1, last, min(last, 10)).round()).tolist()
-    x = Axis("realisations", log=is_log, limits=ends, ticks=whole)
-    caption = f"The estimate from the first realisations, up to {count(last)} of them."
-    return Panel(title, x, Axis(name, unit, limits=limits), [*drawn, *marks], caption)
+    return Panel(
+        title,
+        Axis("realisations", log=is_log, limits=ends, ticks=whole),
+        Axis(name, unit, limits=limits),
+        [*drawn, *marks],
+        f"The estimate from the first realisations, up to {count(last)} of them.",
+    )
 
 
 def several_colours(number: int) -> list[str]:

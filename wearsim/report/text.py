@@ -192,8 +192,7 @@ OBSERVABLES: Mapping[str, Named] = {
 
 def limit_unit(name: str) -> str:
     """Return the unit in which a limit of wear is shown, a key of `PER_SI`."""
-    limited = {"volume": "worn_volume", "clearance": "depth"}.get(name, name)
-    return OBSERVABLES[limited].unit
+    return OBSERVABLES[{"volume": "worn_volume", "clearance": "depth"}.get(name, name)].unit
 
 
 def si_unit(name: str) -> str:

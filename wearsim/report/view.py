@@ -208,6 +208,10 @@ class View(ABC):
     failures: str = ""  # remark on realisations that failed
     has_angles: bool = False  # whether the worn profile depends on the angle of a cam
 
+    def __init__(self, result: Any) -> None:
+        self.result, self.title = result, result.title
+        self.notes, self.warnings = result.notes, result.warnings
+
     @abstractmethod
     def rows(self) -> Rows:
         """Return the answers with their errors, the most important first."""
@@ -231,8 +235,7 @@ class View(ABC):
     def overview(self) -> Overview:
         """Return what a page shows first; by default the main panel and the first answers."""
         sheet = self.panels()
-        main = sheet.first if sheet.panels else None
-        return Overview(main, {self.group: self.rows()[1:_FIRST]})
+        return Overview(sheet.first if sheet.panels else None, {self.group: self.rows()[1:_FIRST]})
 
     def line(self) -> str:
         """Return method, numerical or sampling error and time on one line, or an empty text."""

@@ -281,9 +281,12 @@ class StudyData:
     @property
     def labels(self) -> dict[str, Any]:
         """Format and short attributes, which other programs can read in the file."""
-        named = {"format": self.schema.format, "format_version": self.schema.version}
         short = (str, int, float, np.number, np.bool_)
-        every = {**named, **self.attributes}
+        every = {
+            "format": self.schema.format,
+            "format_version": self.schema.version,
+            **self.attributes,
+        }
         return {name: value for name, value in every.items() if isinstance(value, short)}
 
     @property

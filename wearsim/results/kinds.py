@@ -76,5 +76,9 @@ def as_plugin(name: str) -> dict[str, str]:
         Name of the kind.
     """
     item = registry().registered(StudyKind, name)
-    named = {"kind": StudyKind.kind, "name": name}
-    return {**named, "distribution": item.distribution, "version": item.version}
+    return {
+        "kind": StudyKind.kind,
+        "name": name,
+        "distribution": item.distribution,
+        "version": item.version,
+    }

@@ -53,11 +53,6 @@ class StudyView(View, Generic[Shown]):
     verb = ""  # that repeats the study
     basis = SAMPLING
 
-    def __init__(self, result: Shown) -> None:
-        self.result = result
-        self.title = result.title
-        self.notes, self.warnings = result.notes, result.warnings
-
     def study(self) -> Rows:
         """Return rows on the study: how many, with which method, how long."""
         return []
@@ -72,8 +67,12 @@ class StudyView(View, Generic[Shown]):
 
     def tables(self) -> list[Table]:
         """Return the study, its details, random inputs and origin."""
-        tables = [Table(STUDY, self.study()), *self.details()]
-        tables += [Table("Random inputs", self.random_inputs()), Table(ORIGIN, self._sources())]
+        tables = [
+            Table(STUDY, self.study()),
+            *self.details(),
+            Table("Random inputs", self.random_inputs()),
+            Table(ORIGIN, self._sources()),
+        ]
         return [table for table in tables if table.rows]
 
     def _sources(self) -> Rows:
@@ -126,10 +125,12 @@ class StudyView(View, Generic[Shown]):
 
     def repetition(self) -> Repetition:
         """Return command and files that repeat the study."""
-        files = {Path(name).name: text for name, text in self.stored_files()}
-        scenario = Path(self.result.raw.scenario_file).name
-        command = shlex.join(["wearsim", self.verb, scenario, *self.options()])
-        return Repetition(command, files, SAME_NUMBERS)
+        (scenario, text), *files = [(Path(name).name, text) for name, text in self.stored_files()]
+        return Repetition(
+            shlex.join(["wearsim", self.verb, scenario, *self.options()]),
+            {scenario: text, **dict(files)},
+            SAME_NUMBERS,
+        )
 
 
 class DesignsView(View):

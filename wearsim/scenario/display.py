@@ -30,8 +30,10 @@ def scenario_html(scenario: Scenario) -> str:
     random = {key: item.describe() for item in scenario.random for key in item.keys}
     inner = {key for key in given for name in random if key.startswith(f"{name}.")}
     rows = [(key, _value(value)) for key, value in given.items() if key not in inner]
-    rows = [(key, random.get(key, text)) for key, text in rows if key != "title"]
-    rows += [(key, text) for key, text in random.items() if key not in given]
+    rows = [
+        *((key, random.get(key, text)) for key, text in rows if key != "title"),
+        *((key, text) for key, text in random.items() if key not in given),
+    ]
     panel = None if scenario.cam else _bodies(scenario)
     return table_html(scenario.title, [Row(*row) for row in rows], panel)
 
@@ -55,10 +57,13 @@ def _bodies(scenario: Scenario) -> Panel:
     y = np.linspace(-half, half, 201)
     ground = np.zeros_like(y) if profile is None else np.interp(y, profile.y, profile.height)
     ground = ground - gap.cylinder_drop(y)
-    marks = [
-        Line(y, gap.roller_drop(y), colour="#0072b2", label="roller"),
-        Line(y, ground, colour="#b35900", label="cylinder"),
-    ]
-    caption = "Heights of cylinder and roller across the track before wear."
     axes = Axis("y", "mm"), Axis("height", "um")
-    return Panel("Bodies before wear", *axes, marks, caption)
+    return Panel(
+        "Bodies before wear",
+        *axes,
+        [
+            Line(y, gap.roller_drop(y), colour="#0072b2", label="roller"),
+            Line(y, ground, colour="#b35900", label="cylinder"),
+        ],
+        "Heights of cylinder and roller across the track before wear.",
+    )

@@ -108,13 +108,15 @@ def scenario_schema() -> dict[str, Any]:
     for table, model in TABLES.items():
         keys = _fields(model, table, random)
         if "motion" in keys:
-            motion, laws = model.model_fields["motion"], _motion_laws()
+            motion, names = model.model_fields["motion"], ("motion", "MotionLaw")
+            laws = _chosen(MotionLawSpec, MotionTable, "law", names, _fields(MotionTable))
             described = Field(None, description=motion.description)
             kind: Any = tuple[laws, ...]  # type: ignore[valid-type]
             keys |= {"motion": (kind, described)} if laws else {}
             keys = keys if laws else {key: kept for key, kept in keys.items() if key != "motion"}
         if table == "fatigue":
-            fatigue = _fatigue_laws()
+            names, base = ("fatigue", "FatigueLaw"), _fields(FatigueOfBody)
+            fatigue = _chosen(FatigueLawSpec, FatigueOfBody, "law", names, base)
             given = {body: model.model_fields[body].description for body in BODIES}
             keys |= {body: (fatigue, Field(None, description=t)) for body, t in given.items()}
             keys = (
@@ -122,11 +124,12 @@ def scenario_schema() -> dict[str, Any]:
             )
         if "axial_profile" in keys:
             described = Field(None, description=model.model_fields["axial_profile"].description)
-            keys["axial_profile"] = str | _axial_profiles(table, random), described
+            names, of = (table, f"{table} axial profile"), {"table": f"{table}.axial_profile"}
+            forms = _chosen(AxialProfileSpec, AxialTable, "form", names, {}, **of, random=random)
+            keys["axial_profile"] = str | forms, described
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
         kind = kind or _model(table, model.__doc__, keys)
-        default = ... if table in REQUIRED else None
-        tables[table] = kind, Field(default, description=model.__doc__)
+        tables[table] = kind, Field(... if table in REQUIRED else None, description=model.__doc__)
     for spec in installed(TableSpec):
         owned = _model(spec.name, spec.summary, _fields(spec.options))
         tables[spec.name] = owned, Field(None, description=spec.summary)
@@ -141,37 +144,31 @@ def scenario_schema() -> dict[str, Any]:
     }
 
 
-def _motion_laws() -> Any:
-    """Return the model of an entry of `cam.motion`, for each motion law."""
-    named = MotionTable.model_fields["law"]
-    models = []
-    for spec in installed(MotionLawSpec):
-        fields = {**_fields(MotionTable), **_fields(spec.options)}
-        fields["law"] = Literal[spec.name], Field(..., description=named.description)
-        if spec.rise != "required":
+def _chosen(
+    kind: Any, chooser: Model, key: str, names: tuple[str, str], base: Mapping[str, Any], **of: Any
+) -> Any:
+    """Return the model of a table with a key that chooses a plugin, for each plugin of a kind.
+
+    Parameters
+    ----------
+    kind : type of Spec
+    chooser, key : type of Options, and str
+        Model with the key, and the key.
+    names : tuple of str
+        Begin of the names of the models, and name of all of them together.
+    base : mapping of str to object
+        Fields besides the options of the plugin.
+    **of : object
+        Table and random inputs, as of `_fields`.
+    """
+    named, models = chooser.model_fields[key], []
+    for spec in installed(kind):
+        fields = {**base, **_fields(spec.options, **of)}
+        fields[key] = Literal[spec.name], Field(..., description=named.description)
+        if getattr(spec, "rise", "required") != "required":
             del fields["rise"]
-        models.append(_model(f"motion {spec.name}", spec.summary, fields))
-    return _one_of("MotionLaw", models)
-
-
-def _fatigue_laws() -> Any:
-    """Return the model of a body in the table [fatigue], for each fatigue law."""
-    named, models = FatigueOfBody.model_fields["law"], []
-    for spec in installed(FatigueLawSpec):
-        fields = {**_fields(FatigueOfBody), **_fields(spec.options)}
-        fields["law"] = Literal[spec.name], Field(..., description=named.description)
-        models.append(_model(f"fatigue {spec.name}", spec.summary, fields))
-    return _one_of("FatigueLaw", models)
-
-
-def _axial_profiles(table: str, random: RandomInputs) -> Any:
-    """Return the model of the table `axial_profile` of a body, for each form."""
-    named, models = AxialTable.model_fields["form"], []
-    for spec in installed(AxialProfileSpec):
-        fields = _fields(spec.options, f"{table}.axial_profile", random)
-        fields["form"] = Literal[spec.name], Field(..., description=named.description)
-        models.append(_model(f"{table} {spec.name}", spec.summary, fields))
-    return _one_of(f"{table} axial profile", models)
+        models.append(_model(f"{names[0]} {spec.name}", spec.summary, fields))
+    return _one_of(names[1], models)
 
 
 def _model(name: str, description: str | None, fields: dict[str, Any]) -> Model:

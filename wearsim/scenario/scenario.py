@@ -240,9 +240,7 @@ class Scenario:
 
     def __repr__(self) -> str:
         rollers = self.operation.rollers
-        length = "one contact"
-        if self.has_length:
-            length = f"{self.total_passes} passes"
+        length = f"{self.total_passes} passes" if self.has_length else "one contact"
         random = f", {len(self.random)} random" if self.random else ""
         return (
             f"<Scenario '{self.title}': {rollers} roller{'s' if rollers > 1 else ''},"

@@ -63,6 +63,8 @@ def dry_run(scenario: Scenario) -> Data:
     patch, patch_load = means.hardest_patch(high)
     random = {key for item in scenario.random for key in item.keys}
     fixed_load = {} if "load.normal_force" in random else {"least_N": low, "greatest_N": high}
+    coefficient = scenario.friction.coefficient
+    friction = {} if "friction.coefficient" in random else {"friction": coefficient}
     data: Data = {
         "title": scenario.title,
         "file": scenario.file,
@@ -94,11 +96,11 @@ def dry_run(scenario: Scenario) -> Data:
             "terms": [term.name for term in scenario.load.terms],
         },
         "log": _log(scenario, load),
-        "friction": scenario.friction.coefficient,
+        **friction,
         "creep_factor": scenario.friction.creep_factor,
         "creepage": _creepage(scenario, random),
         "random": [_random(item, units_of(scenario)) for item in scenario.random],
-        "sampling": None,
+        "sampling": dict(scenario.sampling) if scenario.random else None,
         "contact_model": described_model(scenario.contact.model, scenario.text),
         "contact_model_summary": scenario.contact.spec.summary,
         "initial_patch": {
@@ -108,15 +110,6 @@ def dry_run(scenario: Scenario) -> Data:
             "load_N": patch_load,
         },
     }
-    if "friction.coefficient" in random:
-        del data["friction"]
-    if scenario.random:
-        table = scenario.sampling
-        data["sampling"] = {
-            "plan": table.plan,
-            "realisation": table.realisation,
-            "correlation": table.correlation,
-        }
     warnings = plausibility_warnings(means)
     if is_run:
         setup = draw(scenario)
@@ -138,13 +131,12 @@ def _cam(scenario: Scenario) -> Data | None:
     turn = turn_of(scenario)
     stations, motion = turn.stations, cam.motion
     point = turn.at_stations(stations)
-    names = [motion.segments[stations.panels[k].segment].name for k in stations.panel]
     return {
         "base_radius_m": cam.base_radius,
         "follower": cam.follower.kind,
         "groove": cam.groove,
         "stations": {
-            "segment": names,
+            "segment": [motion.segments[stations.panels[k].segment].name for k in stations.panel],
             "angle_rad": point.angle,
             "weight_rad": stations.weight,
             "rolling_speed_m_per_s": turn.speed * point.kinematics.travel,

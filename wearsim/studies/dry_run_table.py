@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -44,10 +45,13 @@ class _Cam(_Cylinder):
 
     def body(self) -> list[str]:
         """Return radius, form, follower and number of stations."""
-        kind = f"{self.cam['follower']} follower" + (" in a groove" if self.cam["groove"] else "")
-        stations = f"{len(self.cam['stations']['angle_rad'])} stations"
         radius, form = _fields(self.cam, "base_radius_m", digits=6), _form(self.data["cylinder"])
-        return [*radius, *form, kind, stations]
+        return [
+            *radius,
+            *form,
+            f"{self.cam['follower']} follower" + (" in a groove" if self.cam["groove"] else ""),
+            f"{len(self.cam['stations']['angle_rad'])} stations",
+        ]
 
     def speed(self) -> str:
         """Return the range of the rolling speed."""
@@ -105,12 +109,11 @@ def _form(body: Data) -> list[str]:
 
 def station_table(stations: Data) -> tuple[list[str], list[list[str]]]:
     """Return heads and rows of the table of a cam's stations, in engineering units."""
-    heads = ["angle [deg]", "weight [deg]", "V [m/s]", "curvature [1/mm]", "N [N]"]
+    heads = ["angle [deg]", "weight [deg]", "V [m/s]", "curvature [1/mm]", "N [N]", "segment"]
     sizes = [np.degrees(1.0), np.degrees(1.0), 1.0, 1e-3, 1.0]
     columns = [values * size for values, size in zip([*stations.values()][1:], sizes, strict=True)]
     rows = [[f"{value:.4g}" for value in row] for row in zip(*columns, strict=True)]
-    named = [[*row, name] for row, name in zip(rows, stations["segment"], strict=True)]
-    return [*heads, "segment"], named
+    return heads, [[*row, name] for row, name in zip(rows, stations["segment"], strict=True)]
 
 
 def _range(bounds: Sequence[float], unit: str, size: float) -> str:
@@ -165,12 +168,14 @@ def _creepage_rows(creepage: Data) -> TableRows:
     if "longitudinal" in creepage:
         words.append(f"longitudinal {creepage['longitudinal']:.4g}")
     if creepage["drive"] == "free":
-        torque = creepage.get("bearing_torque_N_m")
-        words, friction = ["free"], creepage["bearing_friction"]
-        if torque or (torque is not None and not friction):
-            words.append(f"bearing torque {torque * 1e3:.4g} N mm")
-        if friction:
-            words.append(f"bearing friction {friction:g}")
+        torque: Any = creepage.get("bearing_torque_N_m")
+        friction = creepage["bearing_friction"]
+        stated = torque or (torque is not None and not friction)
+        words = [
+            "free",
+            *([f"bearing torque {torque * 1e3:.4g} N mm"] if stated else []),
+            *([f"bearing friction {friction:g}"] if friction else []),
+        ]
     words += _fields(creepage, "yaw_rad", "tilt_rad")
     words += ["differential slip"] if creepage["differential_slip"] else []
     return [("creepage", ", ".join(words))] if words else []
@@ -192,8 +197,11 @@ def _random_rows(data: Data) -> TableRows:
     if table is None:
         return []
     pairs = [f"{first} with {second} {rank:g}" for first, second, rank in table["correlation"]]
-    words = [table["plan"], f"realisation {table['realisation']}"]
-    words += [f"rank correlation of {', '.join(pairs)}"] if pairs else []
+    words = [
+        table["plan"],
+        f"realisation {table['realisation']}",
+        *([f"rank correlation of {', '.join(pairs)}"] if pairs else []),
+    ]
     return [*rows, ("sampling", ", ".join(words))]
 
 

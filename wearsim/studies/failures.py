@@ -162,14 +162,13 @@ def _skid(error: SolverError, scenario: Scenario) -> tuple[str, str]:
     if scenario.cam is None:
         most, of_inertia, start = f" to below {1e3 * carried:.4g} N mm", [], greatest_load(scenario)
         reason = f"; the load has fallen from {start:.4g} N" if load < 0.99 * start else ""
-    remedies = []
     if any(scenario.per_roller(creepage.yaw)):
         reason += "; creepage.yaw takes a part of the friction"
-    if creepage.bearing_torque:
-        torque = 1e3 * creepage.bearing_torque
-        remedies.append(f"lower creepage.bearing_torque = {torque:.6g} N mm{most}")
-    remedies += of_inertia
-    if creepage.bearing_friction:
-        remedies.append(f"lower creepage.bearing_friction = {creepage.bearing_friction:.4g}")
-    remedies.append(f"raise friction.coefficient = {friction:.4g} or the load")
+    torque, bearing = 1e3 * (creepage.bearing_torque or 0.0), creepage.bearing_friction
+    remedies = [
+        *([f"lower creepage.bearing_torque = {torque:.6g} N mm{most}"] if torque else []),
+        *of_inertia,
+        *([f"lower creepage.bearing_friction = {bearing:.4g}"] if bearing else []),
+        f"raise friction.coefficient = {friction:.4g} or the load",
+    ]
     return f"{error.message}{reason}", ", or ".join(remedies)

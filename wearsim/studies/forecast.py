@@ -85,9 +85,7 @@ class WearForecast:
     def __init__(self, scenario: Scenario, problem: WearProblem) -> None:
         self.scenario = self._scout = scenario
         choice = self._scout.contact
-        seconds = math.nan
-        if choice.spec.reference:
-            seconds = _seconds_of_all(problem)
+        seconds = _seconds_of_all(problem) if choice.spec.reference else math.nan
         # a parabola does not approximate a groove that fits the roller; exact theory takes long
         if choice.model in PARABOLA or choice.spec.reference:
             options = registry().get(ContactModelSpec, "slender").options()

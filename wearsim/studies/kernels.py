@@ -54,35 +54,35 @@ def kernels_of(
     steps = study == "test"
     contact, evolution = scenario.contact, scenario.evolution
     model, name = contact.model, evolution.stepper
-    names = set(_MODELS.get(model, ()))
     theory = getattr(contact.options, "tangential", "strip")
-    if model == "hertz-fastsim":
-        names |= {"march_fields"} if fields else set()
-    elif model in _MODELS:
-        names |= _THEORIES[theory] | (_FIELDS[theory] if fields else set())
-        if theory == "strip":
-            batched = model == "slender"
-            names |= {"strip_contacts"} if batched else set()
-            names |= {"solve_strips"} if fields or not batched else set()
-    if steps and model == "slender" and theory == "strip" and name == "per-pass":
-        names |= {"run_passes"}
+    by_strips, batched = model in _MODELS and model != "hertz-fastsim", model == "slender"
+    strip_theory = by_strips and theory == "strip"
     roles = {item.role for item in scenario.random}
     varies = "process" in roles or not scenario.load.built.constant
     redrawn = any(item.is_redrawn for item in scenario.random)
     # the test on coarse strips
     coarse = evolution.strip_error and not (name == "per-pass" and redrawn)
     compliant, implicit = model in {"slender", "semi-hertzian"}, name in {"auto", "implicit"}
-    if steps and compliant and (implicit or coarse):
-        names |= {"begin_step", "linearise_step", "compare_step", "end_step", "next_steps"}
-        names |= {"parts_of_aim"}
-        by_doubling = varies or theory == "fastsim"
-        names |= {"difference_sizes" if by_doubling else "assess_step"}
-    names |= {"damage_of_step"} if steps and scenario.fatigue is not None else set()
+    linearised = steps and compliant and (implicit or coarse)
+    by_doubling = varies or theory == "fastsim"
     doubled = name != "per-pass" if not (compliant and implicit) else evolution.step is not None
-    if steps and (doubled or (coarse and not compliant)):
-        names |= {"difference_sizes"}
-    names |= {"filter_noise"} if "process" in roles else set()
-    return names | ({"smooth", "half_lengths"} if "field" in roles else set())
+    called: list[tuple[bool, Iterable[str]]] = [
+        (model in _MODELS, _MODELS.get(model, ())),
+        (model == "hertz-fastsim" and fields, {"march_fields"}),
+        (by_strips, _THEORIES.get(theory, ())),
+        (by_strips and fields, _FIELDS.get(theory, ())),
+        (strip_theory and batched, {"strip_contacts"}),
+        (strip_theory and (fields or not batched), {"solve_strips"}),
+        (strip_theory and batched and steps and name == "per-pass", {"run_passes"}),
+        (linearised, {"begin_step", "linearise_step", "compare_step", "end_step", "next_steps"}),
+        (linearised, {"parts_of_aim"}),
+        (linearised, {"difference_sizes" if by_doubling else "assess_step"}),
+        (steps and scenario.fatigue is not None, {"damage_of_step"}),
+        (steps and (doubled or (coarse and not compliant)), {"difference_sizes"}),
+        ("process" in roles, {"filter_noise"}),
+        ("field" in roles, {"smooth", "half_lengths"}),
+    ]
+    return {kernel for is_called, kernels in called if is_called for kernel in kernels}
 
 
 @contextmanager

@@ -71,11 +71,14 @@ def bytes_per_realisation(scenario: Scenario) -> int:
 
 def nothing_random(what: str) -> Mistake:
     """Return the mistake of a scenario without effective random inputs."""
-    expected = (
+    return Mistake(
+        "",
+        "",
+        what,
+        None,
         "a distribution instead of a value, such as friction.coefficient ="
-        ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}'
+        ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}',
     )
-    return Mistake("", "", what, None, expected)
 
 
 @cache
@@ -92,18 +95,16 @@ def software() -> Mapping[str, str]:
 
 def plugins_in_use(scenario: Scenario) -> list[dict[str, str]]:
     """Return kind, name, distribution and version of every plugin that a scenario uses."""
+    laws = scenario.fatigue.laws.values() if scenario.fatigue else ()
+    random = [name for item in scenario.random for name in (item.kind, item.marginal) if name]
     used: list[tuple[type[Spec], str]] = [
         (ContactModelSpec, scenario.contact.model),
         (LoadSpec, scenario.load.kind),
+        *((LoadSpec, term.name) for term in scenario.load.terms),
+        *([(WearLawSpec, scenario.wear.law)] if scenario.wear else []),
+        *((FatigueLawSpec, name) for name in dict.fromkeys(law.law for law in laws)),
+        *((RandomInputSpec, name) for name in dict.fromkeys(random)),
     ]
-    used += [(LoadSpec, term.name) for term in scenario.load.terms]
-    if scenario.wear is not None:
-        used.append((WearLawSpec, scenario.wear.law))
-    if scenario.fatigue is not None:
-        names = dict.fromkeys(law.law for law in scenario.fatigue.laws.values())
-        used += [(FatigueLawSpec, name) for name in names]
-    random = [name for item in scenario.random for name in (item.kind, item.marginal) if name]
-    used += [(RandomInputSpec, name) for name in dict.fromkeys(random)]
     return [
         {
             "kind": kind.kind,

@@ -41,8 +41,7 @@ class MotionLawFixture(Fixture[MotionLawSpec]):
 
     def fresh(self) -> Any:
         """Return a new instance."""
-        spec = self.configured.spec
-        return spec.factory(self.configured.options, self.angle, self.rise, "m")
+        return self.configured.spec.factory(self.configured.options, self.angle, self.rise, "m")
 
     def lift(self, angle: FloatArray) -> FloatArray:
         """Return lift and derivatives, shape (3, points)."""

@@ -132,8 +132,8 @@ def contact(
             cylinder, profile=measured, profile_file=str(profile), profile_filter=wavelength
         )
     start = profile_data(cylinder, files)
-    automatic = loaded.contact.model == "auto"  # all models that it takes have fields
-    has_fields = automatic or loaded.contact.spec.capabilities.fields
+    # all models that "auto" takes have fields
+    has_fields = loaded.contact.model == "auto" or loaded.contact.spec.capabilities.fields
     with_fields = figure is not None and has_fields
     with watching(Display, loaded, kind="contact", fields=with_fields):
         study = wearsim.study_contact(loaded, cylinder.profile, with_fields, True, against)
@@ -153,10 +153,11 @@ def _notes_on_means(scenario: Scenario) -> list[str]:
     """Return notes that name the random inputs, which are set to their means."""
     fields = [item.name for item in scenario.random if item.role == "field"]
     others = [item.name for item in scenario.random if item.role != "field"]
-    notes = [f"random inputs are set to their means: {', '.join(others)}"] if others else []
-    if fields:
-        notes.append(f"random fields are set to the means of their marginals: {', '.join(fields)}")
-    return notes
+    named = {
+        "random inputs are set to their means": others,
+        "random fields are set to the means of their marginals": fields,
+    }
+    return [f"{text}: {', '.join(names)}" for text, names in named.items() if names]
 
 
 def dissipation(

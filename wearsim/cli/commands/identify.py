@@ -289,8 +289,7 @@ def _sizes(numbers: str | None) -> list[int]:
         listed = () if colon else str(numbers).split(",")
         counts = sizes(int(first), int(last)) if colon else sorted(set(map(int, listed)))
     wrong = not counts or counts[0] < 2 or counts[-1] > 1000 or (colon and int(first) > int(last))
-    text = f"'{numbers}' is no range of 2 to 1000 tests, expected 3:60 or 3,8,20"
-    refuse(wrong, text, "-n")
+    refuse(wrong, f"'{numbers}' is no range of 2 to 1000 tests, expected 3:60 or 3,8,20", "-n")
     return counts
 
 

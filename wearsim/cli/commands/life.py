@@ -191,8 +191,7 @@ def life(
     with checking("--b"):
         shares = _shares(b)
     files = [path.suffix.lower() in _FILES for path in designs]
-    too_many = len(designs) > 2 and not all(files)
-    refuse(too_many, "give one design, or two to compare", "SCENARIO")
+    refuse(len(designs) > 2 and not all(files), "give one design, or two to compare", "SCENARIO")
     twice = len({path.resolve() for path in designs}) < len(designs)
     refuse(twice, f"{designs[0]} is given twice", "SCENARIO")
     if any(files):
@@ -418,10 +417,15 @@ def _going_on(
         for label, scenario, file in zip(labels, scenarios, paths, strict=True):
             if file.exists():
                 continue
-            swept = ["--set", f"{key}={label}"] if key else []
-            options = [*swept, "--seed", str(scenario.seed), "-o", str(file)]
-            commands.append(shlex.join(["wearsim", "life", scenario.file, *options]))
-        steps = [f"`{command}` with the other options" for command in commands]
-        steps.append(f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`")
+            words = [
+                *("wearsim", "life", scenario.file),
+                *(["--set", f"{key}={label}"] if key else []),
+                *("--seed", str(scenario.seed), "-o", str(file)),
+            ]
+            commands.append(shlex.join(words))
+        steps = [
+            *(f"`{command}` with the other options" for command in commands),
+            f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`",
+        ]
         text = f"{error.at_shell}; the comparison is finished by {', then '.join(steps)}"
         raise type(error)(text) from error

@@ -46,12 +46,11 @@ class LifeUse:
 
     def check(self, force: bool) -> None:
         """Check the options and the names of the files."""
-        both = self.returns is not None and self.demonstrate is not None
-        refuse(both, "goes without --returns", "--demonstrate")
-        lacks = self.life_factor is not None and self.returns is None
-        refuse(lacks, "goes with --returns", "--life-factor")
-        lacks = self.table is not None and not self.is_special
-        refuse(lacks, "goes with --returns or --demonstrate", "--table")
+        returns, demonstrate = self.returns is not None, self.demonstrate is not None
+        refuse(returns and demonstrate, "goes without --returns", "--demonstrate")
+        refuse(self.life_factor is not None and not returns, "goes with --returns", "--life-factor")
+        text = "goes with --returns or --demonstrate"
+        refuse(self.table is not None and not self.is_special, text, "--table")
         check_ending(self.page, force, "--page", (".html",), "format of a page")
         check_ending(self.table, force, "--table", (".csv",), "format of a table")
 

@@ -61,8 +61,7 @@ def maxent(
         raise Infeasible(re.sub(r"\bmean_log\b", "--mean-log", str(error))) from error
     from wearsim.report.maxent import MaxentView
 
-    view = MaxentView(distribution)
-    show_with_figure(view, figure, json=json)
+    show_with_figure(MaxentView(distribution), figure, json=json)
     if not json:
         typer.echo("\n".join(_plot(distribution)))
 

@@ -139,8 +139,7 @@ def measured_profiles(
     How signs were read and the residuals go to stderr.
     """
     if not files:
-        given = {"--level": level, "--angle": angle}
-        refuse_options(given, "needs a measured profile, --measured")
+        refuse_options({"--level": level, "--angle": angle}, "needs a measured profile, --measured")
         return []
     from wearsim.levelling import Measured, levelled
     from wearsim.profiles import load_profile, sign_note
@@ -193,8 +192,7 @@ def compare(
     force: Force = False,
 ) -> None:
     """Compare runs and ensembles, with confidence intervals."""
-    text = f"there is one file, {files[0]}; give another one to compare"
-    refuse(len(files) < 2, text, "FILE.h5")
+    refuse(len(files) < 2, f"there is one file, {files[0]}; give another one to compare", "FILE.h5")
     refuse_inputs(figure, files, "the comparison")
     for file in files:
         refuse(files.count(file) > 1, f"{file} is given twice", "FILE.h5")

@@ -78,8 +78,7 @@ def run(
             if getattr(wearsim.open_results(path), "failure", ""):
                 error.add_note(f"the last accepted step is kept: wearsim show {path}")
         raise
-    files = {"results file": result.path}
-    show_view(result.view, json=json, files=files, known=loaded.notes)
+    show_view(result.view, json=json, files={"results file": result.path}, known=loaded.notes)
 
 
 def resume(

@@ -126,8 +126,10 @@ def _write_scenario(name: Literal["starter", "starter_cam"], file: Path, force: 
 
 
 def _unwritable(error: OSError, path: Path, option: str) -> typer.BadParameter:
-    message = f"cannot write to {path} ({error.strerror}); choose another name or folder"
-    return typer.BadParameter(message, param_hint=option)
+    return typer.BadParameter(
+        f"cannot write to {path} ({error.strerror}); choose another name or folder",
+        param_hint=option,
+    )
 
 
 def plugins(json: Json = False) -> None:

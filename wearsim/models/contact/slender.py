@@ -188,8 +188,7 @@ class Slender(StripModel):
     ) -> None:
         state = {"gap": gap, "line_load": line_load, "approach": approach, "normal_force": loads}
         if status != kernels.CONVERGED:
-            too_fine = status == kernels.TOO_FINE
-            raise normal_failure("slender", _FAILURE[status], too_fine, state)
+            raise normal_failure("slender", _FAILURE[status], status == kernels.TOO_FINE, state)
         check_edges(self._grid, line_load, state)
 
     def pass_loop(self, loop: PassLoop) -> int:

@@ -152,8 +152,7 @@ class LiveFigure:
             source, and one for each column.
         """
         new = recording or record(panel)
-        old = self._recording
-        if new.looks != old.looks:
+        if new.looks != self._recording.looks:
             return False
         for axis, along in ((panel.x, "x"), (panel.y, "y")):
             self._set_axis(axis, along, ends=not is_boxed(panel))

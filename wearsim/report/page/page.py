@@ -11,7 +11,6 @@ from wearsim.atomic_write import replacement
 from wearsim.errors import PluginError
 from wearsim.levelling import Measured
 from wearsim.report.measured import residual_text
-from wearsim.report.panels import Sheet
 from wearsim.report.view import Row, Table, View
 
 
@@ -99,14 +98,13 @@ def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
     template = Environment(
         loader=PackageLoader("wearsim.report.page", "."), autoescape=True, trim_blocks=True
     ).get_template("page.html.jinja")
-    resources = Resources(mode="inline", components=["bokeh"], log_level="fatal")
     return template.render(
         title=views[0].title,
         first=first_of(views),
         parts=parts,
         divisions=divisions,
         script=script,
-        resources=resources.render(),
+        resources=Resources(mode="inline", components=["bokeh"], log_level="fatal").render(),
     )
 
 
@@ -127,7 +125,6 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> dict[str, Any]:
     """
     from wearsim.report.page.plots import plots_of  # noqa: PLC0415  (imports bokeh)
 
-    sheet: Sheet = view.panels(measured)
     tables, computed = view.tables(), view.profile()
     if measured and computed is not None:
         residuals = [
@@ -135,7 +132,12 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> dict[str, Any]:
             for profile in measured
         ]
         tables.insert(-1, Table("Measured profiles", residuals))
-    remarks = [*filter(None, [view.failures]), *view.warnings, *view.notes]
-    panels, steps = plots_of(sheet)
-    part = {"view": view, "rows": view.rows(), "tables": tables, "remarks": remarks}
-    return {**part, "panels": panels, "steps": steps}
+    panels, steps = plots_of(view.panels(measured))
+    return {
+        "view": view,
+        "rows": view.rows(),
+        "tables": tables,
+        "remarks": [*filter(None, [view.failures]), *view.warnings, *view.notes],
+        "panels": panels,
+        "steps": steps,
+    }

@@ -99,7 +99,9 @@ def draw(panel: Panel) -> Any:
         axis.update(major_label_text_font_size="13px", **_TEXT)
     plot.grid.grid_line_color = "#e4e4e4"
     draw_marks(plot, panel)
-    _set_legend(plot)
+    for legend in plot.legend:
+        plot.add_layout(legend, "below")
+        legend.update(**_LEGEND)
     return plot
 
 
@@ -164,13 +166,6 @@ def _set_axis(plot: Any, along: str, axis: Axis) -> None:
         ticks.formatter = BasicTickFormatter(
             power_limit_low=-4, power_limit_high=8, precision="auto"
         )
-
-
-def _set_legend(plot: Any) -> None:
-    """Move the legend below the axes; a click on an entry hides its line."""
-    for legend in plot.legend:
-        plot.add_layout(legend, "below")
-        legend.update(**_LEGEND)
 
 
 def _source(plot: Any, columns: Mapping[str, Any], name: str | None = None) -> Any:
@@ -287,9 +282,12 @@ def _draw_line(
     elif mark.dash:
         pointed = plot.line("x", "y", **line, **style, **named)
     if mark.marker and not mark.at_end:
-        look = {"marker": _MARKERS[mark.marker], "size": max(mark.size, 2.0) * 1.3}
-        look |= {"fill_color": "white"} if mark.open else {}
-        look |= {"angle": 0.5 * np.pi} if mark.marker == "|" else {}
+        look = {
+            "marker": _MARKERS[mark.marker],
+            "size": max(mark.size, 2.0) * 1.3,
+            **({"fill_color": "white"} if mark.open else {}),
+            **({"angle": 0.5 * np.pi} if mark.marker == "|" else {}),
+        }
         points = plot.scatter("x", "y", source=source, **look, **style, **named)
         pointed = pointed if mark.dash else points
     _hover(plot, [pointed], *tips, line=bool(mark.dash))
@@ -328,14 +326,14 @@ def _draw_bars(
     plot: Any, mark: Bars, x: Axis, y: Axis, style: dict[str, Any], named: dict[str, Any]
 ) -> None:
     place, size = (y, x) if mark.horizontal else (x, y)
+    further, more_tips = _more(mark)
     columns: dict[str, Any] = {
         "low": np.asarray(mark.low, dtype=float) * place.scale,
         "high": np.asarray(mark.high, dtype=float) * place.scale,
         "value": np.asarray(mark.value, dtype=float) * size.scale,
+        "start": np.full(len(mark.low), mark.start * size.scale),
+        **further,
     }
-    columns["start"] = np.full(len(columns["low"]), mark.start * size.scale)
-    further, more_tips = _more(mark)
-    columns |= further
     if isinstance(mark.colour, list):
         columns["colour"] = mark.colour
         style = {**style, "color": "colour"}
@@ -387,10 +385,13 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
     greatest = float(np.nanmax(values)) or 1.0
     mapper = LinearColorMapper(palette=_PALETTES[mark.colours], low=0.0, high=greatest)
     mapper.nan_color = "rgba(0, 0, 0, 0)"
-    extent = {"x": float(across[0] * x.scale), "y": float(up[0] * y.scale)}
-    extent |= {"dw": float(np.ptp(across) * x.scale), "dh": float(np.ptp(up) * y.scale)}
-    drawn: dict[str, Any] = {"image": [values.astype(np.float32)]}
-    drawn |= {name: [place] for name, place in extent.items()}
+    drawn: dict[str, Any] = {
+        "image": [values.astype(np.float32)],
+        "x": [float(across[0] * x.scale)],
+        "y": [float(up[0] * y.scale)],
+        "dw": [float(np.ptp(across) * x.scale)],
+        "dh": [float(np.ptp(up) * y.scale)],
+    }
     names = dict(zip(drawn, drawn, strict=True))
     picture = plot.image(**names, source=_source(plot, drawn), color_mapper=mapper)
     bar = ColorBar(color_mapper=mapper, width=12, title=plain_label(mark.axis.label))
@@ -411,9 +412,11 @@ def _regular(places: Any) -> Any:
 
 
 def _draw_text(plot: Any, mark: Text, x: Axis, y: Axis) -> None:
-    places: dict[str, Any] = {"x": float(mark.x * x.scale), "y": float(mark.y * y.scale)}
-    if mark.parts:
-        places |= {mark.parts: 3, f"{mark.parts}_units": "screen"}
+    places: dict[str, Any] = {
+        "x": float(mark.x * x.scale),
+        "y": float(mark.y * y.scale),
+        **({mark.parts: 3, f"{mark.parts}_units": "screen"} if mark.parts else {}),
+    }
     plot.add_layout(
         Label(
             text=plain_label(mark.text), text_color=_colour(mark.colour), text_align=mark.anchor,

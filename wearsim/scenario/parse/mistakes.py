@@ -169,11 +169,10 @@ def validate_options(
         order, or None after adding its mistakes.
     """
     # as JSON: its strict mode rejects "3" for 3 but accepts a list for a tuple
-    numbers = None if refused is None else dict
     context = {
         "read": mistakes.read,
         "quantity": quantity,
-        "numbers": numbers,
+        "numbers": None if refused is None else dict,
         "component": component,
     }
     try:
@@ -247,8 +246,10 @@ def _translate(
         mistakes.add(place, key, str(error), None if isinstance(value, dict) else as_written(value))
     elif kind == "extra_forbidden":
         known = model_at(model, loc[:-1])
-        here = [*(known.model_fields if known else ())]
-        here += other_keys.model_fields if other_keys and len(loc) == 1 else []
+        here = [
+            *(known.model_fields if known else ()),
+            *(other_keys.model_fields if other_keys and len(loc) == 1 else ()),
+        ]
         mistakes.add(place, key, f"unknown key{mistakes.hint(key, here)}")
     elif kind == "missing":
         if field and field.description and expected == "a table":

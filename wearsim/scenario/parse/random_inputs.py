@@ -214,9 +214,11 @@ def read_random_input(
 
 def _check_role(mistakes: Mistakes, spec: RandomInputSpec, name: str, target: RandomTarget) -> bool:
     """Check that the role of the distribution is possible for this value."""
-    roles = {"joint" if target.components else "scalar"}
-    roles |= {"process"} if name in CONTACT_FIELDS else set()
-    roles |= {"field"} if name == FRICTION else set()
+    roles = [
+        "joint" if target.components else "scalar",
+        *(["process"] if name in CONTACT_FIELDS else []),
+        *(["field"] if name == FRICTION else []),
+    ]
     if spec.role in roles:
         return True
     what = {

@@ -338,19 +338,18 @@ def parse_fields(
     check_contained(mistakes)
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)
-    notes = (
-        *dundurs_note(sections["roller"], sections["cylinder"], sections["contact"]),
-        *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
-        *_unused_sampling_note(data, random),
-        *mistakes.notes,
-    )
     return {
         "file": name,
         "title": top.title or PurePath(name).stem,
         "seed": top.seed,
         "text": text,
         "files": files,
-        "notes": notes,
+        "notes": (
+            *dundurs_note(sections["roller"], sections["cylinder"], sections["contact"]),
+            *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
+            *_unused_sampling_note(data, random),
+            *mistakes.notes,
+        ),
         "random": random,
         "tables": owned,
         **sections,
@@ -461,27 +460,29 @@ def _unused_sampling_note(data: Mapping[str, Any], random: tuple[RandomInput, ..
 
 def keys_by_place() -> dict[str, set[str]]:
     """Return the keys of every table and of every plugin, by their place in words."""
-    keys = {"the top of the file": set(TopTable.model_fields)}
-    keys |= {f"[{table}]": set(model.model_fields) for table, model in TABLES.items()}
-    for table, (_, key, kind) in PLUGIN_TABLES.items():
-        for spec in installed(kind):
-            term = isinstance(spec, LoadSpec) and spec.role == "term"
-            place = f"[load.{spec.name}]" if term else f'[{table}] with {key} = "{spec.name}"'
-            keys[place] = set(spec.options.model_fields)
-    for law in installed(MotionLawSpec):
-        keys[f'an entry of cam.motion with law = "{law.name}"'] = set(law.options.model_fields)
-    for spec in installed(FatigueLawSpec):
-        keys[f'a body of [fatigue] with law = "{spec.name}"'] = set(spec.options.model_fields)
-    keys["a body of [fatigue]"] = set(FatigueOfBody.model_fields)
-    keys["an entry of cam.motion"] = set(MotionTable.model_fields)
-    for profile in installed(AxialProfileSpec):
-        place = f'axial_profile with form = "{profile.name}"'
-        keys[place] = set(profile.options.model_fields)
-    keys["axial_profile"] = set(AxialTable.model_fields)
-    keys['[contact] with model = "auto"'] = {"tolerance"}
-    keys |= {f"[{spec.name}]": set(spec.options.model_fields) for spec in installed(TableSpec)}
-    keys["a random input"] = set(RandomInputTable.model_fields)
-    return keys | {
-        f'a random input with distribution = "{spec.name}"': set(spec.options.model_fields)
-        for spec in installed(RandomInputSpec)
+
+    def of(kind: Any, place: str) -> dict[str, set[str]]:
+        options = {spec.name: spec.options for spec in installed(kind)}
+        return {place.format(name): set(model.model_fields) for name, model in options.items()}
+
+    return {
+        "the top of the file": set(TopTable.model_fields),
+        **{f"[{table}]": set(model.model_fields) for table, model in TABLES.items()},
+        **{
+            f"[load.{spec.name}]"
+            if isinstance(spec, LoadSpec) and spec.role == "term"
+            else f'[{table}] with {key} = "{spec.name}"': set(spec.options.model_fields)
+            for table, (_, key, kind) in PLUGIN_TABLES.items()
+            for spec in installed(kind)
+        },
+        **of(MotionLawSpec, 'an entry of cam.motion with law = "{}"'),
+        **of(FatigueLawSpec, 'a body of [fatigue] with law = "{}"'),
+        "a body of [fatigue]": set(FatigueOfBody.model_fields),
+        "an entry of cam.motion": set(MotionTable.model_fields),
+        **of(AxialProfileSpec, 'axial_profile with form = "{}"'),
+        "axial_profile": set(AxialTable.model_fields),
+        '[contact] with model = "auto"': {"tolerance"},
+        **of(TableSpec, "[{}]"),
+        "a random input": set(RandomInputTable.model_fields),
+        **of(RandomInputSpec, 'a random input with distribution = "{}"'),
     }

@@ -112,8 +112,7 @@ def check_axial(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Ro
     roller, cylinder = sections["roller"], sections["cylinder"]
     if roller is None or cylinder is None or not (roller.radius and cylinder.radius):
         return {}
-    pair = pair_of(roller, cylinder)
-    profile = _built(mistakes, "roller", roller.axial_profile, pair)
+    profile = _built(mistakes, "roller", roller.axial_profile, pair_of(roller, cylinder))
     if profile is not None and math.isfinite(profile.length):
         width, length = roller.width, profile.length
         if width is None:

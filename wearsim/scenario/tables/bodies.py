@@ -364,8 +364,7 @@ def dundurs_note(roller: Roller, cylinder: Cylinder, contact: ContactChoice) -> 
     In line contact a pressure p changes the slip by 2 beta p/E*, with Dundurs' constant beta.
     """
     pair = combine(cylinder.material, roller.material)
-    coupled = getattr(contact.options, "coupling", False)
-    if coupled or abs(pair.dundurs) <= DUNDURS_LIMIT:
+    if getattr(contact.options, "coupling", False) or abs(pair.dundurs) <= DUNDURS_LIMIT:
         return []
     slip = 2.0 * abs(pair.dundurs) * COUPLING_PRESSURE / pair.contact_modulus
     return [

@@ -157,8 +157,7 @@ def motion_of_table(
     closed = np.concatenate([closed_lift, closed_lift[1:5]])
     refuse_kinks(path, around, closed, curve.noise if curve else 0.0)
     if curve is not None:
-        light = replace(curve, factor=np.empty((0, 0)))
-        motion = motion_of("lift", light, curve.dwells)
+        motion = motion_of("lift", replace(curve, factor=np.empty((0, 0))), curve.dwells)
         scatter = scatter_through_points(turned[:-1], curve.noise)
         points = turned[:-1], curve.residual
         fitted = curve.noise, tolerance, *points, scatter, curve.second_error, peak(curve)

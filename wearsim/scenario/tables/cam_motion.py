@@ -91,8 +91,7 @@ def _from_shape(table: CamTable, follower: Follower) -> Motion | None:
 
 
 def _rise(value: str | None, unit: str) -> float:
-    kind = ANGLE if unit == "rad" else LENGTH
-    return 0.0 if value is None else Quantity(kind).parse(value)
+    return 0.0 if value is None else Quantity(ANGLE if unit == "rad" else LENGTH).parse(value)
 
 
 def _from_laws(
@@ -150,8 +149,7 @@ def _from_law(mistakes: Mistakes, place: str, raw: dict[str, object], unit: str)
     except ValueError as error:
         mistakes.add(place, "", str(error))
     else:
-        dwell = spec.rise == "none"
-        return Segment(entry.law, entry.angle, law.lift, tuple(law.breaks), dwell)
+        return Segment(entry.law, entry.angle, law.lift, tuple(law.breaks), spec.rise == "none")
     return None
 
 

@@ -72,8 +72,7 @@ def motion_of_profile(
     even = np.linspace(0.0, math.tau, POINTS + 1)
     radii = closed(theta[0] + (even - theta[0]) % math.tau)[0]
     radii[-1] = radii[0]
-    unit = "rad" if follower.swings else "m"
-    return motion_of_table(notes, path, even, radii, unit, 0.0)
+    return motion_of_table(notes, path, even, radii, "rad" if follower.swings else "m", 0.0)
 
 
 def _surface_table(
@@ -95,11 +94,10 @@ def _surface_table(
             what = "has neither the columns angle and radius, nor x and y"
             raise ScenarioError(path, [Mistake("", "", what, ", ".join(given_columns), choice)])
     if polar:
-        wanted = {names[0]: "rad", names[1]: "m"}
         columns = read_columns(
             file.text,
             path,
-            wanted,
+            {names[0]: "rad", names[1]: "m"},
             aliases=aliases,
             units=units,
             rising=names[0],

@@ -129,22 +129,25 @@ def turning(result: Result) -> Animation:
     title = f"{result.title}: wear x {factor:g}"
 
     def frame(number: int) -> Panel:
-        turned = np.exp(-1j * theta[number])
-        marks: list[Mark] = []
+        turned, marks = np.exp(-1j * theta[number]), list[Mark]()
         for unworn, worn in outlines:
             fresh, cut = (np.append(outline, outline[0]) * turned for outline in (unworn, worn))
-            if not turn.cam.groove:
-                marks.append(Patch(cut.real, cut.imag, alpha=0.12))
-            marks.append(Line(fresh.real, fresh.imag, width=0.9, colour=GREY, label="unworn"))
-            label = f"worn, wear x {factor:g}"
-            marks.append(Line(cut.real, cut.imag, width=1.5, label=label))
-        for ray in rays * turned:
-            ends = [0.0, ray.real], [0.0, ray.imag]
-            marks.append(Line(*ends, dash=":", width=0.6, colour=GREY))
-        marks += follower_marks(follower, float(moved[number]), radius, reach)
-        marks += [axis_mark(), *rotation_marks(0.4 * turn.cam.base_radius)]
+            marks += [
+                *([] if turn.cam.groove else [Patch(cut.real, cut.imag, alpha=0.12)]),
+                Line(fresh.real, fresh.imag, width=0.9, colour=GREY, label="unworn"),
+                Line(cut.real, cut.imag, width=1.5, label=f"worn, wear x {factor:g}"),
+            ]
         text = f"{math.degrees(theta[number]):.0f} deg, lift error {shown(errors[number], 'um', 3)}"
-        marks.append(Text(limits[0][0], 0.02, text, parts="y", size=10.0, offset=(6.0, 0.0)))
+        marks += [
+            *(
+                Line([0.0, ray.real], [0.0, ray.imag], dash=":", width=0.6, colour=GREY)
+                for ray in rays * turned
+            ),
+            *follower_marks(follower, float(moved[number]), radius, reach),
+            axis_mark(),
+            *rotation_marks(0.4 * turn.cam.base_radius),
+            Text(limits[0][0], 0.02, text, parts="y", size=10.0, offset=(6.0, 0.0)),
+        ]
         x, y = (Axis(name, "mm", limits=ends) for name, ends in zip("xy", limits, strict=True))
         return Panel(title, x, y, marks, legend="upper left", equal=True)
 

@@ -118,12 +118,11 @@ class CamObservables(CylinderObservables):
     def of_ensemble(self, state: WearState, row: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return lift error, and the angles of its greatest value, of depth and pressure."""
         errors, first = lift_errors(self.problem, state), row["peak_pressure"].argmax(axis=0)[None]
-        pressure_angle = np.take_along_axis(row["peak_pressure_angle"], first, axis=0)[0]
         return {
             "lift_error": row["lift_error"].max(axis=0),
             "lift_error_angle": self.track.greatest(np.abs(errors).max(axis=1)).angle,
             "depth_angle": row["depth_angle"],
-            "peak_pressure_angle": pressure_angle,
+            "peak_pressure_angle": np.take_along_axis(row["peak_pressure_angle"], first, axis=0)[0],
         }
 
     def curves(self, state: WearState, scenarios: Sequence[Scenario]) -> list[dict[str, Any]]:

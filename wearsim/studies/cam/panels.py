@@ -79,18 +79,7 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
 
     right: dict[str, Any] = {"dash": "--", "right": True, "colour": ORANGE}
 
-    motion = [
-        Line(angle, kinematics.lift, label=f"{lift} [{unit}]"),
-        Line(angle, kinematics.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
-        Line(angle, kinematics.lift_per_rad2, label=f"acceleration [{unit}/rad$^2$]", colour=GREEN),
-    ]
     pressures = peak_pressures(Setup(turn.scenario), fine)
-    load: list[Mark] = [
-        Line(angle, fine.normal_force),
-        dots(point.angle, point.normal_force, "."),
-        over_angle(pressures, **right),
-        dots(point.angle, study.peak_pressure, ".", colour=ORANGE, right=True),
-    ]
     skids = [Span(skid.start, skid.stop, colour=RED, alpha=0.12) for skid in study.skids]
     names, edges = segment_marks(turn.cam.motion), segment_marks(turn.cam.motion, names=False)
     margin = (0.1, 0.0)  # the names of the segments lie below
@@ -101,7 +90,17 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
             "Motion of the follower",
             inner,
             Axis(f"{lift} and its derivatives", per_si=PER_SI[unit], margin=(0.18, 0.18)),
-            [*motion, *names],
+            [
+                Line(angle, kinematics.lift, label=f"{lift} [{unit}]"),
+                Line(angle, kinematics.lift_per_rad, label=f"velocity [{unit}/rad]", colour=ORANGE),
+                Line(
+                    angle,
+                    kinematics.lift_per_rad2,
+                    label=f"acceleration [{unit}/rad$^2$]",
+                    colour=GREEN,
+                ),
+                *names,
+            ],
             "Lift, velocity and acceleration of the follower over a turn.",
             legend="upper right",
             columns=3,
@@ -122,7 +121,14 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
             f"Normal force, and peak pressure{shaded}",
             ANGLE,
             Axis("normal force", "N", margin=margin),
-            [*load, *names, *skids],
+            [
+                Line(angle, fine.normal_force),
+                dots(point.angle, point.normal_force, "."),
+                over_angle(pressures, **right),
+                dots(point.angle, study.peak_pressure, ".", colour=ORANGE, right=True),
+                *names,
+                *skids,
+            ],
             "Force between roller and cam, and peak pressure of the fresh contact.",
             right=_right("peak pressure", "MPa", pressures, PER_SI["MPa"], margin),
         ),
@@ -200,17 +206,22 @@ def shape_panel(turn: CamTurn) -> Panel:
     centre, surface = surface_points(follower, point.kinematics, point.angle)
     reach = 1.25 * float(np.hypot(*centre).max())
     start = float(turn.at_angles(np.zeros(1)).kinematics.lift[0])
-    marks = [
-        _curve(between_flanks(surface, point), width=1.6, label="cam"),
-        _curve(centre, width=0.8, dash="--", colour=GREY, label="pitch curve"),
-        Line(*circle(base), width=0.6, dash=":", colour=GREY, label="base circle"),
-        *follower_marks(follower, start, turn.scenario.roller.radius, reach, "roller at 0 deg"),
-        axis_mark(),
-        *rotation_marks(0.5 * base),
-    ]
-    text = "The cam, the path of the roller's centre, and the follower at the start of a turn."
-    title = "Cam, turning clockwise"
-    return Panel(title, *_PLANE, marks, text, legend="below", columns=3, equal=True)
+    return Panel(
+        "Cam, turning clockwise",
+        *_PLANE,
+        [
+            _curve(between_flanks(surface, point), width=1.6, label="cam"),
+            _curve(centre, width=0.8, dash="--", colour=GREY, label="pitch curve"),
+            Line(*circle(base), width=0.6, dash=":", colour=GREY, label="base circle"),
+            *follower_marks(follower, start, turn.scenario.roller.radius, reach, "roller at 0 deg"),
+            axis_mark(),
+            *rotation_marks(0.5 * base),
+        ],
+        "The cam, the path of the roller's centre, and the follower at the start of a turn.",
+        legend="below",
+        columns=3,
+        equal=True,
+    )
 
 
 def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
@@ -296,11 +307,16 @@ def _map(
     # interpolation overshoots next to an edge
     image = Image(angle, result.y, np.maximum(values, 0.0).T, axis, "magma_r")
     limits = (1.25 * extent[0], 1.05 * extent[-1])  # the names of the segments lie below
-    y = Axis("y across the track", "mm", limits=limits)
     place = float(np.max(result.final[f"{quantity}_angle_rad"])) * DEG
     text = f"At the end {where} at {place:.4g} deg: "
     text += f"{shown(float(np.max(course[-1])), axis.unit)}."
-    return Panel(title, ANGLE, y, [image, *segment_marks(turn.cam.motion)], text)
+    return Panel(
+        title,
+        ANGLE,
+        Axis("y across the track", "mm", limits=limits),
+        [image, *segment_marks(turn.cam.motion)],
+        text,
+    )
 
 
 def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
@@ -313,18 +329,24 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     follower, kinematics = turn.cam.follower, point.kinematics
     fresh = surface_points(follower, kinematics, point.angle)[1]
     cut = surface_points(follower, kinematics, point.angle, factor * worn)[1]
-    marks: list[Mark] = [] if turn.cam.groove else [Patch(*cut, alpha=0.12)]
-    label = f"worn, depth x {factor:g}"
-    marks += [
-        _curve(between_flanks(fresh, point), width=0.9, colour=GREY, label="unworn"),
-        _curve(between_flanks(cut, point), width=1.4, label=label),
-    ]
     starts = np.asarray(turn.cam.motion.starts[:-1])
     edges = fresh[:, np.abs(point.angle - starts[:, None]).argmin(axis=1)]
-    marks += [Line([0.0, x], [0.0, y], dash=":", width=0.6, colour=GREY) for x, y in edges.T]
-    text = f"The cam before wear, and at the end with its depth magnified {factor:g} times."
-    marks.append(axis_mark())
-    return Panel("Worn cam", *_PLANE, marks, text, legend="below", columns=2, equal=True)
+    marks: list[Mark] = [
+        *([] if turn.cam.groove else [Patch(*cut, alpha=0.12)]),
+        _curve(between_flanks(fresh, point), width=0.9, colour=GREY, label="unworn"),
+        _curve(between_flanks(cut, point), width=1.4, label=f"worn, depth x {factor:g}"),
+        *(Line([0.0, x], [0.0, y], dash=":", width=0.6, colour=GREY) for x, y in edges.T),
+        axis_mark(),
+    ]
+    return Panel(
+        "Worn cam",
+        *_PLANE,
+        marks,
+        f"The cam before wear, and at the end with its depth magnified {factor:g} times.",
+        legend="below",
+        columns=2,
+        equal=True,
+    )
 
 
 def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
@@ -349,8 +371,7 @@ def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
 def _groove(result: Result, measured: Sequence[Measured]) -> Panel:
     given = measured[0].angle if measured else None
     worn, angle = grooves_at(result, given)
-    points = [profile.y for profile in measured]
-    limits = worn_limits(result.y, worn.max(axis=0), *points)
+    limits = worn_limits(result.y, worn.max(axis=0), *(profile.y for profile in measured))
     which = "Deepest groove, at" if given is None else "Groove at"
     profiles = Records(result.y, result.start_height - worn, result.record_passes)
     return Panel(
@@ -371,9 +392,13 @@ def _residuals(motion: Motion, measured: MeasuredPoints) -> Panel:
         dots(measured.angle, measured.residual, ".", size=3.0),
         *segment_marks(motion, names=False),
     ]
-    title = f"Residuals of the {measured.quantity}, and twice its noise (shaded)"
-    text = "What was measured, less the spline that smooths it."
-    return Panel(title, ANGLE, Axis("measured less spline", unit), marks, text)
+    return Panel(
+        f"Residuals of the {measured.quantity}, and twice its noise (shaded)",
+        ANGLE,
+        Axis("measured less spline", unit),
+        marks,
+        "What was measured, less the spline that smooths it.",
+    )
 
 
 def _roller(result: Result) -> Panel:
@@ -383,5 +408,11 @@ def _roller(result: Result) -> Panel:
     if not profiles.any():
         marks.append(Line([], [], colour=ORANGE, label="the roller does not wear"))
         text = "The roller does not wear."
-    x = Axis(Y, "mm", limits=worn_limits(result.y, profiles.max(axis=0)))
-    return Panel("Worn profile of the roller", x, HEIGHT, marks, text, legend="lower center")
+    return Panel(
+        "Worn profile of the roller",
+        Axis(Y, "mm", limits=worn_limits(result.y, profiles.max(axis=0))),
+        HEIGHT,
+        marks,
+        text,
+        legend="lower center",
+    )

@@ -95,9 +95,12 @@ class CamRunView(RunView):
         """Yield angle, depth and lift error at every record, of an arm also its angle."""
         depth, lift_error = along_angle(self.result)
         yield computed("angle", CURVE_ANGLES, "rad")
-        quantities = {"depth": (depth, "m"), "lift error": (lift_error, "m")}
-        if lever := self._arm_length():
-            quantities["lift error of the arm"] = lift_error / lever, "rad"
+        lever = self._arm_length()
+        quantities = {
+            "depth": (depth, "m"),
+            "lift error": (lift_error, "m"),
+            **({"lift error of the arm": (lift_error / lever, "rad")} if lever else {}),
+        }
         for name, (values, unit) in quantities.items():
             for passes, column in zip(self.result.record_passes, values.T, strict=True):
                 yield computed(f"{name} at {passes:.12g} passes", column, unit)

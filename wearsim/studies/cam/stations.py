@@ -96,8 +96,10 @@ def _relocated(turn: CamTurn, change: FloatArray) -> CamStations:
 
 def joined(stations: CamStations) -> CamStations:
     """Return the stations, equal ones joined: of a dwell, or of a rise and its return."""
-    columns = [getattr(stations, name).ravel() for name in _COMPARED]
-    columns.append(np.abs(stations.pressure_angle.ravel()))
+    columns = [
+        *(getattr(stations, name).ravel() for name in _COMPARED),
+        np.abs(stations.pressure_angle.ravel()),
+    ]
     scales = [max(float(np.nanmax(np.abs(column), initial=0.0)), 1e-300) for column in columns]
     keys = np.stack(
         [np.nan_to_num(c / s, nan=9.0).round(10) for c, s in zip(columns, scales, strict=True)]

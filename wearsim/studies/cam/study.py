@@ -111,10 +111,15 @@ class CamStudy(Viewed):
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
 
+    @property
+    def title(self) -> str:
+        """Title of the scenario."""
+        return self.turn.scenario.title
+
     def __repr__(self) -> str:
         stations = f"{len(self.point.angle)} {'angles' if self.weight is None else 'stations'}"
         peak = float(self.peak_pressure.max()) / 1e6
-        return f"<CamStudy '{self.turn.scenario.title}': {stations}, up to {peak:.4g} MPa>"
+        return f"<CamStudy '{self.title}': {stations}, up to {peak:.4g} MPa>"
 
 
 def study_cam(

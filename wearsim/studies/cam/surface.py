@@ -174,11 +174,13 @@ def _columns(tables: list[tuple[str, FloatArray, FloatArray]]) -> list[Column]:
     angle = np.concatenate([angle for _, angle, _ in tables])
     points = np.concatenate([points for *_, points in tables], axis=1)
     degree, mm, um = np.radians(1.0), 1e-3, 1e-6
-    columns = [Column("flank", flank)] if any(flank) else []
-    columns.append(Column("angle", angle, "deg", degree))
-    for name, places in zip(("unworn", "worn"), points, strict=False):
-        columns += [Column(f"x {name}", places.real, "mm", mm)]
-        columns += [Column(f"y {name}", places.imag, "mm", mm)]
-    if len(points) > 1:
-        columns.append(Column("depth", np.abs(points[1] - points[0]), "um", um))
-    return columns
+    return [
+        *([Column("flank", flank)] if any(flank) else []),
+        Column("angle", angle, "deg", degree),
+        *(
+            Column(f"{axis} {name}", part, "mm", mm)
+            for name, places in zip(("unworn", "worn"), points, strict=False)
+            for axis, part in (("x", places.real), ("y", places.imag))
+        ),
+        *(Column("depth", np.abs(worn - points[0]), "um", um) for worn in points[1:]),
+    ]

@@ -234,8 +234,7 @@ class CamTurn:
                 if arc.panel == number
                 for edge in (arc.theta[0], arc.theta[-1])
             ]
-            edges = sorted({panel.start, panel.stop, *ends})
-            for low, high in itertools.pairwise(edges):
+            for low, high in itertools.pairwise(sorted({panel.start, panel.stop, *ends})):
                 if high - low > 1e-9:
                     rolls = np.isnan(self.slip(np.array([0.5 * (low + high)]))[0])
                     dwell = panel.dwell and bool(rolls)

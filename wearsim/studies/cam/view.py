@@ -13,7 +13,7 @@ from wearsim.report.text import NOTHING, PER_SI, in_unit, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import harmonic_depth
-from wearsim.studies.cam.study import CamStudy, peak_pressures
+from wearsim.studies.cam.study import peak_pressures
 from wearsim.studies.cam.turn import unchecked_turn_of
 from wearsim.studies.fatigue.unworn import lives_at, stresses_below
 from wearsim.studies.fatigue.view import source_rows, with_sources
@@ -75,10 +75,6 @@ class CamView(View):
     sheet = "wearsim.studies.cam.panels:cam_sheet"
     question = "Which motion, loads and contact does the cam have along its angle?"
 
-    def __init__(self, study: CamStudy) -> None:
-        self.result, self.title = study, study.turn.scenario.title
-        self.notes, self.warnings = study.notes, study.warnings
-
     def rows(self) -> Rows:
         """Return the numbers of the turn."""
         study, turn = self.result, self.result.turn
@@ -94,7 +90,6 @@ class CamView(View):
         depth = shown(harmonic_depth(turn), "um", 2)
         p, q = study.winding_ratio
         sweeps = "" if study.sweeps is None else f", {study.sweeps:.4g} sweeps around the roller"
-        never = study.jump_speed is None
         forces = {"least_normal_force": (least, "N"), "greatest_normal_force": (greatest, "N")}
         rows = [
             stated("perimeter", "perimeter", study.perimeter, "mm", 6),
@@ -111,7 +106,12 @@ class CamView(View):
             Row(
                 "speed at which the follower jumps",
                 shown(study.jump_speed, "rpm"),
-                answers={"jump_speed": (math.inf if never else study.jump_speed, "rpm")},
+                answers={
+                    "jump_speed": (
+                        math.inf if study.jump_speed is None else study.jump_speed,
+                        "rpm",
+                    )
+                },
             ),
             Row(f"harmonic limit at {depth} of wear", shown(study.harmonic_limit, "1", 3)),
             Row(
@@ -125,8 +125,7 @@ class CamView(View):
             arcs = f"{len(study.skids)} arc{'s' * (len(study.skids) > 1)}"
             energy = sum(skid.energy for skid in study.skids)
             text = f"{arcs}, {shown(energy, 'J', 3)} per turn" if energy else NOTHING
-            answers = {"skid_energy": (energy, "J")}
-            rows.append(Row("skids of the roller", text, answers=answers))
+            rows.append(Row("skids of the roller", text, answers={"skid_energy": (energy, "J")}))
         lives = lives_at(turn.scenario, np.array(study.max_peak_pressure[:1]))
         if lives is not None:
             turns = float(lives[0]) / turn.scenario.operation.rollers
@@ -165,9 +164,9 @@ class CamView(View):
             [in_unit(value, unit) for value in _without_rounding(values[key][1])]
             for _, key, unit in shown_columns
         ]
-        names = self._segment_names()
+        rows = zip(*cells, self._segment_names(), strict=True)
         heads = [*(head for head, *_ in shown_columns), "segment"]
-        return [Table("", [list(row) for row in zip(*cells, names, strict=True)], heads)]
+        return [Table("", [list(row) for row in rows], heads)]
 
     def _segment_names(self) -> list[str]:
         """Return the name of the segment of each station."""
@@ -214,9 +213,8 @@ class CamView(View):
             "patch_width_m": ("m", study.patch_width),
             "longitudinal_creepage": ("1", study.contacts.longitudinal_creepage),
             "power_W": ("W", study.contacts.power),
+            **({} if study.weight is None else {"weight_rad": ("rad", study.weight)}),
         }
-        if study.weight is not None:
-            columns["weight_rad"] = ("rad", study.weight)
         lubricant = turn.scenario.lubricant
         if lubricant is not None and study.film is not None:
             columns["film_thickness_m"] = ("m", study.film)
@@ -226,8 +224,7 @@ class CamView(View):
             columns["inner_flank"] = ("1", point.inner)
         if (lives := lives_at(turn.scenario, study.peak_pressure)) is not None:
             columns["pitting_life_turns"] = "1", lives / turn.scenario.operation.rollers
-            half = 0.5 * study.patch_length
-            columns |= stresses_below(turn.scenario, study.peak_pressure, half)
+            columns |= stresses_below(turn.scenario, study.peak_pressure, 0.5 * study.patch_length)
         return columns
 
     def data(self) -> dict[str, Any]:
@@ -280,11 +277,13 @@ class CamView(View):
         """Return the motion table, one row for each station."""
         values = self._columns()
         table = [
-            Column(title, values[key][1], unit, 1.0 / PER_SI[unit])
-            for title, key, unit in _MOTION
-            if key in values
+            *(
+                Column(title, values[key][1], unit, 1.0 / PER_SI[unit])
+                for title, key, unit in _MOTION
+                if key in values
+            ),
+            Column("segment", self._segment_names()),
         ]
-        table.append(Column("segment", self._segment_names()))
         return {"motion.csv": [with_sources(table, self.result.turn.scenario)]}
 
     def surface(self, sampling: Sampling) -> Surface:
@@ -295,8 +294,11 @@ class CamView(View):
 
     def frame(self) -> Frame:
         """Return the stations, one row each."""
-        columns = [(name, unit, values) for name, (unit, values) in self._columns().items()]
-        return Frame(columns, "station", range(len(self.result.point.angle)))
+        return Frame(
+            [(name, unit, values) for name, (unit, values) in self._columns().items()],
+            "station",
+            range(len(self.result.point.angle)),
+        )
 
 
 def _without_rounding(values: FloatArray) -> list[float]:

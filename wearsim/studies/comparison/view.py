@@ -84,40 +84,45 @@ class ComparisonView(View):
     def rows(self) -> Rows:
         """Return the comparisons with the first, and the value of each."""
         rows, unit = self.comparison.rows, OBSERVABLES[self.comparison.observable].unit
-        differences = [Row(*pair) for row in rows[1:] for pair in against(self.comparison, row)]
-        values = [Row(row.label, f"{with_interval(row.value, unit)}, {kind(row)}") for row in rows]
-        return [*differences, *values]
+        return [
+            *(Row(*pair) for row in rows[1:] for pair in against(self.comparison, row)),
+            *(Row(row.label, f"{with_interval(row.value, unit)}, {kind(row)}") for row in rows),
+        ]
 
     def tables(self) -> list[Table]:
         """Return what is compared, and the estimates with their intervals."""
         comparison, named = self.comparison, OBSERVABLES[self.comparison.observable]
         what = f"{named.words} at the end" + (f", for values of {self.key}" if self.key else "")
-        described = [
-            Row(row.label, f"{kind(row)}; {length(row)}; {file}")
-            for row, file in zip(comparison.rows, self.files, strict=True)
-        ]
         estimated = next((row.quantiles for row in comparison.rows if row.quantiles), ())
         quantiles = (f"{100 * probability:g} %" for probability, _ in estimated)
         heads = ["[" + named.unit + "]", "mean", "std", *quantiles]
         lines = [line for row in comparison.rows for line in _lines(row, named.unit, len(heads))]
-        study = Table(STUDY, [Row("compared", what), *described])
-        return [study, Table("", lines, heads), self._side_by_side()]
+        study = [
+            Row("compared", what),
+            *(
+                Row(row.label, f"{kind(row)}; {length(row)}; {file}")
+                for row, file in zip(comparison.rows, self.files, strict=True)
+            ),
+        ]
+        return [Table(STUDY, study), Table("", lines, heads), self._side_by_side()]
 
     def _side_by_side(self) -> Table:
         """Return all answers of the results, one column for each of them."""
         answers = [{row.label: row.text for row in view.rows()} for view in self._views]
         labels = list(dict.fromkeys(label for texts in answers for label in texts))
-        lines = [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels]
-        return Table("", lines, ["at the end", *(row.label for row in self.comparison.rows)])
+        return Table(
+            "",
+            [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels],
+            ["at the end", *(row.label for row in self.comparison.rows)],
+        )
 
     def overview(self) -> Overview:
         """Return the comparison, and the limits of each of the results."""
         compared = super().overview()
-        labels = [row.label for row in self.comparison.rows]
         groups, excluded = dict(compared.groups), list[str]()
-        for label, view in zip(labels, self._views, strict=True):
+        for row, view in zip(self.comparison.rows, self._views, strict=True):
             overview = view.overview()
-            groups[f"Limits of {label}"] = overview.groups.get("Limits", [])
+            groups[f"Limits of {row.label}"] = overview.groups.get("Limits", [])
             excluded += [text for text in overview.excluded if text not in excluded]
         return Overview(compared.picture, groups, excluded, alone=True)
 
@@ -137,9 +142,11 @@ class ComparisonView(View):
     def frame(self) -> Frame:
         """Return the compared results, one row each."""
         rows, unit = self.comparison.rows, si_unit(self.comparison.observable)
-        ends = [(end, unit, np.array([getattr(row.value, end) for row in rows])) for end in _ENDS]
-        labels = ("label", "", np.array([row.label for row in rows]))
-        return Frame([labels, *ends], "result", range(1, len(rows) + 1))
+        columns = [
+            ("label", "", np.array([row.label for row in rows])),
+            *((end, unit, np.array([getattr(row.value, end) for row in rows])) for end in _ENDS),
+        ]
+        return Frame(columns, "result", range(1, len(rows) + 1))
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels, with the worn profiles for a page."""
@@ -147,10 +154,9 @@ class ComparisonView(View):
         shared = titles.pop() if len(titles) == 1 else ""
         suffix = f"for values of {self.key}" if self.key else ""
         heading = ", ".join(text for text in (shared, suffix) if text)
-        labels = (row.label for row in self.comparison.rows)
         profiles = {
-            label: result.worn_profile()
-            for label, result in zip(labels, self.results, strict=False)
+            row.label: result.worn_profile()
+            for row, result in zip(self.comparison.rows, self.results, strict=False)
         }
         return comparison_sheet(self.comparison, heading, profiles)
 
@@ -203,10 +209,6 @@ def _lines(row: Compared, unit: str, columns: int) -> list[list[str]]:
 
 def _data(row: Compared, file: str) -> dict[str, Any]:
     """Return one of the compared results in SI units."""
-    paired = row.paired and {
-        "share_with_more": asdict(row.paired.share),
-        "mean_difference": asdict(row.paired.difference),
-    }
     return {
         "label": row.label,
         "file": file,
@@ -222,7 +224,11 @@ def _data(row: Compared, file: str) -> dict[str, Any]:
         "std": asdict(row.std) if row.std is not None else None,
         "quantiles": [{"probability": p, **asdict(quantile)} for p, quantile in row.quantiles],
         "probability_of_more_than_first": asdict(row.deeper) if row.deeper else None,
-        "paired_with_first": paired,
+        "paired_with_first": row.paired
+        and {
+            "share_with_more": asdict(row.paired.share),
+            "mean_difference": asdict(row.paired.difference),
+        },
         "difference_from_first": asdict(row.difference) if row.difference else None,
     }
 
@@ -267,12 +273,12 @@ def against(comparison: Comparison, row: Compared) -> list[tuple[str, str]]:
         errors = (first.value.half_width, row.value.half_width)
         text = _of_runs(row.difference, errors, unit, more, less)
         return [(f"{row.label} against {first.label}", text)]
-    rows = []
-    if row.deeper is not None:
-        rows.append((f"{row.label} {more} than {first.label}", _of_tests(first, row, row.deeper)))
-    if row.paired is not None:
-        rows.append(("  with the same draws", _of_pairs(row.paired, unit, more, less)))
-    return rows
+    deeper, paired = row.deeper, row.paired
+    name = f"{row.label} {more} than {first.label}"
+    return [
+        *([(name, _of_tests(first, row, deeper))] if deeper is not None else []),
+        *([("  with the same draws", _of_pairs(paired, unit, more, less))] if paired else []),
+    ]
 
 
 def _of_runs(
@@ -291,9 +297,8 @@ def _of_runs(
 
 def _of_tests(first: Compared, row: Compared, deeper: Interval) -> str:
     """Return the probability that a test of one ensemble exceeds a test of the other."""
-    low = min(first.values[0], row.values[0])
-    high = max(first.values[-1], row.values[-1])
-    if low == high and row.count + first.count > 2:
+    ends = {first.values[0], row.values[0], first.values[-1], row.values[-1]}
+    if len(ends) == 1 and row.count + first.count > 2:
         return EQUAL
     if not math.isfinite(deeper.value):
         return f"too few realisations, {FEWEST} of each are sufficient"
@@ -345,20 +350,24 @@ def comparison_sheet(
     if all(row.course is not None for row in rows):
         left = _courses(pairs, named)
     else:
-        marks = [mark for row, colour in pairs for mark in _distribution(row, colour)]
         left = Panel(
             "Cumulative distribution",
             at_end,
             Axis("cumulative probability", "%", limits=(0.0, 1.0)),
-            marks,
+            [mark for row, colour in pairs for mark in _distribution(row, colour)],
             "Share of the tests that are below a value.",
             legend="",
         )
-    panels = {"ranges": _ranges(comparison, colours, at_end), "values": left}
-    if profiles:
-        panels["profiles"] = _profiles(profiles)
-    size = (13.0, max(4.6, 1.8 + _ROW_HEIGHT * len(rows)))
-    return Sheet(fill(title, _LINE_LENGTH), panels, [["values", "ranges"]], size)
+    return Sheet(
+        fill(title, _LINE_LENGTH),
+        {
+            "ranges": _ranges(comparison, colours, at_end),
+            "values": left,
+            **({"profiles": _profiles(profiles)} if profiles else {}),
+        },
+        [["values", "ranges"]],
+        (13.0, max(4.6, 1.8 + _ROW_HEIGHT * len(rows))),
+    )
 
 
 def _courses(pairs: list[tuple[Compared, str]], named: Named) -> Panel:
@@ -378,9 +387,14 @@ def _courses(pairs: list[tuple[Compared, str]], named: Named) -> Panel:
         if row.course is not None
     ]
     words = named.words[:1].upper() + named.words[1:]
-    x = pass_axis(max(row.passes for row, _ in pairs))
-    y, text = Axis(named.words, named.unit), "The course of each run."
-    return Panel(f"{words} against roller passes", x, y, marks, text, legend="")
+    return Panel(
+        f"{words} against roller passes",
+        pass_axis(max(row.passes for row, _ in pairs)),
+        Axis(named.words, named.unit),
+        marks,
+        "The course of each run.",
+        legend="",
+    )
 
 
 def _distribution(row: Compared, colour: str) -> list[Mark]:
@@ -407,8 +421,7 @@ def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
         if quantiles:
             marks.append(dots([quantiles[0.5].value], [place], "|", size=13.0, colour=colour))
         if np.isfinite([row.value.low, row.value.high]).all():
-            interval = _interval(place, row.value.low, row.value.high, colour, _THICK, 0.45)
-            marks.append(interval)
+            marks.append(_interval(place, row.value.low, row.value.high, colour, _THICK, 0.45))
         marks.append(dots([row.value.value], [place], size=4.5, colour=colour))
         marks += _labels(comparison, row, place, colour)
     title, legend = "Value and estimated error", ""
@@ -417,12 +430,14 @@ def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
         legend = "\ndot: mean; thick line: 95 % interval; bar: median"
         legend += "; line: 5 % to 95 %" if any(_has_range(row) for row in rows) else ""
     low = min([0.0, *(row.value.value for row in rows)])
-    scale = axis.scale
-    x = Axis(
-        f"{axis.label}{legend}", per_si=scale, margin=(0.0, 0.03), limits=(min(low, 0.0), None)
+    return Panel(
+        title,
+        Axis(f"{axis.label}{legend}", per_si=axis.scale, margin=(0.0, 0.03), limits=(low, None)),
+        Axis(limits=(len(rows) - 0.6, -0.8), ticks=()),
+        marks,
+        "Every row is one of the compared results.",
+        legend="",
     )
-    y = Axis(limits=(len(rows) - 0.6, -0.8), ticks=())
-    return Panel(title, x, y, marks, "Every row is one of the compared results.", legend="")
 
 
 def _interval(
@@ -466,14 +481,16 @@ def _profiles(profiles: dict[str, ComputedProfile]) -> Panel:
     """Return the worn profiles of several results in one panel."""
     y = np.sort(np.concatenate([profile.y for profile in profiles.values()]))
     worn = [np.interp(y, item.y, item.start - item.low) for item in profiles.values()]
-    marks: list[Mark] = []
-    for colour, (label, profile) in zip(
-        several_colours(len(profiles)), profiles.items(), strict=True
-    ):
+    marks, colours = list[Mark](), several_colours(len(profiles))
+    for colour, (label, profile) in zip(colours, profiles.items(), strict=True):
         if profile.label:
             marks.append(Band(profile.y, profile.low, profile.high, colour=colour))
         marks.append(Line(profile.y, profile.height, colour=colour, label=label))
     banded = any(profile.label for profile in profiles.values())
-    text = "Profiles at the end" + (", of ensembles the mean with a band." if banded else ".")
-    x = Axis(Y, "mm", limits=worn_limits(y, np.max(worn, axis=0)))
-    return Panel("Worn profiles", x, HEIGHT, marks, text)
+    return Panel(
+        "Worn profiles",
+        Axis(Y, "mm", limits=worn_limits(y, np.max(worn, axis=0))),
+        HEIGHT,
+        marks,
+        "Profiles at the end" + (", of ensembles the mean with a band." if banded else "."),
+    )

@@ -124,8 +124,7 @@ class LocalFriction:
         for row in range(len(x)):
             uniforms = partial(self._stream.uniforms, realisation=first + row)
             friction[row] = self._field.values(x[row], y, uniforms)
-        carried = self._field.frame != "contact"
-        return replace(batch, friction=friction, friction_carried=carried)
+        return replace(batch, friction=friction, friction_carried=self._field.frame != "contact")
 
 
 def finer_grid(

@@ -193,13 +193,12 @@ def solve_reference(
         errors = _differences(np.concatenate([coarse[:scalars], *there]), values)
     line_load, dissipation = values[len(_SCALARS) :].reshape(2, -1)
     errors = replace(errors, **{name: abs(error) for name, error in vars(errors).items()})
-    scalars_of = dict(zip(_SCALARS, values[: len(_SCALARS)].tolist(), strict=True))
     return ContactReference(
         name,
         grid.y,
         dissipation,
         line_load,
-        **scalars_of,
+        **dict(zip(_SCALARS, values[: len(_SCALARS)].tolist(), strict=True)),
         own=errors,
         seconds=perf_counter() - start,
     )

@@ -113,13 +113,15 @@ def preference(error: float, model: ErrorModel) -> tuple[float, float]:
 def calibration() -> Calibration:
     """Return the calibration of the package."""
     data = json.loads(CALIBRATION.read_text(encoding="utf-8"))
-    arrays = {name: np.array(data[name]) for name in ("mean", "scale", "least", "greatest")}
     models = [
         ErrorModel(**{**item, "coefficients": np.array(item["coefficients"])})
         for item in data["models"]
     ]
-    ordered = tuple(sorted(models, key=lambda item: item.cost))
-    return Calibration(ordered, **arrays, provenance=data["provenance"])
+    return Calibration(
+        tuple(sorted(models, key=lambda item: item.cost)),
+        **{name: np.array(data[name]) for name in ("mean", "scale", "least", "greatest")},
+        provenance=data["provenance"],
+    )
 
 
 def terms_of(scaled: FloatArray) -> FloatArray:

@@ -49,8 +49,7 @@ class ContactView(View):
     question = "Which load and which power does one contact have along the track?"
 
     def __init__(self, study: ContactStudy) -> None:
-        self.result, self.title = study, study.title
-        self.notes, self.warnings = study.notes, study.warnings
+        super().__init__(study)
         self.start: dict[str, str] = {}  # description of a measured profile
         self.edges = patch_edges(study.solution.y, study.solution.half_length)
 
@@ -64,7 +63,6 @@ class ContactView(View):
         study, point, solution = self.result, self.result.point, self.result.solution
         rounding = 1e-12 * point.normal_force * study.grid.spacing * study.grid.strips
         moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
-        spin = f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"
         width = shown(self._width, "mm") if self.edges else NOTHING
         length = 2.0 * float(solution.half_length.max())
         return [
@@ -76,7 +74,7 @@ class ContactView(View):
             Row("friction coefficient", float(np.mean(point.friction))),
             Row("longitudinal creepage", solution.longitudinal_creepage),
             Row("lateral creepage", point.creepage.lateral),
-            Row("spin", spin),
+            Row("spin", f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"),
             Row.answer("patch length 2a", "patch_length", length, "mm"),
             Row("patch width", width, answers={"patch_width": (self._width, "mm")}),
             Row.answer("peak pressure", "peak_pressure", solution.peak_pressure, "MPa"),
@@ -93,11 +91,11 @@ class ContactView(View):
         reference, errors = self.result.reference, self.result.errors
         if reference is None or errors is None:
             return []
-        errors_of_reference, rows = vars(reference.own), []
+        rows = []
         for name, error in vars(errors).items():
             sign = "" if name in {"dissipation", "greatest"} else "+" if error >= 0.0 else "-"
             text = f"{sign}{shown(abs(round(error, _DIGITS)), '%', 2)}"
-            theirs = shown(round(errors_of_reference[name], _DIGITS), "%", 2)
+            theirs = shown(round(getattr(reference.own, name), _DIGITS), "%", 2)
             rows.append(Row(_DIFFERENCES[name], f"{text}, its own error {theirs}"))
         rows.append(Row("time of the reference", lapse(reference.seconds)))
         return [Table(f"difference from '{reference.model}'", rows)]
@@ -173,23 +171,28 @@ class ContactView(View):
         """Return the strips, one row each."""
         solution = self.result.solution
         units = {"y": "m", "half_length": "m", "line_load": "N/m", "dissipation": "W/m"}
-        columns = [(name, unit, getattr(solution, name)) for name, unit in units.items()]
-        return Frame(columns, "strip", range(len(solution.y)))
+        return Frame(
+            [(name, unit, getattr(solution, name)) for name, unit in units.items()],
+            "strip",
+            range(len(solution.y)),
+        )
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the fields, if there are any, line load and dissipated power per length."""
         study = self.result
-        title = (
-            f"{study.title}\n{study.described_model}\n"
-            f"normal force {shown(study.point.normal_force, 'N')},"
-            f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
-            f" dissipated power {shown(study.solution.power, 'W')}"
-        )
         panels = {} if study.fields is None else _fields(study.fields, study.solution)
         rows = [["pressure", "traction"], ["areas", "power"]] if panels else []
         panels |= _strips(study)
         rows.append(["line load", "dissipation"])
-        return Sheet(title, panels, rows, (10.0, 8.2 if study.fields is not None else 3.4))
+        return Sheet(
+            f"{study.title}\n{study.described_model}\n"
+            f"normal force {shown(study.point.normal_force, 'N')},"
+            f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
+            f" dissipated power {shown(study.solution.power, 'W')}",
+            panels,
+            rows,
+            (10.0, 8.2 if study.fields is not None else 3.4),
+        )
 
 
 def _times(error: float | None, value: float) -> float | None:
@@ -209,42 +212,43 @@ def _fields(fields: ContactFields, solution: ContactSolution) -> dict[str, Panel
     traction_x, traction_y = fields.traction_x[:, inside], fields.traction_y[:, inside]
     greatest = float(solution.half_length.max())
     along = Axis("x (rolling direction)", "mm", limits=(-1.35 * greatest, 1.2 * greatest))
-    across = Axis("y", "mm", limits=(None, None))
     outlines = patch_outlines(solution.y, solution.half_length)
     ground = [Patch(*outline, colour=BLACK) for outline in outlines]
     edges = [Line(*outline, colour=BLACK, width=0.8) for outline in outlines]
 
     def panel(title: str, text: str, *marks: Mark) -> Panel:
-        return Panel(title, across, along, [*ground, *marks, *edges], text)
+        return Panel(title, Y, along, [*ground, *marks, *edges], text)
 
     pick = np.ix_(_spread_out(y.shape[0], 8), _spread_out(y.shape[1], 12))
-    arrows = Arrows(y[pick], x[pick], traction_y[pick], traction_x[pick], colour="white")
     percent = 100.0 * solution.adhesion_fraction
-    areas: list[Mark] = [Patch(*outline, colour=SLIDE) for outline in outlines]
-    if min(y.shape) > 1:
-        adhesion = fields.adhesion[:, inside].astype(float)
-        areas.append(Contours(y, x, adhesion, (-0.5, 0.5, 1.5), (SLIDE, STICK)))
-    for colour, label in (
-        (STICK, f"adhesion, {percent:.1f} % of the area"),
-        (SLIDE, f"slip, {100.0 - percent:.1f} %"),
-    ):
-        areas.append(Patch(np.full(3, y[0, 0]), np.zeros(3), colour=colour, label=label))
-    pressure = _pressure(fields, solution)[:, inside]
+    labels = {
+        STICK: f"adhesion, {percent:.1f} % of the area",
+        SLIDE: f"slip, {100.0 - percent:.1f} %",
+    }
+    adhesion = y, x, fields.adhesion[:, inside].astype(float)
+    areas: list[Mark] = [
+        *(Patch(*outline, colour=SLIDE) for outline in outlines),
+        *([Contours(*adhesion, (-0.5, 0.5, 1.5), (SLIDE, STICK))] if min(y.shape) > 1 else []),
+        *(
+            Patch(np.full(3, y[0, 0]), np.zeros(3), colour=colour, label=label)
+            for colour, label in labels.items()
+        ),
+    ]
     return {
         "pressure": panel(
             "Pressure",
             "Normal pressure over the patch.",
-            Image(y, x, pressure, Axis("pressure", "MPa")),
+            Image(y, x, _pressure(fields, solution)[:, inside], Axis("pressure", "MPa")),
         ),
         "traction": panel(
             "Traction on the cylinder",
             "Size and direction of the traction on the cylinder.",
             Image(y, x, np.hypot(traction_x, traction_y), Axis("traction", "MPa")),
-            arrows,
+            Arrows(y[pick], x[pick], traction_y[pick], traction_x[pick], colour="white"),
         ),
         "areas": Panel(
             "Adhesion and slip",
-            across,
+            Y,
             along,
             [*areas, *edges],
             f"The surfaces adhere on {percent:.1f} % of the area.",
@@ -294,9 +298,8 @@ def _strips(study: ContactStudy) -> dict[str, Panel]:
         if reference is not None and errors is not None:
             theirs: FloatArray = getattr(reference, key)
             near = _touching(reference.line_load)
-            text = reference.model
-            if key == "dissipation":
-                text += f"; difference {shown(errors.dissipation, '%', 2)} (L2)"
+            difference = f"; difference {shown(errors.dissipation, '%', 2)} (L2)"
+            text = reference.model + (difference if key == "dissipation" else "")
             curve = reference.y[near], theirs[near]
             marks.append(Line(*curve, dash="--", width=1.0, colour=BLACK, label=text))
             top = 1.25 * 1.05 * max(float(values.max()), float(theirs.max()))

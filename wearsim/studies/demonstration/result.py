@@ -17,7 +17,7 @@ from wearsim.studies.life.result import LifeResult
 from wearsim.studies.life.settings import parse_life
 from wearsim.studies.opening import labels_of
 from wearsim.types import FloatArray
-from wearsim.uq.estimation.intervals import ENDS, Interval
+from wearsim.uq.estimation.intervals import ENDS, UNKNOWN, Interval
 from wearsim.uq.survival.demonstration import (
     DrawnLives,
     drawn_lives,
@@ -198,7 +198,7 @@ class Demonstration(Viewed):
     def _interval(self, values: FloatArray) -> Interval:
         """Return the mean of draws with the 95 % interval."""
         if not np.isfinite(values).all():
-            return Interval(math.nan, -math.inf, math.inf)
+            return UNKNOWN
         low, high = np.quantile(values, ENDS).tolist()
         return Interval(float(values.mean()), low, high)
 
@@ -276,8 +276,7 @@ class Demonstration(Viewed):
         survived = 1.0 - drawn.failed(log + self._scale)
         count = specimens(need.confidence, survived, failures)
         if count is None:
-            unknown = Interval(math.nan, -math.inf, math.inf)
-            return Plan(duration, failures, None, None, None, unknown)
+            return Plan(duration, failures, None, None, None, UNKNOWN)
         ends = np.quantile(survived, ENDS)
         low, high = (specimens(need.confidence, ends[k : k + 1], failures) for k in (0, 1))
         passing = self._interval(pass_probability(count, failures, drawn.failed(log)))

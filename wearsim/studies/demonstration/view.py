@@ -74,9 +74,7 @@ class DemonstrationView(DesignsView):
 
     @staticmethod
     def _number(duration: float) -> str:
-        if duration >= 1000.0:
-            return count(float(f"{duration:.4g}"))
-        return f"{duration:.3g}"
+        return count(float(f"{duration:.4g}")) if duration >= 1000.0 else f"{duration:.3g}"
 
     def rows(self) -> Rows:
         """Return specimens by the binomial, the simulated design, and the acceleration."""
@@ -86,10 +84,9 @@ class DemonstrationView(DesignsView):
             f"{number} with {count_of(k, 'failure', 'no failure')}"
             for k, number in enumerate(numbers)
         )
-        plain = result.plan(need.life)
         rows = [
             Row("specimens", f"{allowed}, for {self._amount(need.life)}"),
-            Row("probability of passing", self._passing(plain)),
+            Row("probability of passing", self._passing(result.plan(need.life))),
             Row(
                 f"simulated survival of {self._amount(need.life)}",
                 part_with_interval(result.survival),
@@ -136,11 +133,15 @@ class DemonstrationView(DesignsView):
             )
         what = "test" if design == 0 else f"test at {result.labels[design]}"
         allowed = (count_of(k, "failure", "no failure") for k in range(need.failures + 1))
-        heads = [
-            f"duration of the {what} [{need.unit}]",
-            *(f"specimens, {text}" for text in allowed),
-        ]
-        return Table("", lines, [*heads, "passes without failure"])
+        return Table(
+            "",
+            lines,
+            [
+                f"duration of the {what} [{need.unit}]",
+                *(f"specimens, {text}" for text in allowed),
+                "passes without failure",
+            ],
+        )
 
     def _passing(self, plan: Plan) -> str:
         return NOTHING if plan.specimens is None else part_with_interval(plan.passing)
@@ -196,11 +197,11 @@ class DemonstrationView(DesignsView):
         result = self.result
         need = result.requirement
         tests = [
-            (count_of(k, "failure", "no failure"), k, 0, 1.0) for k in range(need.failures + 1)
-        ]
-        tests += [
-            (f"no failure, {label}", 0, number, result.acceleration(number).value)
-            for number, label in enumerate(result.labels[1:], 1)
+            *((count_of(k, "failure", "no failure"), k, 0, 1.0) for k in range(need.failures + 1)),
+            *(
+                (f"no failure, {label}", 0, number, result.acceleration(number).value)
+                for number, label in enumerate(result.labels[1:], 1)
+            ),
         ]
         names, *_ = zip(*tests, strict=True)
         plans = [

@@ -82,8 +82,10 @@ class DissipationView(StudyView[DissipationResult]):
     def rows(self) -> Rows:
         """Return mean, ranges and standard deviation of the power, the mean first."""
         power = self.result.summaries["power"]
-        rows = [Row("mean dissipated power", power.mean, "W", power.mean_interval.half_width)]
-        rows.append(Row("inputs at their means", self.result.mean_problem_power, "W"))
+        rows = [
+            Row("mean dissipated power", power.mean, "W", power.mean_interval.half_width),
+            Row("inputs at their means", self.result.mean_problem_power, "W"),
+        ]
         if power.count == 1 or power.is_constant:
             equal = "" if power.count == 1 else ", equal in all realisations"
             return [*rows, Row("dissipated power", shown(power.mean, "W") + equal)]
@@ -92,9 +94,9 @@ class DissipationView(StudyView[DissipationResult]):
             values = " to ".join(in_unit(end.value, "W") for end in ends)
             # with the digits of the quantile, so that rounding does not put it outside its interval
             pairs = [(in_unit(end.low, "W"), in_unit(end.high, "W")) for end in ends]
-            intervals = [
+            intervals = (
                 TOO_FEW_REALISATIONS if NOTHING in pair else "..".join(pair) for pair in pairs
-            ]
+            )
             confidence = " and ".join(dict.fromkeys(intervals))
             name = f"dissipated power, {100.0 * (high - low):g} %"
             rows.append(Row(name, f"{values} W (95 % confidence: {confidence})"))
@@ -145,19 +147,11 @@ class DissipationView(StudyView[DissipationResult]):
 
     def random_inputs(self) -> Rows:
         """Return the draws of the random inputs, and those that vary over the contact."""
-        varying = varying_rows(varying_inputs(self.result, None))
-        return [*drawn_rows(self.result), *varying]
+        return [*drawn_rows(self.result), *varying_rows(varying_inputs(self.result, None))]
 
     def data(self) -> dict[str, Any]:
         """Return the estimates of the study in SI units."""
         result, raw = self.result, self.result.raw
-        estimates = {
-            f"{name}_{_SI[named.unit]}": raw.statistics[name] for name, named in QUANTITIES.items()
-        }
-        strips = {
-            f"dissipation_{part}_W_per_m": result.values(f"dissipation_{part}")
-            for part in ("mean", "std", "low", "high")
-        }
         return {
             "title": result.title,
             "model": raw.model,
@@ -167,11 +161,19 @@ class DissipationView(StudyView[DissipationResult]):
             "requested": raw.requested,
             "finished": result.finished,
             "mean_problem_power_W": result.mean_problem_power,
-            **estimates,
+            **{
+                f"{key}_{_SI[named.unit]}": raw.statistics[key] for key, named in QUANTITIES.items()
+            },
             "inputs": drawn_data(result),
             "random": varying_inputs(result, None),
             "friction_grid": raw.friction_grid or None,
-            "strips": {"y_m": result.y, **strips},
+            "strips": {
+                "y_m": result.y,
+                **{
+                    f"dissipation_{part}_W_per_m": result.values(f"dissipation_{part}")
+                    for part in ("mean", "std", "low", "high")
+                },
+            },
             "solve_seconds": raw.solve_seconds,
             "wall_seconds": raw.wall_seconds,
             **self.ending(),
@@ -180,17 +182,23 @@ class DissipationView(StudyView[DissipationResult]):
     def line(self) -> str:
         """Return the footer of the study, with its sampling error."""
         result, power = self.result, self.result.summaries["power"]
-        used = [result.described_model, f"{len(result.y)} strips", result.raw.plan]
-        used.append(f"{count(result.count)} realisations")
         error = within("mean dissipated power", power.mean_interval.half_width, power.mean)
-        return footer(used, f"{error} (95 % interval)", lapse(result.raw.wall_seconds))
+        return footer(
+            [
+                result.described_model,
+                f"{len(result.y)} strips",
+                result.raw.plan,
+                f"{count(result.count)} realisations",
+            ],
+            f"{error} (95 % interval)",
+            lapse(result.raw.wall_seconds),
+        )
 
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, drawn values first, and strips."""
-        raw = self.result.raw
         numbers = Column("realisation", np.arange(self.result.count, dtype=np.float64))
         by_name = self._along("realisation")
-        first = {item["key"]: by_name[item["key"]] for item in raw.inputs}
+        first = {key: by_name[key] for key in self.result.inputs}
         realisations = [numbers, *(first | by_name).values()]
         return {"realisations.csv": [realisations], "strips.csv": [[*self._along("y").values()]]}
 
@@ -205,12 +213,15 @@ class DissipationView(StudyView[DissipationResult]):
 
     def frame(self) -> Frame:
         """Return the realisations, one row each."""
-        columns = [
-            (name, item.unit, self.result.values(name))
-            for name, item in self.result.raw.schema.variables.items()
-            if item.dims[0] == "realisation"
-        ]
-        return Frame(columns, "realisation", range(self.result.count))
+        return Frame(
+            [
+                (name, item.unit, self.result.values(name))
+                for name, item in self.result.raw.schema.variables.items()
+                if item.dims[0] == "realisation"
+            ],
+            "realisation",
+            range(self.result.count),
+        )
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""
@@ -221,8 +232,11 @@ class DissipationView(StudyView[DissipationResult]):
         """Return convergence of mean and deviation, density of the power, power per length."""
         result = self.result
         course, constant = result.convergence(), result.summaries["power"].is_constant
-        panels = {"density": _density(result)}
-        panels |= {"band": _band(result), "realisations": _realisations(result)}
+        panels = {
+            "density": _density(result),
+            "band": _band(result),
+            "realisations": _realisations(result),
+        }
         for name, title in _LABELS:
             value, error = getattr(course, name), getattr(course, f"{name}_error")
             if constant:  # a constant power has rounding errors only
@@ -287,22 +301,25 @@ def _density(result: DissipationResult) -> Panel:
     across = np.linspace(low, high, 400)
     score = (across - summary.mean) / summary.std
     normal = np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau))
-    label = "normal distribution, same mean and std"
-    marks = [bars, Line(across, normal, colour=ORANGE, label=label)]
-    reach = 1.0 / (1.0 + HEADROOM)
-    for place, colour, style, label in (
+    lines = (
         (summary.mean, BLACK, "-", f"mean: {shown(summary.mean, 'W')}"),
         (result.mean_problem_power, GREEN, "--", at_means),
         (summary.quantile(0.025).value, GREY, ":", "2.5 % and 97.5 % quantile"),
         (summary.quantile(0.975).value, GREY, ":", ""),
-    ):
-        marks.append(Span(place, colour=colour, dash=style, label=label, reach=reach))
+    )
     ends = f"from {shown(float(power.min()), 'W')} to {shown(float(power.max()), 'W')}"
     return Panel(
         title,
         Axis("$P_d$", "W", limits=(low, high)),
         Axis("probability density", "1/W", 1.0, limits=(0.0, None), margin=(0.0, HEADROOM)),
-        marks,
+        [
+            bars,
+            Line(across, normal, colour=ORANGE, label="normal distribution, same mean and std"),
+            *(
+                Span(place, colour=colour, dash=dash, label=label, reach=1.0 / (1.0 + HEADROOM))
+                for place, colour, dash, label in lines
+            ),
+        ],
         f"{count(len(power))} realisations, {ends}.",
         legend="upper right",
     )
@@ -314,12 +331,11 @@ def _realisations(result: DissipationResult) -> Panel:
     title = number_of_realisations(len(rows))
     if len(kept) > 1 and float(np.ptp(kept, axis=0).max()) <= _EQUAL * float(kept.max()):
         rows, title = rows[:1], "equal in all"
-    opacity = float(np.clip(15.0 / len(rows), 0.12, 1.0))
     return Panel(
         f"Dissipated power per length, {title}",
         _across(result),
         _PER_LENGTH,
-        [Line(result.y, rows, width=0.6, alpha=opacity)],
+        [Line(result.y, rows, width=0.6, alpha=float(np.clip(15.0 / len(rows), 0.12, 1.0)))],
         "Dissipated power across the track in single realisations.",
     )
 

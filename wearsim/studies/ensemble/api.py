@@ -173,7 +173,6 @@ def checked_request(
     checked_count(scenario, realisations)
     require_run(scenario)
     chosen = parse_plan(plan or scenario.sampling.plan)
-    target = None if precision is None else parse_target(precision, scenario)
     check_plan(scenario, chosen, "a target" if precision else "")
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.is_redrawn for item in scenario.random)
@@ -182,7 +181,11 @@ def checked_request(
         if scenario.random:
             what += ': inputs drawn at every pass are averaged unless stepper = "per-pass"'
         raise ScenarioError(scenario.file, [nothing_random(what)])
-    return EnsembleRequest(chosen, whole_count(chosen, drawer.groups, realisations), target)
+    return EnsembleRequest(
+        chosen,
+        whole_count(chosen, drawer.groups, realisations),
+        None if precision is None else parse_target(precision, scenario),
+    )
 
 
 def named_precision(precision: str | None, until: str | None) -> str | None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -42,6 +43,7 @@ MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
 MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
 SCALARS = ("depth_error", "volume_error", "steps", "solves")
 Observables = dict[str, float]
+T = TypeVar("T")
 
 
 def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
@@ -88,10 +90,9 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
         np.concatenate([getattr(problem.inputs, item.name) for problem in problems], axis=1)
         for item in fields(ContactInputs)
     )
-    kinematics = problems[0].kinematics.joined([problem.kinematics for problem in problems])
     return replace(
         problems[0],
-        kinematics=kinematics,
+        kinematics=problems[0].kinematics.joined([problem.kinematics for problem in problems]),
         laws=tuple(law for problem in problems for law in problem.laws),
         loads=tuple(load for problem in problems for load in problem.loads),
         flat_gap=np.concatenate([problem.flat_gap for problem in problems], axis=2),
@@ -251,17 +252,25 @@ def scalars_of(problem: WearProblem, state: WearState) -> dict[str, float]:
     return scalars
 
 
-def observe(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]:
-    """Step through the tests of a group together; return the results or the error of each."""
+def in_group(
+    step: Callable[[Sequence[RealisationRun]], list[T | Exception]],
+    runs: Sequence[RealisationRun],
+) -> list[T | Exception]:
+    """Step through the tests of a group together; return the result or the error of each."""
 
-    def step(places: IntArray) -> list[RunObservations | Exception]:
-        return _observed([runs[place] for place in places])
+    def part(places: IntArray) -> list[T | Exception]:
+        return step([runs[place] for place in places])
 
-    done, failed = bisect_failures(step, np.arange(len(runs)))
-    results: dict[int, RunObservations | Exception] = dict(failed)
+    done, failed = bisect_failures(part, np.arange(len(runs)))
+    results: dict[int, T | Exception] = dict(failed)
     for places, values in done:
         results.update(zip(places.tolist(), values, strict=True))
     return [results[place] for place in range(len(runs))]
+
+
+def observe(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]:
+    """Step through the tests of a group together; return the results or the error of each."""
+    return in_group(_observed, runs)
 
 
 def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exception]:

@@ -77,20 +77,22 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
         "convergence": _convergence(result),
         "profile": _profile(result, measured),
     }
-    lower = ["profile"]
-    curves = (
-        ("lift", "lift_error_curve", _lift_error),
-        ("damage", "cylinder_damage_profile", _damage),
-    )
-    for name, curve, panel in curves:
-        if len(result.profiles) and curve in result.raw.schema.variables:
-            panels[name] = panel(result)
-            lower.append(name)
-    panels["effects"] = _effects(result)
+    curves = {
+        "lift": ("lift_error_curve", _lift_error),
+        "damage": ("cylinder_damage_profile", _damage),
+    }
+    known = result.raw.schema.variables if len(result.profiles) else ()
+    drawn = {name: panel(result) for name, (curve, panel) in curves.items() if curve in known}
+    panels |= {**drawn, "effects": _effects(result)}
     panels |= draws_panels(result, "depth", result.at_end("depth"), Axis("depth at the end", "um"))
-    lower.append("effects")
-    rows = [["course", "density", "convergence"], lower]
-    return Sheet(title, panels, rows, (13.0 if len(lower) < 4 else 17.0, 7.5), main="course")
+    lower = ["profile", *drawn, "effects"]
+    return Sheet(
+        title,
+        panels,
+        [["course", "density", "convergence"], lower],
+        (13.0 if len(lower) < 4 else 17.0, 7.5),
+        main="course",
+    )
 
 
 def _caption(result: EnsembleResult) -> str:
@@ -136,14 +138,19 @@ def _course(result: EnsembleResult) -> Panel:
         marks.append(Line(passes, median, label="median"))
         mean = course.mean[drawn]
         marks.append(Line(passes, mean, dash="--", width=1.0, colour=BLACK, label="mean"))
-    text = f"The median of the depth is {shown(float(median[-1]), 'um')} at the end."
-    return Panel("Depth against roller passes", x, y, marks, text, legend="upper left")
+    return Panel(
+        "Depth against roller passes",
+        x,
+        y,
+        marks,
+        f"The median of the depth is {shown(float(median[-1]), 'um')} at the end.",
+        legend="upper left",
+    )
 
 
 def _some(x: FloatArray, rows: FloatArray) -> Line:
     """Return some realisations as thin lines."""
-    label = number_of_realisations(len(rows))
-    return Line(x, rows, width=0.6, alpha=0.6, colour=GREY, label=label)
+    return Line(x, rows, width=0.6, alpha=0.6, colour=GREY, label=number_of_realisations(len(rows)))
 
 
 def _curves(x: FloatArray, curves: FloatArray, mean: FloatArray) -> list[Mark]:
@@ -164,24 +171,23 @@ def _density(result: EnsembleResult) -> Panel:
         return message(title, f"{shown(float(depth.mean()), 'um')} in {where}: no density to draw")
     estimate = result.estimate("depth", -1, (0.05, 0.5, 0.95))
     low, median, high = (estimate.quantile(p).value for p in (0.05, 0.5, 0.95))
+    ends = [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", "")]
     lines: list[tuple[float, str, str, str]] = [
         (estimate.mean.value, BLACK, "--", f"mean {shown(estimate.mean.value, 'um')}"),
         (median, BLUE, "-", f"median {shown(median, 'um')}"),
+        *(ends if sufficient_for(result.count, NINETY_PERCENT[0]) else []),
     ]
-    if sufficient_for(result.count, NINETY_PERCENT[0]):
-        lines += [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", "")]
-    reach = 1.0 / (1.0 + HEADROOM)
     marks = [
-        Span(place, colour=colour, dash=dash, label=label, width=1.1, reach=reach)
+        Span(place, colour=colour, dash=dash, label=label, width=1.1, reach=1.0 / (1.0 + HEADROOM))
         for place, colour, dash, label in lines
     ]
-    ends = f"from {shown(float(depth.min()), 'um')} to {shown(float(depth.max()), 'um')}"
+    extremes = f"from {shown(float(depth.min()), 'um')} to {shown(float(depth.max()), 'um')}"
     return Panel(
         title,
         Axis("depth", "um"),
         Axis("probability density", "1/um", 1e-6, margin=(0.0, HEADROOM), limits=(0.0, None)),
         [histogram(depth)[0], *marks],
-        f"Depths of {count(len(depth))} tests, {ends}.",
+        f"Depths of {count(len(depth))} tests, {extremes}.",
         legend="upper right",
         columns=2,
     )
@@ -194,23 +200,31 @@ def _convergence(result: EnsembleResult) -> Panel:
     counts, intervals = result.convergence(target)
     value, low, high = arrays_of(intervals)
     labels = {-target.width: "", target.width: f"target: ±{100 * target.width:g} %"}
-    marks = [
-        Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
-        for part, label in (labels.items() if result.until else ())
-    ]
-    title = f"{statistic_in_words(target).capitalize()}, with 95 % interval"
-    return convergence(title, named.words, named.unit, counts, value, low, high, marks)
+    return convergence(
+        f"{statistic_in_words(target).capitalize()}, with 95 % interval",
+        named.words,
+        named.unit,
+        counts,
+        value,
+        low,
+        high,
+        [
+            Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
+            for part, label in (labels.items() if result.until else ())
+        ],
+    )
 
 
 def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
     """Return the mean worn profile with its 95 % range, and measured profiles over it."""
     profile = result.worn_profile()
-    marks: list[Mark] = [Line(profile.y, profile.height, colour=BLACK, label="mean")]
-    if profile.label:
-        marks.insert(0, Band(profile.y, profile.low, profile.high, label=profile.label))
-    if profile.start.any():
-        label = "start of the tests"
-        marks.append(Line(profile.y, profile.start, dash="--", width=1.0, colour=GREY, label=label))
+    y, text = profile.y, "start of the tests"
+    start = Line(y, profile.start, dash="--", width=1.0, colour=GREY, label=text)
+    marks: list[Mark] = [
+        *([Band(y, profile.low, profile.high, label=profile.label)] if profile.label else []),
+        Line(y, profile.height, colour=BLACK, label="mean"),
+        *([start] if profile.start.any() else []),
+    ]
     limits = worn_limits(profile.y, profile.start - profile.low, *(item.y for item in measured))
     title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
     title += "" if profile.kept == result.count else f", of the first {count(profile.kept)}"
@@ -231,14 +245,16 @@ def _damage(result: EnsembleResult) -> Panel:
     body, name = ("cam", "damage_curve") if result.raw.cam else of_cylinder
     band, curves = result.band(name), result.kept_values(name)
     mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
-    text = (
-        f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests."
-    )
     x = ANGLE
     if body == "cylinder":
         x = Axis(Y, "mm", limits=worn_limits(band.y, curves.max(axis=0)))
-    marks = _curves(band.y, curves, band.mean)
-    return Panel(f"Damage of the {body} at the end", x, DAMAGE, marks, text)
+    return Panel(
+        f"Damage of the {body} at the end",
+        x,
+        DAMAGE,
+        _curves(band.y, curves, band.mean),
+        f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests.",
+    )
 
 
 def _lift_error(result: EnsembleResult) -> Panel:
@@ -246,8 +262,7 @@ def _lift_error(result: EnsembleResult) -> Panel:
     curves = result.kept_values("lift_error_curve")
     # the last angle is the first one
     curves = curves - curves[:, :-1].mean(axis=1, keepdims=True)
-    angle = np.asarray(result.raw.variables["angle"])
-    marks = _curves(angle, curves, curves.mean(axis=0))
+    marks = _curves(np.asarray(result.raw.variables["angle"]), curves, curves.mean(axis=0))
     mean = shown(result.estimate("lift_error", -1, ()).mean.value, "um")
     return Panel(
         "Lift error at the end",
@@ -329,8 +344,7 @@ def draws_panels(
     drawn = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1)
     finite = np.flatnonzero(np.isfinite(values))
     every = finite[evenly_spaced(len(finite), MOST_POINTS)]
-    more = {"realisation": (every, "1")}
-    points = dots(drawn[every], values[every], alpha=0.5, more=more)
+    points = dots(drawn[every], values[every], alpha=0.5, more={"realisation": (every, "1")})
     title = f"{name.capitalize()} against {item['key']}"
     text = f"One point for each of {count(len(every))} tests."
     return {"draws": Panel(title, Axis(item["key"], unit, 1.0 / size), axis, [points], text)}

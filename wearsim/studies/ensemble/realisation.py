@@ -225,8 +225,12 @@ class RealisationRunner:
             New number of realisations; by default that of the file.
         """
         data = result.raw
-        grid = Grid(data.variables["y"], data.strip_width)
-        return cls(result.scenario, parse_plan(data.plan), total or data.requested, grid)
+        return cls(
+            result.scenario,
+            parse_plan(data.plan),
+            total or data.requested,
+            Grid(data.variables["y"], data.strip_width),
+        )
 
     @property
     def state(self) -> dict[str, object]:
@@ -299,8 +303,7 @@ class RealisationRunner:
         """Return the run of a realisation, and add the values of its random inputs to `drawn`."""
         setup = self.drawer.draw(number, *sources(self.plan, self.drawer.groups, number))
         drawn.update({**setup.values, **setup.time_means})
-        grid = start_of(setup, self.start)
-        problem, stepper, _ = assemble_problem(setup, grid, self._model)
+        problem, stepper, _ = assemble_problem(setup, start_of(setup, self.start), self._model)
         return RealisationRun(number, drawn, setup, problem, stepper)
 
     def compile_kernels(self) -> None:
@@ -355,5 +358,4 @@ class RealisationRunner:
             for name, curve in curves.items():
                 if name.endswith("_profile"):
                     curves[name] = averaged(curve, observations.grid, self.grid)
-        values = {**drawn, **courses, **scalars, **curves}
-        return Outcome(number=run.number, values=values)
+        return Outcome(number=run.number, values={**drawn, **courses, **scalars, **curves})

@@ -171,8 +171,10 @@ class EnsembleResult(EnsembleValues):
         counts = np.unique(spaced.round().astype(np.int64))
         raw, name = self.raw, target.observable
         # kept in memory, since a file's arrays are read again at every access
-        held = {name: raw.column(name, -1)[:, None]}
-        held |= {"control": raw.variables["control"]} if raw.control else {}
+        held = {
+            name: raw.column(name, -1)[:, None],
+            **({"control": raw.variables["control"]} if raw.control else {}),
+        }
         numbers, intervals = np.arange(raw.requested), []
         for last in self.numbers[counts - 1]:
             status = np.where(numbers <= last, raw.status, PENDING)

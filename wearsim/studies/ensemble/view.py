@@ -88,8 +88,9 @@ class RealisationsView(StudyView[Shown]):
     def observables_table(self, title: str) -> Table:
         """Return the estimates of all observables at the end, with intervals."""
         names = observed(self.result)
-        lines = [line for name in names for line in _lines(self.result, name)]
-        return Table("", lines, (title, *_HEADS[1:]))
+        return Table(
+            "", [line for name in names for line in _lines(self.result, name)], (title, *_HEADS[1:])
+        )
 
     def answers(self) -> dict[str, Answer]:
         """Return the numbers of the rows and of the table of observables, ``depth.p95``.
@@ -100,8 +101,12 @@ class RealisationsView(StudyView[Shown]):
         for name in observed(self.result):
             words, unit = OBSERVABLES[name]
             estimate = self.result.estimate(name, -1, QUANTILES)
-            values = {"": estimate.mean, ".mean": estimate.mean, ".std": estimate.std}
-            values |= {f".p{100.0 * p:g}": interval for p, interval in estimate.quantiles}
+            values = {
+                "": estimate.mean,
+                ".mean": estimate.mean,
+                ".std": estimate.std,
+                **{f".p{100.0 * p:g}": interval for p, interval in estimate.quantiles},
+            }
             answers |= {
                 f"{name}{ending}": Answer(value.value, unit, words)
                 for ending, value in values.items()
@@ -111,16 +116,19 @@ class RealisationsView(StudyView[Shown]):
     def frame(self) -> Frame:
         """Return the successful realisations, one row each, at the end of the test."""
         result = self.result
-        columns = [
-            (
-                name,
-                item.unit,
-                result.at_end(name) if name in result.observables else result.values(name),
-            )
-            for name, item in result.raw.schema.variables.items()
-            if item.dims[0] == "realisation" and name not in {"status", "error"}
-        ]
-        return Frame(columns, "realisation", result.numbers)
+        return Frame(
+            [
+                (
+                    name,
+                    item.unit,
+                    result.at_end(name) if name in result.observables else result.values(name),
+                )
+                for name, item in result.raw.schema.variables.items()
+                if item.dims[0] == "realisation" and name not in {"status", "error"}
+            ],
+            "realisation",
+            result.numbers,
+        )
 
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, courses, and profile and lift error at the end."""
@@ -128,10 +136,9 @@ class RealisationsView(StudyView[Shown]):
         scenario = fatigue_scenario(result)
         blocks = _realisations(result.raw)
         tables: dict[str, Columns] = {
-            "realisations.csv": (with_sources(block, scenario) for block in blocks)
+            "realisations.csv": (with_sources(block, scenario) for block in blocks),
+            **({"courses.csv": [with_sources(_courses(result), scenario)]} if result.count else {}),
         }
-        if result.count:
-            tables["courses.csv"] = [with_sources(_courses(result), scenario)]
         for name in [name for name in KEPT if result.count and name in result.raw.schema.variables]:
             band, (file, what) = result.band(name), _CURVES.get(name, (name, "damage"))
             if what != "damage" or band.mean.any():  # of a body that may pit
@@ -191,7 +198,8 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         effort = lapse(wall)
         if wall and ended:
             effort += f", {shown(ended / wall, '1', 3)} realisations per second"
-        rows = [
+        intervals = result.count and result.plan != "monte-carlo"
+        return [
             Row("realisations", done),
             Row("sampling design", f"{raw.plan}, seed {raw.seed}"),
             Row(
@@ -201,10 +209,14 @@ class EnsembleView(RealisationsView[EnsembleResult]):
             *source_rows(fatigue_scenario(result)),
             Row("contact model", result.described_model),
             Row("stepper", f"{raw.stepper}, tolerance {raw.tolerance:g}"),
+            *(
+                [Row("95 % intervals", result.estimate("depth", -1, ()).method)]
+                if intervals
+                else []
+            ),
+            *self._precision(),
+            Row("wall time", effort),
         ]
-        if result.count and result.plan != "monte-carlo":
-            rows.append(Row("95 % intervals", result.estimate("depth", -1, ()).method))
-        return [*rows, *self._precision(), Row("wall time", effort)]
 
     def _precision(self) -> Rows:
         """Return rows on the target and on the variance removed by a control variate."""
@@ -226,10 +238,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
     def details(self) -> list[Table]:
         """Return the estimates of all observables, and the Sobol indices of the depth."""
-        result = self.result
-        if not result.count:
-            return []
-        return [self.observables_table(_HEADS[0]), self._effects()]
+        return [self.observables_table(_HEADS[0]), self._effects()] if self.result.count else []
 
     def _effects(self) -> Table:
         """Return the Sobol indices of the depth."""
@@ -239,8 +248,11 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         effects = result.sensitivity("depth")
         totals = any(item.total is not None for item in effects)
         order = sorted(effects, key=lambda item: item.without_effect)
-        heads = [head, "first order", *(["total"] if totals else [])]
-        return Table("", [_effect(result, item, totals) for item in order], heads)
+        return Table(
+            "",
+            [_effect(result, item, totals) for item in order],
+            [head, "first order", *(["total"] if totals else [])],
+        )
 
     def data(self) -> dict[str, Any]:
         """Return the estimates in SI units."""
@@ -285,14 +297,22 @@ class EnsembleView(RealisationsView[EnsembleResult]):
     def line(self) -> str:
         """Return the footer of the ensemble, with its sampling errors."""
         result, raw, error = self.result, self.result.raw, ""
-        used = [result.described_model, raw.stepper, f"tolerance {raw.tolerance:g}", raw.plan]
-        used.append(f"{count(result.count)} realisations")
         if result.count:
             depth = result.estimate("depth", -1, (0.95,))
             items = ("mean depth", depth.mean), ("its 95 % quantile", depth.quantiles[0][1])
             errors = [within(name, item.half_width, item.value) for name, item in items]
             error = f"{', '.join(errors)} (95 % intervals)"
-        return footer(used, error, lapse(raw.wall_seconds))
+        return footer(
+            [
+                result.described_model,
+                raw.stepper,
+                f"tolerance {raw.tolerance:g}",
+                raw.plan,
+                f"{count(result.count)} realisations",
+            ],
+            error,
+            lapse(raw.wall_seconds),
+        )
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the mean profile, with which measured ones are compared."""
@@ -301,8 +321,10 @@ class EnsembleView(RealisationsView[EnsembleResult]):
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the ensemble."""
         raw = self.result.raw
-        options = ["-n", str(self.result.requested), "--plan", raw.plan, "--seed", str(raw.seed)]
-        return [*options, *(["--precision", raw.until] if raw.until else [])]
+        return [
+            *("-n", str(self.result.requested), "--plan", raw.plan, "--seed", str(raw.seed)),
+            *(["--precision", raw.until] if raw.until else []),
+        ]
 
 
 def observed(result: EnsembleResult) -> list[str]:
@@ -430,5 +452,7 @@ def _band(raw: EnsembleData, name: str, what: str, band: Band) -> list[Column]:
     """Return mean and band of a curve at the end, under the name of its quantity."""
     variables, parts = raw.schema.variables, ("mean", "std", "low", "high")
     axis, unit = variables[name].dims[-1], variables[name].unit
-    curves = [computed(f"{what} {part}", getattr(band, part), unit) for part in parts]
-    return [computed(axis, band.y, variables[axis].unit), *curves]
+    return [
+        computed(axis, band.y, variables[axis].unit),
+        *(computed(f"{what} {part}", getattr(band, part), unit) for part in parts),
+    ]

@@ -88,8 +88,7 @@ def whole_number(name: str, value: int, example: int) -> int:
     try:
         count = operator.index(value)
     except TypeError:
-        message = f"{name} must be a whole number such as {example}, got {value!r}"
-        raise TypeError(message) from None
+        raise TypeError(f"{name} must be a whole number such as {example}, got {value!r}") from None
     if count < 1:
         raise ValueError(f"{name} must be 1 or more, got {count}")
     return count

@@ -250,8 +250,7 @@ class _Worker:
 
     def cause_of_death(self) -> str:
         """Return how the process ended, as a predicate: "was killed by SIGKILL"."""
-        code = next((process.exitcode for process in self._processes), None)
-        return end_of_process(code)
+        return end_of_process(next((process.exitcode for process in self._processes), None))
 
     def end(self) -> None:
         """Kill the process."""

@@ -97,5 +97,4 @@ def damage_after(
     bodies = np.concatenate([damage[:, 0], damage[:, 1:].sum(axis=0)])
     strips = np.array([np.interp(problem.grid.y, y, row) for row in bodies])
     effective = effective_damage(problem, strips[:, None])
-    pitting = fatigue.pitting(effective)
-    return {"damage": float(effective[0]), "pitting": float(pitting[0])}
+    return {"damage": float(effective[0]), "pitting": float(fatigue.pitting(effective)[0])}

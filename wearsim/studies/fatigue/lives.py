@@ -155,8 +155,7 @@ def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | N
         ]
         for name, (words, last) in names.items()
     ]
-    heads = [f"life [{result.unit}]", *(f"B{share:g}" for share in shares), "at last"]
-    return heads, cells
+    return [f"life [{result.unit}]", *(f"B{share:g}" for share in shares), "at last"], cells
 
 
 def _life(life: float) -> str:

@@ -77,8 +77,9 @@ def final_fatigue(last: Mapping[str, Any]) -> dict[str, FloatArray]:
     if "damage" not in last:
         return {}
     names = "damage", "damage_error", "pitting", "cylinder_damage", "roller_damage"
-    final = {name: np.asarray(last[name]) for name in names}
-    final["roller_damage"] = final["roller_damage"].max(axis=0)
-    if "damage_angle" in last:
-        final["damage_angle_rad"] = np.asarray(last["damage_angle"])
-    return final
+    angle = {"damage_angle_rad": np.asarray(last.get("damage_angle"))}
+    return {
+        **{name: np.asarray(last[name]) for name in names},
+        "roller_damage": np.asarray(last["roller_damage"]).max(axis=0),
+        **(angle if "damage_angle" in last else {}),
+    }

@@ -56,14 +56,18 @@ def damage_panel(result: Result) -> Panel:
     """Return the damage of the cylinder across the track at every record, and of the rollers."""
     records = result.raw.records
     cylinder = np.asarray(records["cylinder_damage_profile"])[:, 0, 0]
-    rollers = np.asarray(records["roller_damage_profile"])[-1, :, 0]
-    marks: list[Mark] = [Records(result.y, cylinder, result.record_passes)]
-    marks += rollers_at_end(result.y, rollers)
-    limits = worn_limits(result.y, cylinder.max(axis=0))
-    text = f"At the end the cylinder has a damage of {shown(float(cylinder[-1].max()), '1')}."
-    title = "Damage of the cylinder by fatigue"
-    x = Axis("y", "mm", limits=limits)
-    return Panel(title, x, DAMAGE, marks, text, legend="upper right")
+    marks: list[Mark] = [
+        Records(result.y, cylinder, result.record_passes),
+        *rollers_at_end(result.y, np.asarray(records["roller_damage_profile"])[-1, :, 0]),
+    ]
+    return Panel(
+        "Damage of the cylinder by fatigue",
+        Axis("y", "mm", limits=worn_limits(result.y, cylinder.max(axis=0))),
+        DAMAGE,
+        marks,
+        f"At the end the cylinder has a damage of {shown(float(cylinder[-1].max()), '1')}.",
+        legend="upper right",
+    )
 
 
 def pitting_panel(result: Result) -> Panel:
@@ -76,12 +80,15 @@ def pitting_panel(result: Result) -> Panel:
         Line(result.passes, damage, label="effective damage"),
         Line(result.passes, chance, dash="--", label="probability of pitting"),
     ]
-    text = (
+    return Panel(
+        "Effective damage, and pitting",
+        pass_axis(float(result.passes[-1])),
+        DAMAGE,
+        marks,
         f"At the end the effective damage is {shown(float(damage[-1]), '1')} and the probability of"
-        f" pitting {shown(float(chance[-1]), '%', 3)}."
+        f" pitting {shown(float(chance[-1]), '%', 3)}.",
+        legend="lower right",
     )
-    x = pass_axis(float(result.passes[-1]))
-    return Panel("Effective damage, and pitting", x, DAMAGE, marks, text, legend="lower right")
 
 
 def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) -> Panel:
@@ -120,5 +127,11 @@ def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) 
         text += f" {shown(level.pitting, '%', 3)} by pitting."
     if not marks:
         return message(title, "no life ended by wear or by pitting")
-    x, y = Axis(axis.name, axis.unit, axis.per_si, log=True), share_axis("ended")
-    return Panel(title, x, y, marks, text.strip(), legend="upper left")
+    return Panel(
+        title,
+        Axis(axis.name, axis.unit, axis.per_si, log=True),
+        share_axis("ended"),
+        marks,
+        text.strip(),
+        legend="upper left",
+    )

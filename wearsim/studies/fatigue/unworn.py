@@ -83,16 +83,14 @@ def unworn_data(scenario: Scenario, problem: WearProblem) -> dict[str, Any] | No
         "cylinder_passes": cylinder,
         "roller_passes": rollers.max(axis=0),
     }
-    data: dict[str, Any] = {
-        name: float(1.0 / value[0]) if value[0] > 0.0 else None for name, value in damages.items()
-    }
-    data["probability"] = choice.probability
-    data["sources"] = {body: law.source for body, law in choice.laws.items()}
     damage = rate[: problem.shape[0]].max(axis=-1)
     angle = float(problem.kinematics.track.greatest(damage).angle[0])
-    if math.isfinite(angle):  # not of a cylinder
-        data["angle_rad"] = angle
-    return data
+    return {
+        **{name: float(1.0 / n[0]) if n[0] > 0.0 else None for name, n in damages.items()},
+        "probability": choice.probability,
+        "sources": {body: law.source for body, law in choice.laws.items()},
+        **({"angle_rad": angle} if math.isfinite(angle) else {}),  # not of a cylinder
+    }
 
 
 def unworn_text(data: dict[str, Any], body: str, unit: str, size: float) -> str:

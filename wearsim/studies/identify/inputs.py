@@ -76,8 +76,7 @@ def with_known(scenario: Scenario, test: Measurement) -> Scenario:
             changed = _changed(known, {key: _normal(key, test.values[key], error)}, test, "std")
             random += [random_input for random_input in changed.random if random_input.name == key]
         else:
-            std = _std(item, error, key, test)
-            random.append(_measured(item, _number(known, key), std, test))
+            random.append(_measured(item, _number(known, key), _std(item, error, key, test), test))
     return replace(known, random=tuple(sorted(random, key=lambda random_input: random_input.name)))
 
 

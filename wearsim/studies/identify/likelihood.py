@@ -122,8 +122,7 @@ class TraceLikelihood:
 
     def residual(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:
         """Return whitened residuals without offset and inclination, shape (points, columns)."""
-        sum_ = self.height[:, None] + self.worn(draw, ln_k, shift)
-        white = self.noise.whitened(self.y, sum_)
+        white = self.noise.whitened(self.y, self.height[:, None] + self.worn(draw, ln_k, shift))
         return np.asarray(white - self._lines @ (self._lines.T @ white))
 
     def chi2(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:

@@ -26,6 +26,11 @@ FEW_DRAWS = 25.0
 _CURVE = 601  # values of ln K/H of a stored density
 _NODES = 81  # parts of the likelihood of a specimen that joins several tests
 _FIVE = (0.025, 0.05, 0.5, 0.95, 0.975)
+_NOTHING_RANDOM = (
+    "no input of the scenario is random: differences of load, friction, creepage or slack"
+    " between the tests count as scatter of K/H; give their distributions in the scenario,"
+    " or measured values with std in a tests file"
+)
 
 
 @dataclass(frozen=True)
@@ -72,8 +77,7 @@ def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
             before = [(test.passes, test.item.surface) for test in tests[-1]] if tests else []
             later = bool(before) and row.passes >= before[-1][0]
             continues = later and (row.passes, row.item.surface) not in before
-            same = continues and _same_inputs(row, tests[-1][-1])
-            if same:
+            if continues and _same_inputs(row, tests[-1][-1]):
                 tests[-1].append(row)
             else:
                 tests.append([row])
@@ -148,7 +152,6 @@ def content(
     kernels = [specimen.kernel for specimen in specimens]
     posterior = Posterior.of(kernels)
     centres = np.array([kernel.mean for kernel in kernels])
-    summary = _summary(scenario, specimens, posterior, negligible)
     spread = float(np.sqrt(max(kernel.variance for kernel in kernels)))
     ends = centres.min() - 4.0 * spread, centres.max() + 4.0 * spread
     grid = np.linspace(*ends, _CURVE)
@@ -162,7 +165,7 @@ def content(
         warnings=_warnings(specimens, rows),
         tests=[_test(row, specimen) for specimen in specimens for t in specimen.tests for row in t],
         specimens=[specimen.name for specimen in specimens],
-        summary=summary,
+        summary=_summary(scenario, specimens, posterior, negligible),
         **given,
         variables={
             "scatter": posterior.t,
@@ -223,7 +226,6 @@ def _summary(
     centres = np.array([kernel.mean for kernel in kernels])
     count = len(kernels)
     variance = float(np.mean([kernel.variance for kernel in kernels]))
-    seen = float(centres.std(ddof=1)) if count > 1 else None
     ratio = limit = None
     random = False
     if count > 1:
@@ -240,7 +242,7 @@ def _summary(
     }
     low, middle, high = posterior.next((0.025, 0.5, 0.975))
     return {
-        "scatter_seen": seen,
+        "scatter_seen": float(centres.std(ddof=1)) if count > 1 else None,
         "scatter_from_inputs": variance**0.5,
         "scatter_of_k": _three(posterior.scatter(_FIVE)),
         "scatter_upper_95": upper,
@@ -303,7 +305,6 @@ def _to_decide(
 
 def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list[str]:
     """Return remarks on fits, on the number of draws and on missing random inputs."""
-    texts = [text for row in rows if row.fit is not None for text in row.fit.warnings]
     few = [
         specimen.name
         for specimen in specimens
@@ -311,18 +312,16 @@ def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list
         and specimen.kernel.effective_size < FEW_DRAWS
         and len(specimen.tests) == 1
     ]
-    if few:
-        texts.append(
-            f"{', '.join(few)}: fewer than {FEW_DRAWS:.0f} draws describe the shape of the groove;"
-            " give more with --draws"
-        )
-    if len(specimens) > 1 and all(len(row.likelihood.mean) == 1 for row in rows):
-        texts.append(
-            "no input of the scenario is random: differences of load, friction, creepage or slack"
-            " between the tests count as scatter of K/H; give their distributions in the scenario,"
-            " or measured values with std in a tests file"
-        )
-    return texts
+    too_few = (
+        f"{', '.join(few)}: fewer than {FEW_DRAWS:.0f} draws describe the shape of the groove;"
+        " give more with --draws"
+    )
+    certain = len(specimens) > 1 and all(len(row.likelihood.mean) == 1 for row in rows)
+    return [
+        *(text for row in rows if row.fit is not None for text in row.fit.warnings),
+        *([too_few] if few else []),
+        *([_NOTHING_RANDOM] if certain else []),
+    ]
 
 
 def _traces(rows: Sequence[Identified]) -> dict[str, FloatArray]:

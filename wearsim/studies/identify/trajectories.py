@@ -383,8 +383,7 @@ class Grower:
             ready.append(replace(draws, scenario=scenario))
         last = {number: place for place, (number, _) in enumerate(tests)}  # of the greatest wear
         setups = [ready[place] for place in last.values()]
-        grids = [strips_of_run(setup) for setup in setups]
-        self._grid = grid = _covering(grids, setups)
+        self._grid = grid = _covering([strips_of_run(setup) for setup in setups], setups)
         model = prepared_model(self.scenario, grid)
 
         def models(scenario: Scenario, strips: Grid) -> ContactModel:

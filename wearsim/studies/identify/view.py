@@ -162,30 +162,46 @@ class IdentificationView(StudyView[IdentificationResult]):
     def columns(self) -> Mapping[str, Columns]:
         """Return the tests, and all traces below each other."""
         tests, names = self._tests(), ("height", "fitted", "low", "high")
-        table = {name: [test[name] for test in tests] for name in ("file", "specimen")}
-        for title, name, size, _ in _NUMBERS:
-            table[title] = [_number(test[name], size) for test in tests]
+        table = {
+            **{name: [test[name] for test in tests] for name in ("file", "specimen")},
+            **{
+                title: [_number(test[key], size) for test in tests]
+                for title, key, size, _ in _NUMBERS
+            },
+        }
         traces = [self.result.values(f"trace_{name}") for name in ("y", *names)]
         known = np.isfinite(traces[0])
         numbers = np.broadcast_to(np.arange(1.0, len(known) + 1.0)[:, None], known.shape)
         y, *heights = (trace[known] for trace in traces)
         curves = [
-            Column(name, height, "um", 1e-6) for name, height in zip(names, heights, strict=True)
+            Column("test", numbers[known]),
+            Column("y", y, "mm", 1e-3),
+            *(
+                Column(name, height, "um", 1e-6)
+                for name, height in zip(names, heights, strict=True)
+            ),
         ]
         return {
             "tests.csv": [[Column(name, cells) for name, cells in table.items()]],
-            "traces.csv": [[Column("test", numbers[known]), Column("y", y, "mm", 1e-3), *curves]],
+            "traces.csv": [curves],
         }
 
     def frame(self) -> Frame:
         """Return the tests, one row for each groove."""
         tests = self._tests()
         units = {"file": "", "specimen": "", **{name: unit for _, name, _, unit in _NUMBERS}}
-        columns = [
-            (name, unit, np.array([np.nan if test[name] is None else test[name] for test in tests]))
-            for name, unit in {**units, "energy_J": "J"}.items()
-        ]
-        return Frame(columns, "groove", range(1, len(tests) + 1))
+        return Frame(
+            [
+                (
+                    name,
+                    unit,
+                    np.array([np.nan if test[name] is None else test[name] for test in tests]),
+                )
+                for name, unit in {**units, "energy_J": "J"}.items()
+            ],
+            "groove",
+            range(1, len(tests) + 1),
+        )
 
     def _tests(self) -> list[dict[str, Any]]:
         """Return the tests with one entry for each end of an interval."""
@@ -235,29 +251,36 @@ class IdentificationView(StudyView[IdentificationResult]):
         if not raw.measured:
             return [_name(test["file"]) for test in self.result.tests]
         negligible = f"{self.result.summary['negligible']!r}"
-        options = ["--tests", self._tests_file, "--negligible", negligible]
-        options += ["--draws", str(raw.draws)] if raw.draws is not None else []
-        return [*options, *(["--share", "k=cylinder,roller"] if raw.shared else [])]
+        return [
+            *("--tests", self._tests_file, "--negligible", negligible),
+            *(["--draws", str(raw.draws)] if raw.draws is not None else []),
+            *(["--share", "k=cylinder,roller"] if raw.shared else []),
+        ]
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return K/H of each specimen, density of m and t, and traces with their residuals."""
         result = self.result
-        panels = {"factors": _factors(result), "scatter": _density_of_scatter(result)}
-        panels["density"] = _density(result)
+        panels = {
+            "factors": _factors(result),
+            "scatter": _density_of_scatter(result),
+            "density": _density(result),
+        }
         traced = [
             k for k in range(len(result.tests)) if np.isfinite(result.values("trace_y")[k, 0])
         ]
         for place in traced[:MOST_TRACES]:
             panels[f"trace {place}"], panels[f"residual {place}"] = _trace(result, place)
-        columns = max(len(traced[:_IN_FIGURE]), 1)
-        rows, heights = [["factors", "density"]], [1.0]
+        drawn, rows, heights = traced[:_IN_FIGURE], [["factors", "density"]], [1.0]
         if traced:
-            drawn = traced[:_IN_FIGURE]
             upper = ([f"{name} {place}" for place in drawn] for name in ("trace", "residual"))
             rows, heights = [*upper, *rows], [0.75, 0.35, 1.0]
-        size = (max(4.2 * columns, 9.6), 8.6 if traced else 4.2)
-        title = f"{result.title}\n{result.verdict_words}"
-        return Sheet(title, panels, rows, size, heights=heights)
+        return Sheet(
+            f"{result.title}\n{result.verdict_words}",
+            panels,
+            rows,
+            (max(4.2 * len(drawn), 9.6), 8.6 if traced else 4.2),
+            heights=heights,
+        )
 
 
 def _name(file: str) -> str:
@@ -305,20 +328,19 @@ def deciding(decision: Mapping[str, Any], tests: int) -> str:
         Number of tests at hand.
     """
     measure = ", ".join(decision["measure"]) or "all inputs"
-    many = decision["tests"]
+    many = decision["tests"] or f"more than {decision['most_tests']}"
     now = f"{decision['power']:.2f} by these {tests} tests" if tests > 1 else "0 by one test"
-    lines = [
-        f"a scatter of {decision['scatter']:g} is seen with probability {now}, and 0.8 by "
-        + (f"{many}" if many else f"more than {decision['most_tests']}")
-        + " such tests"
-    ]
+    text = (
+        f"a scatter of {decision['scatter']:g} is seen with probability {now}, and 0.8 by {many}"
+        " such tests"
+    )
     if decision["tests_if_measured"] and decision["power_if_measured"] > decision["power"]:
-        lines.append(
-            f"with {measure} measured, so that inputs leave 0.1:"
+        text += (
+            f"\nwith {measure} measured, so that inputs leave 0.1:"
             f" {decision['power_if_measured']:.2f}, and 0.8 by"
             f" {decision['tests_if_measured']} tests"
         )
-    return "\n".join(lines)
+    return text
 
 
 _IN_FIGURE, MOST_TRACES, MOST_POINTS = 6, 12, 1200
@@ -368,8 +390,10 @@ def _factors(result: IdentificationResult) -> Panel:
     """Return K/H of each specimen with its density, and the distribution of the next one."""
     k, following = np.exp(result.ln_k), result.summary["next_specimen"]
     std, middle = np.log(following["factor"]), np.log(following["median_per_Pa"])
-    named: list[tuple[str, Any]] = [*zip(result.raw.specimens, result.test_density, strict=True)]
-    named.append(("next specimen", np.exp(-0.5 * ((result.ln_k - middle) / std) ** 2)))
+    named: list[tuple[str, Any]] = [
+        *zip(result.raw.specimens, result.test_density, strict=True),
+        ("next specimen", np.exp(-0.5 * ((result.ln_k - middle) / std) ** 2)),
+    ]
     marks: list[Mark] = []
     for row, (name, density) in enumerate(named):
         colour, alpha = (BLUE, 0.35) if row < len(named) - 1 else (ORANGE, 0.5)
@@ -423,12 +447,11 @@ def _density(result: IdentificationResult) -> Panel:
     inside = (density > levels[0]) & (rows < top)
     limits = (0.9 * float(median[inside].min()), 1.1 * float(median[inside].max()))
     areas = Contours(median, rows, density, [*levels, density.max()], _SHADES, outlined=True)
-    negligible = Span(result.summary["negligible"], across="y", dash="--", width=0.8, colour=GREY)
     return Panel(
         "Median and scatter of K/H: 50, 90 and 95 %",
         Axis("median of K/H", log=True, limits=limits, **_UNIT),
         Axis("scatter t of ln K/H (dashed: negligible)", limits=(0.0, top)),
-        [areas, negligible],
+        [areas, Span(result.summary["negligible"], across="y", dash="--", width=0.8, colour=GREY)],
         figure_only=True,
     )
 
@@ -442,10 +465,10 @@ def power_sheet(designs: Sequence[PlannedDesign], title: str = "") -> Sheet:
             for t in (0.0, *SCATTERS)
         }
         marks: list[Mark] = [
-            Line(design.tests, rate, marker="o", size=3.5, colour=colour, label=label)
-            for (label, rate), colour in zip(rates.items(), (GREY, *COLOURS), strict=False)
-        ]
-        marks += [
+            *(
+                Line(design.tests, rate, marker="o", size=3.5, colour=colour, label=label)
+                for (label, rate), colour in zip(rates.items(), (GREY, *COLOURS), strict=False)
+            ),
             Line(
                 design.tests, design.explained[0.0], dash="--", marker="s", size=3.5, colour=RED,
                 label="'explained', t = 0",
@@ -460,5 +483,4 @@ def power_sheet(designs: Sequence[PlannedDesign], title: str = "") -> Sheet:
             "Rates of the verdicts by the number of tests.",
             legend="" if number else "best",
         )
-    size = (4.9 * len(designs) + 0.4, 4.2)
-    return Sheet(title, panels, [list(panels)], size)
+    return Sheet(title, panels, [list(panels)], (4.9 * len(designs) + 0.4, 4.2))

@@ -37,6 +37,7 @@ from wearsim.studies.ensemble.batch import (
     RunObservations,
     add_strip_errors,
     curves_at_end,
+    in_group,
     joined_problem,
     observables_of,
     scalars_of,
@@ -89,15 +90,7 @@ def observe_lives(
     runs: Sequence[RealisationRun], limits: Sequence[Limit]
 ) -> list[LifeRun | Exception]:
     """Step the tests of a group together to their limits; return the result or error of each."""
-
-    def step(places: IntArray) -> list[LifeRun | Exception]:
-        return _Group([runs[place] for place in places], limits).results()
-
-    done, failed = bisect_failures(step, np.arange(len(runs)))
-    results: dict[int, LifeRun | Exception] = dict(failed)
-    for places, lives in done:
-        results.update(zip(places.tolist(), lives, strict=True))
-    return [results[place] for place in range(len(runs))]
+    return in_group(lambda part: _Group(part, limits).results(), runs)
 
 
 class _Group:
@@ -120,8 +113,7 @@ class _Group:
         self.tests = [_Test() for _ in runs]
         self.first_rows = self._observed(self.problem, self.state)
         if self.problem.fatigue and self.state.damage is not None:
-            rate = effective_damage(self.problem, self.state.damage[2])
-            self.first_damage = rate.tolist()
+            self.first_damage = effective_damage(self.problem, self.state.damage[2]).tolist()
 
     def results(self) -> list[LifeRun | Exception]:
         """Return the result or the error of each test."""
@@ -202,10 +194,8 @@ class _Group:
             for crossing in crossings:
                 self._reached(advance, crossing)
         self._end_deep(advance)
-        over = [number for number in numbers if self._is_over(number)]
-        self.evolution.end(over)
-        ended = np.flatnonzero(advance.end.passes >= self.stop)
-        for place in ended.tolist():
+        self.evolution.end([number for number in numbers if self._is_over(number)])
+        for place in np.flatnonzero(advance.end.passes >= self.stop).tolist():
             if self.tests[numbers[place]].outcome is None and numbers[place] not in failed:
                 chosen = np.array([place])
                 life = dict.fromkeys(("life", "life_low", "life_high"), math.inf)
@@ -214,8 +204,7 @@ class _Group:
 
     def _end_deep(self, advance: Advance) -> None:
         """End tests that become too deep before they reach a limit."""
-        scenario = self.runs[0].scenario
-        deep = too_deep_tests(advance, scenario, _LIMITS)
+        deep = too_deep_tests(advance, self.runs[0].scenario, _LIMITS)
         for place, number in enumerate(advance.numbers.tolist()):
             if number in deep and self.tests[number].outcome is None:
                 chosen = np.array([place])

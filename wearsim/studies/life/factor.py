@@ -129,9 +129,7 @@ def _obstacle(scenario: Scenario) -> str:
         return f'the load "{scenario.load.kind}" varies in time'
     if scenario.load.terms:
         return f'the load term "{scenario.load.terms[0].name}" depends on time'
-    if scenario.evolution.stepper == "per-pass":
-        return "every pass is solved separately"
-    return ""
+    return "every pass is solved separately" if scenario.evolution.stepper == "per-pass" else ""
 
 
 def with_posterior(scenario: Scenario, file: str | Path) -> Scenario:

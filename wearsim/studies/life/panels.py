@@ -41,6 +41,7 @@ from wearsim.studies.life.result import LifeResult
 from wearsim.studies.run.view import EXCLUDED
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
+from wearsim.uq.estimation.intervals import arrays_of
 from wearsim.uq.survival.fits import FAMILIES, Family, FittedLives, standard_score
 from wearsim.uq.survival.lives import cumulative_incidence, median_positions
 
@@ -97,10 +98,13 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
     designs = [_Design(*pair, len(results) > 1) for pair in pairs]
     titles = {result.title for result in results}
     axis = Axis("life", results[0].unit, 1.0)
-    panels = {"survival": _survival(designs, axis)}
-    panels |= {family: _probabilities(designs, family, axis) for family in FAMILIES}
-    panels |= {"tornado": _tornado(designs), "incidence": _incidence(designs, axis)}
-    panels["limits"] = _limits(designs)
+    panels: dict[str, Panel] = {
+        "survival": _survival(designs, axis),
+        **{family: _probabilities(designs, family, axis) for family in FAMILIES},
+        "tornado": _tornado(designs),
+        "incidence": _incidence(designs, axis),
+        "limits": _limits(designs),
+    }
     rows: list[list[str]] = [["survival", *FAMILIES], ["tornado", "incidence", "limits"]]
     if swept_variable(results) is not None:
         panels["against"] = _against(designs)
@@ -138,9 +142,7 @@ def _against(designs: Sequence[_Design]) -> Panel:
         if not known:
             continue
         values, lives = zip(*known, strict=True)
-        value, low, high = (
-            np.array([getattr(life, name) for life in lives]) for name in ("value", "low", "high")
-        )
+        value, low, high = arrays_of(lives)
         low, high = (np.where(np.isfinite(end), end, np.nan) for end in (low, high))
         marks += [
             Whiskers(values, low, high, colour=colour),
@@ -185,9 +187,13 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
                 Text(target, 0.02, "target", colour=BLACK, offset=(3.0, 0.0), size=9.0),
             ]
             text += f" Dotted: the target of {count(target)} {axis.unit}."
-    x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
-    y = share_axis("survival")
-    return Panel("Survival, with 95 % band", x, y, marks, text)
+    return Panel(
+        "Survival, with 95 % band",
+        Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None)),
+        share_axis("survival"),
+        marks,
+        text,
+    )
 
 
 def _scale(family: Family) -> Callable[[FloatArray], FloatArray]:
@@ -247,10 +253,9 @@ def _fit_marks(fit: FittedLives, life: FloatArray, colour: str, *, is_best: bool
     inside = (score > low) & (score < high)
     life, score, reach = life[inside], score[inside], reach[inside]
     dash, label = ("-", "fit, lower AIC") if is_best else ("--", "fit")
-    marks: list[Mark] = [Line(life, score, dash=dash, width=1.4, colour=colour, label=label)]
-    if reach.any():
-        marks.append(Band(life, score - reach, score + reach, colour=colour, alpha=0.15))
-    return marks
+    band = Band(life, score - reach, score + reach, colour=colour, alpha=0.15)
+    line = Line(life, score, dash=dash, width=1.4, colour=colour, label=label)
+    return [line, band] if reach.any() else [line]
 
 
 def _tornado(designs: Sequence[_Design]) -> Panel:
@@ -270,8 +275,7 @@ def _tornado(designs: Sequence[_Design]) -> Panel:
         places = np.array([names.index(name) for name in by_input], dtype=float) + middle
         for end, alpha in enumerate((0.35, 0.8)):
             ends = [effect.factors[end] for effect in by_input.values()]
-            value = [factor.value for factor in ends]
-            low, high = ([getattr(factor, side) for factor in ends] for side in ("low", "high"))
+            value, low, high = arrays_of(ends)
             label = design.named if end else ""
             bars = (places - 0.5 * height, places + 0.5 * height, value, 1.0, True)
             marks += [
@@ -303,9 +307,13 @@ def _incidence(designs: Sequence[_Design], axis: Axis) -> Panel:
                 marks.append(Line(*curve, dash, steps=True, colour=design.colour, label=label))
     if not marks:
         return message(title, "no limit was reached")
-    x = Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None))
-    text = "Share of the machines whose life has ended at each limit."
-    return Panel(title, x, share_axis("ended"), marks, text)
+    return Panel(
+        title,
+        Axis(axis.name, axis.unit, axis.per_si, limits=(0.0, None)),
+        share_axis("ended"),
+        marks,
+        "Share of the machines whose life has ended at each limit.",
+    )
 
 
 def _limits(designs: Sequence[_Design]) -> Panel:

@@ -51,8 +51,7 @@ def first_length(scenario: Scenario, fixed: Mapping[str, float], most: float) ->
     length = EXTENSION * float(scenario.total_passes)
     limit = scenario.limit.depth
     if limit is not None and scenario.cam is None:
-        drawer = Drawer(scenario, "monte-carlo")
-        columns = drawer.columns(0, _SAMPLE)
+        columns = Drawer(scenario, "monte-carlo").columns(0, _SAMPLE)
         columns |= {key: np.full(_SAMPLE, value) for key, value in fixed.items()}
         with np.errstate(divide="ignore", invalid="ignore"):
             depths = closed_form_depths(scenario, columns, _SAMPLE)
@@ -131,9 +130,13 @@ class LifeRunner(RealisationRunner):
         """Return the runner of the tests in a file; parameters as of `RealisationRunner`."""
         data, settings = result.raw, result.settings
         plain = total or settings.plain
-        grid = Grid(data.variables["y"], data.strip_width)
-        changed = replace(settings, plain=plain)
-        return cls(result.scenario, plain, grid, changed, data.life["base"])
+        return cls(
+            result.scenario,
+            plain,
+            Grid(data.variables["y"], data.strip_width),
+            replace(settings, plain=plain),
+            data.life["base"],
+        )
 
     @property
     def state(self) -> dict[str, object]:
@@ -146,9 +149,13 @@ class LifeRunner(RealisationRunner):
 
         if not (stages := next_stages(result)):
             return None
-        settings = replace(self.settings, stages=(*self.settings.stages, *stages))
-        total = stages[-1]["first"] + stages[-1]["count"]
-        return LifeRunner(self.scenario, total, self.grid, settings, self.base)
+        return LifeRunner(
+            self.scenario,
+            stages[-1]["first"] + stages[-1]["count"],
+            self.grid,
+            replace(self.settings, stages=(*self.settings.stages, *stages)),
+            self.base,
+        )
 
     def result(self, data: EnsembleData, path: Path | None) -> LifeResult:
         """Return the result of the realisations in a file."""
@@ -224,8 +231,7 @@ class LifeRunner(RealisationRunner):
     def _level(self, level: int, stage: int) -> LevelRunner:
         """Return the runner of a length and a stage, 0 for draws without weights."""
         if (level, stage) not in self._levels:
-            passes = min(self.base * EXTENSION**level, self.longest)
-            scenario = with_length(self.scenario, passes)
+            scenario = with_length(self.scenario, min(self.base * EXTENSION**level, self.longest))
             stage_settings = self.settings.stages[stage - 1] if stage else {"shift": {}}
             changes = changes_of(self.settings.stages[:stage])
             self._levels[level, stage] = LevelRunner(

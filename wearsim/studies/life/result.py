@@ -255,8 +255,7 @@ class LifeResult(LifeValues):
         >>> wearsim.open_results("rig-life.h5").lower_bound(10)  # takes 29 lives
         -inf
         """
-        lives = np.minimum(self.lives, self.most)
-        return lower_bound(lives, self.observed, percent / 100.0)
+        return lower_bound(np.minimum(self.lives, self.most), self.observed, percent / 100.0)
 
     def probability_before(self, life: float) -> Interval:
         """Return the probability of a life below `life`; unknown beyond the censoring.
@@ -446,5 +445,7 @@ class LifeResult(LifeValues):
         >>> lives.final_estimates()["life"]["b10"]["value"] == lives.b(10).value
         True
         """
-        lives = {f"b{share:g}": asdict(self.b(share)) for share in self.settings.shares}
-        return {**super().final_estimates(), "life": lives}
+        return {
+            **super().final_estimates(),
+            "life": {f"b{share:g}": asdict(self.b(share)) for share in self.settings.shares},
+        }

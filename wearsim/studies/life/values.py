@@ -90,8 +90,7 @@ class LifeValues(EnsembleResult):
             from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
             drawn = self.values(self.settings.factor)
-            chance = ndtr(self._drawn_score(drawn))
-            lives = lives * drawn / self.law.quantile(chance)
+            lives = lives * drawn / self.law.quantile(ndtr(self._drawn_score(drawn)))
         return lives
 
     @cached_property

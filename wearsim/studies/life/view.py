@@ -83,10 +83,8 @@ class LifeView(RealisationsView[LifeResult]):
             rows.append(Row(name, target_text(result), answers={"probability": (chance, "%")}))
             obstacle = result.probability_obstacle(result.target)
             if obstacle and result.rare is None and not result.settings.alone:
-                command = f"`{rare_command(result)}`"
-                rows.append(Row("tests that sample the other inputs", command))
-        for method, estimate in result.rare_estimates.items():
-            rows.append(Row(f"by {method}", rare_text(estimate)))
+                rows.append(Row("tests that sample the other inputs", f"`{rare_command(result)}`"))
+        rows += [Row(f"by {name}", rare_text(item)) for name, item in result.rare_estimates.items()]
         if result.rare is not None and not result.rare.is_reliable:
             rows.append(Row("small probability", "not stated; give a greater --rare"))
         if not result.observed.any() and not result.is_exact:
@@ -108,10 +106,11 @@ class LifeView(RealisationsView[LifeResult]):
                 factor += f", with its posterior given {_tests_of(result)}"
             alone = "; nothing else is random, so that one test is sufficient"
             factor += alone if settings.alone else ""
-        ends = f"{count(int(result.observed.sum()))} ended by a limit"
-        ends += f", {count(result.censored)} censored at {count(result.most)} {result.unit}"
-        if result.at_once:
-            ends += f"; {count(result.at_once)} reached a limit at once, when fresh"
+        fresh = f"; {count(result.at_once)} reached a limit at once, when fresh"
+        ends = (
+            f"{count(int(result.observed.sum()))} ended by a limit, {count(result.censored)}"
+            f" censored at {count(result.most)} {result.unit}{fresh if result.at_once else ''}"
+        )
         return [
             Row("life", f"{result.unit} until the first of: {limits}"),
             Row("realisations", done if result.finished else f"{done}, unfinished"),
@@ -167,16 +166,21 @@ class LifeView(RealisationsView[LifeResult]):
             deviation = f"{math.sqrt(total):.2g}" if known else NOTHING
             cells = (predictive, plug_in, f"{low}..{high}", deviation)
             lines.append([f"B{share:g}", *cells, *(of_total if known else [NOTHING, NOTHING])])
-        head = f"life [{result.unit}], given {_tests_of(result)}"
-        parts_of = ["sd of ln life", "by more tests", "by more realisations"]
-        return Table("", lines, [head, "predictive", "plug-in", "95 % credible", *parts_of])
+        return Table(
+            "",
+            lines,
+            [
+                f"life [{result.unit}], given {_tests_of(result)}",
+                *("predictive", "plug-in", "95 % credible"),
+                *("sd of ln life", "by more tests", "by more realisations"),
+            ],
+        )
 
     def _angle(self, name: str) -> str:
         """Return where on a cam a limit was reached, empty for other limits."""
         if name not in self.result.angles:
             return ""
-        angles = self.result.angles[name]
-        low, middle, high = np.degrees(np.quantile(angles, (0.05, 0.5, 0.95)))
+        low, middle, high = np.degrees(np.quantile(self.result.angles[name], (0.05, 0.5, 0.95)))
         where = f"at {middle:.1f} deg"
         return where + (f" (90 % in {low:.1f} to {high:.1f} deg)" if high - low > 0.05 else "")
 
@@ -186,17 +190,24 @@ class LifeView(RealisationsView[LifeResult]):
         if why := self._no_effects():
             return Table("", [[f"{_EFFECTS}: {why}"]], [""])
         changes = result.tornado()
-        lines = [
+        return Table(
+            "",
             [
-                item.name,
-                f"not significant, at most {shown(item.first.high, '%', 2)}"
-                if item.without_effect
-                else part_with_interval(item.first),
-                *(map(_change, changes[item.name].factors) if item.name in changes else _UNKNOWN),
-            ]
-            for item in result.sensitivity("life")
-        ]
-        return Table("", lines, [_EFFECTS, "first order", "life, input at 10 %", "input at 90 %"])
+                [
+                    item.name,
+                    f"not significant, at most {shown(item.first.high, '%', 2)}"
+                    if item.without_effect
+                    else part_with_interval(item.first),
+                    *(
+                        map(_change, changes[item.name].factors)
+                        if item.name in changes
+                        else _UNKNOWN
+                    ),
+                ]
+                for item in result.sensitivity("life")
+            ],
+            [_EFFECTS, "first order", "life, input at 10 %", "input at 90 %"],
+        )
 
     def _no_effects(self) -> str:
         """Return why there are no effects, or an empty text."""
@@ -303,12 +314,13 @@ class LifeView(RealisationsView[LifeResult]):
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""
-        settings, options = self.result.settings, study_options(self.result)
-        if self.result.raw.until:
-            options += ["--precision", self.result.raw.until]
-        if settings.rare:
-            options += ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
-        return options
+        settings, until = self.result.settings, self.result.raw.until
+        rare = ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
+        return [
+            *study_options(self.result),
+            *(["--precision", until] if until else []),
+            *(rare if settings.rare else []),
+        ]
 
 
 def _three_digits(result: LifeResult, share: float) -> str:
@@ -340,8 +352,9 @@ def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
             low, high = rounded_lives(*ends)
             error = f"{low}..{high}" if all(map(math.isfinite, ends)) else NOTHING
             lines.append([f"{label} B{share:g}".strip(), *life_cells(result, share), error])
-    heads = [f"life [{results[0].unit}]", "estimate", "95 % interval", "numerical error"]
-    return Table("", lines, heads)
+    return Table(
+        "", lines, [f"life [{results[0].unit}]", "estimate", "95 % interval", "numerical error"]
+    )
 
 
 def limit_texts(limits: Mapping[str, float]) -> list[str]:
@@ -386,21 +399,24 @@ def _change(factor: Interval) -> str:
 def study_options(result: LifeResult) -> list[str]:
     """Return the options of a study of lives but for precision and rare events."""
     shares = ",".join(f"{share:g}" for share in result.settings.shares)
-    options = ["-n", str(result.settings.plain), "--seed", str(result.raw.seed), "--b", shares]
-    options += ["--max", f"{result.most:.17g}"]
-    if result.target is not None:
-        options += ["--target", f"{result.target:.17g}"]
-    return options
+    return [
+        *("-n", str(result.settings.plain), "--seed", str(result.raw.seed), "--b", shares),
+        *("--max", f"{result.most:.17g}"),
+        *(["--target", f"{result.target:.17g}"] if result.target is not None else []),
+    ]
 
 
 def rare_command(result: LifeResult) -> str:
     """Return the command for a small probability of a life before the target."""
     given = _limits_in_si(result.scenario.limit.given)
-    limits = [text for limit in given for text in ("--limit", limit)]
-    options = [*study_options(result), *limits, "--rare", str(RARE_TESTS)]
     stem = Path(result.raw.scenario_file).stem.removesuffix("-life")
-    output = ["-o", f"{stem}-rare-life.h5"]
-    return shlex.join(["wearsim", "life", result.raw.scenario_file, *options, *output])
+    return shlex.join(
+        [
+            *("wearsim", "life", result.raw.scenario_file, *study_options(result)),
+            *(text for limit in given for text in ("--limit", limit)),
+            *("--rare", str(RARE_TESTS), "-o", f"{stem}-rare-life.h5"),
+        ]
+    )
 
 
 def _limits_in_si(limits: Mapping[str, float]) -> list[str]:
@@ -431,10 +447,9 @@ def rare_text(estimate: RareProbability) -> str:
     if not estimate.is_reliable:
         return f"refused, {estimate.obstacle}"
     chance = estimate.probability
-    text = (
-        f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(estimate.tests)} tests"
+    size = estimate.effective_size
+    return (
+        f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(estimate.tests)} tests,"
+        f" variation {shown(estimate.variation, '%', 2)}"
+        + ("" if size is None else f", effective sample size {size:.0f}")
     )
-    text += f", variation {shown(estimate.variation, '%', 2)}"
-    if estimate.effective_size is not None:
-        text += f", effective sample size {estimate.effective_size:.0f}"
-    return text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
@@ -105,9 +105,11 @@ class FieldReturnsView(DesignsView):
         fleet = result.returns.fleet
         failed = int(fleet.failed.sum())
         known = int((fleet.failed & (fleet.low < fleet.high)).sum())
-        units = f"{count_of(len(fleet), 'unit')}: {count(failed)} failed"
-        units += f", {count(known)} of them at an inspection" if known else ""
-        units += f", {count(len(result.running))} running"
+        inspected = f", {count(known)} of them at an inspection" if known else ""
+        units = (
+            f"{count_of(len(fleet), 'unit')}: {count(failed)} failed{inspected},"
+            f" {count(len(result.running))} running"
+        )
         factor = result.life_factor
         prior = f"median 1, two of three within {factor:g} times" if factor > 1.0 else "1"
         limits = ", ".join(limit_texts(result.designs[0].scenario.limit.given))
@@ -117,8 +119,10 @@ class FieldReturnsView(DesignsView):
             Row("wear factor", f"posterior given {self._tests()}, integrated exactly"),
             Row("prior of the life factor", prior),
         ]
-        tables = [Table(STUDY, study), self._lives(), self._bands(), self._known()]
-        return [*tables, *([self._running()] if result.running else [])]
+        return [
+            *(Table(STUDY, study), self._lives(), self._bands(), self._known()),
+            *([self._running()] if result.running else []),
+        ]
 
     def _tests(self) -> str:
         levels = self.result.posterior.before
@@ -129,16 +133,14 @@ class FieldReturnsView(DesignsView):
         result, lines = self.result, []
         for number, label in enumerate(result.labels):
             for share in result.designs[number].settings.shares:
-                name = f"{label} B{share:g}" if len(result.labels) > 1 else f"B{share:g}"
-                cells = [name]
+                cells = [f"{label} B{share:g}" if len(result.labels) > 1 else f"B{share:g}"]
                 for life in (result.before(share, number), result.after(share, number)):
                     low, value, high = rounded_lives(life.low, life.predictive, life.high)
                     deviation = math.sqrt(life.by_tests + life.by_realisations)
                     cells += [value, f"{low}..{high}", f"{deviation:.2g}"]
                 lines.append(cells)
         columns = ["95 % credible", "sd of ln life"]
-        heads = [f"life [{result.unit}]", "before", *columns, "after", *columns]
-        return Table("", lines, heads)
+        return Table("", lines, [f"life [{result.unit}]", "before", *columns, "after", *columns])
 
     def _bands(self) -> Table:
         """Return predicted and observed failures in bands of lives."""
@@ -148,38 +150,48 @@ class FieldReturnsView(DesignsView):
         for place, name in enumerate([*names, "in all"]):
             if len(names) == 1 and place == 1:
                 continue
-            observed = f"{check.observed[place]:.3g}"
             predicted = (_numbers(item, place) for item in (check.before, check.after))
-            lines.append([name, observed, *predicted])
-        heads = [f"failures at [{self.result.unit}]", "observed", "predicted before", "after"]
-        return Table("", lines, heads)
+            lines.append([name, f"{check.observed[place]:.3g}", *predicted])
+        return Table(
+            "",
+            lines,
+            [f"failures at [{self.result.unit}]", "observed", "predicted before", "after"],
+        )
 
     def _known(self) -> Table:
         """Return wear factor and life factor before and after the returns."""
         result, posterior = self.result, self.result.posterior
         pairs = [result.wear_factor(levels) for levels in (posterior.before, posterior.after)]
         medians, scatters = zip(*pairs, strict=True)
-        known = {"median of K/H over the life factor [1/Pa]": medians}
-        known["scatter t of ln K/H"] = scatters
-        if result.life_factor > 1.0:
-            known["life factor"] = result.factor_before, result.factor
-        lines = [
-            [name, *(with_ends(end, "{:.3g}".format) for end in ends)]
-            for name, ends in known.items()
-        ]
-        return Table("", lines, ["what is not known", "before", "after"])
+        factors = {"life factor": (result.factor_before, result.factor)}
+        known = {
+            "median of K/H over the life factor [1/Pa]": medians,
+            "scatter t of ln K/H": scatters,
+            **(factors if result.life_factor > 1.0 else {}),
+        }
+        return Table(
+            "",
+            [
+                [name, *(with_ends(end, "{:.3g}".format) for end in ends)]
+                for name, ends in known.items()
+            ],
+            ["what is not known", "before", "after"],
+        )
 
     def _running(self) -> Table:
         """Return the running units with the least remaining lives."""
         result, target = self.result, self.result.designs[0].target
         units = sorted(result.running, key=lambda unit: unit.remaining.lives[0].value)[:_MOST]
-        columns = {"running unit": [unit.name for unit in units]}
-        if len(result.labels) > 1:
-            columns["design"] = [result.labels[unit.design] for unit in units]
-        columns[f"age [{result.unit}]"] = [count(float(f"{unit.age:.4g}")) for unit in units]
-        for place, share in enumerate(SHARES):
-            lives = [_life(unit.remaining.lives[place]) for unit in units]
-            columns[f"further life, B{share:g}"] = lives
+        designs = {"design": [result.labels[unit.design] for unit in units]}
+        columns = {
+            "running unit": [unit.name for unit in units],
+            **(designs if len(result.labels) > 1 else {}),
+            f"age [{result.unit}]": [count(float(f"{unit.age:.4g}")) for unit in units],
+            **{
+                f"further life, B{share:g}": [_life(unit.remaining.lives[place]) for unit in units]
+                for place, share in enumerate(SHARES)
+            },
+        }
         if target is not None:
             chances = [unit.remaining.survival for unit in units]
             texts = ["reached" if part is None else part_with_interval(part) for part in chances]
@@ -193,7 +205,7 @@ class FieldReturnsView(DesignsView):
     def data(self) -> dict[str, Any]:
         """Return all numbers, lives in their unit."""
         result, posterior, check = self.result, self.result.posterior, self.result.check
-        designs = []
+        designs: list[dict[str, Any]] = []
         for number, label in enumerate(result.labels):
             design = result.designs[number]
             b = {
@@ -203,16 +215,15 @@ class FieldReturnsView(DesignsView):
                 }
                 for share in design.settings.shares
             }
-            entry: dict[str, Any] = {"label": label, "b": b, "target": design.target}
+            designs.append({"label": label, "b": b, "target": design.target})
             if design.target is not None:
-                entry["probability_before_target"] = {
+                designs[-1]["probability_before_target"] = {
                     name: asdict(lives[number].probability_before(design.target))
                     for name, lives in (
                         ("before", result.lives_before),
                         ("after", result.lives_after),
                     )
                 }
-            designs.append(entry)
         before, after = (
             dict(zip(("k_over_h", "scatter"), map(asdict, result.wear_factor(levels)), strict=True))
             for levels in (posterior.before, posterior.after)
@@ -302,21 +313,19 @@ def _judged(probability: float, contradicted: str, agreed: str) -> str:
     return f"p = {probability:.2g}: {contradicted if probability < 0.05 else agreed}"
 
 
-def _warnings(result: FieldReturns) -> Sequence[str]:
+def _warnings(result: FieldReturns) -> Iterator[str]:
     """Return what speaks against the model."""
-    check, warnings = result.check, []
-    if check.fit < 0.05:
-        warnings.append(
-            f"the lives in the field do not have the predicted distribution (p = {check.fit:.2g}):"
+    fit, factor, prior = result.check.fit, result.factor, result.factor_before
+    if fit < 0.05:
+        yield (
+            f"the lives in the field do not have the predicted distribution (p = {fit:.2g}):"
             " another limit or another scatter of the inputs than in the scenario"
         )
-    factor, prior = result.factor, result.factor_before
     if result.life_factor > 1.0 and not prior.low < factor.value < prior.high:
-        warnings.append(
+        yield (
             f"the life factor of {factor.value:.2g} is outside its prior: the computed life is"
             " systematically wrong, or the units are not those of the scenario"
         )
-    return warnings
 
 
 _POINTS = 80
@@ -373,9 +382,15 @@ def _failures(result: FieldReturns) -> Panel:
         marks.append(Whiskers(place + shift, *ends, colour=colour))
         marks.append(dots(place + shift, predicted.mean[:bands], "o", colour=colour, label=label))
     most = max(float(check.after.high[:bands].max()), float(check.observed[:bands].max()))
-    x = Axis(f"life [{result.unit}]", ticks=place.tolist(), names=names, limits=(-0.6, bands - 0.4))
-    text = "Failures observed in bands of lives, and predicted with 95 % intervals."
-    return Panel("Failures", x, Axis("units", limits=(0.0, 1.6 * most + 1.0)), marks, text)
+    return Panel(
+        "Failures",
+        Axis(
+            f"life [{result.unit}]", ticks=place.tolist(), names=names, limits=(-0.6, bands - 0.4)
+        ),
+        Axis("units", limits=(0.0, 1.6 * most + 1.0)),
+        marks,
+        "Failures observed in bands of lives, and predicted with 95 % intervals.",
+    )
 
 
 def _remaining(result: FieldReturns) -> Panel:
@@ -390,6 +405,11 @@ def _remaining(result: FieldReturns) -> Panel:
         high = np.where(np.isfinite(high), high, np.nan)
         marks.append(Whiskers(age, low, high, colour=colour))
         marks.append(dots(age, value, "o", colour=colour, label=f"B{share:g}"))
-    text = "Further lives that 10 % and 50 % of units of an age do not reach, with 95 % intervals."
     x, y = (Axis(name, result.unit, 1.0, limits=(0.0, None)) for name in ("age", "further life"))
-    return Panel(title, x, y, marks, text)
+    return Panel(
+        title,
+        x,
+        y,
+        marks,
+        "Further lives that 10 % and 50 % of units of an age do not reach, with 95 % intervals.",
+    )

@@ -233,8 +233,13 @@ def _fatigue(scenario: Scenario) -> Fatigue | None:
     if choice is None:
         return None
     modulus = scenario.pair.contact_modulus
-    laws = {body: law.build(modulus) for body, law in choice.laws.items()}
-    return Fatigue(laws, choice.slope, choice.probability, choice.reference_area, choice.remove)
+    return Fatigue(
+        {body: law.build(modulus) for body, law in choice.laws.items()},
+        choice.slope,
+        choice.probability,
+        choice.reference_area,
+        choice.remove,
+    )
 
 
 def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
@@ -388,8 +393,7 @@ def surfaces(
     height = start_height(scenario, grid, angles)
     if form.has_crowned_cylinder:
         height = height - form.cylinder_drop(grid.y)
-    raised = roller_height(scenario, rollers, s)
-    drop = form.roller_drop(s) - raised
+    drop = form.roller_drop(s) - roller_height(scenario, rollers, s)
     # leading axes: stations, rollers, realisations
     height = height if height.ndim == 1 else height[:, None, None]
     gap = drop - height

@@ -28,8 +28,12 @@ _DEPTHS = ("depth", "roller depth", "lift error", "clearance")
 
 def stored_scenario(data: RunData, passes: float | None = None) -> Scenario:
     """Return the scenario of a file, with another number of passes if given."""
-    overrides = None if passes is None else {"operation.passes": round(passes)}
-    return parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__, overrides)
+    return parse_scenario(
+        data.scenario_text,
+        data.scenario_file,
+        data.files.__getitem__,
+        None if passes is None else {"operation.passes": round(passes)},
+    )
 
 
 def with_end(scenario: Scenario, limit: Limit | None) -> tuple[Scenario, Limit | None]:
@@ -42,8 +46,7 @@ def with_end(scenario: Scenario, limit: Limit | None) -> tuple[Scenario, Limit |
     override: dict[str, object] = {"operation.duration": f"{limit.value!r} s"}
     if limit.quantity == "passes":
         override = {"operation.passes": round(limit.value)}
-    files = scenario.files.__getitem__
-    ended = parse_scenario(scenario.text, scenario.file, files, override)
+    ended = parse_scenario(scenario.text, scenario.file, scenario.files.__getitem__, override)
     if ended.total_passes < scenario.total_passes:
         # a time is rounded to whole passes, as the duration of a scenario
         return scenario, Limit("passes", float(ended.total_passes), limit.text)

@@ -54,8 +54,7 @@ def contact_grid(setup: Setup, load: float) -> Grid:
     if choice.width is None and profile is not None:
         return profile_grid(profile.low, profile.high, half_width, choice.strips)
     half = 1.2 * half_width
-    crowned = scenario.axial_gap.is_crowned
-    default = STRIPS_OF_CONTACT if crowned else STRIPS_OF_CONTACT_OF_FORM
+    default = STRIPS_OF_CONTACT if scenario.axial_gap.is_crowned else STRIPS_OF_CONTACT_OF_FORM
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
         return roller_grid(scenario, choice.strips or strips_of_roller(scenario, default, load))
     if choice.width is None and choice.strips is None:
@@ -125,8 +124,8 @@ def wider_grid(setup: Setup, grid: Grid, load: float, shift: float = 0.0) -> Gri
     if added <= 0:
         return None
     margin = added * grid.spacing
-    edges = grid.edges[0] - margin, grid.edges[1] + margin
-    return Grid.spanning(*edges, grid.strips + 2 * added)
+    low, high = grid.edges
+    return Grid.spanning(low - margin, high + margin, grid.strips + 2 * added)
 
 
 def strips_over(width: float, half_width: float, tolerance: float, groove: float = 0.0) -> int:
@@ -255,9 +254,7 @@ def start_of(setup: Setup, shared: Grid) -> Grid:
 
 def start_of_run(scenario: Scenario, setup: Setup) -> Grid:
     """Return the strips with which the run of a scenario starts, for its realisation."""
-    if not scenario.random:
-        return strips_of_run(setup)
-    return start_of(setup, shared_strips(scenario))
+    return start_of(setup, shared_strips(scenario)) if scenario.random else strips_of_run(setup)
 
 
 def growth_of(

@@ -405,9 +405,6 @@ class RunInProgress:
         """Return the content of the results file."""
         scenario, problem = self.scenario, self.present
         kinematics = problem.kinematics
-        checkpoint = self.recorder.state.to_arrays()
-        checkpoint["record_base"] = np.asarray(self.record_base)
-        checkpoint["spacing"] = np.asarray(problem.grid.spacing)
         return RunData(
             **self.origin,
             drawn=self.drawn,
@@ -438,7 +435,11 @@ class RunInProgress:
             },
             history=self.recorder.history,
             records=self.recorder.records,
-            checkpoint=checkpoint,
+            checkpoint={
+                **self.recorder.state.to_arrays(),
+                "record_base": np.asarray(self.record_base),
+                "spacing": np.asarray(problem.grid.spacing),
+            },
             finished=finished,
             wall_seconds=self._wall(),
             created=self.created,

@@ -88,5 +88,4 @@ def load_file(scenario: Scenario) -> tuple[str, str] | None:
 def _load_mistake(scenario: Scenario, what: str, got: str, expected: str) -> ScenarioError:
     """Return the error of a load, which names the file that the load reads."""
     key, file = load_file(scenario) or ("kind", scenario.load.kind)
-    mistake = Mistake("load", key, f"{file}: {what}", got, expected)
-    return ScenarioError(scenario.file, [mistake])
+    return ScenarioError(scenario.file, [Mistake("load", key, f"{file}: {what}", got, expected)])

@@ -123,30 +123,35 @@ def depth_panel(result: Result) -> Panel:
     more = {"time": (time, "min"), "estimated error": (error, "um")}
     marks.append(Line(passes, depth, marker=marker, size=2.6, label=label, more=more))
     first, last = (shown(float(value), "um") for value in (depth[0], depth[-1]))
-    text = f"The depth grows from {first} at pass {count(passes[0])} to {last} at the end."
-    return Panel(title, x, y, marks, text, legend="upper left")
+    return Panel(
+        title,
+        x,
+        y,
+        marks,
+        f"The depth grows from {first} at pass {count(passes[0])} to {last} at the end.",
+        legend="upper left",
+    )
 
 
 def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
     power = np.asarray(result.dissipation).reshape(len(result.record_passes), -1, len(result.y))
     rollers = power.shape[1]
-    marks = [
-        Records(
-            result.y,
-            power[:, number],
-            result.record_passes,
-            dash=DASHES[number % len(DASHES)],
-            most=10 if rollers == 1 else 5,
-            label="" if rollers == 1 else f"roller {number + 1}",
-            colour=COLOURS[number % len(COLOURS)],
-        )
-        for number in range(rollers)
-    ]
     return Panel(
         "Dissipated power per length (black: start of the run)",
         Axis(Y, "mm", limits=limits),
         Axis("$P_l$", "W/mm", limits=(0.0, None)),
-        marks,
+        [
+            Records(
+                result.y,
+                power[:, number],
+                result.record_passes,
+                dash=DASHES[number % len(DASHES)],
+                most=10 if rollers == 1 else 5,
+                label="" if rollers == 1 else f"roller {number + 1}",
+                colour=COLOURS[number % len(COLOURS)],
+            )
+            for number in range(rollers)
+        ],
         "Power across the track: high and narrow on fresh bodies, low and wide in a groove.",
         legend="upper right",
     )
@@ -154,23 +159,31 @@ def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
 
 def _normal_force(result: Result) -> Panel:
     force = _by_roller(result.normal_force)
-    base, marks = _base_load(result), list[Mark]()
-    if base is not None:
-        marks.append(Line(*base, width=0.8, colour=GREY, label="without feedback"))
+    base = _base_load(result)
     # between the steps, a line would contradict the load; at many of them, the dots are a line
     style: dict[str, Any] = {} if base is None else {"dash": "", "marker": "o", "size": 2.6}
-    marks += _lines(result, force, "" if base is None else "at the steps", **style)
-    y = _force_axis("normal force", "N", force if base is None else np.array([0.0, 1.0]))
-    title, text = "Normal force of one roller", _first_and_last(force, "N")
-    return Panel(title, Axis("time", "min", margin=(0.02, 0.02)), y, marks, text)
+    return Panel(
+        "Normal force of one roller",
+        Axis("time", "min", margin=(0.02, 0.02)),
+        _force_axis("normal force", "N", force if base is None else np.array([0.0, 1.0])),
+        [
+            *([Line(*base, width=0.8, colour=GREY, label="without feedback")] if base else []),
+            *_lines(result, force, "" if base is None else "at the steps", **style),
+        ],
+        _first_and_last(force, "N"),
+    )
 
 
 def pressure_panel(result: Result) -> Panel:
     """Return the peak pressure of the rollers against time."""
-    values = _by_roller(result.peak_pressure)
-    marks = _lines(result, values)
-    y, text = _force_axis("peak pressure", "MPa", values), _first_and_last(values, "MPa")
-    return Panel("Peak pressure of the rollers", Axis("time", "min"), y, marks, text)
+    values, x = _by_roller(result.peak_pressure), Axis("time", "min")
+    return Panel(
+        "Peak pressure of the rollers",
+        x,
+        _force_axis("peak pressure", "MPa", values),
+        _lines(result, values),
+        _first_and_last(values, "MPa"),
+    )
 
 
 def _lines(result: Result, values: FloatArray, alone: str = "", **style: Any) -> list[Line]:

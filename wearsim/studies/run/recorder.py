@@ -342,8 +342,7 @@ class Recorder:
             self._records.append((problem, kept, passes))
         else:
             self._compute_records()
-            there = states_at(self.stepper, advance, [due])
-            self._records.append(self._row(problem, *there))
+            self._records.append(self._row(problem, *states_at(self.stepper, advance, [due])))
 
     @property
     def _waiting(self) -> list[tuple[WearProblem, WearState, float]]:

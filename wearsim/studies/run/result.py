@@ -421,9 +421,7 @@ class Result(StudyResult[RunData]):
         last.update({name: last[name].max(axis=0) for name in per_roller})
         deepest = np.maximum(last["depth"], last["roller_depth"])
         rollers = self.raw.static["multiplicity"] @ self.raw.history["roller_worn_volume"][-1]
-        below: dict[str, Number] = {}
-        if self.start_height.any():
-            below["depth_below_nominal_m"] = _number(np.asarray(self.depth_below_nominal[-1]))
+        below = {"depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1]))}
 
         def with_units(*names: str) -> dict[str, Number]:
             return {_key(name): _number(last[name]) for name in names}
@@ -432,7 +430,7 @@ class Result(StudyResult[RunData]):
             "passes": _number(last["passes"]),
             **self._final_of_cam(last),
             **with_units("time", "depth"),
-            **below,
+            **(below if self.start_height.any() else {}),
             **with_units("width", "worn_volume", "roller_depth", "roller_worn_volume"),
             **with_units("dissipated_energy", "power", "normal_force", "peak_pressure"),
             **with_units("descent", "elastic_approach"),
@@ -452,8 +450,7 @@ class Result(StudyResult[RunData]):
         for name in ESTIMATED:
             error = last.get(f"{name}_error")
             if error is not None and ALL_VARIABLES[name].unit != "1":
-                over_rollers = "roller" in ALL_VARIABLES[name].dims
-                greatest = error.max(axis=0) if over_rollers else error
+                greatest = error.max(axis=0) if "roller" in ALL_VARIABLES[name].dims else error
                 errors[_key(name, "_error")] = _number(greatest)
         return errors
 

@@ -207,8 +207,7 @@ def _run_to_limit(run: RunInProgress) -> Result:
         else:
             try:
                 scenario = stored_scenario(data, 2.0 * data.total_passes)
-                setup = draw(scenario)
-                longer = run.extended(scenario, setup, data, state)
+                longer = run.extended(scenario, draw(scenario), data, state)
             except ScenarioError as error:
                 reason = "it cannot be extended: " + "; ".join(map(str, error.mistakes))
         if reason:

@@ -118,8 +118,11 @@ class Setup:
             for key, limits in zip(random.keys, _ranges(random), strict=True)
             if CONTACT_FIELDS[key] == name
         ]
-        values = [0.0, *self.rollers.get(name, ()), *(end for pair in limits for end in pair)]
-        values += [float(end) for path in paths for end in (path.min(), path.max())]
+        values = [
+            *(0.0, *self.rollers.get(name, ())),
+            *(end for pair in limits for end in pair),
+            *(float(end) for path in paths for end in (path.min(), path.max())),
+        ]
         return min(values), max(values)
 
     @cached_property

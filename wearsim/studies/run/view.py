@@ -197,18 +197,18 @@ class RunView(StudyView[Result]):
     def origin(self) -> dict[str, Any]:
         """Return length, records, scenario, files, plugins and software for JSON."""
         result = self.result
-        length = {"total_passes": result.raw.total_passes, "record_passes": result.record_passes}
-        return {**length, **super().origin()}
+        return {
+            "total_passes": result.raw.total_passes,
+            "record_passes": result.record_passes,
+            **super().origin(),
+        }
 
     def line(self) -> str:
         """Return the footer of the run, with the estimated errors of its steps and strips."""
         result = self.result
-        used = [result.described_model, f"{len(result.y)} strips", result.stepper]
-        error = "no stepping error"
+        error, has_steps = "no stepping error", result.stepper != "per-pass"
         known = bool(np.isfinite(result.profile_error_by_strips[-1]).all())
-        if result.stepper != "per-pass":
-            used.append(f"tolerance {result.raw.tolerance:g}")
-        if result.stepper != "per-pass" or known:
+        if has_steps or known:
             depth = max(np.max(result.depth[-1]), np.max(result.roller_depth[-1]))
             volume = np.max(result.worn_volume[-1])
             text, parts = within("depth", np.max(result.depth_error[-1]), depth), "steps"
@@ -226,7 +226,16 @@ class RunView(StudyView[Result]):
                 f"{text}, {profile}, {volume_text} (estimated numerical error of the {parts}, not"
                 " of model or inputs)"
             )
-        return footer(used, error, lapse(result.raw.wall_seconds))
+        return footer(
+            [
+                result.described_model,
+                f"{len(result.y)} strips",
+                result.stepper,
+                *([f"tolerance {result.raw.tolerance:g}"] if has_steps else []),
+            ],
+            error,
+            lapse(result.raw.wall_seconds),
+        )
 
     def overview(self) -> Overview:
         """Return the worn body, its loads, and limits that are passed or not."""
@@ -237,8 +246,11 @@ class RunView(StudyView[Result]):
         limits = self.limit_rows(brief=True)
         limits = limits or [Row("limits", "none in the scenario, table [limit]")]
         shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
-        groups = {"Loads": self.loads(), "Limits": limits, "Wear": shown_rows}
-        return Overview(sheet.panels.get("shape", sheet.first), groups, excluded)
+        return Overview(
+            sheet.panels.get("shape", sheet.first),
+            {"Loads": self.loads(), "Limits": limits, "Wear": shown_rows},
+            excluded,
+        )
 
     def loads(self) -> Rows:
         """Return the loads of the overview."""
@@ -290,12 +302,15 @@ class RunView(StudyView[Result]):
     def frame(self) -> Frame:
         """Return the history, one row for each step."""
         result = self.result
-        columns = [
-            (name, item.unit, result.values(name))
-            for name, item in result.raw.schema.variables.items()
-            if item.kind == "history"
-        ]
-        return Frame(columns, "step", range(len(result.passes)))
+        return Frame(
+            [
+                (name, item.unit, result.values(name))
+                for name, item in result.raw.schema.variables.items()
+                if item.kind == "history"
+            ],
+            "step",
+            range(len(result.passes)),
+        )
 
     def limit_rows(self, *, brief: bool = False) -> Rows:
         """Return a row for each limit of [limit]: reached or not, when, and by how much.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -106,20 +106,15 @@ def export_running_in(result: Result, folder: str | Path, *, force: bool = False
     removed = [f"cylinder.profile_{key}" for key in _OF_PROFILES]
     text = apply_overrides(data.scenario_text, data.scenario_file, overrides, removed)
     scenario_name = f"{Path(data.scenario_file).stem}-worn.toml"
-    paths = write_files(Path(folder), {scenario_name: [text], **_pieces(contents)}, force=force)
-    return RunningIn(paths, list(_notes(scenario, data)))
-
-
-def _pieces(contents: Mapping[str, str]) -> dict[str, list[str]]:
-    return {name: [text] for name, text in contents.items()}
+    pieces = {name: [content] for name, content in {scenario_name: text, **contents}.items()}
+    return RunningIn(write_files(Path(folder), pieces, force=force), list(_notes(scenario, data)))
 
 
 def _keys_of_texts(text: str) -> dict[str, str]:
     """Return the dotted keys of the texts in a scenario, by text."""
     keys: dict[str, str] = {}
     for key, value in flat(parse_toml(text, "scenario")):
-        texts = value if isinstance(value, list) else [value]
-        for item in texts:
+        for item in value if isinstance(value, list) else [value]:
             inner = item.values() if isinstance(item, dict) else [item]
             keys |= {name: key for name in inner if isinstance(name, str)}
     return keys
@@ -134,9 +129,10 @@ def _joined(y: FloatArray, height: FloatArray, earlier: Profile | None) -> Profi
     if earlier is None:
         return Profile(y, height)
     before, after = earlier.y < y[0], earlier.y > y[-1]
-    places = np.concatenate([earlier.y[before], y, earlier.y[after]])
-    heights = np.concatenate([earlier.height[before], height, earlier.height[after]])
-    return Profile(places, heights)
+    return Profile(
+        np.concatenate([earlier.y[before], y, earlier.y[after]]),
+        np.concatenate([earlier.height[before], height, earlier.height[after]]),
+    )
 
 
 def _cylinder(scenario: Scenario, data: RunData) -> Profile:
@@ -189,8 +185,7 @@ def _notes(scenario: Scenario, data: RunData) -> Iterator[str]:
     passes, total = float(data.records["record_passes"][-1]), data.total_passes
     if passes < total:
         yield f"the profiles are those after {passes:.0f} of {total:.0f} passes"
-    feedback = getattr(load, "feedback", "none") != "none"
-    if load.stiffness or feedback:
+    if load.stiffness or getattr(load, "feedback", "none") != "none":
         yield (
             "the load of the new scenario is that of the old one at its start: it falls with the"
             " wear of the new test alone"

@@ -149,8 +149,7 @@ def _check(
         not finite or math.isfinite(high - low),
         f"the support {support} is too wide: its width overflows",
     )
-    moments = {"mean": mean, "std": std, "mean_log": mean_log}
-    for name, value in moments.items():
+    for name, value in {"mean": mean, "std": std, "mean_log": mean_log}.items():
         _require(value is None or math.isfinite(value), f"{name} must be finite, got {value}")
     _check_sizes(low, high, mean, std)
     if mean_log is not None:

@@ -273,10 +273,11 @@ class QuadraticExponent(MaxentDistribution):
             return lambda u: (-top - (slope + bend * u) * u, -slope - 2.0 * bend * u, -2.0 * bend)
 
         stop = -0.5 * fall / bend if from_above > 0.0 else (high - low) / scale
-        pieces = [Piece(low, scale, exponent(fall, 0.0), stop)]
-        if from_above > 0.0:
-            upper = exponent(-from_above, top)
-            pieces.append(Piece(high, scale, upper, 0.5 * from_above / bend))
+        above = exponent(-from_above, top)
+        pieces = [
+            Piece(low, scale, exponent(fall, 0.0), stop),
+            *([Piece(high, scale, above, 0.5 * from_above / bend)] if from_above > 0.0 else []),
+        ]
         self._table = table = InverseTable(pieces)
         self.mean, self.std = table.mean, table.std
         log_total = math.log(scale) + table.log_total

@@ -49,8 +49,7 @@ def simulated_centres(
     numbers = Stream(seed, name, "test").rows(0, sets, 3 * tests).reshape(sets, 3, tests)
     centres = t * ndtri(numbers[:, 0])
     for test in range(tests):
-        kernel = kernels[test % len(kernels)]
-        centres[:, test] += kernel.deviations(numbers[:, 1:, test].T)
+        centres[:, test] += kernels[test % len(kernels)].deviations(numbers[:, 1:, test].T)
     return np.asarray(centres)
 
 
@@ -95,8 +94,7 @@ class Design:
         self.kernels, self.tests = list(kernels), tests or len(kernels)
         self.negligible, self.seed, self.sets = negligible, seed, sets
         self.hierarchy = Hierarchy(kernels, scatters(_SCATTERS, _GREATEST), tests)
-        null = self.simulated(0.0, "null")
-        self.null = np.sort(ratios(self.hierarchy.integrated(null)))
+        self.null = np.sort(ratios(self.hierarchy.integrated(self.simulated(0.0, "null"))))
         self.quantile = float(np.quantile(self.null, 1.0 - ALPHA))
 
     def simulated(self, t: float, name: str) -> FloatArray:

@@ -75,8 +75,7 @@ def effects(values: FloatArray, scores: Mapping[str, FloatArray]) -> dict[str, S
         Econometrics 29 (1985), DOI 10.1016/0304-4076(85)90158-7.
     """
     designs = {name: np.column_stack([score, score**2]) for name, score in scores.items()}
-    columns = sum(design.shape[1] for design in designs.values())
-    if len(values) >= _PER_TERM * (1 + columns):
+    if len(values) >= _PER_TERM * (1 + sum(design.shape[1] for design in designs.values())):
         return _fitted(values, designs)
     by_input: dict[str, SignedEffect] = {}
     for name, design in designs.items():
@@ -126,8 +125,7 @@ def _fitted(values: FloatArray, designs: Mapping[str, FloatArray]) -> dict[str, 
             at = np.zeros(terms.shape[1])
             at[first : first + many], at[first + many : first + 2 * many] = score, score**2
             error = math.sqrt(float(((at @ inverse * left_out) ** 2).sum()))
-            change = float(at @ slopes)
-            changes.append(t_interval(change, error, len(values) - terms.shape[1]))
+            changes.append(t_interval(float(at @ slopes), error, len(values) - terms.shape[1]))
         by_input[name] = SignedEffect(*changes)
         first += design.shape[1]
     return by_input

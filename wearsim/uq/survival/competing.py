@@ -159,8 +159,7 @@ class CompetingRisks:
         from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
 
         assert self.score is not None
-        score = self.score(ratio * self.reference)
-        return np.asarray(ndtr((score - self.shift) / self.spread))
+        return np.asarray(ndtr((self.score(ratio * self.reference) - self.shift) / self.spread))
 
     def _factors(self, chance: FloatArray) -> FloatArray:
         """Return factors over the reference at probabilities, shape (realisations, nodes)."""

@@ -129,8 +129,7 @@ def predicted_number(
     numbers = []
     for fit in fits:
         failed = probability(fit)
-        inner = float(_DENSITY @ failed)
-        mean = sure + fitted * inner
+        mean = sure + fitted * float(_DENSITY @ failed)
         terms = fitted * float(_DENSITY @ (failed - mean) ** 2)
         variance = sure * (1.0 - mean) ** 2 + terms + (1.0 - sure - fitted) * mean**2
         numbers.append(effective_number(count, mean, variance))

@@ -82,8 +82,7 @@ class FittedLives:
         section 8.4), so that score +- 1.96 errors is a pointwise 95 % band on a probability plot.
         """
         gradient = np.stack([np.full(np.shape(life), -1.0 / self.sigma), -self.score(life)])
-        covariance = self.covariance
-        square = np.einsum("i...,ij,j...->...", gradient, covariance, gradient)
+        square = np.einsum("i...,ij,j...->...", gradient, self.covariance, gradient)
         return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 

@@ -84,8 +84,9 @@ def _result(
         return RareProbability(Interval(0.0, 0.0, 1.0), tests, math.inf, size, obstacle)
     degrees = math.inf if size is None else max(size - 1.0, 1.0)
     reach = math.exp(min(t_quantile(degrees) * variation, 700.0))
-    interval = Interval(value, value / reach, min(value * reach, 1.0))
-    return RareProbability(interval, tests, variation, size, obstacle)
+    return RareProbability(
+        Interval(value, value / reach, min(value * reach, 1.0)), tests, variation, size, obstacle
+    )
 
 
 def weighted_probability(

@@ -88,8 +88,11 @@ class LifeFunctions:
         part = np.exp(exponent - density[:, None]) / lives.count
         density -= math.log(scatter * math.sqrt(2.0 * math.pi))
         failed, survived = _log_mean(log_ndtr(z)), _log_mean(log_ndtr(-z))
-        slopes = [np.exp(density - failed), -np.exp(density - survived)]
-        slopes.append(-(part * inside).sum(axis=1) / scatter)
+        slopes = [
+            np.exp(density - failed),
+            -np.exp(density - survived),
+            -(part * inside).sum(axis=1) / scatter,
+        ]
         values = np.stack([failed, survived, density], axis=1)
         spline = CubicHermiteSpline(nodes, values, np.stack(slopes, axis=1))
         self._ends = nodes[0], nodes[-1]

@@ -78,8 +78,7 @@ class UncertainLives:
     def given(self, m: float, t: float) -> FactorMixture:
         """Return the lives for one median and scatter of the wear factor."""
         ends = np.array([-_WIDE, _WIDE])
-        score = ScoreFunction(ends, (ends - m) / t, np.zeros(0))
-        return replace(self.mixture, score=score)
+        return replace(self.mixture, score=ScoreFunction(ends, (ends - m) / t, np.zeros(0)))
 
     def quantile(self, share: float) -> UncertainLife:
         """Return the life that a share of the machines does not reach."""

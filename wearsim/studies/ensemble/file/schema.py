@@ -300,9 +300,11 @@ def ensemble_schema(
     schema = with_random_inputs(ENSEMBLE, inputs)
     given = {"control": control, "life": life, "cam": cam, "fatigue": fatigue}
     present = {name for name, value in given.items() if value}
-    axes = {**schema.axes, **({_COURSE.name: _COURSE} if {"fatigue", "life"} <= present else {})}
-    variables = {**schema.variables, **of_present(_FURTHER, present)}
-    return replace(schema, axes=axes, variables=variables)
+    return replace(
+        schema,
+        axes={**schema.axes, **({_COURSE.name: _COURSE} if {"fatigue", "life"} <= present else {})},
+        variables={**schema.variables, **of_present(_FURTHER, present)},
+    )
 
 
 def is_row(variable: Variable) -> bool:

@@ -133,8 +133,10 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         is_new = not folder.exists()
         # the parts of an ensemble that is replaced count as merged, and are deleted later
         last = max(part_numbers(path), default=0)
-        known = {name: np.asarray(array, float) for name, array in static.items()}
-        known["quantile"] = np.array(QUANTILES)
+        known = {
+            **{name: np.asarray(array, float) for name, array in static.items()},
+            "quantile": np.array(QUANTILES),
+        }
         header = replace(header, variables=known, run_id=uuid.uuid4().hex, merged=last)
         with os_errors_converted(path):
             folder.mkdir(exist_ok=True)  # before the file, which is incomplete without it
