@@ -101,7 +101,8 @@ def test_two_loads_add_up_by_their_shares(share):
         one, state = worn(**UNWORN, **fatigue(), load__normal_force=level)
         lives.append(float(state.passes[0]) / damage_of(one, state))
     expected = 1.0 / (share / lives[0] + (1.0 - share) / lives[1])
-    assert passes / damage_of(problem, end) == pytest.approx(expected, rel=1e-8)
+    # line loads converge to 1e-8, and a life goes with a high power of the pressure
+    assert passes / damage_of(problem, end) == pytest.approx(expected, rel=1e-7)
 
 
 def test_weakest_link_of_twice_the_area_has_a_shorter_life(unworn):
