@@ -27,7 +27,7 @@ R = TypeVar("R")
 
 # kernels are never passed to C code, for which numba would compile a second wrapper
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
-OPTIMISATION = 2  # level at which LLVM optimises kernels
+OPTIMISATION = 1  # level at which LLVM optimises kernels
 KEPT = 86400.0  # seconds for which the compiled kernels of other sources are kept
 _KERNELS: list[Kernel] = []
 _SUBROUTINES: list[Callable[..., Any]] = []  # those that numba has not been given yet
@@ -111,7 +111,8 @@ def _prepared_numba() -> Any:
     class Compilations(event.Listener):
         """Listener that reports every kernel when its compilation starts, and sets its level.
 
-        The highest level makes compilation a tenth longer, and no kernel faster.
+        The second level makes compilation a twentieth longer, the third one more, and no kernel
+        faster.
         """
 
         def __init__(self) -> None:
