@@ -253,7 +253,9 @@ def _rubbing() -> list[RobustnessCase]:
             rough=True,  # two ridges remain where the slip is zero
         ),
         RobustnessCase(
-            "creepage through zero in time", {"creepage.longitudinal": wandering}, steps=8
+            "creepage through zero in time",
+            {"creepage.longitudinal": wandering},
+            steps=64,  # paths are rough, so that the error falls irregularly from step to step
         ),
     ]
 
@@ -272,7 +274,7 @@ def _wear() -> list[RobustnessCase]:
         ),
         RobustnessCase("K/H x 1e-6", {"wear.cylinder.k_over_h": "1.1e-17 1/Pa"}),
         RobustnessCase("1e9 passes", {"operation.passes": 10**9, "evolution.allow_deep": True}),
-        RobustnessCase("rollers wear 1e3 times more", both(1e3)),
+        RobustnessCase("rollers wear 1e3 times more", both(1e3) | {"evolution.allow_deep": True}),
         RobustnessCase("equal wear of both bodies", both(1.0)),
         RobustnessCase("rollers wear 1e3 times less", both(1e-3)),
     ]
