@@ -67,7 +67,7 @@ _MODULES = {
     **dict.fromkeys(("ensemble", "resume"), "run"),
     **dict.fromkeys(("cam", "dissipation"), "contact"),
 }
-#: options of the shell whose name differs from that of the argument in Python
+#: command-line options by argument of Python, where their names differ
 _OPTIONS = {"limits": "--limit", "most": "--max"}
 FAILED = 1
 INTERRUPTED = 130

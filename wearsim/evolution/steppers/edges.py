@@ -127,7 +127,7 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
 
 
 def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
-    """Return which tests have a roller whose spring has lost most of its load."""
+    """Return in which tests the spring of a roller has lost most of its load."""
     force = problem.force(problem.time(state.passes))
     free = with_feedback(problem, force, np.zeros(()), ())
     return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))

@@ -105,8 +105,7 @@ class ImplicitStepper(StepDoublingStepper):
         if whole and edges.resolves_edges(problem, state.contacts):
             state = edges.without_edges(problem, state)
         end = scheme(problem, state, step)
-        if problem.has_nodes:
-            end = with_pass_errors(problem, state, end, end, scheme, step)
+        end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
         fixed = state.irreducible
         left = self._left(problem, state, stop, OF_STEPS, fixed)

@@ -95,8 +95,7 @@ class StepDoublingStepper(Stepper):
         half = scheme(problem, state, 0.5 * step)
         end = scheme(problem, half, 0.5 * step)
         coarse = self.whole_step(problem, coarse_start, step, end, scheme)
-        if problem.has_nodes:
-            end = with_pass_errors(problem, state, end, coarse, scheme, step)
+        end = with_pass_errors(problem, state, end, coarse, scheme, step)
         negligible = NEGLIGIBLE * self.tolerance
         bias = variation_bias(problem, end, state.passes, step, self.follows_trends, negligible)
         varies = np.zeros(len(step), dtype=np.bool_)

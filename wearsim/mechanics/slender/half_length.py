@@ -151,36 +151,29 @@ def add_influences(
     total : ndarray, shape (strips,)
         Increased.
     """
-    nodes, middle, waiting = table.shape[0], table.shape[2] // 2, -1
-    start, stop = np.uint64(left), np.uint64(right + 1)
-    for j in range(weight.shape[0]):
-        if weight[j] == 0.0:
+    nodes, middle, strips = table.shape[0], table.shape[2] // 2, weight.shape[0]
+    start, stop, first = np.uint64(left), np.uint64(right + 1), -1
+    for j in range(strips + 1):  # two strips at once, so that `total` is read half as often
+        if j < strips and weight[j] == 0.0:
             continue
-        if waiting < 0:
-            waiting = j
+        if first < 0:
+            first = j
             continue
-        p, (a0, a1, b0, b1), _ = interpolation(nodes, log_ratio[k, waiting])
-        q, (c0, c1, d0, d1), _ = interpolation(nodes, log_ratio[k, j])
-        u, v = weight[waiting], weight[j]
+        second, v = (j, weight[j]) if j < strips else (first, 0.0)  # the last one alone
+        p, (a0, a1, b0, b1), _ = interpolation(nodes, log_ratio[k, first])
+        q, (c0, c1, d0, d1), _ = interpolation(nodes, log_ratio[k, second])
+        u = weight[first]
         a0, a1, b0, b1 = a0 * u, a1 * u, b0 * u, b1 * u
         c0, c1, d0, d1 = c0 * v, c1 * v, d0 * v, d1 * v
-        near, here = np.uint64(middle - waiting), np.uint64(middle - j)
+        to_first, to_second = np.uint64(middle - first), np.uint64(middle - second)
         for i in range(start, stop):
-            m, n = i + near, i + here
+            m, n = i + to_first, i + to_second
             low = a0 * table[p, 0, m] + a1 * table[p, 1, m]
             low += c0 * table[q, 0, n] + c1 * table[q, 1, n]
             high = b0 * table[p + 1, 0, m] + b1 * table[p + 1, 1, m]
             high += d0 * table[q + 1, 0, n] + d1 * table[q + 1, 1, n]
             total[i] += low + high
-        waiting = -1
-    if waiting >= 0:
-        p, (a0, a1, b0, b1), _ = interpolation(nodes, log_ratio[k, waiting])
-        u, near = weight[waiting], np.uint64(middle - waiting)
-        a0, a1, b0, b1 = a0 * u, a1 * u, b0 * u, b1 * u
-        for i in range(start, stop):
-            low = a0 * table[p, 0, i + near] + a1 * table[p, 1, i + near]
-            high = b0 * table[p + 1, 0, i + near] + b1 * table[p + 1, 1, i + near]
-            total[i] += low + high
+        first = -1
 
 
 @subroutine

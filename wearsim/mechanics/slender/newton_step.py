@@ -185,10 +185,25 @@ def add_displacement(
     state: NewtonState,
 ) -> None:
     """Add the displacement by contact `k`'s line loads to `surface` of the followed strips."""
-    weight, left, last = state.weight, state.left[k], state.right[k] - 1
+    _displace(k, state.left[k], state.right[k] - 1, table, unit, line_load, lengths, state)
+
+
+@subroutine
+def _displace(
+    k: int,
+    first: int,
+    last: int,
+    table: FloatArray,
+    unit: float,
+    line_load: FloatArray,
+    lengths: HalfLengths,
+    state: NewtonState,
+) -> None:
+    """Add the displacement by contact `k`'s line loads to `surface` of some strips."""
+    weight = state.weight
     for i in range(line_load.shape[1]):
         weight[i] = unit * line_load[k, i]
-    add_influences(table, k, left, last, weight, lengths.log_ratio, state.surface[k])
+    add_influences(table, k, first, last, weight, lengths.log_ratio, state.surface[k])
 
 
 @subroutine
@@ -350,13 +365,10 @@ def complete_surface(
         first = i if surface[i] < approach else first
     for i in range(right, n):
         last = i if surface[i] < approach else last
-    weight = state.weight
-    for i in range(n):
-        weight[i] = unit * line_load[k, i]
     if first < left:
-        add_influences(table, k, first, left - 1, weight, lengths.log_ratio, surface)
+        _displace(k, first, left - 1, table, unit, line_load, lengths, state)
     if last >= right:
-        add_influences(table, k, right, last, weight, lengths.log_ratio, surface)
+        _displace(k, right, last, table, unit, line_load, lengths, state)
     return first, last + 1
 
 

@@ -172,7 +172,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
 
     @classmethod
     def _locked(cls, path: Path, storage: Storage) -> EnsembleFile:
-        """Open an ensemble, whose file exists, after locking it; raises as `open`."""
+        """Lock an existing ensemble and open it; the errors are those of `open`."""
         with os_errors_converted(path):
             parts_folder(path).mkdir(exist_ok=True)
             lock = lock_path(path).open("a+b")
