@@ -159,7 +159,7 @@ class WearProblem:
         def part(values: FloatArray, axis: int) -> FloatArray:
             return values if values.shape[axis] == 1 else values.take(realisations, axis=axis)
 
-        return replace(
+        some = replace(
             self,
             laws=tuple(map(self.laws.__getitem__, numbers)),
             growth=tuple(map(self.growth.__getitem__, numbers)) if self.growth else (),
@@ -175,6 +175,12 @@ class WearProblem:
                 for item in self.varying
             ),
         )
+        # the history observes a state of each step together, in many realisations
+        if self.constant_load is not None:
+            some.__dict__["constant_load"] = self.constant_load.take(realisations, axis=-1)
+        if not self.pauses:
+            some.__dict__["pauses"] = []
+        return some
 
     @cached_property
     def bodies(self) -> IntArray:
@@ -493,6 +499,14 @@ class WearProblem:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
         physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
         return np.asarray(self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0])
+
+    @cached_property
+    def energy_weights(self) -> FloatArray:
+        """Energy per roller pass for a power of 1 W of each contact, shape (S * C,) [J]."""
+        of_stations = self.mean_over_turn(np.eye(self.shape[0]))[0]
+        passes = self.cylinder_share * self.kinematics.physical_rollers
+        weights = np.outer(of_stations, passes) / self.kinematics.pass_rate
+        return np.ascontiguousarray(weights.ravel())
 
     @cached_property
     def mean_over_turn(self) -> Callable[[FloatArray], FloatArray]:
