@@ -276,7 +276,8 @@ class WearState:
         past : Past
             Of the fields in `others`.
         """
-        cylinder, roller = separated(depths, self.cylinder_depth.shape[0])
+        stations = self.cylinder_depth.shape[0]
+        cylinder, roller = depths[:stations, None], depths[None, stations:]
         state = self.replaced(cylinder_depth=cylinder, roller_depth=roller, **others)
         state.__dict__.update(stacked=depths, past=past)
         return state

@@ -39,8 +39,8 @@ from wearsim.mechanics.numerics.step_errors import COVER, KEEP, SHARE, assess_st
 from wearsim.types import FloatArray, IntArray
 
 DOUBLED_SHARE = 0.7  # part of the tolerance that a step may add to the profiles, by step doubling
-# least relative error of the energy that step doubling aims at: no step is short enough for a smaller
-# one where the power changes by jumps
+# least relative error of the energy that step doubling aims at: where the power changes by jumps, a
+# smaller one asks for ever shorter steps
 LEAST_OF_JUMPS = 1e-4
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 # factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
@@ -105,7 +105,8 @@ class ImplicitStepper(StepDoublingStepper):
         if whole and edges.resolves_edges(problem, state.contacts):
             state = edges.without_edges(problem, state)
         end = scheme(problem, state, step)
-        end = with_pass_errors(problem, state, end, end, scheme, step)
+        if problem.has_nodes:
+            end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
         fixed = state.irreducible
         left = self._left(problem, state, stop, OF_STEPS, fixed)
@@ -113,11 +114,11 @@ class ImplicitStepper(StepDoublingStepper):
         assert state.stepping_error is not None
         assert end.wear_exponents is not None
         assert end.order is not None
-        displaced = np.zeros(len(step))
+        displaced = np.zeros(step.size)
         if problem.has_spring:
             aim = SHARE * self.tolerance
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, scale, aim, KEEP)
-        work, order = np.empty((5, len(step))), np.empty_like(end.order)
+        work, order = np.empty((5, step.size)), np.empty_like(end.order)
         of_next, estimates = work[:2], work[2:]
         errors = assess_step(
             self.tolerance,
@@ -156,10 +157,10 @@ class ImplicitStepper(StepDoublingStepper):
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0] * left), np.minimum(ratio, of_loads[1])
-        others = {
-            n: solution.replaced(order=order, passes=passes)
-            for n, solution in end.auxiliary.items()
-        }
+        others = end.auxiliary
+        if others:
+            changed = {"order": order, "passes": passes}
+            others = {name: solution.replaced(**changed) for name, solution in others.items()}
         end = end.replaced(
             passes=passes,
             steps=state.steps + 1,

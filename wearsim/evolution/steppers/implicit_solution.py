@@ -162,12 +162,15 @@ def step_by_formula(
         *(bodies, resolved, gap, depths, past.part, of_bodies, of_contacts),
     )
     base, guess = of_bodies[3], of_bodies[4]
-    exponents = np.array(state.wear_exponents).reshape(shape)
+    assert state.wear_exponents is not None
+    of_strips = state.wear_exponents.copy()
+    exponents = of_strips.reshape(shape)
     loads = LoadsOfStep(problem, state, conditions, passes, feedback)
     stations, iterations = problem.shape[0], np.zeros(realisations, dtype=np.int64)
     most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        about, compliance = np.empty((5, *shape)), np.empty((realisations, len(bodies), 2, strips))
+        about = np.empty((5, *shape))
+        compliance = np.empty((realisations, bodies.shape[0], 2, strips))
         given: tuple[Any, ...] = (line_load, wear, exponents, about, compliance)
         linearise_step(*of_step, *given)
         batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
@@ -238,7 +241,7 @@ def step_by_formula(
         Past(past_wear, past_sums, past_feedback, spans, *edges),
         contacts=contacts,
         solves=state.solves + iterations * problem.contacts_each,
-        wear_exponents=exponents.reshape(by_contact),
+        wear_exponents=of_strips,
         passes=state.passes + passes,
         energy=state.energy + energy,
         past_wear=past_wear,
