@@ -14,7 +14,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located, relocated
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
-from wearsim.evolution.strips import grown, identical_strips, next_grids, on_grid
+from wearsim.evolution.strips import free_strips, grown, identical_strips, next_grids, on_grid
 from wearsim.types import FloatArray, IntArray
 
 T = TypeVar("T")
@@ -303,7 +303,7 @@ class Evolution:
         for place, error in failed.items():
             number = int(self.numbers[place])
             passes = float(self.state.passes[place])
-            edge = getattr(error, "cause", "") == "edge" and self.problem.free_strips[place]
+            edge = getattr(error, "cause", "") == "edge" and free_strips(self.problem)[place]
             before, times = self._widened.get(number, (passes, 0))
             times = times if before == passes else 0
             if edge and times < MOST_WIDENED:  # the step is tried again on wider strips

@@ -221,7 +221,7 @@ def step_by_formula(
     past_feedback = np.empty(past.feedback.shape)
     ended: list[Any] = [past.separation, past.whole_steps, share, contacts.line_load, new, worn]
     ended += of_tests, sums, loads.feedback if loads.vary else feedback
-    ended += kernel_input(contacts.power), problem.energy_weights
+    ended += kernel_input(contacts.power), problem.power_weights / problem.kinematics.pass_rate
     ended += past.wear, past.sums, past.feedback
     ended += energy, ends, fields, past_wear, past_sums, past_feedback, decreased
     end_step(*of_step, *ended)
