@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.evolution import built
+from tests.evolution import built, stepped
 from tests.evolution.test_step_loads import THREE, Line, with_loads
 from wearsim.evolution.quantities import Varying
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers import edges
-from wearsim.evolution.steppers.implicit import ImplicitStepper, with_rates
+from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step, with_rates
 from wearsim.mechanics.numerics.edge_strips import SETTLED
 from wearsim.mechanics.numerics.multistep import MAX_ORDER
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
@@ -244,3 +244,15 @@ def test_start_of_a_test_has_the_fields_that_its_stepper_needs(three):
     )
     many = with_loads(nodes, Line())
     assert ImplicitStepper(1e-3).started(many, fresh_state(many)).part is None
+
+
+def test_long_step_of_a_cam_keeps_its_edges():
+    # its edges pass strips that they were not predicted to reach
+    problem, stepper, stop = built("cam-cycloidal", contact__strips=41, evolution__tolerance=1e-2)
+    state, _ = stepped(problem, stepper, 0.1 * stop)
+    assert np.isfinite(state.part).all()
+    first = state.replaced(order=np.ones(1, dtype=np.int64))
+    end = implicit_step(problem, first, np.array([0.2 * stop]))
+    assert np.isfinite(end.part).all()
+    reached = (end.part > 0.0) & (state.part <= 0.0)
+    assert np.count_nonzero(reached) > 2 * problem.contacts_each

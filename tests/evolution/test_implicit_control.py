@@ -17,7 +17,6 @@ from wearsim.evolution.steppers.base import GROW, SAFETY
 from wearsim.evolution.steppers.implicit import (
     DOUBLED_SHARE,
     LEAST_AIM_OF_ROWS,
-    LEAST_OF_ENERGY,
     PART_EXPONENT,
     ImplicitStepper,
     implicit_step,
@@ -31,7 +30,7 @@ from wearsim.evolution.steppers.load_errors import (
 from wearsim.evolution.steppers.single_step import volumes_of, wear_per_pass
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
-from wearsim.mechanics.numerics.step_errors import KEEP, LEAST_AIM, SHARE
+from wearsim.mechanics.numerics.step_errors import KEEP, LEAST_AIM, LEAST_OF_ENERGY, SHARE
 
 TOLERANCE, TIGHT, STOP = 1e-3, 1e-6, 1e5
 SECOND = np.array([2])  # order

@@ -16,7 +16,6 @@ from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.conditions import conditions_of
 from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.load_errors import (
-    LEAST_ENERGY,
     LEAST_LOAD,
     next_steps_of_energy,
     next_steps_of_loads,
@@ -39,6 +38,7 @@ from wearsim.evolution.steppers.loads import (
 )
 from wearsim.mechanics.numerics.multistep import GROW, LIMIT, SAFETY
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.step_errors import LEAST_ENERGY
 from wearsim.plugins import Load
 
 THREE = {"roller__offset": ["-1 mm", "0 mm", "0.5 mm"], "contact__strips": 41}

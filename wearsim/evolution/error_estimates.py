@@ -275,8 +275,6 @@ def with_pass_errors(
     passes : ndarray, shape (realisations,)
         Length of the step.
     """
-    if not problem.has_nodes:
-        return end
     halved, first = half_quadrature(problem, start)
     half = step(halved, start.half_quadrature_solution or first, passes)
     volume = volume_of(problem, end.depths)

@@ -14,7 +14,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located, relocated
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
-from wearsim.evolution.strips import grown, identical_strips, next_grids, on_grid
+from wearsim.evolution.strips import free_strips, grown, identical_strips, next_grids, on_grid
 from wearsim.types import FloatArray, IntArray
 
 T = TypeVar("T")
@@ -41,7 +41,7 @@ def bisect_failures(
     failed : dict of int to Exception
         Exception of each place that fails when processed individually.
     """
-    if not len(places):
+    if not places.size:
         return [], {}
     try:
         return [(places, work(places))], {}
@@ -136,10 +136,10 @@ class Evolution:
         self._end_finished()
 
     def __iter__(self) -> Iterator[Advance]:
-        while len(self.numbers) or self._waiting:
-            if not len(self.numbers):
+        while self.numbers.size or self._waiting:
+            if not self.numbers.size:
                 self._continue_waiting()
-            advance = self._try_steps() if len(self.numbers) else None
+            advance = self._try_steps() if self.numbers.size else None
             if advance is not None:
                 yield advance
 
@@ -214,9 +214,9 @@ class Evolution:
         self._grow()
         self._relocate()
         lengths = self._lengths()
-        if not len(self.numbers):
+        if not self.numbers.size:
             return None
-        problem, state, scheme, count = self.problem, self.state, self._scheme, len(lengths)
+        problem, state, scheme, count = self.problem, self.state, self._scheme, lengths.size
 
         def selected(places: IntArray) -> tuple[WearProblem, WearState, FloatArray]:
             if places.size == count:
@@ -230,7 +230,7 @@ class Evolution:
 
         accepted: list[tuple[IntArray, Sequence[WearState]]] = []
         stepping = np.arange(count)
-        if self._has_pauses:
+        if problem.pauses and not self.stepper.pass_by_pass:  # which passes over them itself
             resting = at_rest(problem, state.passes)
             stepping, places = (~resting).nonzero()[0], resting.nonzero()[0]
             if places.size:
@@ -242,7 +242,7 @@ class Evolution:
             errors = tried.excess.tolist(), lengths[places].tolist(), ratios
             tests = enumerate(zip(numbers, *errors, strict=True))
             taken = [k for k, (n, *error) in tests if self._trials[n].accepts(*error)]
-            if len(taken) == len(numbers):
+            if len(taken) == places.size:
                 accepted.append((places, tried.path))
             elif taken:
                 chosen = np.array(taken)
@@ -273,17 +273,22 @@ class Evolution:
             for number, length in zip(numbers, proposed, strict=True):
                 self._trials.setdefault(number, self.stepper.trial(length))
         failures: dict[int, Exception] = {}
-        count = len(numbers)
+        done, count = self.state.passes.tolist(), len(numbers)
         stops, resting = [self.stop] * count, [False] * count
-        if self._has_pauses:
+        if self.stepper.pass_by_pass:
+            stops = [min(self.stop, self._next_record(passes)) for passes in done]
+        elif self.problem.pauses:
             stops = np.minimum(self.stop, next_boundaries(self.problem, self.state.passes)).tolist()
             resting = at_rest(self.problem, self.state.passes).tolist()
-        done = self.state.passes.tolist(), self.state.steps.tolist(), stops, resting
-        for place, (number, passes, steps, stop, rests) in enumerate(
-            zip(numbers, *done, strict=True)
-        ):
+        tests = zip(numbers, done, self.state.steps.tolist(), stops, resting, strict=True)
+        for place, (number, passes, steps, stop, rests) in enumerate(tests):
             try:
-                length = self._length(self._trials[number], passes, steps, stop)
+                if steps >= self.max_steps and not self.stepper.pass_by_pass:
+                    raise StepError(
+                        f"{steps} steps have reached pass {passes:.0f} of {self.stop:.0f};"
+                        " raise evolution.max_steps or evolution.tolerance"
+                    )
+                length = self._trials[number].step(passes, stop)
                 lengths.append(stop - passes if rests else length)
             except SolverError as error:
                 error.state = error.state or self.state.at(np.array([place])).to_arrays()
@@ -292,29 +297,13 @@ class Evolution:
             self.fail(failures)
         return np.array(lengths)
 
-    @property
-    def _has_pauses(self) -> bool:
-        """Whether steps end at pauses; a pass-by-pass stepper passes over them itself."""
-        return bool(self.problem.pauses) and not self.stepper.pass_by_pass
-
-    def _length(self, trial: Trial, passes: float, steps: int, stop: float) -> float:
-        """Return the length of the next trial step of a test, up to `stop` [passes]."""
-        if self.stepper.pass_by_pass:
-            return trial.step(passes, min(self.stop, self._next_record(passes)))
-        if steps >= self.max_steps:
-            raise StepError(
-                f"{steps} steps have reached pass {passes:.0f} of {self.stop:.0f};"
-                " raise evolution.max_steps or evolution.tolerance"
-            )
-        return trial.step(passes, stop)
-
     def _rejected(self, failed: dict[int, Exception], lengths: FloatArray) -> dict[int, Exception]:
         """Shorten the steps that failed, by place; return errors of tests that cannot continue."""
         failures: dict[int, Exception] = {}
         for place, error in failed.items():
             number = int(self.numbers[place])
             passes = float(self.state.passes[place])
-            edge = getattr(error, "cause", "") == "edge" and self.problem.free_strips[place]
+            edge = getattr(error, "cause", "") == "edge" and free_strips(self.problem)[place]
             before, times = self._widened.get(number, (passes, 0))
             times = times if before == passes else 0
             if edge and times < MOST_WIDENED:  # the step is tried again on wider strips

@@ -29,12 +29,11 @@ if TYPE_CHECKING:
     from wearsim.evolution.fatigue import Fatigue
     from wearsim.evolution.strips import Growth
 
-FREE = 0.075  # part of all strips that is without load on each side, at least
 UNEVEN = 3.0  # bend of a gap over its median from which it is not that of crowned bodies
 #: properties that do not depend on the inputs of contacts, or on the tilt alone
 _CONSTANTS = (
     *("shape", "body_rows", "volume_weights", "nominal_least_gap", "cylinder_share", "has_spring"),
-    *("constant_load", "pauses", "greatest_load", "wear_coefficients"),
+    *("constant_load", "pauses", "greatest_load", "wear_coefficients", "power_weights"),
 )
 _OF_LOAD = {"normal_force_offset"}  # inputs on which no other constant value depends
 _OF_GAP = "nominal_gap", "contact_gap", "nominal_least_gap", "has_crowned_gap"
@@ -159,7 +158,7 @@ class WearProblem:
         def part(values: FloatArray, axis: int) -> FloatArray:
             return values if values.shape[axis] == 1 else values.take(realisations, axis=axis)
 
-        return replace(
+        some = replace(
             self,
             laws=tuple(map(self.laws.__getitem__, numbers)),
             growth=tuple(map(self.growth.__getitem__, numbers)) if self.growth else (),
@@ -175,6 +174,11 @@ class WearProblem:
                 for item in self.varying
             ),
         )
+        if self.constant_load is not None:  # the history takes many realisations of one test
+            some.__dict__["constant_load"] = self.constant_load.take(realisations, axis=-1)
+        if not self.pauses:
+            some.__dict__["pauses"] = []
+        return some
 
     @cached_property
     def bodies(self) -> IntArray:
@@ -187,16 +191,6 @@ class WearProblem:
     def body_rows(self) -> IntArray:
         """`bodies` counted together, the stations of the cylinder first, as in `stacked`."""
         return np.asarray(self.bodies + np.array([0, self.shape[0]]))
-
-    @cached_property
-    def free_strips(self) -> list[int]:
-        """Strips without load on each side below which strips grow; 0 where they do not."""
-        strips, spacing = self.grid.strips, self.grid.spacing
-        least = max(3, math.ceil(FREE * strips))
-        return [
-            min(max(least, math.ceil(growth.margin / spacing)), strips) if growth.most else 0
-            for growth in self.growth
-        ] or [0] * self.shape[2]
 
     @cached_property
     def volume_weights(self) -> FloatArray:
@@ -491,8 +485,14 @@ class WearProblem:
 
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
-        physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
-        return np.asarray(self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0])
+        return sum_in_order(self.power_weights[:, None] * power.reshape(self.contacts_each, -1), 0)
+
+    @cached_property
+    def power_weights(self) -> FloatArray:
+        """Part of the power of each contact in that of all physical rollers, shape (S * C,)."""
+        of_stations = self.mean_over_turn(np.eye(self.shape[0]))[0]
+        of_rollers = self.cylinder_share * self.kinematics.physical_rollers
+        return np.outer(of_stations, of_rollers).ravel()
 
     @cached_property
     def mean_over_turn(self) -> Callable[[FloatArray], FloatArray]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -61,6 +61,35 @@ _AXES = {
     "damage": 2,
     "damage_points": 1,
 }
+
+
+class Past(NamedTuple):
+    """Rates, differences, past points and edges of a state as kernels take them; see `WearState`.
+
+    Sums and feedback have the shape (6, rows, realisations, 1), without rows where a state has
+    none; fields of the edges the shape (contacts, strips), without strips where a state has none.
+    """
+
+    wear: FloatArray
+    sums: FloatArray
+    feedback: FloatArray
+    spans: FloatArray
+    separation: FloatArray
+    part: FloatArray
+    whole_steps: FloatArray
+
+
+#: properties of a `WearState` that are computed once, and the fields that they are computed from
+_DERIVED = (
+    ("stacked", {"cylinder_depth", "roller_depth"}),
+    (
+        "past",
+        {
+            *("past_wear", "past_sums", "past_feedback", "past_spans"),
+            *("separation", "part", "whole_steps"),
+        },
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -198,6 +227,27 @@ class WearState:
         """Worn depths of all bodies, shape (stations + rollers, realisations, strips) [m]."""
         return np.concatenate([self.cylinder_depth[:, 0], self.roller_depth[0]])
 
+    @cached_property
+    def past(self) -> Past:
+        """Past points of a state of the implicit stepper, as kernels take them."""
+        sums, feedback, part = self.past_sums, self.past_feedback, self.part
+        assert self.past_wear is not None
+        assert sums is not None
+        assert self.past_spans is not None
+        (rows, _, realisations), contacts = sums.shape, len(self.contacts)
+        if feedback is None:
+            feedback = np.empty((rows, 0, realisations))
+        none = np.empty((contacts, 0))
+        return Past(
+            self.past_wear,
+            sums[..., None],
+            feedback.reshape(rows, -1, realisations, 1),
+            self.past_spans,
+            none if self.separation is None else self.separation.reshape(contacts, -1),
+            none if part is None else part.reshape(contacts, -1),
+            none if self.whole_steps is None else self.whole_steps.reshape(contacts, -1),
+        )
+
     @property
     def auxiliary(self) -> dict[str, Any]:
         """The coarse-step and half-quadrature solutions that exist, by field name."""
@@ -210,16 +260,26 @@ class WearState:
         """Return the state with some fields replaced, in a tenth of the time of `replace`."""
         state = object.__new__(WearState)
         values = self.__dict__ | others
-        if "cylinder_depth" in others or "roller_depth" in others:
-            values.pop("stacked", None)
+        changed = {*others}
+        for name, fields in _DERIVED:
+            if name in values and fields & changed:
+                del values[name]
         state.__dict__.update(values)
         return state
 
-    def with_stacked(self, depths: FloatArray, **others: Any) -> WearState:
-        """Return the state with depths given as `stacked` [m], and with other fields replaced."""
-        cylinder, roller = separated(depths, self.cylinder_depth.shape[0])
+    def with_stacked(self, depths: FloatArray, past: Past, **others: Any) -> WearState:
+        """Return the state with depths given as `stacked` [m], and with other fields replaced.
+
+        Parameters
+        ----------
+        depths : ndarray
+        past : Past
+            Of the fields in `others`.
+        """
+        stations = self.cylinder_depth.shape[0]
+        cylinder, roller = depths[:stations, None], depths[None, stations:]
         state = self.replaced(cylinder_depth=cylinder, roller_depth=roller, **others)
-        state.__dict__["stacked"] = depths
+        state.__dict__.update(stacked=depths, past=past)
         return state
 
     def with_added(self, depths: Depths) -> WearState:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from wearsim.evolution.contacts import computed_once
 from wearsim.evolution.error_estimates import half_quadrature
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
@@ -22,6 +23,7 @@ from wearsim.evolution.steppers.single_step import carried_loads, solve_present
 from wearsim.plugins import ContactModel
 from wearsim.types import FloatArray, Grid
 
+FREE = 0.075  # part of all strips that is without load on each side, at least
 WIDER = 1.5  # width after growing over that before
 JOINED = 3  # strips joined to one; an odd number keeps symmetric strips symmetric
 LEAST_LOADED = 24  # least number of strips of each contact after joining, as of a fresh contact
@@ -83,6 +85,16 @@ class Growth:
     by_angle: bool = False
 
 
+def free_strips(problem: WearProblem) -> list[int]:
+    """Return the strips without load on each side below which strips grow; 0 where they do not."""
+    strips, spacing = problem.grid.strips, problem.grid.spacing
+    least = max(3, math.ceil(FREE * strips))
+    return [
+        min(max(least, math.ceil(growth.margin / spacing)), strips) if growth.most else 0
+        for growth in problem.growth
+    ] or [0] * problem.shape[2]
+
+
 def next_grids(
     problem: WearProblem, state: WearState, outgrown: Collection[int]
 ) -> dict[int, Grid]:
@@ -91,7 +103,7 @@ def next_grids(
     Strips grow if a contact is loaded close to the outer strips. They also grow for the
     realisations at the places `outgrown`, whose contacts reach these in a step from the state.
     """
-    free, load = problem.free_strips, state.contacts.line_load
+    free, load = computed_once(free_strips, problem), state.contacts.line_load
     widest = max(free)
     # any() takes ten times as long on short arrays
     if not widest or not (

@@ -76,6 +76,7 @@ def kernels_of(
         (strip_theory and batched and steps and name == "per-pass", {"run_passes"}),
         (linearised, {"begin_step", "linearise_step", "compare_step", "end_step", "next_steps"}),
         (linearised, {"parts_of_aim", "difference_sizes" if by_doubling else "assess_step"}),
+        (linearised and not varies, {"energy_steps"}),
         (steps and scenario.fatigue is not None, {"damage_of_step"}),
         (steps and (doubled or (coarse and not compliant)), {"difference_sizes"}),
         ("process" in roles, {"filter_noise"}),

@@ -211,8 +211,14 @@ def test_difference_to_the_formula_is_the_greatest_of_all_strips(edges: Edges, p
     rest, expected = compare_edges(*arguments), np.zeros((TESTS, STRIPS))
     for k, v, i in edges.each():
         moved = gaps[k, i] + linear[k, i] - apart[k, i] - edges.strips.gap[k, i]
-        assert level[k, i] == pytest.approx(moved if active[v] else edges.level[k, i], rel=1e-14)
-        mean, joint = edges.mean_wear(k, i, level[k, i]), edges.others(k, i)[2]
+        moved = moved if active[v] else edges.level[k, i]
+        _, grown, joint = edges.others(k, i)
+        mean, expected_level = edges.mean_wear(k, i, moved), moved
+        if active[v] and edges.loads[k, i] > 0.0 and slopes[k, i] == np.inf:
+            halfway = edges.strips.first[k, i] + grown  # the edge in the middle of the strip
+            assert edges.part_of(k, i, halfway) == pytest.approx(0.5) or edges.part[k, i] == 1.0
+            expected_level = max(moved, halfway)
+        assert level[k, i] == pytest.approx(expected_level, rel=1e-14)
         own = edges.wear[:, k, i].sum()
         if edges.loads[k, i] == 0.0:
             differs = mean - joint

@@ -215,11 +215,13 @@ def test_step_ends_with_the_sums_of_its_formula(step: Step, broken: str) -> None
     for c, pair in enumerate(step.bodies):
         for side, b in enumerate(pair):
             worn[b] += step.wear[side].reshape(-1, TESTS, STRIPS)[c]
-    energy = SIZE * np.array([1.0, 2.0, 3.0])
+    power, weights = SIZE * np.array([1.0, 2.0, 3.0]), np.array([0.4, 0.2])
     if broken == "energy":
         step.sums[3, 1] = -9.0 * SIZE * (1.0 + step.of_tests[0, 1])
     worn_passes, half, *distances = step.of_tests.copy()
-    sums, per_pass = step.sums.copy(), energy.copy()
+    sums, energy = step.sums.copy(), np.empty(TESTS)
+    powers = np.array([power, 3.0 * power])  # of two contacts of each test
+    per_pass = weights @ powers
     feedback, fields = rng.random((2, TESTS, 1)), np.full((3, CONTACTS, STRIPS), np.nan)
     if step.edges == "none":
         fields = np.empty((0, 0, 0))
@@ -231,8 +233,8 @@ def test_step_ends_with_the_sums_of_its_formula(step: Step, broken: str) -> None
     decreased = np.zeros(TESTS, bool)
     end_step(
         *(*step.strips, step.separation, step.whole_steps, step.share, step.loads, step.wear),
-        *(worn, step.of_tests, step.sums, feedback, energy, step.past_wear, step.past_sums),
-        *(step.past_feedback, found, fields, *new, decreased),
+        *(worn, step.of_tests, step.sums, feedback, powers.ravel(), weights, step.past_wear),
+        *(step.past_sums, step.past_feedback, energy, found, fields, *new, decreased),
     )
     rates = worn / worn_passes[:, None] / step.of_bodies[0]
     sum_rates = np.concatenate([rates.sum(axis=2), per_pass[None]])[..., None]

@@ -19,6 +19,7 @@ from wearsim.mechanics.numerics.step_errors import (
     EDGE_ORDER,
     EDGES,
     KEEP,
+    LEAST_ENERGY,
     OF_EDGES,
     OF_VOLUME,
     SHARE,
@@ -58,16 +59,22 @@ class Step:
         self.irreducible = SIZE * np.array([[0.01, 0.02], [1e-9, 2e-9], [1e2, 3e2]])
         self.weights = np.array([[1.0, 0.5], [1e-6, 3e-7]])
         self.passes = np.array([2.0 * WHOLE_PASSES, 0.5 * WHOLE_PASSES])
-        self.scale = np.array([1.0, 3.0])
+        self.scale, self.left = np.array([1.0, 3.0]), np.array([1.0, 0.4])
+        self.begun, self.energy = np.array([300.0, 500.0]), np.array([4.0, 5.0])
+        self.spent = np.array([1e-3, 0.02])  # in the step
         self.resolved = np.array([True, False])
 
     def assess(self):
-        return assess_step(
-            1e-3, self.scale, self.passes, self.displaced, self.volume_error, self.irreducible,
-            self.stepping, self.depths, self.orders, self.spans, self.past, self.sums, self.part,
-            self.whole_steps, BODIES, self.gap, self.approach, self.loads, self.wear.copy(),
-            self.exponents, self.stiffness, 1e-4, self.weights,
+        of_next, orders, estimates = np.empty((2, TESTS)), self.orders.copy(), np.empty((3, TESTS))
+        errors = assess_step(
+            1e-3, self.left, self.scale, self.passes, self.begun, self.begun + self.passes,
+            self.energy, self.energy + self.spent, self.displaced, self.volume_error,
+            self.irreducible, self.stepping, self.depths, self.orders, self.spans, self.past,
+            self.sums, self.part, self.whole_steps, BODIES, self.gap, self.approach,
+            self.loads, self.wear.copy(), self.exponents, self.stiffness, 1e-4, self.weights,
+            of_next, orders, estimates,
         )  # fmt: skip
+        return of_next, orders, errors, estimates
 
 
 def error_of_sum(step: Step, b: int, v: int) -> float:
@@ -113,9 +120,11 @@ def test_sum_without_past_points_has_no_error() -> None:
     assert not found.any()
 
 
+@pytest.mark.parametrize("of_energy", [1e-12, 1e3])
 @pytest.mark.parametrize("points", [2, 3, ROWS])
-def test_estimates_cover_errors_of_steps_edges_and_sums(points: int) -> None:
+def test_estimates_cover_errors_of_steps_edges_and_sums(points: int, of_energy: float) -> None:
     step = Step()
+    step.sums[2:, -1] *= of_energy / SIZE
     step.spans[points - 1 :] = np.inf  # missing past points
     young, crossed = np.empty(SHAPE, bool), np.empty(SHAPE, bool)
     parts, own, orders = np.empty(SHAPE), np.empty(SHAPE), np.empty(TESTS, np.int64)
@@ -126,6 +135,18 @@ def test_estimates_cover_errors_of_steps_edges_and_sums(points: int) -> None:
     most = np.array([EDGE_ORDER, MAX_ORDER])
     arguments = step.scale, SHARE * 1e-3, KEEP, most, parts, own, orders
     expected = next_steps(step.past, step.spans, step.depths, step.orders, *arguments)
+    expected[0] *= step.left
+    energy, by_energy = step.sums[:, -1:].copy(), np.empty(TESTS, np.int64)
+    least = LEAST_ENERGY * (step.energy + step.spent) * step.passes / (step.begun + step.passes)
+    worn, ones = np.maximum(step.spent, least)[None, :, None], np.ones((1, TESTS, 1))
+    over, ratio = next_steps(
+        *(energy, step.spans, worn, step.orders, np.ones(TESTS), 1e-3, KEEP, most, ones),
+        *(np.empty((1, TESTS, 1)), by_energy),
+    )
+    governs = bool((ratio < expected[1]).all() and (over > expected[0]).all())
+    assert governs == (of_energy > 1e-3) or points < ROWS
+    orders = np.where(ratio < expected[1], by_energy, orders)
+    expected = np.maximum(over, expected[0]), np.minimum(ratio, expected[1])
     own[:, 1] *= 2.0  # less than a whole pass
     added = with_sum(own, parts, crossed, step.resolved, step.sums, step.spans, step.orders)
     worn = step.wear * step.passes[:, None]

@@ -23,6 +23,7 @@ from wearsim.mechanics.slender.influence import (
 )
 from wearsim.mechanics.slender.newton import CAUTIOUS, GAP_TOLERANCE, add_penetrated
 from wearsim.mechanics.slender.newton_step import (
+    REUSED,
     NewtonState,
     add_approach,
     add_displacement,
@@ -314,6 +315,18 @@ def test_cautious_steps_reduce_loads_before_strips_leave() -> None:
     assert not state.fresh[0]
     state.step[0, 0] = np.nan
     assert update_loads(line_load, state, False)[0] == np.inf
+
+
+def test_only_contacts_that_change_much_have_a_new_jacobian() -> None:
+    state, line_load = new_newton_state(3, STRIPS), np.zeros((3, STRIPS))
+    line_load[:, 3:9] = 10.0, 12.0, 20.0, 12.0, 11.0, 10.0
+    for k, part in enumerate((0.9, 1.0, 1.1)):
+        number_strips(k, line_load, 1, state)
+        state.step[k, :6] = part * REUSED * 20.0 * np.array([0.1, -0.2, 0.5, -1.0, 0.3, 0.0])
+    state.fresh[:] = False
+    change, left = update_loads(line_load, state, False)
+    assert (change, left) == (pytest.approx(1.1 * REUSED), False)
+    assert state.fresh.tolist() == [False, True, True]
 
 
 def test_separation_is_that_of_the_deformed_surfaces() -> None:

@@ -13,7 +13,9 @@ crossed the part f of the strip, the surfaces are in contact at the depth
     l = u_0 + (f - 1/2) r,   and   u = u_0 + r f^2 / 2,   s = r (1 - f)^2 / 2,
 
 where u_0 is the depth when the edge reached the strip: l = u - s, and du = f dl. A step with the
-formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear of the strip.
+formula l = l_0 + w then solves f(l) (l - l_0) = f w, where f w is the mean wear of the strip. Its
+iteration begins at the extrapolated l; a strip that is loaded although the edge does not reach it
+there continues from f = 1/2.
 
 Where edges are not resolved, as under loads that vary, strips are in contact or not as wholes. Past
 points of the depth of a strip that has just come into contact lie before the corner, so that it

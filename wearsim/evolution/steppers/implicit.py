@@ -18,7 +18,7 @@ from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.conditions import Conditions, conditions_of, exposure
-from wearsim.evolution.steppers.implicit_solution import Past, step_by_formula
+from wearsim.evolution.steppers.implicit_solution import step_by_formula
 from wearsim.evolution.steppers.load_errors import (
     next_steps_of_energy,
     next_steps_of_loads,
@@ -39,9 +39,9 @@ from wearsim.mechanics.numerics.step_errors import COVER, KEEP, SHARE, assess_st
 from wearsim.types import FloatArray, IntArray
 
 DOUBLED_SHARE = 0.7  # part of the tolerance that a step may add to the profiles, by step doubling
-# least relative error of the energy that a step aims at: no step is short enough for a smaller one,
-# as iterations are not more accurate, and by step doubling where the power changes by jumps
-LEAST_OF_ENERGY, LEAST_OF_JUMPS = 1e-5, 1e-4
+# least relative error of the energy that step doubling aims at: where the power changes by jumps, a
+# smaller one asks for ever shorter steps
+LEAST_OF_JUMPS = 1e-4
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 # factors of volume and profile in the errors that steps aim at; step doubling sums absolute changes
 # of the volume, which do not add up
@@ -105,22 +105,30 @@ class ImplicitStepper(StepDoublingStepper):
         if whole and edges.resolves_edges(problem, state.contacts):
             state = edges.without_edges(problem, state)
         end = scheme(problem, state, step)
-        end = with_pass_errors(problem, state, end, end, scheme, step)
+        if problem.has_nodes:
+            end = with_pass_errors(problem, state, end, end, scheme, step)
         passes = np.where(step == stop - state.passes, stop, end.passes)
         fixed = state.irreducible
         left = self._left(problem, state, stop, OF_STEPS, fixed)
-        scale, contacts, past = (passes / stop) ** PART_EXPONENT / left, end.contacts, Past.of(end)
+        scale, contacts, past = (passes / stop) ** PART_EXPONENT / left, end.contacts, end.past
         assert state.stepping_error is not None
         assert end.wear_exponents is not None
         assert end.order is not None
-        displaced = np.zeros(len(step))
+        displaced = np.zeros(step.size)
         if problem.has_spring:
             aim = SHARE * self.tolerance
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, scale, aim, KEEP)
-        (over, ratio), order, errors, estimates = assess_step(
+        work, order = np.empty((5, step.size)), np.empty_like(end.order)
+        of_next, estimates = work[:2], work[2:]
+        errors = assess_step(
             self.tolerance,
+            left,
             scale,
             step,
+            state.passes,
+            end.passes,
+            state.energy,
+            end.energy,
             displaced,
             state.volume_error - fixed[1],
             end.irreducible if problem.has_nodes else fixed,
@@ -141,19 +149,18 @@ class ImplicitStepper(StepDoublingStepper):
             problem.contact_stiffness,
             problem.grid.spacing,
             problem.volume_weights,
+            of_next,
+            order,
+            estimates,
         )
+        over, ratio = of_next
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
-            over, ratio = np.maximum(over, of_loads[0]), np.minimum(ratio, of_loads[1])
-        least = max(self.tolerance, LEAST_OF_ENERGY)
-        of_energy, their_order = next_steps_of_energy(state, end, least, KEEP, edges.most(end))
-        order = np.where(of_energy[1] < ratio, their_order, order)
-        # the error so far shortens the next step
-        over, ratio = np.maximum(over * left, of_energy[0]), np.minimum(ratio, of_energy[1])
-        others = {
-            n: solution.replaced(order=order, passes=passes)
-            for n, solution in end.auxiliary.items()
-        }
+            over, ratio = np.maximum(over, of_loads[0] * left), np.minimum(ratio, of_loads[1])
+        others = end.auxiliary
+        if others:
+            changed = {"order": order, "passes": passes}
+            others = {name: solution.replaced(**changed) for name, solution in others.items()}
         end = end.replaced(
             passes=passes,
             steps=state.steps + 1,
@@ -172,7 +179,7 @@ class ImplicitStepper(StepDoublingStepper):
         """Take a step as two halves and as a whole; choose order and length of the next one."""
         doubled = self.doubled(problem, state, step, stop, scheme)
         half, end = doubled.path
-        past, depths, orders = Past.of(end), end.stacked, np.asarray(end.order)
+        past, depths, orders = end.past, end.stacked, np.asarray(end.order)
         errors, order = np.empty_like(depths), np.empty_like(orders)
         most = np.full_like(order, MAX_ORDER)
         left = self._left(problem, state, stop, DOUBLED, state.irreducible)

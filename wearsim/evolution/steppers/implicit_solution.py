@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.error_estimates import ADHERING
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, separated
+from wearsim.evolution.state import Past, WearState, separated
 from wearsim.evolution.steppers.conditions import Conditions
 from wearsim.evolution.steppers.edges import FIELDS, have_groove
 from wearsim.evolution.steppers.loads import (
@@ -25,7 +24,6 @@ from wearsim.evolution.steppers.loads import (
 )
 from wearsim.evolution.steppers.single_step import (
     carried_loads,
-    energy_per_pass,
     wear_of_contacts,
 )
 from wearsim.mechanics.numerics.implicit_step import (
@@ -86,47 +84,6 @@ class _Slope:
         return self._exponent
 
 
-_PAST = attrgetter(
-    *("past_wear", "past_sums", "past_feedback", "past_spans"),
-    *("separation", "part", "whole_steps"),
-)
-
-
-class Past(NamedTuple):
-    """Rates, differences, past points and edges of a state as kernels take them; see `WearState`.
-
-    Sums and feedback have the shape (6, rows, realisations, 1), without rows where a state has
-    none; fields of the edges the shape (contacts, strips), without strips where a state has none.
-    """
-
-    wear: FloatArray
-    sums: FloatArray
-    feedback: FloatArray
-    spans: FloatArray
-    separation: FloatArray
-    part: FloatArray
-    whole_steps: FloatArray
-
-    @classmethod
-    def of(cls, state: WearState) -> Past:
-        """Return those of a state of the implicit stepper."""
-        wear, sums, feedback, spans, separation, part, whole_steps = _PAST(state)
-        realisations, contacts = state.passes.size, state.contacts.power.size
-        if feedback is None:
-            feedback = np.empty((ROWS, 0, realisations))
-        if part is None or whole_steps is None:
-            separation = part = whole_steps = np.empty((contacts, 0))
-        return cls(
-            wear,
-            sums[..., None],
-            feedback.reshape(ROWS, -1, realisations, 1),
-            spans,
-            np.empty((contacts, 0)) if separation is None else separation.reshape(contacts, -1),
-            part.reshape(contacts, -1),
-            whole_steps.reshape(contacts, -1),
-        )
-
-
 def step_by_formula(
     problem: WearProblem,
     state: WearState,
@@ -160,7 +117,7 @@ def step_by_formula(
     StepError
         If the iteration does not converge.
     """
-    past, contacts, depths = Past.of(state), state.contacts, state.stacked
+    past, contacts, depths = state.past, state.contacts, state.stacked
     bodies, gap = problem.body_rows, problem.contact_gap
     share, shape = problem.cylinder_wear_share, contacts.line_load.shape
     realisations, strips = passes.size, shape[1]
@@ -205,18 +162,21 @@ def step_by_formula(
         *(bodies, resolved, gap, depths, past.part, of_bodies, of_contacts),
     )
     base, guess = of_bodies[3], of_bodies[4]
-    exponents = np.array(state.wear_exponents).reshape(shape)
+    assert state.wear_exponents is not None
+    of_strips = state.wear_exponents.copy()
+    exponents = of_strips.reshape(shape)
     loads = LoadsOfStep(problem, state, conditions, passes, feedback)
     stations, iterations = problem.shape[0], np.zeros(realisations, dtype=np.int64)
     most = MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        about, compliance = np.empty((5, *shape)), np.empty((realisations, len(bodies), 2, strips))
+        about = np.empty((5, *shape))
+        compliance = np.empty((realisations, bodies.shape[0], 2, strips))
         given: tuple[Any, ...] = (line_load, wear, exponents, about, compliance)
         linearise_step(*of_step, *given)
         batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
         warm = contacts if near is None or iteration > 1 else near
         solved = solve_compliant(problem, batch, compliance, warm, active)
-        iterations += active
+        iterations[active] = iteration
         new, apart = wear_of_contacts(problem, solved), solved.separation
         apart = (
             past.separation if apart is None or not past.separation.size else kernel_input(apart)
@@ -255,33 +215,40 @@ def step_by_formula(
             line_load, wear = solved.line_load, new
         else:  # strips at an edge enter and leave the contact in turn
             line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
-    energy, ends = energy_per_pass(problem, contacts), np.empty(depths.shape)
+    energy, ends = np.empty(realisations), np.empty(depths.shape)
     fields = np.empty((3, *past.part.shape) if past.part.size else (0, 0, 0))
     past_wear, past_sums = np.empty(past.wear.shape), np.empty(past.sums.shape)
     past_feedback = np.empty(past.feedback.shape)
     ended: list[Any] = [past.separation, past.whole_steps, share, contacts.line_load, new, worn]
-    ended += of_tests, sums, loads.feedback, energy, past.wear, past.sums, past.feedback
-    ended += ends, fields, past_wear, past_sums, past_feedback, decreased
+    ended += of_tests, sums, loads.feedback if loads.vary else feedback
+    ended += kernel_input(contacts.power), problem.power_weights / problem.kinematics.pass_rate
+    ended += past.wear, past.sums, past.feedback
+    ended += energy, ends, fields, past_wear, past_sums, past_feedback, decreased
     end_step(*of_step, *ended)
-    by_contact = *problem.shape, strips
-    edges = dict(zip(FIELDS, fields.reshape(-1, *by_contact), strict=False))
-    if not past.separation.size:
-        edges["separation"] = None
+    by_contact, edges = (*problem.shape, strips), past[4:]
+    others: dict[str, Any] = {}
+    if past.part.size:
+        edges = (*fields,)
+        others = dict(zip(FIELDS, fields.reshape(-1, *by_contact), strict=False))
+        if not past.separation.size:
+            edges, others["separation"] = (past.separation, *edges[1:]), None
     if loads.vary:
-        edges["past_feedback"] = past_feedback.reshape(ROWS, *problem.shape)
+        others["past_feedback"] = past_feedback.reshape(ROWS, *problem.shape)
+        others["terms"] = loads.terms(contacts)
+    spans = of_tests[2:]
     end = state.with_stacked(
         ends,
-        **edges,
+        Past(past_wear, past_sums, past_feedback, spans, *edges),
         contacts=contacts,
-        terms=loads.terms(contacts),
         solves=state.solves + iterations * problem.contacts_each,
-        wear_exponents=exponents.reshape(by_contact),
+        wear_exponents=of_strips,
         passes=state.passes + passes,
         energy=state.energy + energy,
         past_wear=past_wear,
         past_sums=past_sums[..., 0],
-        past_spans=of_tests[2:],
+        past_spans=spans,
         order=order,
+        **others,
     )
     return end, decreased
 
@@ -316,7 +283,7 @@ class LoadsOfStep:
         self._problem, self._start, self._passes = problem, start, passes
         self._force, self._prescribed = conditions.force, conditions.prescribed
         self.used, self.vary = checked_loads(start, self._prescribed), feedback.size > 0
-        self._none = feedback
+        self._shape = feedback.shape
         if self.vary:
             self._before = carried_loads(problem, start.contacts)
             self._slope = _Slope(self.used.shape)
@@ -328,9 +295,7 @@ class LoadsOfStep:
     @property
     def feedback(self) -> FloatArray:
         """Part of the loads due to springs and load terms, (rows, realisations, 1) [N]."""
-        if not self.vary:
-            return self._none
-        return (self.target - self._prescribed).reshape(self._none.shape)
+        return (self.target - self._prescribed).reshape(self._shape)
 
     def moved(
         self,

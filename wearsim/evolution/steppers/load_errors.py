@@ -9,9 +9,9 @@ from wearsim.evolution.state import HERTZ, WearState
 from wearsim.evolution.steppers.loads import elastic_approaches, with_feedback
 from wearsim.evolution.steppers.single_step import WearIncrement
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
+from wearsim.mechanics.numerics.step_errors import energy_steps
 from wearsim.types import FloatArray, IntArray
 
-LEAST_ENERGY = 0.1  # part of the mean energy that an error of the energy is compared with, at least
 LEAST_LOAD = 0.01  # of the load without feedback; the error of smaller loads is compared with it
 
 
@@ -86,17 +86,10 @@ def next_steps_of_energy(
     order : ndarray of int, shape (realisations,)
         Its order.
     """
-    sums, spans, orders = end.past_sums, end.past_spans, end.order
-    assert sums is not None
-    assert spans is not None
+    past, orders = end.past, end.order
     assert orders is not None
-    energy = np.array(sums[:, -1:, :, None])
-    least = LEAST_ENERGY * end.energy * (1.0 - start.passes / end.passes)
-    worn = np.maximum(end.energy - start.energy, least)[None, :, None]
-    ones, order, errors = np.ones(worn.shape), np.empty_like(orders), np.empty_like(worn)
-    steps = next_steps(
-        *(energy, spans, worn, orders, ones[0, :, 0], tolerance, keep, most, ones, errors, order)
-    )
+    order, about = np.empty_like(orders), (start.passes, end.passes, start.energy, end.energy)
+    steps = energy_steps(past.sums, past.spans, *about, orders, tolerance, keep, most, order)
     return steps, order
 
 

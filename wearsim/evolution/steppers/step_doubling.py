@@ -95,7 +95,8 @@ class StepDoublingStepper(Stepper):
         half = scheme(problem, state, 0.5 * step)
         end = scheme(problem, half, 0.5 * step)
         coarse = self.whole_step(problem, coarse_start, step, end, scheme)
-        end = with_pass_errors(problem, state, end, coarse, scheme, step)
+        if problem.has_nodes:
+            end = with_pass_errors(problem, state, end, coarse, scheme, step)
         negligible = NEGLIGIBLE * self.tolerance
         bias = variation_bias(problem, end, state.passes, step, self.follows_trends, negligible)
         varies = np.zeros(len(step), dtype=np.bool_)

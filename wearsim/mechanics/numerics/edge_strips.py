@@ -295,6 +295,8 @@ def compare_edges(
                 rest[v] = max(rest[v], mean - joint)
             elif slopes[k, i] == np.inf:
                 rest[v] = max(rest[v], own)
+                if active[v]:  # loaded ahead of the predicted edge, which is now in its middle
+                    level[k, i] = max(level[k, i], strips.first[k, i] + grown)
             else:
                 rest[v] = max(rest[v], abs(mean - own - joint))
     return rest

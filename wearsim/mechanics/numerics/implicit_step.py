@@ -281,10 +281,12 @@ def end_step(
     of_tests: FloatArray,
     sums: FloatArray,
     feedback: FloatArray,
-    energy: FloatArray,
+    power: FloatArray,
+    energy_weights: FloatArray,
     past_wear: FloatArray,
     past_sums: FloatArray,
     past_feedback: FloatArray,
+    energy: FloatArray,
     ends: FloatArray,
     fields: FloatArray,
     new_wear: FloatArray,
@@ -310,8 +312,12 @@ def end_step(
         From `begin_step`.
     feedback : ndarray, shape (rows, realisations, 1)
         At the end [N].
+    power : ndarray, shape (contacts,)
+        Dissipated power of each contact at the end [W].
+    energy_weights : ndarray, shape (contacts each,)
+        Energy per pass of one test for a power of 1 W of each of its contacts [J].
     energy : ndarray, shape (realisations,)
-        Dissipated energy per pass at the end; overwritten with that of the step [J].
+        Result: dissipated energy of the step [J].
     ends : ndarray, shape (bodies, realisations, strips)
         Result: depths at the end [m].
     fields : ndarray, shape (3, contacts, strips), or (0, 0, 0)
@@ -347,8 +353,10 @@ def end_step(
                         ends[b, v, i] += missing * parts[b, v, i]
     last = len(sums) - 1
     for v in range(realisations):
-        sum_rates[last, v, 0] = energy[v]
-        sums[last, v, 0] += worn_passes[v] * energy[v]
+        sum_rates[last, v, 0] = 0.0
+        for c in range(len(energy_weights)):
+            sum_rates[last, v, 0] += energy_weights[c] * power[c * realisations + v]
+        sums[last, v, 0] += worn_passes[v] * sum_rates[last, v, 0]
         energy[v] = sums[last, v, 0]
         decreased[v] = energy[v] < 0.0
     for b in range(rows):
@@ -388,9 +396,9 @@ def compile_implicit_step() -> None:
     strips = bodies, resolved, strip, rows, strip, of_bodies, of_contacts
     about, compliance, apart = np.ones((5, 1, 1)), np.ones((1, 1, 2, 1)), strip.copy()
     end_step(
-        *(*strips, strip, strip, one, strip, wear, rows, of_tests, total, total, one.copy()),
-        *(past, sums, sums, rows.copy(), np.ones((3, 1, 1)), past.copy(), sums.copy()),
-        *(sums.copy(), resolved),
+        *(*strips, strip, strip, one, strip, wear, rows, of_tests, total, total, one, one),
+        *(past, sums, sums, one.copy(), rows.copy(), np.ones((3, 1, 1)), past.copy()),
+        *(sums.copy(), sums.copy(), resolved),
     )
     compare_step(
         *(*strips, strip, wear, apart, about, compliance, strip, strip, wear.copy(), one, 1.0),

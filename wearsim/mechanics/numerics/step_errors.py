@@ -35,6 +35,10 @@ DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 # the error that a step aims at falls where the errors so far, over the tolerance, exceed the first
 # number, to a least part of itself at the second one
 ADDED_UP, LEAST_AIM = (0.75, 1.5), 0.1
+# least relative error of the energy that a step aims at: no step is short enough for a smaller one,
+# as iterations are not more accurate
+LEAST_OF_ENERGY = 1e-5
+LEAST_ENERGY = 0.1  # part of the mean energy that an error of the energy is compared with, at least
 
 
 @subroutine
@@ -81,10 +85,61 @@ def with_sum(
 
 
 @kernel
+def energy_steps(
+    past_sums: FloatArray,
+    spans: FloatArray,
+    begun: FloatArray,
+    ended: FloatArray,
+    spent: FloatArray,
+    energy: FloatArray,
+    orders: IntArray,
+    tolerance: float,
+    keep: float,
+    most: IntArray,
+    next_orders: IntArray,
+) -> FloatArray:
+    """Choose the next step by the error of the energy; others as of `next_steps`.
+
+    Parameters
+    ----------
+    past_sums : ndarray, shape (6, sums, realisations, 1)
+        After the step, that of the energy last.
+    begun, ended, spent, energy : ndarray, shape (realisations,)
+        Passes done, and energy dissipated [J], before and after the step.
+    """
+    realisations, last = len(orders), past_sums.shape[1] - 1
+    differences = np.empty((ROWS, 1, realisations, 1))
+    worn, errors = np.empty((1, realisations, 1)), np.empty((1, realisations, 1))
+    for v in range(realisations):
+        least = LEAST_ENERGY * energy[v] * (1.0 - begun[v] / ended[v])
+        worn[0, v, 0] = max(energy[v] - spent[v], least)
+        for r in range(ROWS):
+            differences[r, 0, v, 0] = past_sums[r, last, v, 0]
+    return next_steps(
+        differences,
+        spans,
+        worn,
+        orders,
+        np.ones(realisations),
+        tolerance,
+        keep,
+        most,
+        np.ones((1, realisations, 1)),
+        errors,
+        next_orders,
+    )
+
+
+@kernel
 def assess_step(
     tolerance: float,
+    left: FloatArray,
     scale: FloatArray,
     passes: FloatArray,
+    begun: FloatArray,
+    ended: FloatArray,
+    spent: FloatArray,
+    energy: FloatArray,
     displaced: FloatArray,
     volume_error: FloatArray,
     irreducible: FloatArray,
@@ -105,16 +160,23 @@ def assess_step(
     stiffness: FloatArray,
     spacing: float,
     volume_weights: FloatArray,
-) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
-    """Return excess of error and length of the next step, its order, and errors of the test.
+    of_next: FloatArray,
+    next_orders: IntArray,
+    estimates: FloatArray,
+) -> FloatArray:
+    """Choose length and order of the next step, and return the errors of the test.
 
     Parameters
     ----------
     tolerance : float
+    left : ndarray, shape (realisations,)
+        From `parts_of_aim`, for the errors before the step.
     scale : ndarray, shape (realisations,)
         Part of the error that the step should add is one over this.
     passes : ndarray, shape (realisations,)
         Length of the step.
+    begun, ended, spent, energy
+        As of `energy_steps`.
     displaced : ndarray, shape (realisations,)
         Displacement of a roller that the error of its load corresponds to [m]: a stiff spring holds
         the depth, and errors of its load remain.
@@ -134,19 +196,20 @@ def assess_step(
         Their wear per pass; overwritten with that of the step [m].
     stiffness, spacing, volume_weights
         As of `carried_errors`.
+    of_next : ndarray, shape (2, realisations)
+        Filled: excess of error and ratio of the next step, as of `next_steps`.
+    next_orders : ndarray of int, shape (realisations,)
+        Filled.
+    estimates : ndarray, shape (3, realisations)
+        Filled: errors of depth, volume and profile after the step.
 
     Returns
     -------
-    of_next : ndarray, shape (2, realisations)
-        Excess of error and ratio of the next step, as of `next_steps`.
-    next_orders : ndarray of int, shape (realisations,)
-    errors : ndarray, shape (bodies, realisations, strips)
+    ndarray, shape (bodies, realisations, strips)
         Errors of the depths after the step [m].
-    estimates : ndarray, shape (3, realisations)
-        Errors of depth, volume and profile after the step.
     """
     rows, realisations, n = depths.shape
-    most, next_orders = np.empty(realisations, np.int64), np.empty(realisations, np.int64)
+    most, orders_by_energy = np.empty(realisations, np.int64), np.empty(realisations, np.int64)
     resolved = np.empty(realisations, np.bool_)
     fill_resolved(part, part, resolved)
     young, crossed = np.empty(depths.shape, np.bool_), np.empty(depths.shape, np.bool_)
@@ -159,7 +222,7 @@ def assess_step(
             for i in range(n):
                 if young[b, v, i]:
                     parts[b, v, i] *= YOUNG
-    of_next = next_steps(
+    by_depths = next_steps(
         past_wear,
         spans,
         depths,
@@ -172,6 +235,25 @@ def assess_step(
         own,
         next_orders,
     )
+    by_energy = energy_steps(
+        past_sums,
+        spans,
+        begun,
+        ended,
+        spent,
+        energy,
+        orders,
+        max(tolerance, LEAST_OF_ENERGY),
+        KEEP,
+        most,
+        orders_by_energy,
+    )
+    for v in range(realisations):
+        if by_energy[1, v] < by_depths[1, v]:
+            next_orders[v] = orders_by_energy[v]
+        # the error so far shortens the next step
+        of_next[0, v] = max(by_depths[0, v] * left[v], by_energy[0, v])
+        of_next[1, v] = min(by_depths[1, v], by_energy[1, v])
     # without half a pass, the wear of a pass is that after it instead of before it
     for b in range(rows):
         for v in range(realisations):
@@ -196,7 +278,6 @@ def assess_step(
         spacing,
         volume_weights,
     )
-    estimates = np.empty((3, realisations))
     for v in range(realisations):
         deepest, volume, of_edges, square = 0.0, 0.0, 0.0, 0.0
         # error of steps of first order
@@ -228,7 +309,7 @@ def assess_step(
         estimates[0, v] = depth + irreducible[0, v]
         estimates[1, v] = of_test + irreducible[1, v]
         estimates[2, v] = profile + irreducible[2, v]
-    return of_next, next_orders, errors, estimates
+    return errors
 
 
 @kernel
@@ -291,8 +372,9 @@ def compile_step_errors() -> None:
     strip, wear, rows = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
     past, sums, spans = np.ones((ROWS, 2, 1, 1)), np.ones((ROWS, 3, 1, 1)), np.ones((ROWS - 1, 1))
     assess_step(
-        *(1e-3, one, one, one, one, errors, rows, rows, order, spans, past, sums, strip, strip),
-        *(np.array([[0, 1]]), strip, one, strip, wear, strip, one, 1.0, np.ones((2, 2))),
+        *(1e-3, one, one, one, one, one, one, one, one, one, errors, rows, rows, order),
+        *(spans, past, sums, strip, strip, np.array([[0, 1]]), strip, one, strip, wear, strip),
+        *(one, 1.0, np.ones((2, 2)), rows[:, 0], order, errors),
     )
     parts_of_aim(1e-3, one, 1.0, 1.0, one, one, errors, rows, np.ones((2, 2)))
     compile_implicit_step()

@@ -63,8 +63,7 @@ CONVERGED, SINGULAR, TOO_FINE, NO_CONVERGENCE, NOT_FINITE = range(5)
 CONTINUE = -1
 
 TOLERANCE = 1e-8  # predicted change of the next step, relative to the greatest line load
-REUSED = 0.1  # relative change up to which the Jacobian may be reused
-SHRINKING = 0.2  # ratio of successive steps up to which it may be reused
+SHRINKING = 0.2  # ratio of successive steps up to which Jacobians may be reused
 FIRST = 0.1  # assumed ratio of the second step to the first
 MUCH = 0.05  # share of the load that starting line loads lack and a foundation corrects
 SMALL = 1e-3  # relative change since the Jacobian up to which its nonlinear part is neglected
@@ -159,7 +158,7 @@ def check_convergence(
         if add_penetrated(k, first, end, iteration, unit, state, approach, line_load):
             entered = True
     shrinking = min(max(change / before, AT_BEST), 1.0) if before > 0.0 else FIRST
-    if not (change < REUSED and shrinking < SHRINKING):
+    if not shrinking < SHRINKING:
         for k in range(contacts):
             state.fresh[k] = True
     if left or entered:

@@ -18,6 +18,7 @@ from wearsim.mechanics.slender.influence import HIGHEST, interpolation
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 MANIFOLD = 3.0  # ratio of new to old load of a strip up to which the Jacobian may be reused
+REUSED = 0.1  # change over the greatest line load up to which it may be reused
 MAX_CORRECTED = 0.5  # relative change of a load up to which the residual is corrected
 
 
@@ -400,6 +401,8 @@ def update_loads(line_load: FloatArray, state: NewtonState, cautious: bool) -> t
                 state.fresh[k] = True
             greatest = max(greatest, abs(new - old))
             line_load[k, i], state.change[k, i] = new, new - old
+        if greatest >= REUSED * peak:
+            state.fresh[k] = True
         change = max(change, greatest / peak)
     return change, left
 

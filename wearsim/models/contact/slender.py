@@ -131,9 +131,8 @@ class Slender(StripModel):
                 lambda trial: strip_tractions(*solved, trial, *tangential)[2],
             )
         dissipation, sums, _ = strip_tractions(*solved, batch, *tangential)
-        unknown = (~np.isfinite(sums)).nonzero()[1]
-        if unknown.size:
-            number = int(unknown.min())
+        if not np.isfinite(np.add.reduce(sums, axis=None)):
+            number = int((~np.isfinite(sums)).nonzero()[1].min())
             error = power_not_finite(batch.point(number), line_load=line_load[number])
             raise naming_contact(error, number, batch)
         return ContactBatchSolution.of_columns(
