@@ -88,10 +88,10 @@ def with_sum(
 def energy_steps(
     past_sums: FloatArray,
     spans: FloatArray,
-    begun: FloatArray,
-    ended: FloatArray,
-    spent: FloatArray,
-    energy: FloatArray,
+    passes_before: FloatArray,
+    passes_after: FloatArray,
+    energy_before: FloatArray,
+    energy_after: FloatArray,
     orders: IntArray,
     tolerance: float,
     keep: float,
@@ -104,15 +104,15 @@ def energy_steps(
     ----------
     past_sums : ndarray, shape (6, sums, realisations, 1)
         After the step, that of the energy last.
-    begun, ended, spent, energy : ndarray, shape (realisations,)
-        Passes done, and energy dissipated [J], before and after the step.
+    passes_before, passes_after, energy_before, energy_after : ndarray, shape (realisations,)
+        Passes done and energy dissipated [J].
     """
     realisations, last = len(orders), past_sums.shape[1] - 1
     differences = np.empty((ROWS, 1, realisations, 1))
     worn, errors = np.empty((1, realisations, 1)), np.empty((1, realisations, 1))
     for v in range(realisations):
-        least = LEAST_ENERGY * energy[v] * (1.0 - begun[v] / ended[v])
-        worn[0, v, 0] = max(energy[v] - spent[v], least)
+        least = LEAST_ENERGY * energy_after[v] * (1.0 - passes_before[v] / passes_after[v])
+        worn[0, v, 0] = max(energy_after[v] - energy_before[v], least)
         for r in range(ROWS):
             differences[r, 0, v, 0] = past_sums[r, last, v, 0]
     return next_steps(
@@ -136,10 +136,10 @@ def assess_step(
     left: FloatArray,
     scale: FloatArray,
     passes: FloatArray,
-    begun: FloatArray,
-    ended: FloatArray,
-    spent: FloatArray,
-    energy: FloatArray,
+    passes_before: FloatArray,
+    passes_after: FloatArray,
+    energy_before: FloatArray,
+    energy_after: FloatArray,
     displaced: FloatArray,
     volume_error: FloatArray,
     irreducible: FloatArray,
@@ -175,7 +175,7 @@ def assess_step(
         Part of the error that the step should add is one over this.
     passes : ndarray, shape (realisations,)
         Length of the step.
-    begun, ended, spent, energy
+    passes_before, passes_after, energy_before, energy_after
         As of `energy_steps`.
     displaced : ndarray, shape (realisations,)
         Displacement of a roller that the error of its load corresponds to [m]: a stiff spring holds
@@ -238,10 +238,10 @@ def assess_step(
     by_energy = energy_steps(
         past_sums,
         spans,
-        begun,
-        ended,
-        spent,
-        energy,
+        passes_before,
+        passes_after,
+        energy_before,
+        energy_after,
         orders,
         max(tolerance, LEAST_OF_ENERGY),
         KEEP,
