@@ -14,9 +14,7 @@ from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step, with_rates
 from wearsim.mechanics.numerics.edge_strips import SETTLED
-from wearsim.mechanics.numerics.multistep import MAX_ORDER
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
-from wearsim.mechanics.numerics.step_errors import EDGE_ORDER
 
 THERMAL = {"load__thermal": {"gain": "50 N/W", "time_constant": "2 s"}}
 SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
@@ -98,11 +96,10 @@ def test_tests_without_edges_have_fields_that_are_no_numbers(three):
     np.testing.assert_array_equal(found.past_sums[:, -1], begun.past_sums[:, -1])
     again = edges.without_edges(problem, found)
     np.testing.assert_array_equal(again.past_sums, found.past_sums)
-    assert (edges.most(begun) == MAX_ORDER).all()
+    assert begun.separation is None
     some = np.isin(np.arange(7), [1, 4])
     part = np.where(some[:, None], 0.5, found.part)
-    expected = np.where(some, EDGE_ORDER, MAX_ORDER)
-    np.testing.assert_array_equal(edges.most(found.replaced(part=part)), expected)
+    np.testing.assert_array_equal(edges.unresolved(found.replaced(part=part)), ~some)
 
 
 def test_whole_strips_are_those_with_load(three):

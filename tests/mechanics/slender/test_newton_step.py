@@ -66,7 +66,7 @@ class Contact:
         number_strips(0, line_load, STRIPS, state)
         find_factors(0, line_load, False, self.lengths)
         state.surface[0] = 0.0
-        add_displacement(0, self.table, UNIT, line_load, self.lengths, state)
+        add_displacement(0, 0, STRIPS - 1, self.table, UNIT, line_load, self.lengths, state)
         return state.surface[0].copy()
 
 

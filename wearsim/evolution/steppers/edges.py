@@ -34,9 +34,7 @@ from wearsim.evolution.steppers.loads import with_feedback
 from wearsim.evolution.steppers.single_step import carried_loads
 from wearsim.mechanics.numerics.edge_strips import SETTLED
 from wearsim.mechanics.numerics.jit import kernel_input
-from wearsim.mechanics.numerics.multistep import MAX_ORDER
-from wearsim.mechanics.numerics.step_errors import EDGE_ORDER
-from wearsim.types import BoolArray, FloatArray, IntArray
+from wearsim.types import BoolArray, FloatArray
 
 LEAST_LOAD = 0.2  # load of a spring over that of the unworn bodies
 GROOVE = 4.0  # worn descent over the elastic approach from which edges are resolved
@@ -89,14 +87,6 @@ def unresolved(state: WearState) -> BoolArray:
     assert state.part is not None
     whole: BoolArray = np.isnan(state.part[0, 0, :, 0])
     return whole
-
-
-def most(state: WearState) -> IntArray:
-    """Return the greatest order of steps of each test, shape (realisations,)."""
-    assert state.order is not None
-    if state.separation is None:
-        return np.full(state.order.shape, MAX_ORDER)
-    return np.where(unresolved(state), MAX_ORDER, EDGE_ORDER)
 
 
 def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:

@@ -257,10 +257,10 @@ def rest_contacts(
     if members is not None and displaced:
         add_depths(members, worn, line_load, surface)
     for k in range(line_load.shape[0] if widest <= HIGHEST else 0):
+        load, first, end = these.loads[k] / these.spacing, state.left[k], state.right[k]
         if displaced:
-            add_displacement(k, these.table, unit, line_load, lengths, state)
+            add_displacement(k, first, end - 1, these.table, unit, line_load, lengths, state)
         if displaced or state.size[k] == 0:
-            load, first, end = these.loads[k] / these.spacing, state.left[k], state.right[k]
             rest_on_foundation(k, surface, softness, soft, load, first, end, line_load, approach)
 
 
@@ -305,7 +305,8 @@ def factor_contacts(
         if find_factors(k, line_load, fresh, lengths) > HIGHEST:
             return TOO_FINE, renewed
         if not fresh:
-            add_displacement(k, these.table, unit, line_load, lengths, state)
+            first, last = state.left[k], state.right[k] - 1
+            add_displacement(k, first, last, these.table, unit, line_load, lengths, state)
         else:
             fill_jacobian(k, these.table, unit, state.softness, line_load, lengths, state)
             if members is None:

@@ -179,19 +179,6 @@ def rest_on_foundation(
 @subroutine
 def add_displacement(
     k: int,
-    table: FloatArray,
-    unit: float,
-    line_load: FloatArray,
-    lengths: HalfLengths,
-    state: NewtonState,
-) -> None:
-    """Add the displacement by contact `k`'s line loads to `surface` of the followed strips."""
-    _displace(k, state.left[k], state.right[k] - 1, table, unit, line_load, lengths, state)
-
-
-@subroutine
-def _displace(
-    k: int,
     first: int,
     last: int,
     table: FloatArray,
@@ -200,7 +187,7 @@ def _displace(
     lengths: HalfLengths,
     state: NewtonState,
 ) -> None:
-    """Add the displacement by contact `k`'s line loads to `surface` of some strips."""
+    """Add the displacement by line loads of contact `k` to `surface` from `first` to `last`."""
     weight = state.weight
     for i in range(line_load.shape[1]):
         weight[i] = unit * line_load[k, i]
@@ -367,9 +354,9 @@ def complete_surface(
     for i in range(right, n):
         last = i if surface[i] < approach else last
     if first < left:
-        _displace(k, first, left - 1, table, unit, line_load, lengths, state)
+        add_displacement(k, first, left - 1, table, unit, line_load, lengths, state)
     if last >= right:
-        _displace(k, right, last, table, unit, line_load, lengths, state)
+        add_displacement(k, right, last, table, unit, line_load, lengths, state)
     return first, last + 1
 
 
