@@ -26,6 +26,7 @@ SHARE = 0.7  # part of the tolerance that one step may use
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
 ROUND_OFF = 1e-9  # relative standard deviation up to which a load or an input is constant
 ADHERING = 0.1  # part of a contact that adheres from which it is in partial slip
+MOST_ADHERING = 0.5  # the same above which the power may depend strongly on the load
 DEPTHS = ("cylinder_depth", "roller_depth")
 
 
@@ -99,8 +100,9 @@ def variation_bias(
         Whether the scheme takes a smooth load at the end of the step instead of its mean.
     negligible : float
         Half the square of a relative standard deviation up to which the bias is neglected, except
-        in partial slip and where the wear is not proportional to the dissipated power. The relative
-        bias is of this size times a factor below one, such as 2/9 for a power of 2/3.
+        where most of a contact adheres or the wear is not proportional to the dissipated power. The
+        relative bias of the volume is at most half of it, in partial slip; that of the depth is a
+        third of it in a fresh contact, and wears off at the edge of a groove.
 
     Returns
     -------
@@ -128,7 +130,7 @@ def variation_bias(
     loads, least = carried_loads(problem, end.contacts), np.full(len(first), ROUND_OFF)
     if problem.linear_wear:
         adhesion = end.contacts.adhesion_fraction.reshape(problem.shape).max(axis=(0, 1))
-        least[adhesion <= ADHERING] = max(math.sqrt(2.0 * negligible), ROUND_OFF)
+        least[adhesion <= MOST_ADHERING] = max(math.sqrt(2.0 * negligible), ROUND_OFF)
     varies, chosen = np.zeros((2, len(first)), dtype=np.bool_)
     shifts: list[tuple[str, FloatArray]] = []
     for name, rollers, deviation in deviations:

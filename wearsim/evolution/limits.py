@@ -279,7 +279,7 @@ def _between(
     """Return the states between two of each test at which it reaches a limit.
 
     The greatest quantity over its limit is located by regula falsi (Illinois) on log scales, with
-    a bisection at every third trial.
+    a bisection at every fifth trial.
     """
     done, span = start.passes, end.passes - start.passes
     if len(limits) == 1 and limits[0].quantity == "passes":
@@ -292,14 +292,9 @@ def _between(
         state = take_side_step(stepper.side_step, *tests, passes)
         return state, _logs(limits, stepper, tests[0], state) - tolerance
 
-    every = np.arange(len(done))
-    located, high = trial(every, span)
-    low = _logs(limits, stepper, problem, start) - tolerance
-    # a single step instead of those that led to `end` may not reach the limit
-    short = np.flatnonzero(high < -tolerance)
-    if short.size:
-        located = located.with_others(short, end.at(short))
-    active = every[high > tolerance]
+    located = end.replaced(coarse_step_solution=None, half_quadrature_solution=None)
+    low, high = (_logs(limits, stepper, problem, state) - tolerance for state in (start, end))
+    active = np.flatnonzero(high > tolerance)
     before, after = np.zeros_like(span), span.copy()
     for count in range(_MOST_TRIALS):
         if not active.size:
@@ -312,8 +307,9 @@ def _between(
                 known, first * (last / first) ** part, last * np.exp(-high[active] / _POWER)
             )
         margin = 1e-3 * (last - first)
-        unsure = ~known | (count % 3 == 2)
-        middle = np.where(count % 3 == 2, 0.5 * (first + last), guess)
+        halved = count % 5 == 4
+        unsure = ~known | halved
+        middle = np.where(halved, 0.5 * (first + last), guess)
         guess = np.where(unsure, np.clip(middle, first + margin, last - margin), guess)
         length = guess - done[active]
         state, value = trial(active, length)

@@ -28,7 +28,7 @@ from wearsim.types import BoolArray, FloatArray
 # least error of the greatest depth over that of the profile; it is about 0.6 times that one except
 # where the difference crosses zero
 LEAST = 0.3
-NEGLIGIBLE = 0.05  # half the relative variance that is neglected, over the tolerance
+NEGLIGIBLE = 0.15  # half the relative variance that is neglected, over the tolerance
 
 
 @dataclass(frozen=True)

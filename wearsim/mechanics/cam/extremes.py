@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.cam.stations import Stations, interpolation
+from wearsim.mechanics.numerics.jit import kernel, kernel_input, subroutine
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 _PER_STATION = 4  # samples from one station to the next
@@ -68,7 +69,7 @@ def greatest(stations: Stations, values: FloatArray) -> Extreme:
     few = _with_few(stations, 3)
     panels[3, few] = 0.5 * widths[few]
     peak, angle, error, angle_error = panels
-    first = _first_of_equal(peak, axis=0)
+    first = _first_of_equal(peak)
     largest = np.take_along_axis(peak, first, axis=0)[0]
     equal = np.abs(peak - largest) <= _EQUAL * np.abs(largest)
     at, error_there, angle_error_there = (
@@ -90,7 +91,7 @@ def greatest_value(stations: Stations, values: FloatArray) -> FloatArray:
     for chosen, places in stations.groups:
         rows = values[places]
         peak[chosen] = rows[:, 0] if rows.shape[1] == 1 else _peaks(rows).value
-    return np.asarray(np.take_along_axis(peak, _first_of_equal(peak, axis=0), axis=0)[0])
+    return np.asarray(np.take_along_axis(peak, _first_of_equal(peak), axis=0)[0])
 
 
 def integral_error(stations: Stations, values: FloatArray) -> FloatArray:
@@ -125,11 +126,11 @@ def _with_few(stations: Stations, most: int) -> BoolArray:
     return np.asarray(moving & (np.array(stations.numbers) <= most))
 
 
-def _first_of_equal(values: FloatArray, axis: int) -> IntArray:
-    """Return the number of the greatest value along an axis, the first of equal ones."""
-    most = values.max(axis=axis, keepdims=True)
-    first = (values >= most - _EQUAL * np.abs(most)).argmax(axis=axis)
-    return np.expand_dims(first, axis)
+def _first_of_equal(values: FloatArray) -> IntArray:
+    """Return the number of the greatest value on the first axis, (1, ...), the first of equals."""
+    most = values.max(axis=0)
+    first = (values >= most - _EQUAL * np.abs(most)).argmax(axis=0)
+    return np.asarray(first[None])
 
 
 def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[FloatArray]:
@@ -182,27 +183,97 @@ class _Peaks(NamedTuple):
 
 def _peaks(rows: FloatArray) -> _Peaks:
     """Return the peaks of panels of several stations; rows as of `_of_panels`."""
-    number = rows.shape[1]
+    panels, number, *others = rows.shape
     points, matrix = _sampling(number)
-    count = len(points) - 1
-    samples = _product(matrix, rows)
-    place = _first_of_equal(samples, axis=1)
-    value = np.take_along_axis(samples, place, axis=1)[:, 0]
-    first = np.asarray(np.pi / count * place[:, 0], dtype=np.float64)
-    # Newton's method on the sum of c cos(order phi), in which the ends of a panel are stationary
-    orders = np.arange(number).reshape(-1, *(1,) * (rows.ndim - 2))
-    cosines = _product(_transform(number), rows)
-    phi = first
-    for _ in range(_ITERATIONS):
-        turned = orders * phi[:, None]
-        slope = -_sum(orders * cosines * np.sin(turned))
-        bend = _sum(orders**2 * cosines * np.cos(turned))
-        step = slope / np.where(bend > 0.0, bend, np.inf)
-        phi = np.clip(phi + np.clip(step, -np.pi / count, np.pi / count), 0.0, np.pi)
-    gain = _sum(cosines * (np.cos(orders * phi[:, None]) - np.cos(orders * first[:, None])))
-    higher = gain > _ROUNDING * np.abs(value)
-    value, phi = np.where(higher, value + gain, value), np.where(higher, phi, first)
-    return _Peaks(value, phi, bend, cosines, samples, place)
+    columns = math.prod(others)
+    vertices, cosines = np.empty((3, panels, columns)), np.empty((panels, number, columns))
+    samples = np.empty((panels, len(points), columns))
+    place = np.empty((panels, 1, columns), dtype=np.int64)
+    values = kernel_input(rows.reshape(cosines.shape))
+    find_peaks(values, matrix, _transform(number), vertices, cosines, samples, place[:, 0])
+    results = *vertices, cosines, samples, place
+    return _Peaks(*(result.reshape(*result.shape[:-1], *others) for result in results))
+
+
+@kernel
+def find_peaks(
+    rows: FloatArray,
+    sampling: FloatArray,
+    transform: FloatArray,
+    vertices: FloatArray,
+    cosines: FloatArray,
+    samples: FloatArray,
+    places: IntArray,
+) -> None:
+    """Find the greatest value of the polynomial through the stations of each panel.
+
+    Newton's method on the sum of c cos(order phi), in which the ends of a panel are stationary,
+    begins at the greatest sample.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (panels, stations, columns)
+        Values at the stations.
+    sampling, transform : ndarray, shape (samples, stations) and (stations, stations)
+        Matrices from values at stations to samples and to the amplitudes c.
+    vertices : ndarray, shape (3, panels, columns)
+        Results: greatest value, its phi, and the second derivative of minus the value by phi.
+    cosines, samples : ndarray, shape (panels, stations or samples, columns)
+        Results: amplitudes and samples.
+    places : ndarray of int, shape (panels, columns)
+        Result: the greatest sample, the first of equal ones.
+    """
+    panels, number, columns = rows.shape
+    count = samples.shape[1] - 1
+    longest = np.pi / count
+    for p in range(panels):
+        for c in range(columns):
+            most = -np.inf
+            for i in range(count + 1):
+                value = 0.0
+                for j in range(number):
+                    value += sampling[i, j] * rows[p, j, c]
+                samples[p, i, c] = value
+                most = max(most, value)
+            place = 0
+            while samples[p, place, c] < most - _EQUAL * abs(most):
+                place += 1
+            for i in range(number):
+                value = 0.0
+                for j in range(number):
+                    value += transform[i, j] * rows[p, j, c]
+                cosines[p, i, c] = value
+            phi = longest * place
+            value, slope, bend = _series(cosines, p, c, phi)
+            vertices[0, p, c], vertices[1, p, c] = samples[p, place, c], phi
+            first = value
+            for _ in range(_ITERATIONS):
+                step = slope / bend if bend > 0.0 else 0.0
+                phi = min(max(phi + min(max(step, -longest), longest), 0.0), np.pi)
+                value, slope, bend = _series(cosines, p, c, phi)
+            if value - first > _ROUNDING * abs(first):
+                vertices[0, p, c] += value - first
+                vertices[1, p, c] = phi
+            vertices[2, p, c] = bend
+            places[p, c] = place
+
+
+@subroutine
+def _series(cosines: FloatArray, p: int, c: int, phi: float) -> tuple[float, float, float]:
+    """Return a sum of cosines of multiples of phi, its slope, and minus its second derivative."""
+    turn_cosine, turn_sine = math.cos(phi), math.sin(phi)
+    cosine, sine, value, slope, bend = 1.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(cosines.shape[1]):
+        amplitude = cosines[p, j, c]
+        value += amplitude * cosine
+        slope -= j * amplitude * sine
+        bend += j * j * amplitude * cosine
+        # of the next multiple
+        cosine, sine = (
+            cosine * turn_cosine - sine * turn_sine,
+            sine * turn_cosine + cosine * turn_sine,
+        )
+    return value, slope, bend
 
 
 @lru_cache
@@ -226,8 +297,3 @@ def _product(matrix: FloatArray, rows: FloatArray) -> FloatArray:
     """Return a matrix times the second axis; the round-off is that of a single column."""
     factors = matrix.reshape(*matrix.shape, *(1,) * (rows.ndim - 2))
     return np.asarray(np.add.accumulate(factors * rows[:, None], axis=2)[:, :, -1])
-
-
-def _sum(values: FloatArray) -> FloatArray:
-    """Return the sum over the second axis in its order."""
-    return np.asarray(np.add.accumulate(values, axis=1)[:, -1])

@@ -20,6 +20,7 @@ from wearsim.types import FloatArray, IntArray
 NUMBERS = (7, 13, 25)  # of stations on a panel; every set contains the one before
 _MOST_HALVINGS = 6
 _SAMPLES = 193
+_REFINEMENTS = 4  # samplings about the greatest sample, the last 1e-8 of a panel apart
 
 
 @lru_cache
@@ -254,7 +255,7 @@ def extreme(
     best = -np.inf, 0.0
     for panel in panels:
         low, high = panel.start, panel.stop
-        for _ in range(1 if panel.dwell else 6):
+        for _ in range(1 if panel.dwell else _REFINEMENTS):
             angles = np.linspace(low, high, _SAMPLES)
             values = quantity(panel, angles)
             values = np.where(np.isnan(values), -np.inf, values)
