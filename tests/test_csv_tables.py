@@ -97,7 +97,12 @@ def test_plain_numbers_need_no_unit() -> None:
         ),
         (
             "time [s],load [N],load [kN]\n0,1,2\n1,2,3\n",
-            ["line 1: column 'load' appears 2 times"],
+            [
+                (
+                    "line 1: column 'load' appears 2 times, got time [s], load [N], load [kN],"
+                    " expected one such column"
+                )
+            ],
         ),
         (
             'time [s],load [N]\n0,"1,5"\n1,x\n2,\n3\n4,nan\n5,-inf\n6,1_0\n7,1e999\n',

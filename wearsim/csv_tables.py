@@ -347,7 +347,8 @@ def _find_columns(
             columns.append(_Column(name, place, factor, conversion))
         elif places:
             what = f"column '{name}' appears {len(places)} times"
-            mistakes.append(_mistake(header.line, what))
+            got = ", ".join(header.cells)
+            mistakes.append(_mistake(header.line, what, got, "one such column"))
         else:
             near = difflib.get_close_matches(name, [other for other, _ in heads], n=1)
             what = f"column '{name}' is missing" + (f" (is it '{near[0]}'?)" if near else "")

@@ -129,6 +129,8 @@ def test_table_states_limits_and_reason(command: Command, slim: Path) -> None:
     assert "depth 1.000 um" in text
     assert "lives are counted: every pass is solved separately" in text
     assert "too few lives" in text
+    assert "takes 69 lives" in text
+    assert "lives passes" not in text
 
 
 def test_sweep_compares_with_the_first_value(command: Command, slim: Path) -> None:

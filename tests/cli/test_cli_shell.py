@@ -97,6 +97,7 @@ def test_wrong_usage_is_bad_input(command: Command, arguments: list[str]) -> Non
         (SolverError("no strip", {"contact_model": "hertz"}), 1, "error: no strip\n"),
         (FileNotFoundError(2, "No such file or directory", "x"), 1, "error: x: No such file"),
         (ZeroDivisionError("oh"), 1, "internal error: ZeroDivisionError: oh\n"),
+        (MemoryError("8 GiB"), 1, "error: not enough memory (8 GiB); fewer strips"),
         (KeyboardInterrupt(), 130, "interrupted\n"),
     ],
 )

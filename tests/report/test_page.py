@@ -82,6 +82,7 @@ def test_page_states_question_answer_error_and_origin(result):
     page = unescape(page_of([result]))
     assert "How deep does the cylinder wear in 9,000 roller passes (3.000 min)?" in page
     assert f"{1e6 * result.depth[-1]:.4g} um ± " in page
+    assert "The stated error is that of the steps and strips" in page
     assert "It does not contain the errors of the contact model" in page
     assert "numpy " in page
     assert "wearsim run rig-450min.toml" in page

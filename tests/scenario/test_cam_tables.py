@@ -65,6 +65,10 @@ MISTAKES = [
         [('mass = "0.5 kg"', 'offset = "50 mm"')],
         "offset of 50 mm does not reach",
     ),
+    *(
+        ([("motion = [", f"stations = {value}\nmotion = [")], "stations: is neither 'auto' nor")
+        for value in (0, 100_000, 2.5, '"few"')
+    ),
     ([('"300 N"', '"24 N m"')], r"\[load\] preload: wrong dimension"),
     ([("turns = 1_350_000", 'turns = 10\nduration = "1 min"')], "duration or passes or turns"),
 ]

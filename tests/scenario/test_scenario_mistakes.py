@@ -11,6 +11,7 @@ from scenario_examples import GOOD, RIG, Parse
 
 from wearsim.errors import ScenarioError
 from wearsim.scenario import load_scenario, parse_override
+from wearsim.scenario.parse.mistakes import Mistakes
 
 LOAD = '[load]\nnormal_force = "300 N"\n'
 SLIP = "longitudinal = 1e-3"
@@ -397,3 +398,9 @@ def test_files_are_read_from_the_folder_of_the_scenario(
 def test_expected_multiple_is_reported():
     with pytest.raises(ScenarioError, match="expected a multiple of 4 of at least 4"):
         load_scenario(RIG, {"evolution.nodes": 6})
+
+
+def test_keys_of_other_tables_are_suggested_only_if_much_alike() -> None:
+    collector = Mistakes("rig.toml", str, lambda: {"[other]": ["over", "hardness"]})
+    assert collector.hint("k_over_h", ["mild"]) == " (known here: mild)"
+    assert collector.hint("hardnes", ["mild"]) == " (did you mean 'hardness' of [other]?)"

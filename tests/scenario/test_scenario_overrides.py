@@ -56,6 +56,10 @@ def test_two_exclusive_overrides_are_refused(parse: Parse) -> None:
             {"load.normal_forc": "3 N"},
             "rig.toml: [load] normal_forc: unknown key (did you mean 'normal_force'?)",
         ),
+        (
+            {"load.force": "300 N"},
+            "rig.toml: [load] force: unknown key (did you mean 'normal_force'?)",
+        ),
         ({"loda.x": 1}, "rig.toml: [loda]: unknown table (did you mean 'load'?)"),
         (
             {"roller.material.x": 3, "a..b": 1, "": 2, "seed": None},

@@ -58,6 +58,20 @@ def test_forecast_agrees_with_the_run(name: str, tmp_path: Path) -> None:
         assert 1.0 / 3.0 < forecast[key] / value < 3.0, (key, forecast[key], value)
 
 
+def test_start_profile_that_fits_the_roller(tmp_path: Path) -> None:
+    """The gap does not rise in the contact, whose middle is known all the same."""
+    rows = (f"{y},{-max(10.0 - y * y, 0.0)}" for y in np.linspace(-8.0, 8.0, 401))
+    profile = tmp_path / "groove.csv"
+    profile.write_text("\n".join(["y [mm],height [um]", *rows]))
+    changes = {**LOOSE, "cylinder.profile": str(profile)}
+    scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", changes)
+    checked = dry_run(scenario)
+    assert not [text for text in checked["warnings"] if "forecast" in text]
+    assert checked["forecast"]["depth_m"] == pytest.approx(
+        wearsim.run(scenario).depth[-1], rel=ERROR
+    )
+
+
 @pytest.mark.parametrize(
     ("file", "changes", "factor"),
     [

@@ -263,6 +263,11 @@ def _message(error: BaseException) -> str:
         return f"error: {error.at_shell}"
     if isinstance(error, OSError):
         return f"error: {error.filename or 'a file'}: {error.strerror or error}"
+    if isinstance(error, MemoryError):
+        return (
+            f"error: not enough memory ({described(error)}); fewer strips, records, realisations or"
+            " workers take less"
+        )
     return (
         f"internal error: {type(error).__name__}: {described(error)}\n"
         "this is a defect of wearsim or of a plugin; --traceback shows where"

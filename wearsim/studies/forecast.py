@@ -103,12 +103,14 @@ class WearForecast:
         loaded = problem.values_of(self._fresh.contacts, "line_load") > 0.0
         rise = problem.nominal_gap - problem.nominal_least_gap[..., None]
         self.loaded_strips = int(loaded.sum(axis=-1).min())
-        half_strip = 0.5 * problem.grid.spacing  # where strips are wider than the contact
-        least = half_strip**2 / (2.0 * self._scout.axial_gap.radius_at(half_strip))
+        first, last = loaded.argmax(axis=-1), -1 - loaded[..., ::-1].argmax(axis=-1)
+        middle = 0.5 * (problem.grid.y[first] + problem.grid.y[last])
+        self._centres = np.array([middle.min(), middle.max()])
+        # of the nominal surfaces: a start profile may fit the roller, without any rise
+        half = 0.5 * problem.grid.spacing * max(int(loaded.sum(axis=-1).max()) - 1, 1)
+        least = self._scout.axial_gap.depth_at(half)
         self.elastic = float(rise.max(initial=least, where=loaded))
-        lowest = problem.nominal_gap.argmin(axis=-1)
         self._places = places_across(problem)
-        self._centres = problem.grid.y[[lowest.min(), lowest.max()]]
         self._depths: list[float] = []
         self._rates: list[Rates] = []
         self._add(0.0)

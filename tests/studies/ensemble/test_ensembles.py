@@ -279,6 +279,15 @@ def test_correlated_inputs_cause_a_warning(tmp_path):
     assert any("correlated" in text for text in result.warnings)
 
 
+def test_error_of_few_strips_is_stated_with_what_decreases_it(tmp_path):
+    few = small(contact__strips=15, evolution__strip_error=True, evolution__tolerance=1e-3)
+    result = ensemble(few, 2, tmp_path / "e.h5", **SERIAL)
+    worst = 100.0 * (result.values("depth_error") / result.at_end("depth")).max()
+    (text,) = [text for text in result.warnings if "estimated error of depth" in text]
+    assert f"is {worst:.2g} % of the depth at most" in text
+    assert "more contact.strips" in text
+
+
 def test_inputs_without_effect_are_identified(tmp_path):
     # the worn volume does not depend on a tiny yaw of a roller that does not wear
     scenario = scenario_of(

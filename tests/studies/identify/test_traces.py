@@ -63,6 +63,14 @@ def test_spikes_and_dropouts_are_left_out(tmp_path: Path):
         trace(write(tmp_path / "bad.csv", y, rough))
 
 
+def test_trace_without_noise_is_refused_as_such(tmp_path: Path):
+    """A computed profile has shoulders of one height, which are no dropouts."""
+    y = np.linspace(-10e-3, 10e-3, 501)
+    path = write(tmp_path / "computed.csv", y, -np.maximum(DEPTH - y**2, 0.0))
+    with pytest.raises(ScenarioError, match="greatest or least height, 10 or more"):
+        trace(path)
+
+
 def test_good_points_of_an_inclined_trace_are_kept(tmp_path: Path):
     y, height = groove(np.random.default_rng(1), inclination=20e-3)
     found = trace(write(tmp_path / "t.csv", y, height))

@@ -10,6 +10,7 @@ import pytest
 import wearsim
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.fatigue.lives import competing_risks, lives_of
+from wearsim.studies.life.settings import with_limits
 from wearsim.studies.opening import export_csv
 
 RIG = shipped_scenario
@@ -111,6 +112,12 @@ def test_limit_of_damage_ends_lives_which_are_then_counted():
     assert "damage depends on the wear factor and on the passes" in found.settings.reason
     assert found.first_limits["damage"] == 1.0
     assert found.at_end("damage") == pytest.approx([2e-4] * 2, rel=1e-5)
+
+
+def test_limits_without_a_unit_are_given_as_texts():
+    limits = ["damage=2e-4", "pitting 0.1"]
+    limited = with_limits(RIG("rig-life", {"fatigue": FATIGUE}), limits)
+    assert limited.limit.given == {"depth": 50e-6, "damage": 2e-4, "pitting": 0.1}
 
 
 def test_limit_of_damage_needs_fatigue():

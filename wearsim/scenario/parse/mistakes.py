@@ -23,6 +23,7 @@ M = TypeVar("M", bound=BaseModel)
 S = TypeVar("S", bound=Spec)
 
 _NUMBER_IN_TEXT = re.compile(rf"(?:{NUMBER.pattern}) ?%?")
+_ALIKE = 0.75  # similarity of a key to those of other tables, from which it is suggested
 _BOUNDS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}
 _WHAT = {
     "finite_number": "must be finite",
@@ -115,7 +116,7 @@ class Mistakes:
         if near := nearest(key, here):
             return near
         everywhere = {name for keys in self._keys.values() for name in keys}
-        for name in difflib.get_close_matches(key, everywhere, n=1):
+        for name in difflib.get_close_matches(key, everywhere, n=1, cutoff=_ALIKE):
             return f" (did you mean '{name}' of {self._places(name)}?)"
         return f" (known here: {', '.join(sorted(here))})" if here else ""
 
@@ -131,7 +132,8 @@ def installed(kind: type[S]) -> list[S]:
 
 def nearest(name: str, known: Collection[str]) -> str:
     """Return the most similar of the `known` names as a hint in parentheses, or nothing."""
-    similar = difflib.get_close_matches(name, known, n=1)
+    longer = [other for other in known if name in other.split("_")]  # "force" of "normal_force"
+    similar = difflib.get_close_matches(name, known, n=1) or (longer if len(longer) == 1 else [])
     return f" (did you mean '{similar[0]}'?)" if similar else ""
 
 

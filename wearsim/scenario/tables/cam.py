@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, WrapValidator
 
 from wearsim.mechanics.cam import Follower, Motion
 from wearsim.plugins import Options
@@ -20,6 +20,22 @@ from wearsim.scenario.tables.start_profiles import read_start_surface
 from wearsim.units import COMPRESSIBILITY, INERTIA, MASS, VISCOSITY, as_written
 
 _WAYS = ("motion", "lift", "profile", "shape")
+_MOST_STATIONS = 1000  # on a part; far more than results need, and matrices of this size
+
+
+def _as_stations(value: object, read: ValidatorFunctionWrapHandler) -> object:
+    """Validate a number of stations with one message for all mistakes."""
+    try:
+        return read(value)
+    except ValidationError as error:
+        raise ValueError(
+            f"is neither 'auto' nor a whole number from 1 to {_MOST_STATIONS}"
+        ) from error
+
+
+Stations = Annotated[
+    Literal["auto"] | Annotated[int, Field(ge=1, le=_MOST_STATIONS)], WrapValidator(_as_stations)
+]
 
 
 class CamTable(Options):
@@ -74,7 +90,7 @@ class CamTable(Options):
         description="Worn surface at the start: a CSV file with columns 'angle [deg]', 'y [mm]' and"
         " 'height [um]', or depth, of the same positions y at every angle; or without angle.",
     )
-    stations: Literal["auto"] | int = Field(
+    stations: Stations = Field(
         default="auto",
         description="Stations on each part of a moving segment; auto chooses by the tolerance.",
     )
@@ -222,8 +238,6 @@ def read_cam(
         ways = "exactly one of motion, lift, profile and shape is needed"
         mistakes.add("cam", "motion", ways, " and ".join(given) or "none")
     stations = table.stations if isinstance(table.stations, int) else None
-    if stations is not None and stations < 1:
-        mistakes.add("cam", "stations", "is out of range", str(stations), "at least 1")
     _check_shape(mistakes, table)
     if follower is None or roller is None or len(given) != 1:
         return None

@@ -67,8 +67,8 @@ class ComparisonView(View):
     """
 
     basis = (
-        "Intervals of ensembles are those of their means; those of runs contain the error of the"
-        " steps only."
+        "Intervals of ensembles are those of their means; those of runs contain the errors of the"
+        " steps and strips only."
     )
 
     def __init__(self, comparison: Comparison, key: str = "") -> None:

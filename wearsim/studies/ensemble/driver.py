@@ -88,8 +88,8 @@ def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bo
             beyond > 0,
             (
                 f"the estimated error of depth exceeds the tolerance in {beyond} of {result.count}"
-                f" realisations, by {100.0 * worst:.2g} % of the depth at most; a lower"
-                " evolution.tolerance decreases it"
+                f" realisations, and is {100.0 * worst:.2g} % of the depth at most; a lower"
+                " evolution.tolerance or more contact.strips decrease it"
             ),
         ),
         (

@@ -128,6 +128,14 @@ def _mean_line(path: object, item: Measurement, notes: list[str]) -> tuple[Profi
         profile = load_profile(path, item.choice)  # type: ignore[arg-type]
     good = _without_spikes(profile)
     removed = len(good) - int(good.sum())
+    level = int(_in_runs(profile.height).sum())
+    if level > _MOST_SPIKES * len(good):
+        raise _error(
+            item,
+            f"{level} of {len(good)} points are at its greatest or least height, {_RUN} or more in"
+            " a row, as where an instrument is out of range or noise is missing",
+            "a trace as it was measured",
+        )
     if removed > _MOST_SPIKES * len(good):
         raise _error(
             item,
@@ -143,13 +151,7 @@ def _mean_line(path: object, item: Measurement, notes: list[str]) -> tuple[Profi
 
 def _without_spikes(profile: Profile) -> BoolArray:
     """Return which points are neither spikes nor dropouts."""
-    y, height = profile.y, profile.height
-    good = np.ones(len(y), dtype=np.bool_)
-    change = np.flatnonzero(np.diff(height) != 0.0) + 1
-    for part in np.split(np.arange(len(y)), change):
-        extreme = height[part[0]] in {height.min(), height.max()}
-        if len(part) >= _RUN and extreme and len(part) < len(y):
-            good[part] = False
+    y, good = profile.y, ~_in_runs(profile.height)
     for _ in range(2):
         kept = np.flatnonzero(good)
         # at the ends the window is mirrored, where an inclination looks like a bend
@@ -168,6 +170,17 @@ def _without_spikes(profile: Profile) -> BoolArray:
             break
         good[kept[far]] = False
     return good
+
+
+def _in_runs(height: FloatArray) -> BoolArray:
+    """Return which points belong to runs of equal readings at either end of the range."""
+    inside = np.zeros(len(height), dtype=np.bool_)
+    change = np.flatnonzero(np.diff(height) != 0.0) + 1
+    for part in np.split(np.arange(len(height)), change):
+        extreme = height[part[0]] in {height.min(), height.max()}
+        if len(part) >= _RUN and extreme and len(part) < len(height):
+            inside[part] = True
+    return inside
 
 
 def _line_of_ends(y: FloatArray, height: FloatArray) -> tuple[float, float]:

@@ -114,7 +114,7 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
     ScenarioError
         If there is none, or one is of no meaning for the scenario.
     """
-    changes: dict[str, str] = {}
+    changes: dict[str, str | float] = {}
     for text in limits:
         name = text.replace("_", " ").split("=")[0].strip().lower().removeprefix("worn ")
         if "=" in text and name not in OF_LIFE:
@@ -127,7 +127,8 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
             )
         if f"limit.{limit.key}" in changes:
             raise ValueError(f"'{text}': a limit of {limit.quantity} is given twice")
-        changes[f"limit.{limit.key}"] = limit.text.removeprefix(limit.quantity).strip()
+        written = limit.text.removeprefix(limit.quantity).strip()
+        changes[f"limit.{limit.key}"] = limit.value if limit.unit == "1" else written
     changed = scenario.changed(changes) if changes else scenario
     if not changed.limit.given:
         what, expected = "is needed for a life", 'one limit or more, such as depth = "50 um"'

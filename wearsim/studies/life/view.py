@@ -366,6 +366,8 @@ def limit_texts(limits: Mapping[str, float]) -> list[str]:
 def life_text(result: LifeResult, share: float) -> str:
     """Return a life with its unit and its interval."""
     value, interval = life_cells(result, share)
+    if math.isnan(result.b(share).value) and not interval:
+        return value  # how many lives it takes
     return f"{value} {result.unit}" + (f" [{interval}]" if interval else "")
 
 

@@ -39,8 +39,8 @@ from wearsim.units import LONG, engineers_unit
 
 NO_STEPPING_ERROR = "Every roller pass is solved: there is no stepping error."
 _NOT_MODEL = (
-    "The stated error is that of the steps in time. It does not contain the errors of the contact"
-    " model, of the wear law or of the inputs."
+    "The stated error is that of the steps and strips, and of the stations of a cam. It does not"
+    " contain the errors of the contact model, of the wear law or of the inputs."
 )
 
 _IN_OVERVIEW = {"roller depth", "width", "lift error, peak to peak"}

@@ -110,7 +110,7 @@ class OptimisationView(StudyView[OptimisationResult]):
         name = self.result.goals.objectives[0][0]
         if not math.isfinite(item["gain"]):
             return ""
-        return f"; 1 % more changes {name} by {100.0 * item['gain']:+.2g} %"
+        return f"; relaxing it by 1 % changes {name} by {100.0 * item['gain']:+.2g} %"
 
     def _robustness(self, robustness: Mapping[str, Any]) -> str:
         """Return the worst neighbour in words."""
