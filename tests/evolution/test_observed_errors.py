@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,32 @@ def test_errors_are_in_final_state_and_summary(spring: wearsim.Result) -> None:
     assert final["peak_pressure_error_Pa"] == spring.errors["peak_pressure"][-1]
     assert final["normal_force_error_N"] == spring.errors["normal_force"][-1] > 0.0
     assert set(spring.errors) >= {"depth", "worn_volume", "width", "power", "descent"}
+
+
+@pytest.mark.parametrize("gain", [0.0, 50.0], ids=["known load", "load term"])
+def test_error_under_a_logged_load_is_not_that_of_interpolation(
+    gain: float, tmp_path: Path
+) -> None:
+    time = np.linspace(0.0, 3600.0, 721)
+    log = np.column_stack([time, 300.0 + 20.0 * np.sin(time / 100.0)])
+    header = "time [s],force [N]"
+    np.savetxt(tmp_path / "log.csv", log, delimiter=",", header=header, comments="")
+    content = tomllib.loads(RIG.read_text())
+    content["operation"]["duration"] = "60 min"
+    content["load"] = {"kind": "recorded", "file": "log.csv"}
+    if gain:
+        content["load"]["thermal"] = {"gain": f"{gain} N/W", "time_constant": "20 min"}
+    result, true = (
+        wearsim.run(wearsim.Scenario.from_dict({**content, **changes}, folder=tmp_path))
+        for changes in ({}, {"contact": {"strips": 241}, "evolution": {"tolerance": 1e-5}})
+    )
+    for name in ("normal_force", "power", "peak_pressure", "elastic_approach"):
+        error = abs(float(result.values(name)[-1] - true.values(name)[-1]))
+        size = abs(float(true.values(name)[-1]))
+        assert error <= result.errors[name][-1] + 1e-6 * size, name
+        most = 0.1 if name in {"peak_pressure", "elastic_approach"} else 0.003
+        assert result.errors[name][-1] < most * size, name
+    assert (result.errors["normal_force"][-1] == 0.0) == (gain == 0.0)
 
 
 def of_exact_sizes(

@@ -8,6 +8,11 @@ since a peak pressure rises and falls as single strips come into contact. Depth 
 roller have at least the relative error by strips of depth and volume of both bodies: single
 differences may be small by chance, and both bodies are worn by the same contacts.
 
+A load that varies in time differs between two steps from its values at them. Power, pressure and
+approach are therefore compared after division by a power of the normal force, and the error of the
+force is added. A force without feedback is known; of one with feedback the part due to it is
+compared, or the whole force where that differs less.
+
 At the edge of a groove the line load falls within a layer to zero. Where the layer is shorter than
 the contact is long, the contact is shorter there under the same load, and its pressure higher.
 Neither strips wider than the contact is long nor those of the coarse test resolve this peak, which
@@ -17,7 +22,8 @@ is added to the error of the pressure.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -32,6 +38,8 @@ COVER = 1.5
 #: observables whose relative error is at least that of the greatest depth or of the volume worn off
 #: both bodies
 OF_DEPTH, OF_VOLUME = ("roller_depth", "descent"), ("roller_worn_volume",)
+#: exponents of the normal force in observables that depend on it, in a groove or a fresh contact
+OF_FORCE = {"power": 1.0, "peak_pressure": 0.5, "elastic_approach": 0.75}
 # relative peak at an edge without a layer; measured on grooves of crowns of 30 to 250 mm, on strips
 # of a sixth of the half-length
 ABRUPT_EDGE = 0.3
@@ -53,6 +61,16 @@ def relative_crown_radius(problem: WearProblem) -> FloatArray | None:
     return np.asarray(np.broadcast_to(problem.grid.spacing**2 / bend[0], problem.shape[1:]))
 
 
+def load_before_feedback(problem: WearProblem, passes: FloatArray) -> FloatArray:
+    """Return the load before feedback of a test on a cylinder at some passes, (points,) [N]."""
+    loads = np.empty(len(passes))
+    for place, done in enumerate(passes):
+        time = problem.time(np.array([done]))
+        here = problem.at_time(time, time)
+        loads[place] = float((here.force(time) + here.inputs.normal_force_offset).mean())
+    return loads
+
+
 def observed_errors(
     coarse: Course | None,
     passes: FloatArray,
@@ -61,6 +79,8 @@ def observed_errors(
     by_strips: FloatArray,
     crown_radius: FloatArray | None = None,
     spacing: float = math.inf,
+    load: Callable[[FloatArray], FloatArray] | None = None,
+    feedback: bool = True,
 ) -> dict[str, FloatArray]:
     """Return the estimated errors of observables of a test.
 
@@ -78,6 +98,10 @@ def observed_errors(
         See `relative_crown_radius` [m]; None where peaks at edges are not estimated.
     spacing : float
         Width of the strips at the end [m].
+    load : callable, optional
+        Returns the load before feedback at some passes [N]; None for a constant one.
+    feedback : bool
+        Whether the normal force depends on wear or power.
     """
     if not observed:
         return {}
@@ -94,20 +118,33 @@ def observed_errors(
         np.log1p(points / first) for points in (steps, common, passes)
     )
     differences, widths = [], []
-    for name, values in observed.items():
-        fine_values = values.reshape(len(passes), -1)
-        coarse_values = np.reshape(coarse.observed[name], (len(steps), -1))
+    for name in observed:
+        fine_values, coarse_values = (
+            _over_force(name, courses, len(points))
+            for courses, points in ((observed, passes), (coarse.observed, steps))
+        )
         fine = _interpolated(at_common, at_passes, fine_values)
         difference = np.abs(_interpolated(at_common, at_steps, coarse_values) - fine)
         if name.endswith("angle"):
             difference = np.minimum(difference, math.tau - difference)
         else:
             difference /= np.where(fine != 0.0, np.abs(fine), np.inf)
+        if name == "normal_force" and not feedback:
+            difference[:] = 0.0
+        elif name == "normal_force" and load is not None:
+            before = load(passes)[:, None], load(steps)[:, None]
+            by_feedback = np.abs(
+                _interpolated(at_common, at_steps, coarse_values - before[1])
+                - _interpolated(at_common, at_passes, fine_values - before[0])
+            )
+            # both contain errors of interpolation
+            difference = np.minimum(difference, by_feedback / np.where(fine != 0.0, fine, np.inf))
         differences.append(difference)
         widths.append(fine_values.shape[1])
     greatest = _greatest_of_last(common, np.concatenate(differences, axis=1))
     part = np.column_stack([np.interp(at_passes, at_common, column) for column in greatest.T])
     columns = np.split(COVER * part, np.cumsum(widths)[:-1], axis=1)
+    of_force = dict(zip(observed, columns, strict=True)).get("normal_force", np.zeros((1, 1)))
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
@@ -123,10 +160,20 @@ def observed_errors(
             if name in names
         ]
         relative = np.maximum(estimate, lowest[0][:, None]) if lowest else estimate
+        relative = relative + OF_FORCE.get(name, 0.0) * of_force.max(axis=1, keepdims=True)
         errors[name] = relative.reshape(values.shape) * scale
         if name == "peak_pressure":
             errors[name] = errors[name] + scale * edge_peaks
     return errors
+
+
+def _over_force(name: str, observed: Mapping[str, Any], points: int) -> FloatArray:
+    """Return an observable over the power of the normal force with which it varies, as columns."""
+    values = np.reshape(observed[name], (points, -1))
+    if name not in OF_FORCE or "normal_force" not in observed:
+        return values
+    force = np.reshape(observed["normal_force"], (points, -1)).mean(axis=1, keepdims=True)
+    return values / np.where(force > 0.0, force, 1.0) ** OF_FORCE[name]
 
 
 def _edge_peaks(

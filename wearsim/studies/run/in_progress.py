@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,11 @@ from wearsim.evolution.observables import (
     present_batch,
     volume_error_by_stations,
 )
-from wearsim.evolution.observed_errors import observed_errors, relative_crown_radius
+from wearsim.evolution.observed_errors import (
+    load_before_feedback,
+    observed_errors,
+    relative_crown_radius,
+)
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
@@ -220,10 +225,13 @@ class RunInProgress:
         end = Course(profiles=np.concatenate(profiles), grid=problem.grid)
         errors = strip_errors(coarse, passes, np.array(sizes), end)
         crown, spacing = relative_crown_radius(first), problem.grid.spacing
+        varies = problem.varies and problem.shape[0] == 1
         self.recorder.strip_errors = errors
         self.recorder.observed_errors = observed_errors(
             *(coarse, passes, self.recorder.observed, np.array(sizes), errors),
             *(None if crown is None else crown[:, 0], spacing),
+            partial(load_before_feedback, problem) if varies else None,
+            feedback=problem.has_spring or bool(problem.terms),
         )
 
     def _check_errors(self) -> None:
