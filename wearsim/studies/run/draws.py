@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import scipy
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.quantities import Varying
@@ -210,28 +211,32 @@ class Drawer:
             for name, numbers in self._changed(first + place).items():
                 uniforms[name][place] = numbers
         if self._shift:
-            from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
-
             for name, shift in self._shift.items():
                 uniforms[name] = np.clip(
-                    ndtr(ndtri(uniforms[name]) + shift), 1.0 - BELOW_ONE, BELOW_ONE
+                    scipy.special.ndtr(scipy.special.ndtri(uniforms[name]) + shift),
+                    1.0 - BELOW_ONE,
+                    BELOW_ONE,
                 )
         return uniforms
 
     def _changed(self, realisation: int) -> dict[str, FloatArray]:
         """Return the uniform numbers of a realisation that is a change of others, (dimension,)."""
-        from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
-
         line = [realisation]
         while line[-1] in self._changes:
             line.append(self._changes[line[-1]][0])
         scores: dict[str, FloatArray] = {}
         for number in reversed(line):
-            fresh = {name: ndtri(u[0]) for name, u in self._sampler.uniforms(number, 1).items()}
+            fresh = {
+                name: scipy.special.ndtri(u[0])
+                for name, u in self._sampler.uniforms(number, 1).items()
+            }
             _, scale = self._changes.get(number, (number, 1.0))
             part = math.sqrt(1.0 - scale**2)
             scores = {n: part * scores[n] + scale * z if scores else z for n, z in fresh.items()}
-        return {name: np.clip(ndtr(z), 1.0 - BELOW_ONE, BELOW_ONE) for name, z in scores.items()}
+        return {
+            name: np.clip(scipy.special.ndtr(z), 1.0 - BELOW_ONE, BELOW_ONE)
+            for name, z in scores.items()
+        }
 
     def columns(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the values drawn for whole tests and rollers in consecutive realisations.
