@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.arguments import ArgumentError, checking_argument
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.evolution.limits import OF_LIFE, Limit
 from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import Scenario
@@ -131,7 +131,7 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
     changed = scenario.changed(changes) if changes else scenario
     if not changed.limit.given:
         what, expected = "is needed for a life", 'one limit or more, such as depth = "50 um"'
-        raise ScenarioError(scenario.file, [Mistake("limit", "", what, "none", expected)])
+        raise mistake_in(scenario.file, what, "none", expected, table="limit")
     return changed
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wearsim.errors import Mistake, ResultsFileError, ScenarioError
+from wearsim.errors import ResultsFileError, ScenarioError, mistake_in
 from wearsim.evolution.limits import OF_FATIGUE, SAME_VALUE, Limit
 from wearsim.evolution.state import WearState
 from wearsim.scenario import Scenario, parse_scenario
@@ -123,8 +123,9 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
         reaches it, as forecast.
     """
     if limit.quantity in OF_FATIGUE and scenario.fatigue is None:
-        what, remedy = "needs the fatigue of the bodies", "a table [fatigue] in the scenario"
-        raise _refusal(scenario, limit, what, remedy)
+        raise _refusal(
+            scenario, limit, "needs the fatigue of the bodies", "a table [fatigue] in the scenario"
+        )
     if limit.quantity in {"time", "passes", *OF_FATIGUE}:
         return []
     roller, deep = scenario.roller, DEEPEST * scenario.roller.radius
@@ -151,11 +152,19 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
     if limit.quantity == "peak pressure":
         greatest = max(fresh[name], end[name])
         if limit.value > PRESSURE * greatest:
-            text = f"is far above the pressures of the test, {greatest / 1e6:.4g} MPa at most"
-            raise _refusal(scenario, limit, text, "a lower pressure")
+            raise _refusal(
+                scenario,
+                limit,
+                f"is far above the pressures of the test, {greatest / 1e6:.4g} MPa at most",
+                "a lower pressure",
+            )
         if limit.value <= fresh[name]:
-            text = "is below the pressure of the unworn contact, where the test would end at once"
-            raise _refusal(scenario, limit, text, f"above {fresh[name] / 1e6:.4g} MPa")
+            raise _refusal(
+                scenario,
+                limit,
+                "is below the pressure of the unworn contact, where the test would end at once",
+                f"above {fresh[name] / 1e6:.4g} MPa",
+            )
         if limit.value <= greatest:
             return []
         course = f"{fresh[name] / 1e6:.3g} MPa at the start and about {end[name] / 1e6:.3g} MPa"
@@ -176,5 +185,4 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
 
 
 def _refusal(scenario: Scenario, limit: Limit, what: str, expected: str) -> ScenarioError:
-    mistake = Mistake("", "the limit of the run (until)", what, limit.text, expected)
-    return ScenarioError(scenario.file, [mistake])
+    return mistake_in(scenario.file, what, limit.text, expected, key="the limit of the run (until)")

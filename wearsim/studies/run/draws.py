@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import scipy
 
-from wearsim.errors import CapabilityError, Mistake, ScenarioError
+from wearsim.errors import CapabilityError, mistake_in
 from wearsim.evolution.quantities import Varying
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.plugins import Process
@@ -50,17 +50,13 @@ def draw(scenario: Scenario) -> Setup:
     if not scenario.random:
         return Setup(scenario)
     if scenario.sampling.plan == "latin-hypercube":
-        raise ScenarioError(
+        raise mistake_in(
             scenario.file,
-            [
-                Mistake(
-                    "sampling",
-                    "plan",
-                    "a Latin hypercube requires a study of many realisations, and a run is one",
-                    '"latin-hypercube"',
-                    '"monte-carlo" or "sobol"',
-                )
-            ],
+            "a Latin hypercube requires a study of many realisations, and a run is one",
+            '"latin-hypercube"',
+            '"monte-carlo" or "sobol"',
+            table="sampling",
+            key="plan",
         )
     return Drawer(scenario, scenario.sampling.plan).draw(scenario.sampling.realisation)
 
@@ -286,18 +282,13 @@ def _paths(scenario: Scenario, item: RandomInput, realisation: int) -> list[Vary
     points = int(np.ceil(scenario.total_time / process.spacing)) + 2
     if points > LONGEST_PATH:
         table, key = item.name.rsplit(".", 1)
-        raise ScenarioError(
+        raise mistake_in(
             scenario.file,
-            [
-                Mistake(
-                    table,
-                    key,
-                    f"the process would take {points:,} steps of {process.spacing:.3g} s over the"
-                    " test",
-                    None,
-                    'a longer correlation_time, or persistence = "per-pass" instead of a process',
-                )
-            ],
+            f"the process would take {points:,} steps of {process.spacing:.3g} s over the test",
+            None,
+            'a longer correlation_time, or persistence = "per-pass" instead of a process',
+            table=table,
+            key=key,
         )
     rollers = tuple(range(scenario.operation.rollers))
     groups = [rollers] if item.persistence == "per-test" else [(r,) for r in rollers]
