@@ -187,9 +187,9 @@ def read_tests(path: str | Path) -> list[Measurement]:
     mistakes = [Mistake("", key, "is unknown", None, _EXAMPLE) for key in tables]
     if not isinstance(tests, list) or not all(isinstance(test, dict) for test in tests or []):
         raise ScenarioError(str(path), [*mistakes, Mistake("", "", "has no tests", None, _EXAMPLE)])
-    measurements = []
-    for number, table in enumerate(tests, 1):
-        measurements.append(_read_test(table, f"test {number}", file, mistakes))
+    measurements = [
+        _read_test(table, f"test {number}", file, mistakes) for number, table in enumerate(tests, 1)
+    ]
     if mistakes:
         raise ScenarioError(str(path), mistakes)
     return measurements

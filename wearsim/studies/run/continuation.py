@@ -43,9 +43,11 @@ def with_end(scenario: Scenario, limit: Limit | None) -> tuple[Scenario, Limit |
     """
     if limit is None or limit.quantity not in {"time", "passes"}:
         return scenario, limit
-    override: dict[str, object] = {"operation.duration": f"{limit.value!r} s"}
-    if limit.quantity == "passes":
-        override = {"operation.passes": round(limit.value)}
+    override: dict[str, object] = (
+        {"operation.passes": round(limit.value)}
+        if limit.quantity == "passes"
+        else {"operation.duration": f"{limit.value!r} s"}
+    )
     ended = parse_scenario(scenario.text, scenario.file, scenario.files.__getitem__, override)
     if ended.total_passes < scenario.total_passes:
         # a time is rounded to whole passes, as the duration of a scenario
@@ -90,9 +92,8 @@ def written_value(limit: Limit, value: float) -> str:
         return f"{value:.0f} passes"
     if limit.quantity in OF_FATIGUE:
         return f"{limit.quantity} {value:.6g}"
-    text = in_engineers_unit(value, limit.unit, 6)
-    if limit.unit == "m":
-        text = f"{value * 1e6:.6g} um"
+    length = f"{value * 1e6:.6g} um"
+    text = length if limit.unit == "m" else in_engineers_unit(value, limit.unit, 6)
     return text if limit.quantity == "time" else f"{limit.quantity} {text}"
 
 
