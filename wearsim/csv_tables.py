@@ -25,7 +25,7 @@ from wearsim.csv_cells import (
     is_unit,
     iso_time,
 )
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.quantities import DECIMAL_COMMA, NOT_FINITE, NUMBER
 from wearsim.units import QuantityError, conversion
 
@@ -136,13 +136,18 @@ def read_columns(
     heads = ", ".join(_head(name, unit) for name, unit in columns.items())
     expected = f"a header line such as {heads}"
     if header is None:
-        raise ScenarioError(file, [Mistake("", "", "the file is empty", None, expected)])
+        raise mistake_in(file, "the file is empty", None, expected)
     if all(map(_starts_as_number, header.cells)):
         got = separator.join(header.cells)
-        raise ScenarioError(file, [_mistake(header.line, "there is no header", got, expected)])
+        raise mistake_in(file, "there is no header", got, expected, key=f"line {header.line}")
     if len(header.cells) == 1 < len(columns):
-        what, expected = "the header is one column", "commas, semicolons or tabs between columns"
-        raise ScenarioError(file, [_mistake(header.line, what, header.cells[0], expected)])
+        raise mistake_in(
+            file,
+            "the header is one column",
+            header.cells[0],
+            "commas, semicolons or tabs between columns",
+            key=f"line {header.line}",
+        )
     start = header.line
     sample = list(_rows(lines[start : start + HEAD_LINES], start, separator))
     below = _unit_line(header, sample)

@@ -120,6 +120,19 @@ class ScenarioError(WearsimError):
         return type(self), (self.file, self.mistakes), {**self.__dict__, "args": self.args}
 
 
+def mistake_in(
+    file: str,
+    what: str,
+    got: str | None = None,
+    expected: str | None = None,
+    *,
+    table: str = "",
+    key: str = "",
+) -> ScenarioError:
+    """Return the error of the only mistake in a file; parameters as of `Mistake`."""
+    return ScenarioError(file, [Mistake(table, key, what, got, expected)])
+
+
 class InfeasibleCamError(ScenarioError):
     """A cam that its roller cannot follow: undercut, jumping or reaching the pivot of its arm.
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wearsim.csv_cells import decode
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import ScenarioError, mistake_in
 from wearsim.profiles import ProfileChoice, is_surface, read_profile
 from wearsim.types import Profile
 from wearsim.units import QuantityError, conversion
@@ -67,7 +67,7 @@ def _log_of_tdms(content: bytes, file: str) -> str:
     """
 
     def error(what: str, got: str | None = None, expected: str | None = None) -> ScenarioError:
-        return ScenarioError(file, [Mistake("", "", what, got, expected)])
+        return mistake_in(file, what, got, expected)
 
     try:
         reader: Any = import_module("nptdms").TdmsFile

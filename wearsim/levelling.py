@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.types import FloatArray
 
 _WORN = 0.01  # part of the greatest depth above which a strip counts as worn
@@ -106,9 +106,7 @@ def levelled(measured: Measured, computed: ComputedProfile) -> Measured:
         left, right = y < limits[0] + shift, y > limits[1] + shift
         if min(left.sum(), right.sum()) < _FEWEST:
             what = "cannot be levelled: there is no unworn surface on both sides of the groove"
-            raise ScenarioError(
-                measured.label, [Mistake("", "", what, None, "a longer profile, or a levelled one")]
-            )
+            raise mistake_in(measured.label, what, None, "a longer profile, or a levelled one")
         unworn = left | right
         start = np.interp(y - shift, computed.y, computed.start)
         line = np.polyfit(y[unworn], (height - start)[unworn], 1)

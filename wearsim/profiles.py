@@ -15,7 +15,7 @@ import numpy as np
 
 from wearsim.csv_cells import decode
 from wearsim.csv_tables import read_columns
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import ScenarioError, mistake_in
 from wearsim.quantities import quantity
 from wearsim.types import FloatArray, Profile
 
@@ -264,7 +264,7 @@ def is_surface(content: bytes) -> bool:
 def _error(
     file: str, what: str, got: str | None = None, expected: str | None = None
 ) -> ScenarioError:
-    return ScenarioError(file, [Mistake("", "", what, got, expected)])
+    return mistake_in(file, what, got, expected)
 
 
 class _Surface(NamedTuple):

@@ -219,8 +219,6 @@ Duration: TypeAlias = Annotated[float, Quantity(DURATION)]
 
 PositiveDuration: TypeAlias = Annotated[float, Quantity(DURATION, "positive")]
 
-NonNegativeDuration: TypeAlias = Annotated[float, Quantity(DURATION, "not negative")]
-
 Angle: TypeAlias = Annotated[float, Quantity(ANGLE)]
 
 Torque: TypeAlias = Annotated[float, Quantity(TORQUE)]
@@ -228,8 +226,6 @@ Torque: TypeAlias = Annotated[float, Quantity(TORQUE)]
 NonNegativeTorque: TypeAlias = Annotated[float, Quantity(TORQUE, "not negative")]
 
 Speed: TypeAlias = Annotated[float, Quantity(SPEED)]
-
-PositiveSpeed: TypeAlias = Annotated[float, Quantity(SPEED, "positive")]
 
 PerPower: TypeAlias = Annotated[float, Quantity(PER_POWER)]
 

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import ScenarioError, mistake_in
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -150,7 +150,7 @@ class Profile:
 def _profile_error(
     key: str, what: str, got: str | None = None, expected: str | None = None
 ) -> ScenarioError:
-    return ScenarioError("profile", [Mistake("", key, what, got, expected)])
+    return mistake_in("profile", what, got, expected, key=key)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from wearsim.models import axial, fatigue, loads, motion, wear
 from wearsim.models.contact import hertz as hertz_model, hertz_fastsim, slender, strip_model
-from wearsim.models.random import distributions, mixture, posterior, varying
+from wearsim.models.random import distributions, posterior, varying
 from wearsim.plugins import (
     AxialProfileSpec,
     ContactModelSpec,
@@ -40,7 +40,7 @@ def wearsim_loads() -> Iterable[LoadSpec]:
 @hookimpl
 def wearsim_random_inputs() -> Iterable[RandomInputSpec]:
     """Yield the built-in distributions, friction fields and processes."""
-    return (*distributions.SPECS, *mixture.SPECS, *posterior.SPECS, *varying.SPECS)
+    return (*distributions.SPECS, *posterior.SPECS, *varying.SPECS)
 
 
 @hookimpl

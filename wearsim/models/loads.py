@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from wearsim.csv_tables import read_columns
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.models.motion import ANGLE_NAMES
 from wearsim.plugins import Load, LoadSpec, LoadTerm, Options
@@ -160,13 +160,13 @@ def _periodic(file: InputFile, arm: bool) -> Callable[[FloatArray], FloatArray]:
     if turn > math.tau * (1.0 + 1e-9) or len(angle) < 4:
         got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
         expected = "at least 4 rows within 360 deg"
-        raise ScenarioError(file.path, [Mistake("", "", "is not one turn", got, expected)])
+        raise mistake_in(file.path, "is not one turn", got, expected)
     if turn < math.tau * (1.0 - 1e-9):
         angle, force = np.append(angle, angle[0] + math.tau), np.append(force, force[0])
     elif abs(force[-1] - force[0]) > 1e-9 * float(np.abs(force).max()):
         got = f"{force[0]:.6g} and {force[-1]:.6g} {unit}"
         expected = "equal values at 0 and 360 deg"
-        raise ScenarioError(file.path, [Mistake("", "", f"the {name} jumps", got, expected)])
+        raise mistake_in(file.path, f"the {name} jumps", got, expected)
     force[-1] = force[0]
     spline = CubicSpline(angle - angle[0], force, bc_type="periodic")
     start = float(angle[0])
@@ -202,7 +202,7 @@ def _read_log(
         {} if names else {"time": ["t"], "load": ["force", "normal force", "normal_force"]}
     )
     if first == second:
-        raise ScenarioError(path, [Mistake("", "", "time and load need two columns", first)])
+        raise mistake_in(path, "time and load need two columns", first)
     units = {first: "s", second: "N"}
     columns = read_columns(text, path, units, aliases=other_names, rising=first, choice=choice)
     time, load = columns[first], columns[second]
@@ -215,7 +215,7 @@ def _read_log(
     if len(before) and gaps == "error":
         text = gap_text(missing, float(np.median(steps)))
         expected = 'a log without gaps, or load.gaps = "hold" or "interpolate"'
-        raise ScenarioError(path, [Mistake("", "", text, None, expected)])
+        raise mistake_in(path, text, None, expected)
     if gaps == "hold":
         time = np.insert(time, before + 1, missing[:, 1])
         load = np.insert(load, before + 1, load[before])

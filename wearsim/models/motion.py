@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from wearsim.csv_tables import read_columns
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.plugins import MotionLaw, MotionLawSpec, Options
 from wearsim.quantities import InputFile, Quantity
 from wearsim.types import FloatArray, IntArray
@@ -254,7 +254,7 @@ class Table(MotionLaw):
             got = f"{math.degrees(angles[0]):.6g} to {math.degrees(angles[-1]):.6g} deg"
             expected = f"0 to {math.degrees(angle):.6g} deg, the segment's angle"
             what = "the angles do not span the segment"
-            raise ScenarioError(options.file.path, [Mistake("", "", what, got, expected)])
+            raise mistake_in(options.file.path, what, got, expected)
         angles[-1] = angle
         refuse_kinks(options.file.path, angles, lift)
         self._spline = LiftSpline(angles, lift - lift[0])
@@ -304,7 +304,7 @@ def read_lift(text: str, path: str, unit: str) -> tuple[FloatArray, FloatArray]:
     if len(columns["angle"]) < FEWEST_ROWS:
         got = f"{len(columns['angle'])} rows"
         what = "too few rows for a quintic spline"
-        raise ScenarioError(path, [Mistake("", "", what, got, f"at least {FEWEST_ROWS}")])
+        raise mistake_in(path, what, got, f"at least {FEWEST_ROWS}")
     return columns["angle"], columns["lift"]
 
 
@@ -377,7 +377,7 @@ def refuse_kinks(
         got = ", ".join(f"{math.degrees(at):.6g} deg" for at in corners[:3])
         expected = f"a {name} without corners, or more points where it turns sharply"
         what = f"the slope of the {name} jumps at"
-        raise ScenarioError(path, [Mistake("", "", what, got, expected)])
+        raise mistake_in(path, what, got, expected)
 
 
 def _spec(

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path, PurePath
 from typing import TypeAlias
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.plugins import Options
 from wearsim.profiles import split_name
@@ -381,7 +381,7 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
         )
     if "\n" in str(path):
         what = "is a text, not the name of a file; Scenario.from_toml reads it"
-        raise ScenarioError("scenario", [Mistake("", "", what)])
+        raise mistake_in("scenario", what)
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -394,9 +394,7 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
         mistake = Mistake("", "", what)
         raise ScenarioError(str(path), [mistake], python=python, shell=shell) from error
     except OSError as error:
-        raise ScenarioError(
-            str(path), [Mistake("", "", f"the file cannot be read ({error.strerror})")]
-        ) from error
+        raise mistake_in(str(path), f"the file cannot be read ({error.strerror})") from error
     return parse_scenario(text, str(path), reader_in(path.parent), overrides)
 
 

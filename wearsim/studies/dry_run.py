@@ -188,9 +188,11 @@ def _log(scenario: Scenario, load: Load) -> Data | None:
 def _creepage(scenario: Scenario, random: set[str]) -> Data:
     """Return the creepages that are not random."""
     creepage = scenario.creepage
-    driven = ("longitudinal", "", creepage.longitudinal)
-    if creepage.drive == "free":
-        driven = ("bearing_torque", "_N_m", creepage.bearing_torque or 0.0)
+    driven = (
+        ("bearing_torque", "_N_m", creepage.bearing_torque or 0.0)
+        if creepage.drive == "free"
+        else ("longitudinal", "", creepage.longitudinal)
+    )
     both = ("yaw", creepage.yaw), ("tilt", creepage.tilt)
     angles = [(name, "_rad", scenario.per_roller(angle)) for name, angle in both]
     known = [item for item in (driven, *angles) if f"creepage.{item[0]}" not in random]

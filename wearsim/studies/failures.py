@@ -99,9 +99,8 @@ def _edge(error: SolverError, scenario: Scenario) -> tuple[str, str]:
     choice, roller = scenario.contact, scenario.roller
     if choice.width is not None:
         given = f"contact.width = {choice.width * 1e3:.6g} mm"
-        where = ""
-        if choice.centre is not None:
-            where = f", move contact.centre = {choice.centre * 1e3:.6g} mm"
+        centre = choice.centre
+        where = "" if centre is None else f", move contact.centre = {centre * 1e3:.6g} mm"
         remedy = f"raise {given}{where}, or leave it out, and the strips follow the groove"
         return error.message, remedy
     if choice.centre is not None:

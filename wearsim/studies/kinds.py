@@ -75,7 +75,7 @@ def wearsim_study_kinds() -> Iterable[StudyKind]:
             marked_by="life",
             holds="lives, from `wearsim life`",
             resume="wearsim.studies.ensemble.api:resume_ensemble",
-            compare="wearsim.studies.life.comparison_view:lives_view",
+            compare="wearsim.studies.life.comparison_view:LivesView",
             protocol=2,
         ),
         StudyKind(

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from wearsim.errors import Mistake, ResultsFileError, ScenarioError
+from wearsim.errors import Mistake, ResultsFileError, mistake_in
 from wearsim.plugins import (
     ContactModelSpec,
     FatigueLawSpec,
@@ -59,7 +59,7 @@ def checked_count(scenario: Scenario, realisations: int) -> int:
     if count * size > MOST_BYTES:
         what = f"would take {count * size / 1e9:,.4g} GB of memory, {size} bytes each"
         most = f"at most {MOST_BYTES // size}, which take {MOST_BYTES / 1e9:g} GB"
-        raise ScenarioError(scenario.file, [Mistake("", "realisations", what, str(count), most)])
+        raise mistake_in(scenario.file, what, str(count), most, key="realisations")
     return count
 
 

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Self
+from typing import Annotated, Any, Self, TypeAlias
 
 import numpy as np
-from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
+from pydantic import Field, PlainValidator, PrivateAttr, ValidationInfo, model_validator
 
 from wearsim.csv_tables import column_names, read_columns
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import Distribution, JointDistribution, Options, RandomInputSpec
 from wearsim.quantities import InputFile, Limit, PositiveValue, Quantity, Value
 from wearsim.types import FloatArray
-from wearsim.units import QuantityError
+from wearsim.units import QuantityError, as_written
 from wearsim.uq.distributions.base import MaxentDistribution, Uniform
 from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
+from wearsim.uq.distributions.mixture import Mixture
 from wearsim.uq.distributions.truncated_normal import TruncatedNormal, cut_normal
 
 _LARGEST_SCORE = 40.0  # above the normal score of any floating-point number below 1
@@ -57,8 +58,9 @@ def _read_quantiles(file: InputFile, unit: str) -> tuple[FloatArray, FloatArray]
         places = (np.arange(len(samples)) + 0.5) / len(samples)
         ends = samples[:1], samples[-1:]
         return np.concatenate([[0.0], places, [1.0]]), np.concatenate([ends[0], samples, ends[1]])
-    columns = {"probability": "1", "value": unit}
-    read = read_columns(file.text, file.path, columns, rising="probability")
+    read = read_columns(
+        file.text, file.path, {"probability": "1", "value": unit}, rising="probability"
+    )
     probability, value = read["probability"], read["value"]
     mistakes = []
     if probability[0] != 0.0 or probability[-1] != 1.0:
@@ -169,8 +171,11 @@ class LognormalOptions(Options):
     def _exactly_one_pair(self) -> Self:
         given = [name for name, value in self if value is not None]
         if given not in (["mean", "std"], ["median", "factor"]):
-            expected = "either mean and std, or median and factor"
-            raise QuantityError("needs one pair", " and ".join(given) or "none", expected)
+            raise QuantityError(
+                "needs one pair",
+                " and ".join(given) or "none",
+                "either mean and std, or median and factor",
+            )
         return self
 
 
@@ -236,8 +241,9 @@ class MaxentOptions(Options):
 def check_rising(low: float, high: float, info: ValidationInfo) -> None:
     """Raise a QuantityError unless the limits of a support are in ascending order."""
     if not low < high:
-        what = f"the upper limit must be above the lower one{_in_unit(info)}"
-        raise QuantityError(what, f"{low:g} to {high:g}")
+        raise QuantityError(
+            f"the upper limit must be above the lower one{_in_unit(info)}", f"{low:g} to {high:g}"
+        )
 
 
 def _in_unit(info: ValidationInfo) -> str:
@@ -279,6 +285,51 @@ class Lognormal(Distribution):
     def std(self) -> float:
         """Exact standard deviation."""
         return self.mean * math.sqrt(math.expm1(self._spread**2))
+
+
+_TABLE = "a table with a distribution and its options"
+
+
+def _read_component(value: object, info: ValidationInfo) -> Distribution | None:
+    """Return the distribution of a table by the reader in the validation context.
+
+    The reader reports the mistakes within the table itself, and then returns None.
+    """
+    if not isinstance(value, dict):
+        raise QuantityError("is not a table", as_written(value), _TABLE)
+    distribution: Distribution | None = (info.context or {})["component"](value)
+    return distribution
+
+
+#: A distribution within the options of another one.
+Component: TypeAlias = Annotated[
+    Any, PlainValidator(_read_component, json_schema_input_type=dict[str, object])
+]
+
+
+class MixtureOptions(Options):
+    """Options of the distribution `mixture`."""
+
+    of: tuple[Component, ...] = Field(
+        description="tables with a distribution and its options each, such as"
+        " {distribution = 'lognormal', median = '300 N', factor = 1.2}"
+    )
+    weights: tuple[float, ...] = Field(
+        description="shares of the distributions, [0.7, 0.3]; they are divided by their sum"
+    )
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if len(self.of) < 2:
+            got = f"{len(self.of)} in 'of'"
+            raise QuantityError("needs two distributions or more", got, _TABLE)
+        if len(self.weights) != len(self.of):
+            got = f"{len(self.weights)} weights for {len(self.of)} distributions"
+            raise QuantityError("needs a weight for each distribution", got, f"{len(self.of)}")
+        if not all(0.0 < weight < float("inf") for weight in self.weights):
+            got = as_written(self.weights)
+            raise QuantityError("'weights' must be above 0", got, "shares such as [0.7, 0.3]")
+        return self
 
 
 SPECS = (
@@ -341,6 +392,13 @@ SPECS = (
         role="joint",
         summary="yaw and tilt, uniform on a disc",
         references=_ENTROPY[1:],
+        protocol=2,
+    ),
+    RandomInputSpec(
+        name="mixture",
+        factory=lambda options: Mixture(options.of, options.weights),
+        options=MixtureOptions,
+        summary="one of several distributions with given shares, as of batches or suppliers",
         protocol=2,
     ),
 )

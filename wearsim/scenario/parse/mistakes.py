@@ -271,8 +271,8 @@ def _translate(
 
 
 def key_of_file(raw: Mapping[str, object], file: str) -> str:
-    """Return the key of a table that names `file`, or nothing."""
-    return next((key for key, value in raw.items() if value == file), "")
+    """Return the key of a table or of its options that names `file` or has read it, or nothing."""
+    return next((key for key, value in raw.items() if getattr(value, "path", value) == file), "")
 
 
 def split_keys(

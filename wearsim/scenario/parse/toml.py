@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.input_files import csv_of_profile, read_input
 from wearsim.plugins import (
     AxialProfileSpec,
@@ -361,7 +361,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
     try:
         data = tomllib.loads(text)
     except RecursionError as error:
-        raise ScenarioError(name, [Mistake("", "", *TOO_DEEP)]) from error
+        raise mistake_in(name, *TOO_DEEP) from error
     except ValueError as error:  # a TOMLDecodeError, or an integer with too many digits
         raise ScenarioError(name, [_syntax_mistake(text, str(error))]) from error
     deep = [Mistake("", key, *TOO_DEEP) for key, value in data.items() if is_deep(value)]

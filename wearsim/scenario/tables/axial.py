@@ -132,8 +132,7 @@ def _built(
     try:
         return choice.build(pair)
     except ScenarioError as error:
-        files = {key: getattr(value, "path", None) for key, value in choice.options}
-        mistakes.add_file(error, place, key_of_file(files, error.file))
+        mistakes.add_file(error, place, key_of_file(dict(choice.options), error.file))
     except QuantityError as error:
         mistakes.add(place, "", error.what, error.got, error.expected)
     except ValueError as error:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wearsim.csv_tables import read_columns, units_of_columns
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.mechanics.cam import Follower, Motion
 from wearsim.mechanics.cam.smoothing import estimated_noise, scatter_through_points
 from wearsim.models.motion import (
@@ -130,14 +130,14 @@ def one_turn(path: str, angle: FloatArray, values: FloatArray) -> tuple[FloatArr
         if not 0.0 < math.tau - turn < 1.5 * step + 1e-6:
             got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
             what = "the angles do not span a turn"
-            raise ScenarioError(path, [Mistake("", "", what, got, "0 to 360 deg")])
+            raise mistake_in(path, what, got, "0 to 360 deg")
         return np.append(angle, angle[0] + math.tau), np.append(values, values[0])
     noise = estimated_noise(angle[:-1], values[:-1])
     allowed = max(1e-9 * float(np.ptp(values)), _CLOSED * math.sqrt(2.0) * noise)
     if abs(values[-1] - values[0]) > allowed:
         got = f"{values[0]:.6g} and {values[-1]:.6g}"
         what = "the lift does not close: its first and last value differ"
-        raise ScenarioError(path, [Mistake("", "", what, got, "equal values at 0 and 360 deg")])
+        raise mistake_in(path, what, got, "equal values at 0 and 360 deg")
     return angle, values
 
 

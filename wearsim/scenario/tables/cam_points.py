@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.mechanics.cam import Motion, Segment
 from wearsim.mechanics.cam.smoothing import (
     SmoothedCurve,
@@ -142,5 +142,4 @@ def has_dimension(unit: str | None, target: str) -> bool:
 def refuse_few(path: str, count: int, fewest: int, what: str) -> None:
     """Raise a ScenarioError if a file has too few rows."""
     if count < fewest:
-        mistake = Mistake("", "", f"too few {what}", str(count), f"at least {fewest}")
-        raise ScenarioError(path, [mistake])
+        raise mistake_in(path, f"too few {what}", str(count), f"at least {fewest}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wearsim.csv_tables import column_names, read_columns, units_of_columns
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.mechanics.cam import Follower, Motion
 from wearsim.mechanics.cam.smoothing import SmoothedCurve, scatter_through_points
 from wearsim.models.motion import ANGLE_NAMES, LiftSpline, refuse_kinks
@@ -92,7 +92,7 @@ def _surface_table(
         given_columns = column_names(file.text)
         if not polar and not {"x", "y"} & set(given_columns):
             what = "has neither the columns angle and radius, nor x and y"
-            raise ScenarioError(path, [Mistake("", "", what, ", ".join(given_columns), choice)])
+            raise mistake_in(path, what, ", ".join(given_columns), choice)
     if polar:
         columns = read_columns(
             file.text,
@@ -174,7 +174,7 @@ def lift_of_surface(
         got = f"{-1e3 / curvature[place]:.4g} mm at {at:.4g} deg"
         expected = f"more than {1e3 * follower.roller_radius:.6g} mm, the radius of the roller"
         what = "a concave arc is tighter than the roller: its radius is"
-        raise ScenarioError(path, [Mistake("", "", what, got, expected)])
+        raise mistake_in(path, what, got, expected)
     cx = px + follower.roller_radius * dy / size
     cy = py - follower.roller_radius * dx / size
     centre, polar = np.hypot(cx, cy), np.unwrap(np.arctan2(cy, cx))
@@ -183,7 +183,7 @@ def lift_of_surface(
         c, arm = follower.centre_distance, follower.arm_length
         cosine = (centre**2 + c * c - arm * arm) / (2.0 * centre * c)
         if (np.abs(cosine) >= 1.0).any():
-            raise ScenarioError(path, [Mistake("", "", "the arm does not reach the cam")])
+            raise mistake_in(path, "the arm does not reach the cam")
         sense = 1.0 if not follower.towards else -1.0
         theta = polar + sense * np.arccos(cosine)
         lift = np.arccos((c * c + arm * arm - centre**2) / (2.0 * c * arm)) - follower.rest
@@ -194,7 +194,7 @@ def lift_of_surface(
         place = int(np.argmin(np.diff(theta)))
         got = f"{math.degrees(theta[place]) % 360.0:.4g} deg"
         what = "the follower does not follow the surface at"
-        raise ScenarioError(path, [Mistake("", "", what, got)])
+        raise mistake_in(path, what, got)
     return theta, lift
 
 

@@ -340,8 +340,7 @@ def check_load(mistakes: Mistakes, load: LoadChoice) -> None:
     try:
         load.built  # noqa: B018  (reads its file)
     except ScenarioError as error:
-        files = {key: getattr(value, "path", None) for key, value in load.options}
-        mistakes.add_file(error, "load", key_of_file(files, error.file))
+        mistakes.add_file(error, "load", key_of_file(dict(load.options), error.file))
 
 
 def _read_term(mistakes: Mistakes, name: str, raw: dict[str, object]) -> TermChoice | None:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from wearsim.csv_tables import column_names, read_columns
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import ScenarioError, mistake_in
 from wearsim.profiles import read_profile
 from wearsim.quantities import InputFile
 from wearsim.scenario.parse.mistakes import Mistakes
@@ -127,11 +127,11 @@ def _surface(file: InputFile) -> StartSurface:
     if not whole or count < 2 or (grid != grid[0]).any():
         what = "needs the same positions y, at least two and increasing, at every angle"
         got = f"{len(y)} rows, {len(angles)} angles"
-        raise ScenarioError(file.path, [Mistake("", "column y", what, got)])
+        raise mistake_in(file.path, what, got, key="column y")
     turns = np.diff(angles)
     thrice = (np.abs(turns[1:]) + np.abs(turns[:-1]) < _SAME_ANGLE).any()
     if angles[0] < 0.0 or angles[-1] > math.tau or (turns < -_SAME_ANGLE).any() or thrice:
         got = f"{math.degrees(angles.min()):.6g} to {math.degrees(angles.max()):.6g} deg"
         what = "must not fall from row to row, be within 0 to 360 deg and at most twice the same"
-        raise ScenarioError(file.path, [Mistake("", "column angle", what, got)])
+        raise mistake_in(file.path, what, got, key="column angle")
     return StartSurface(angles, grid[0], height.reshape(grid.shape))

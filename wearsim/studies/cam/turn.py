@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from wearsim.errors import InfeasibleCamError, Mistake, ScenarioError
+from wearsim.errors import InfeasibleCamError, Mistake, ScenarioError, mistake_in
 from wearsim.mechanics.cam import (
     Panel,
     RollerKinematics,
@@ -51,7 +51,7 @@ class CamTurn:
     def __init__(self, scenario: Scenario) -> None:
         if scenario.cam is None:
             what = "is needed for the kinematics of a cam"
-            raise ScenarioError(scenario.file, [Mistake("cam", "", what, "none", "a table [cam]")])
+            raise mistake_in(scenario.file, what, "none", "a table [cam]", table="cam")
         self.scenario, self.cam = scenario, scenario.cam
         self._path = path_of(self.cam)
         self.speed = scenario.operation.speed
@@ -400,7 +400,7 @@ class CamTurn:
     def _mistake(
         self, table: str, key: str, what: str, got: str | None, expected: str | None
     ) -> ScenarioError:
-        return ScenarioError(self.scenario.file, [Mistake(table, key, what, got, expected)])
+        return mistake_in(self.scenario.file, what, got, expected, table=table, key=key)
 
     def checked(self) -> CamTurn:
         """Return the turn if the roller can follow it.

@@ -13,10 +13,9 @@ from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import (
     CapabilityError,
     ContactError,
-    Mistake,
-    ScenarioError,
     SolverError,
     WearsimError,
+    mistake_in,
 )
 from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.problem import WearProblem
@@ -103,8 +102,8 @@ class LocalFriction:
         if mistake is not None:
             table, key = self._item.name.split(".", 1)
             remedy = finer_grid(self._scenario, self._field, len(x), along, spacing)
-            raise ScenarioError(
-                self._scenario.file, [Mistake(table, key, mistake, self._item.describe(), remedy)]
+            raise mistake_in(
+                self._scenario.file, mistake, self._item.describe(), remedy, table=table, key=key
             )
 
     def put(self, batch: ContactBatch, x: FloatArray, y: FloatArray, first: int) -> ContactBatch:
@@ -201,7 +200,7 @@ class Realisations:
         if scenario.cam is not None:
             what = "has many contacts, and this study solves one"
             remedy = "wearsim cam for its contacts, or wearsim ensemble"
-            raise ScenarioError(scenario.file, [Mistake("cam", "", what, None, remedy)])
+            raise mistake_in(scenario.file, what, None, remedy, table="cam")
         mean_load, self._setup = load_range(scenario, 0.0)[0], Setup(scenario)
         setup = self._setup
         self._once, field, self.notes = acting_inputs(scenario)
@@ -368,4 +367,4 @@ def _acts(scenario: Scenario, item: RandomInput) -> bool:
     written = str(item.quantity.write(mean)) if item.quantity else f"{mean:g}"
     what = "changes the load of the contact, and only load.normal_force can be random here"
     expected = f"one value, such as {written}"
-    raise ScenarioError(scenario.file, [Mistake(table, key, what, item.kind, expected)])
+    raise mistake_in(scenario.file, what, item.kind, expected, table=table, key=key)

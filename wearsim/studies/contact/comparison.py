@@ -106,9 +106,8 @@ def reference_spec(name: str) -> ContactModelSpec:
     """
     names = registry().names(ContactModelSpec)
     if name not in names:
-        remedy = f"there are {', '.join(names)}"
-        if name in INSTALL:
-            remedy = f"install it with: {INSTALL[name]}"
+        known = f"there are {', '.join(names)}"
+        remedy = f"install it with: {INSTALL[name]}" if name in INSTALL else known
         raise PluginError(f"no contact model '{name}' is installed; {remedy}")
     return registry().get(ContactModelSpec, name)
 
@@ -269,9 +268,8 @@ def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:
 def _differences(values: FloatArray, reference: FloatArray) -> ContactErrors:
     """Return the differences of values from a reference, ordered as by `_values`."""
     count = len(_SCALARS)
-    power, pressure, length = (
-        values[: count - 1] / _nonzero(reference[: count - 1]) - 1.0
-    ).tolist()
+    size = np.where(reference != 0.0, reference, 1.0)
+    power, pressure, length = (values / size - 1.0)[: count - 1].tolist()
     strips, exact = (part[count:].reshape(2, -1)[1] for part in (values, reference))
     norms = [float(np.linalg.norm(part)) for part in (strips - exact, exact)]
     peaks = [float(np.abs(part).max()) for part in (strips - exact, exact)]
@@ -283,10 +281,6 @@ def _differences(values: FloatArray, reference: FloatArray) -> ContactErrors:
         length,
         float(values[count - 1] - reference[count - 1]),
     )
-
-
-def _nonzero(values: FloatArray) -> FloatArray:
-    return np.where(values != 0.0, values, 1.0)
 
 
 def _on(point: OperatingPoint, grid: Grid, other: Grid) -> OperatingPoint:

@@ -176,11 +176,14 @@ class Demonstration(Viewed):
     @cached_property
     def _drawn(self) -> list[DrawnLives]:
         """Lives of all designs with what is not known of them, in their own unit."""
-        drawn = []
-        for design in self.designs:
-            most = math.inf if design.is_known_throughout else design.most
-            drawn.append(drawn_lives(design.distribution, design.uncertain, most))
-        return drawn
+        return [
+            drawn_lives(
+                design.distribution,
+                design.uncertain,
+                math.inf if design.is_known_throughout else design.most,
+            )
+            for design in self.designs
+        ]
 
     def _units(self, design: int) -> float:
         """Return the number of units of life in a unit of the requirement."""

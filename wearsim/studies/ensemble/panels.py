@@ -245,12 +245,10 @@ def _damage(result: EnsembleResult) -> Panel:
     body, name = ("cam", "damage_curve") if result.raw.cam else of_cylinder
     band, curves = result.band(name), result.kept_values(name)
     mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
-    x = ANGLE
-    if body == "cylinder":
-        x = Axis(Y, "mm", limits=worn_limits(band.y, curves.max(axis=0)))
+    limits = worn_limits(band.y, curves.max(axis=0))
     return Panel(
         f"Damage of the {body} at the end",
-        x,
+        ANGLE if body == "cam" else Axis(Y, "mm", limits=limits),
         DAMAGE,
         _curves(band.y, curves, band.mean),
         f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests.",
@@ -293,8 +291,10 @@ def effects_panel(title: str, of: str, effects: list[Effect]) -> Panel:
     marks: list[Mark] = [bars, _intervals(places, first, BLACK)]
     if any(item.total for item in effects):
         below, values = places + 0.38, [index.value for index in total]
-        marks.append(_intervals(below, total, ORANGE))
-        marks.append(dots(values, below, "D", colour=ORANGE, label="total, with interactions"))
+        marks += [
+            _intervals(below, total, ORANGE),
+            dots(values, below, "D", colour=ORANGE, label="total, with interactions"),
+        ]
     share = f"{100.0 * largest.first.value:.0f} % of the variance"
     return Panel(
         title,

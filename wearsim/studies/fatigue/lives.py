@@ -58,14 +58,16 @@ def competing_risks(result: LifeValues) -> CompetingRisks | None:
         for name in ("damage_course", "course_end", "damage_per_pass", "life", "score_mean")
     }
     settings = result.settings
-    exact: dict[str, Any] = {}
-    if result.is_exact:
-        exact = {
+    exact: dict[str, Any] = (
+        {
             "score": result.score,
             "reference": settings.reference,
             "shift": values["score_mean"],
             "spread": settings.spread,
         }
+        if result.is_exact
+        else {}
+    )
     return CompetingRisks(
         damage=values["damage_course"],
         end=np.maximum(values["course_end"], _LEAST),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, mistake_in
 from wearsim.studies.cam.cam_wear import size_of
 from wearsim.studies.cam.observables import CURVE_ANGLES
 from wearsim.studies.identify.checks import (
@@ -129,7 +129,7 @@ def kernel_of(likelihood: DrawLikelihood, name: str) -> LikelihoodMixture:
     """
     known = np.isfinite(likelihood.log_evidence)
     if not known.any():
-        raise ScenarioError(name, [Mistake("", "", "no draw of the inputs describes this groove")])
+        raise mistake_in(name, "no draw of the inputs describes this groove")
     return LikelihoodMixture.of(
         likelihood.log_evidence[known], likelihood.mean[known], likelihood.std[known]
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, mistake_in
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.results.io.files import write_results
@@ -216,7 +216,7 @@ class _Study:
             self._by_inputs.setdefault(repr(known), []).append(ready)
         if not self._by_inputs:
             what = f"no groove can be used: {'; '.join(self.left_out)}"
-            raise ScenarioError(items[0].file or items[0].name, [Mistake("", "", what)])
+            raise mistake_in(items[0].file or items[0].name, what)
 
     def _ready(self, item: Measurement) -> _Ready | None:
         """Read a measurement; None if it is left out."""
@@ -230,13 +230,14 @@ class _Study:
         passes = _passes(scenario, item)
         crown = scenario.roller.crown_radius
         if item.profile is not None and not scenario.axial_gap.is_crowned:
-            what = "makes grooves that this study cannot level, those of circular crowns only"
-            form, remedy = (
+            raise mistake_in(
+                scenario.file,
+                "makes grooves that this study cannot level, those of circular crowns only",
                 scenario.roller.axial_profile.form,
                 "crown_radius, or depth = in the tests",
+                table="roller",
+                key="axial_profile",
             )
-            mistake = Mistake("roller", "axial_profile", what, form, remedy)
-            raise ScenarioError(scenario.file, [mistake])
         if item.lift is not None:
             trace = read_change(item, turn_of(scenario).cam.follower)
             size = float(size_of(item.surface, smoothed(trace.height)))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.studies.identify.likelihood import DrawLikelihood, TraceLikelihood
 from wearsim.studies.identify.traces import Trace, half_depth_width, smoothed
 from wearsim.studies.identify.trajectories import Grown
@@ -70,7 +70,7 @@ def check_width(trace: Trace, y: FloatArray, rows: FloatArray) -> list[str]:
         + " mm for this depth: is it of another rig, or are its units others?"
     )
     if away > _WIDTH_REFUSED:
-        raise ScenarioError(trace.name, [Mistake("", "", what)])
+        raise mistake_in(trace.name, what)
     return [what]
 
 
@@ -79,34 +79,22 @@ def check_covered(likelihood: DrawLikelihood, grown: Grown, trace: Trace) -> Non
     best = int(likelihood.chi2.argmin())
     top = grown.ln_k[best, -1]
     if trace.depth is None and likelihood.mean[best] + likelihood.std[best] > top:
-        raise ScenarioError(
+        raise mistake_in(
             trace.name,
-            [
-                Mistake(
-                    "",
-                    "",
-                    "the groove may be wider than the trace: without its edges and the unworn"
-                    " surface beside it nothing can be identified",
-                    f"a trace of {1e3 * (trace.y[-1] - trace.y[0]):.4g} mm",
-                    "a longer one",
-                )
-            ],
+            "the groove may be wider than the trace: without its edges and the unworn"
+            " surface beside it nothing can be identified",
+            f"a trace of {1e3 * (trace.y[-1] - trace.y[0]):.4g} mm",
+            "a longer one",
         )
     freedom = len(trace.y) - 4
     ratio = float(likelihood.chi2.min()) / freedom
     if ratio > _FOREIGN:
-        raise ScenarioError(
+        raise mistake_in(
             trace.name,
-            [
-                Mistake(
-                    "",
-                    "",
-                    f"the model does not describe this groove: residuals are {ratio**0.5:.0f} times"
-                    " the noise of the shoulders",
-                    None,
-                    "a trace of the rig of the scenario, and its units",
-                )
-            ],
+            f"the model does not describe this groove: residuals are {ratio**0.5:.0f} times"
+            " the noise of the shoulders",
+            None,
+            "a trace of the rig of the scenario, and its units",
         )
 
 

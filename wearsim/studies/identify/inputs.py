@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.models.random.distributions import TableDistribution
 from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import RandomInput, Scenario
@@ -192,7 +192,7 @@ def with_measured(scenario: Scenario, stds: Mapping[str, float]) -> Scenario:
             single = [item.name for item in random if item.role != "joint"]
             expected = ", ".join(single) or "a random input"
             what = "is not a random number of the scenario, so measuring it changes nothing"
-            raise ScenarioError(scenario.file, [Mistake("", key, what, None, expected)])
+            raise mistake_in(scenario.file, what, None, expected, key=key)
         place = names.index(key)
         item = random[place]
         uniform = (np.arange(2001) + 0.5) / 2001

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.csv_cells import decode
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.mechanics.cam import Follower
 from wearsim.models.motion import LiftSpline
 from wearsim.scenario.tables.cam_lift import one_turn, read_lift_table
@@ -73,7 +73,7 @@ def _lift(path: Path, item: Measurement, follower: Follower) -> tuple[FloatArray
         text = decode(path.read_bytes())
     except OSError as error:
         what = f"the file cannot be read ({error.strerror})"
-        raise ScenarioError(str(path), [Mistake("", "", what)]) from error
+        raise mistake_in(str(path), what) from error
     choice = item.choice
     angle, lift = read_lift_table(text, str(path), choice.columns, choice.units, follower)
     angle, lift = one_turn(str(path), angle, lift)

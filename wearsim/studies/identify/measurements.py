@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.scenario.parse.mistakes import nearest
@@ -180,16 +180,16 @@ def read_tests(path: str | Path) -> list[Measurement]:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         what = f"the file cannot be read ({error.strerror})"
-        raise ScenarioError(str(path), [Mistake("", "", what)]) from error
+        raise mistake_in(str(path), what) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(path), [Mistake("", "", f"is not TOML: {error}")]) from error
+        raise mistake_in(str(path), f"is not TOML: {error}") from error
     tests = tables.pop("test", None)
     mistakes = [Mistake("", key, "is unknown", None, _EXAMPLE) for key in tables]
     if not isinstance(tests, list) or not all(isinstance(test, dict) for test in tests or []):
         raise ScenarioError(str(path), [*mistakes, Mistake("", "", "has no tests", None, _EXAMPLE)])
-    measurements = []
-    for number, table in enumerate(tests, 1):
-        measurements.append(_read_test(table, f"test {number}", file, mistakes))
+    measurements = [
+        _read_test(table, f"test {number}", file, mistakes) for number, table in enumerate(tests, 1)
+    ]
     if mistakes:
         raise ScenarioError(str(path), mistakes)
     return measurements

@@ -184,9 +184,10 @@ def plan_tables(designs: Sequence[PlannedDesign]) -> Iterator[tuple[Table, list[
         rows = zip(design.tests, *rates, strict=True)
         cells = [(str(row[0]), *(f"{rate:.2f}" for rate in row[1:])) for row in rows]
         scatter = f"they scatter ln K/H by {design.scatter_from_inputs:.3f}"
-        sentences = []
-        for t in SCATTERS:
-            reached = f"{design.needed[t] or f'more than {MOST_TESTS}'} tests"
-            sentences.append(f"a scatter of {t:g} is found with power 0.8 by {reached}")
+        sentences = [
+            f"a scatter of {t:g} is found with power 0.8 by"
+            f" {design.needed[t] or f'more than {MOST_TESTS}'} tests"
+            for t in SCATTERS
+        ]
         named = (*heads, "false 'random'", "'explained' if t = 0")
         yield Table(f"inputs {design.name}: {scatter}", cells, named), sentences

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.scenario import Scenario
 from wearsim.studies.identify.analysis import Identified, exponent, kernel_of
 from wearsim.studies.identify.likelihood import DrawLikelihood
@@ -111,7 +111,7 @@ def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> LikelihoodMixtu
     weight = np.exp(score - score.max())
     if not np.isfinite(middle) or weight.sum() < 1.5:
         what = "its tests contradict each other: no K/H describes them all"
-        raise ScenarioError(name, [Mistake("", "group", what)])
+        raise mistake_in(name, what, key="group")
     step = grid[1] - grid[0]
     return LikelihoodMixture.of(np.log(np.maximum(weight, 1e-300)), grid, np.full_like(grid, step))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import ScenarioError, mistake_in
 from wearsim.profiles import load_lines, load_profile
 from wearsim.studies.identify.measurements import Measurement
 from wearsim.types import BoolArray, FloatArray, Profile
@@ -107,7 +107,7 @@ def read_trace(item: Measurement, crown_radius: float) -> Trace:
 
 
 def _error(item: Measurement, what: str, expected: str | None = None) -> ScenarioError:
-    return ScenarioError(item.name, [Mistake("", "", what, None, expected)])
+    return mistake_in(item.name, what, None, expected)
 
 
 def _mean_line(path: object, item: Measurement, notes: list[str]) -> tuple[Profile, float]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import CapabilityError, Mistake, ScenarioError, SolverError
+from wearsim.errors import CapabilityError, SolverError, mistake_in
 from wearsim.evolution.integrate import Evolution, bisect_failures
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
@@ -157,13 +157,16 @@ def check_law(scenario: Scenario) -> None:
     if any(item.name == "wear.factor" for item in scenario.random):
         what = "is random, and so is what is identified: the scatter of K/H between specimens"
         remedy = "no such line: delete factor under [wear], or the table [wear.factor]"
-        raise ScenarioError(scenario.file, [Mistake("wear", "factor", what, None, remedy)])
+        raise mistake_in(scenario.file, what, None, remedy, table="wear", key="factor")
     if factors(scenario)[0] <= 0.0:
-        what = "must be above 0: it is where the search begins"
-        mistake = Mistake(
-            "wear.cylinder", "k_over_h", what, "0", "a positive value such as '1e-11 1/Pa'"
+        raise mistake_in(
+            scenario.file,
+            "must be above 0: it is where the search begins",
+            "0",
+            "a positive value such as '1e-11 1/Pa'",
+            table="wear.cylinder",
+            key="k_over_h",
         )
-        raise ScenarioError(scenario.file, [mistake])
 
 
 def factors(scenario: Scenario) -> tuple[float, float]:
@@ -293,7 +296,7 @@ class Grower:
             if not (sizes > 0.0).all():
                 where = wanted[int(sizes.argmin())].surface
                 what = "the model does not wear there"
-                raise ScenarioError(self.scenario.file, [Mistake("", where, what)])
+                raise mistake_in(self.scenario.file, what, key=where)
             ratio = float((high / sizes).max())
             if 1.0 / _NEAR < ratio < _NEAR or number == _PILOTS - 1:
                 break

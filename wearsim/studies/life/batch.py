@@ -147,7 +147,8 @@ class _Group:
             observed["depth"] = errors[0] / max(cylinder, roller)
             observed["volume"] = errors[1] / volume
             self._widen(number, observed)
-        return [failures.get(k) or test.outcome or _missing() for k, test in enumerate(self.tests)]
+        missing = AssertionError("a test has neither ended nor failed")
+        return [failures.get(k) or test.outcome or missing for k, test in enumerate(self.tests)]
 
     def _by_limit(self, relative: FloatArray) -> dict[str, FloatArray]:
         """Return quantities over their limits, (limits, tests), by the name of the quantity."""
@@ -357,7 +358,3 @@ class _Group:
 
     def _observed(self, problem: WearProblem, state: WearState) -> list[Observables]:
         return observables_of(self.stepper, problem, state, self.threshold)
-
-
-def _missing() -> Exception:
-    return AssertionError("a test has neither ended nor failed")

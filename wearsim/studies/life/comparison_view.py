@@ -28,6 +28,8 @@ class LivesView(View):
     ----------
     results : sequence of LifeResult
     labels : sequence of str
+    observable : str, optional
+        Without meaning: there is one, the life.
 
     Raises
     ------
@@ -37,7 +39,9 @@ class LivesView(View):
 
     basis = ERROR
 
-    def __init__(self, results: Sequence[LifeResult], labels: Sequence[str]) -> None:
+    def __init__(
+        self, results: Sequence[LifeResult], labels: Sequence[str], observable: str | None = None
+    ) -> None:
         self.results, self.labels = list(results), list(labels)
         self.title = f"{', '.join(labels[:-1])} and {labels[-1]}"
         first, *others = results
@@ -53,18 +57,22 @@ class LivesView(View):
         for label, comparison in zip(self.labels[1:], self.compared, strict=True):
             of = "" if len(self.compared) == 1 else f", {first} against {label}"
             ratio = f"{first} has {_factor(comparison.b10_ratio)} times the B10 of {label}"
-            machine = "unknown: the studies have no common draws"
-            if comparison.same_machine is not None:
-                machine = (
-                    f"{first} outlives {label} on {part_with_interval(comparison.same_machine)} of"
-                    " the machines, each with the same drawn values for both designs"
-                )
-            specimens = (
-                f"a specimen of {first} outlives a specimen of {label}, drawn separately, with"
-                f" probability {part_with_interval(comparison.two_specimens)}"
-            )
-            rows += [Row(f"B10 ratio{of}", ratio), Row(f"same machine{of}", machine)]
-            rows.append(Row(f"two specimens{of}", specimens))
+            same = comparison.same_machine
+            rows += [
+                Row(f"B10 ratio{of}", ratio),
+                Row(
+                    f"same machine{of}",
+                    "unknown: the studies have no common draws"
+                    if same is None
+                    else f"{first} outlives {label} on {part_with_interval(same)} of the machines,"
+                    " each with the same drawn values for both designs",
+                ),
+                Row(
+                    f"two specimens{of}",
+                    f"a specimen of {first} outlives a specimen of {label}, drawn separately, with"
+                    f" probability {part_with_interval(comparison.two_specimens)}",
+                ),
+            ]
         return rows
 
     def tables(self) -> list[Table]:
@@ -89,13 +97,6 @@ class LivesView(View):
         from wearsim.studies.life.panels import lives_sheet  # noqa: PLC0415  (only of figures)
 
         return lives_sheet(self.results, self.labels)
-
-
-def lives_view(
-    results: Sequence[LifeResult], labels: Sequence[str], observable: str | None
-) -> View:
-    """Return the view of several designs; there is one observable, the life."""
-    return LivesView(results, labels)
 
 
 def _factor(ratio: Interval) -> str:

@@ -35,11 +35,9 @@ _MARGIN = 1.3
 
 def limits_of(scenario: Scenario) -> list[Limit]:
     """Return the limits of a scenario, in the order of its table."""
-    limits = []
-    for key, value in scenario.limit.given.items():
-        name = key.replace("_", " ")
-        limits.append(Limit(name, value, name, scenario.outputs.width_threshold))
-    return limits
+    named = ((key.replace("_", " "), value) for key, value in scenario.limit.given.items())
+    threshold = scenario.outputs.width_threshold
+    return [Limit(name, value, name, threshold) for name, value in named]
 
 
 def first_length(scenario: Scenario, fixed: Mapping[str, float], most: float) -> float:

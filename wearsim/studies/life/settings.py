@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.arguments import ArgumentError, checking_argument
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.evolution.limits import OF_LIFE, Limit
 from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import Scenario
@@ -76,27 +76,29 @@ def with_rare_events(
     """
     if not rare:
         return settings
-    if settings.target is None:
-        raise ValueError("rare events need a target, the life of which the probability is small")
-    if settings.alone:
-        raise ValueError(
-            f"{settings.factor} is integrated exactly, and nothing else is random: any probability"
-            " is known without further tests"
-        )
-    if precision is not None:
-        raise ValueError("rare events go with a fixed number of realisations, not a precision")
-    if rare < LEAST_TESTS:
-        raise ValueError(f"rare events take {LEAST_TESTS} tests or more, got {rare}")
-    if method not in RARE_METHODS:
-        raise ValueError(f"'{method}' is not a method, expected one of {', '.join(RARE_METHODS)}")
     drawn = [item for item in scenario.random if not item.is_redrawn and item.role != "process"]
-    if not drawn:
-        raise ValueError("rare events need an input that is drawn once per test or roller")
-    if not shifted_inputs(scenario, settings.factor):
-        if method == "importance":
-            raise ValueError("no random input of one number per test can be shifted; use subset")
-        method = "subset"
-    return replace(settings, rare=rare, rare_method=method)
+    can_shift = bool(shifted_inputs(scenario, settings.factor))
+    obstacles = {
+        "rare events need a target, the life of which the probability is small": (
+            settings.target is None
+        ),
+        f"{settings.factor} is integrated exactly, and nothing else is random: any probability is"
+        " known without further tests": settings.alone,
+        "rare events go with a fixed number of realisations, not a precision": (
+            precision is not None
+        ),
+        f"rare events take {LEAST_TESTS} tests or more, got {rare}": rare < LEAST_TESTS,
+        f"'{method}' is not a method, expected one of {', '.join(RARE_METHODS)}": (
+            method not in RARE_METHODS
+        ),
+        "rare events need an input that is drawn once per test or roller": not drawn,
+        "no random input of one number per test can be shifted; use subset": (
+            method == "importance" and not can_shift
+        ),
+    }
+    if text := next((text for text, holds in obstacles.items() if holds), ""):
+        raise ValueError(text)
+    return replace(settings, rare=rare, rare_method=method if can_shift else "subset")
 
 
 def results_file(scenario: Scenario) -> Path:
@@ -132,7 +134,7 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
     changed = scenario.changed(changes) if changes else scenario
     if not changed.limit.given:
         what, expected = "is needed for a life", 'one limit or more, such as depth = "50 um"'
-        raise ScenarioError(scenario.file, [Mistake("limit", "", what, "none", expected)])
+        raise mistake_in(scenario.file, what, "none", expected, table="limit")
     return changed
 
 

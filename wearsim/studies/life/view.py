@@ -236,13 +236,13 @@ class LifeView(RealisationsView[LifeResult]):
             }
         lives = {}
         for share in settings.shares:
-            low, high = result.b_error(share)
+            (low, high), life = result.b_error(share), result.uncertain_life(share)
             lives[f"{share:g}"] = {
                 **asdict(result.b(share)),
                 "lower_bound": result.lower_bound(share) if not result.is_exact else None,
                 "numerical_low": low,
                 "numerical_high": high,
-                **self._uncertain(share),
+                **({} if life is None else {"given_tests": asdict(life)}),
             }
         return {
             "title": result.title,
@@ -285,11 +285,6 @@ class LifeView(RealisationsView[LifeResult]):
             **self.ending(),
             "warnings": list(result.warnings),
         }
-
-    def _uncertain(self, share: float) -> dict[str, Any]:
-        """Return predictive and plug-in life and their uncertainty; nothing without a posterior."""
-        life = self.result.uncertain_life(share)
-        return {} if life is None else {"given_tests": asdict(life)}
 
     def _rare(self) -> dict[str, Any] | None:
         if self.result.rare is None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.csv_tables import TextRow, read_texts, refuse_mistakes
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, mistake_in
 from wearsim.types import BoolArray
 from wearsim.units import QuantityError, conversion
 from wearsim.uq.survival.returns import Fleet
@@ -165,8 +165,7 @@ def read_returns(file: str | Path, designs: Sequence[UnitsOf]) -> Returns:
         text = Path(file).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         cause = error.strerror if isinstance(error, OSError) else "it is not text in UTF-8"
-        mistake = Mistake("", "", f"the file cannot be read ({cause})")
-        raise ScenarioError(str(file), [mistake]) from error
+        raise mistake_in(str(file), f"the file cannot be read ({cause})") from error
     units, rows = read_texts(text)
     reader = _Reader(units, designs)
     if not rows:

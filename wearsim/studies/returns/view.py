@@ -73,8 +73,10 @@ class FieldReturnsView(DesignsView):
                 _life(life(10.0, number).interval, f" {result.unit}")
                 for life in (result.before, result.after)
             )
-            rows.append(Row(f"B10 after{of}", f"{after} {given} and {units}"))
-            rows.append(Row(f"B10 before{of}", f"{before} {given}"))
+            rows += [
+                Row(f"B10 after{of}", f"{after} {given} and {units}"),
+                Row(f"B10 before{of}", f"{before} {given}"),
+            ]
             target = result.designs[number].target
             if target is not None:
                 name = f"P(life < {count(target)} {result.unit}){of}"
@@ -346,8 +348,10 @@ def _survival(result: FieldReturns) -> Panel:
         ):
             chances = [lives.probability_before(float(end)) for end in life]
             value, high, low = 1.0 - arrays_of(chances)
-            marks.append(Band(life, low, high, colour=shade, alpha=alpha))
-            marks.append(Line(life, value, colour=shade, label=f"{name}{text}"))
+            marks += [
+                Band(life, low, high, colour=shade, alpha=alpha),
+                Line(life, value, colour=shade, label=f"{name}{text}"),
+            ]
         chosen = fleet.design == number
         ends = np.where(fleet.failed, fleet.high, fleet.low)[chosen]
         curve = survival_curve(ends, fleet.failed[chosen])
@@ -403,8 +407,10 @@ def _remaining(result: FieldReturns) -> Panel:
     for place, (share, colour) in enumerate(zip(SHARES, several_colours(len(SHARES)), strict=True)):
         value, low, high = arrays_of(unit.remaining.lives[place] for unit in result.running)
         high = np.where(np.isfinite(high), high, np.nan)
-        marks.append(Whiskers(age, low, high, colour=colour))
-        marks.append(dots(age, value, "o", colour=colour, label=f"B{share:g}"))
+        marks += [
+            Whiskers(age, low, high, colour=colour),
+            dots(age, value, "o", colour=colour, label=f"B{share:g}"),
+        ]
     x, y = (Axis(name, result.unit, 1.0, limits=(0.0, None)) for name in ("age", "further life"))
     return Panel(
         title,

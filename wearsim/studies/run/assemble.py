@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wearsim.errors import CapabilityError, Mistake, ScenarioError
+from wearsim.errors import CapabilityError, Mistake, ScenarioError, mistake_in
 from wearsim.evolution.error_estimates import half_quadrature, volume_of
 from wearsim.evolution.fatigue import Fatigue
 from wearsim.evolution.problem import WearProblem
@@ -90,7 +90,7 @@ def _check_spring(setup: Setup) -> None:
         what = f"unloads the roller, whose load cannot be followed by contact.model = '{model}'"
         got = in_engineers_unit(stiffness, "N/m")
         remedy = "contact.model = 'slender', a softer spring or a shorter test"
-        raise ScenarioError(scenario.file, [Mistake("load", "stiffness", what, got, remedy)])
+        raise mistake_in(scenario.file, what, got, remedy, table="load", key="stiffness")
 
 
 def build_stepper(scenario: Scenario, name: str) -> Stepper:
@@ -193,9 +193,11 @@ def assemble_problem(
         raise ScenarioError(scenario.file, [mistake])
     stepper = build_stepper(scenario, name)
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not setup.passes):
-        raise ScenarioError(
+        raise mistake_in(
             scenario.file,
-            [Mistake("evolution", "nodes", "has no meaning without an expectation over passes")],
+            "has no meaning without an expectation over passes",
+            table="evolution",
+            key="nodes",
         )
     place = {number: k for k, number in enumerate(first)}
     problem = replace(
@@ -216,9 +218,14 @@ def assemble_problem(
         growth=growth,
     )
     if setup.passes and stepper.pass_by_pass and scenario.fatigue is not None:
-        what = "cannot follow damage by inputs drawn at every pass, which no contact represents"
-        mistake = Mistake("evolution", "stepper", what, "per-pass", "another stepper")
-        raise ScenarioError(scenario.file, [mistake])
+        raise mistake_in(
+            scenario.file,
+            "cannot follow damage by inputs drawn at every pass, which no contact represents",
+            "per-pass",
+            "another stepper",
+            table="evolution",
+            key="stepper",
+        )
     if setup.passes and stepper.pass_by_pass:
         nodes = PassQuadrature(problem, setup).with_nodes(minimum_nodes(setup.passes))
         stepper = PerPassStepper(redrawing(scenario, setup.passes), nodes)

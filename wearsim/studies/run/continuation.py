@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wearsim.errors import Mistake, ResultsFileError, ScenarioError
+from wearsim.errors import ResultsFileError, ScenarioError, mistake_in
 from wearsim.evolution.limits import OF_FATIGUE, SAME_VALUE, Limit
 from wearsim.evolution.state import WearState
 from wearsim.scenario import Scenario, parse_scenario
@@ -43,9 +43,11 @@ def with_end(scenario: Scenario, limit: Limit | None) -> tuple[Scenario, Limit |
     """
     if limit is None or limit.quantity not in {"time", "passes"}:
         return scenario, limit
-    override: dict[str, object] = {"operation.duration": f"{limit.value!r} s"}
-    if limit.quantity == "passes":
-        override = {"operation.passes": round(limit.value)}
+    override: dict[str, object] = (
+        {"operation.passes": round(limit.value)}
+        if limit.quantity == "passes"
+        else {"operation.duration": f"{limit.value!r} s"}
+    )
     ended = parse_scenario(scenario.text, scenario.file, scenario.files.__getitem__, override)
     if ended.total_passes < scenario.total_passes:
         # a time is rounded to whole passes, as the duration of a scenario
@@ -90,9 +92,8 @@ def written_value(limit: Limit, value: float) -> str:
         return f"{value:.0f} passes"
     if limit.quantity in OF_FATIGUE:
         return f"{limit.quantity} {value:.6g}"
-    text = in_engineers_unit(value, limit.unit, 6)
-    if limit.unit == "m":
-        text = f"{value * 1e6:.6g} um"
+    length = f"{value * 1e6:.6g} um"
+    text = length if limit.unit == "m" else in_engineers_unit(value, limit.unit, 6)
     return text if limit.quantity == "time" else f"{limit.quantity} {text}"
 
 
@@ -123,8 +124,9 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
         reaches it, as forecast.
     """
     if limit.quantity in OF_FATIGUE and scenario.fatigue is None:
-        what, remedy = "needs the fatigue of the bodies", "a table [fatigue] in the scenario"
-        raise _refusal(scenario, limit, what, remedy)
+        raise _refusal(
+            scenario, limit, "needs the fatigue of the bodies", "a table [fatigue] in the scenario"
+        )
     if limit.quantity in {"time", "passes", *OF_FATIGUE}:
         return []
     roller, deep = scenario.roller, DEEPEST * scenario.roller.radius
@@ -151,11 +153,19 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
     if limit.quantity == "peak pressure":
         greatest = max(fresh[name], end[name])
         if limit.value > PRESSURE * greatest:
-            text = f"is far above the pressures of the test, {greatest / 1e6:.4g} MPa at most"
-            raise _refusal(scenario, limit, text, "a lower pressure")
+            raise _refusal(
+                scenario,
+                limit,
+                f"is far above the pressures of the test, {greatest / 1e6:.4g} MPa at most",
+                "a lower pressure",
+            )
         if limit.value <= fresh[name]:
-            text = "is below the pressure of the unworn contact, where the test would end at once"
-            raise _refusal(scenario, limit, text, f"above {fresh[name] / 1e6:.4g} MPa")
+            raise _refusal(
+                scenario,
+                limit,
+                "is below the pressure of the unworn contact, where the test would end at once",
+                f"above {fresh[name] / 1e6:.4g} MPa",
+            )
         if limit.value <= greatest:
             return []
         course = f"{fresh[name] / 1e6:.3g} MPa at the start and about {end[name] / 1e6:.3g} MPa"
@@ -176,5 +186,4 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
 
 
 def _refusal(scenario: Scenario, limit: Limit, what: str, expected: str) -> ScenarioError:
-    mistake = Mistake("", "the limit of the run (until)", what, limit.text, expected)
-    return ScenarioError(scenario.file, [mistake])
+    return mistake_in(scenario.file, what, limit.text, expected, key="the limit of the run (until)")

@@ -8,8 +8,9 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import scipy
 
-from wearsim.errors import CapabilityError, Mistake, ScenarioError
+from wearsim.errors import CapabilityError, mistake_in
 from wearsim.evolution.quantities import Varying
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.plugins import Process
@@ -49,17 +50,13 @@ def draw(scenario: Scenario) -> Setup:
     if not scenario.random:
         return Setup(scenario)
     if scenario.sampling.plan == "latin-hypercube":
-        raise ScenarioError(
+        raise mistake_in(
             scenario.file,
-            [
-                Mistake(
-                    "sampling",
-                    "plan",
-                    "a Latin hypercube requires a study of many realisations, and a run is one",
-                    '"latin-hypercube"',
-                    '"monte-carlo" or "sobol"',
-                )
-            ],
+            "a Latin hypercube requires a study of many realisations, and a run is one",
+            '"latin-hypercube"',
+            '"monte-carlo" or "sobol"',
+            table="sampling",
+            key="plan",
         )
     return Drawer(scenario, scenario.sampling.plan).draw(scenario.sampling.realisation)
 
@@ -210,28 +207,32 @@ class Drawer:
             for name, numbers in self._changed(first + place).items():
                 uniforms[name][place] = numbers
         if self._shift:
-            from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
-
             for name, shift in self._shift.items():
                 uniforms[name] = np.clip(
-                    ndtr(ndtri(uniforms[name]) + shift), 1.0 - BELOW_ONE, BELOW_ONE
+                    scipy.special.ndtr(scipy.special.ndtri(uniforms[name]) + shift),
+                    1.0 - BELOW_ONE,
+                    BELOW_ONE,
                 )
         return uniforms
 
     def _changed(self, realisation: int) -> dict[str, FloatArray]:
         """Return the uniform numbers of a realisation that is a change of others, (dimension,)."""
-        from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
-
         line = [realisation]
         while line[-1] in self._changes:
             line.append(self._changes[line[-1]][0])
         scores: dict[str, FloatArray] = {}
         for number in reversed(line):
-            fresh = {name: ndtri(u[0]) for name, u in self._sampler.uniforms(number, 1).items()}
+            fresh = {
+                name: scipy.special.ndtri(u[0])
+                for name, u in self._sampler.uniforms(number, 1).items()
+            }
             _, scale = self._changes.get(number, (number, 1.0))
             part = math.sqrt(1.0 - scale**2)
             scores = {n: part * scores[n] + scale * z if scores else z for n, z in fresh.items()}
-        return {name: np.clip(ndtr(z), 1.0 - BELOW_ONE, BELOW_ONE) for name, z in scores.items()}
+        return {
+            name: np.clip(scipy.special.ndtr(z), 1.0 - BELOW_ONE, BELOW_ONE)
+            for name, z in scores.items()
+        }
 
     def columns(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the values drawn for whole tests and rollers in consecutive realisations.
@@ -281,18 +282,13 @@ def _paths(scenario: Scenario, item: RandomInput, realisation: int) -> list[Vary
     points = int(np.ceil(scenario.total_time / process.spacing)) + 2
     if points > LONGEST_PATH:
         table, key = item.name.rsplit(".", 1)
-        raise ScenarioError(
+        raise mistake_in(
             scenario.file,
-            [
-                Mistake(
-                    table,
-                    key,
-                    f"the process would take {points:,} steps of {process.spacing:.3g} s over the"
-                    " test",
-                    None,
-                    'a longer correlation_time, or persistence = "per-pass" instead of a process',
-                )
-            ],
+            f"the process would take {points:,} steps of {process.spacing:.3g} s over the test",
+            None,
+            'a longer correlation_time, or persistence = "per-pass" instead of a process',
+            table=table,
+            key=key,
         )
     rollers = tuple(range(scenario.operation.rollers))
     groups = [rollers] if item.persistence == "per-test" else [(r,) for r in rollers]

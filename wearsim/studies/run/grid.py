@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.evolution.strips import JOINED, LEAST_LOADED, Growth, Surfaces, same_strips
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
@@ -192,17 +192,13 @@ def strips_of_run(setup: Setup) -> Grid:
         width = min(width, max(2.0 * fresh, size / per_half_width * at_start))
     strips = choice.strips or strips_over(width, size, tolerance, resolved)
     if width < 2.0 * (setup.shift + patch.b):
-        raise ScenarioError(
+        raise mistake_in(
             scenario.file,
-            [
-                Mistake(
-                    "contact",
-                    "width",
-                    "the initial contact does not fit",
-                    f"{width * 1e3:.4g} mm",
-                    f"at least {2e3 * (setup.shift + patch.b):.4g} mm",
-                )
-            ],
+            "the initial contact does not fit",
+            f"{width * 1e3:.4g} mm",
+            f"at least {2e3 * (setup.shift + patch.b):.4g} mm",
+            table="contact",
+            key="width",
         )
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, strips)
 
@@ -340,17 +336,13 @@ def realisation_grid(setup: Setup, load: float, loads: FloatArray, centres: Floa
     if choice.width is not None:
         needed = 2.0 * float((away + half_widths).max())
         if choice.width < needed * (1.0 - _MARGIN):
-            raise ScenarioError(
+            raise mistake_in(
                 scenario.file,
-                [
-                    Mistake(
-                        "contact",
-                        "width",
-                        "the contacts of all realisations do not fit",
-                        f"{choice.width * 1e3:.4g} mm",
-                        f"at least {needed * 1e3:.4g} mm",
-                    )
-                ],
+                "the contacts of all realisations do not fit",
+                f"{choice.width * 1e3:.4g} mm",
+                f"at least {needed * 1e3:.4g} mm",
+                table="contact",
+                key="width",
             )
     if choice.width is not None or setup.start_extent is not None:
         return contact_grid(setup, load)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import ScenarioError, mistake_in
 from wearsim.models.loads import FollowerLoad
 from wearsim.quantities import InputFile
 from wearsim.scenario import RandomInput, Scenario
@@ -88,4 +88,4 @@ def load_file(scenario: Scenario) -> tuple[str, str] | None:
 def _load_mistake(scenario: Scenario, what: str, got: str, expected: str) -> ScenarioError:
     """Return the error of a load, which names the file that the load reads."""
     key, file = load_file(scenario) or ("kind", scenario.load.kind)
-    return ScenarioError(scenario.file, [Mistake("load", key, f"{file}: {what}", got, expected)])
+    return mistake_in(scenario.file, f"{file}: {what}", got, expected, table="load", key=key)

@@ -306,9 +306,8 @@ class RowMoments:
 
     def mean_and_std(self) -> tuple[FloatArray, FloatArray]:
         """Return mean and standard deviation of the rows so far, each (columns,); nan for one."""
-        count, mean, square = self._merged
-        if self._held:
-            count, mean, square = _merge(self._merged, self._waiting[: self._held])
+        waiting = self._waiting[: self._held]
+        count, mean, square = _merge(self._merged, waiting) if self._held else self._merged
         if count < 2:
             return mean, np.full_like(mean, np.nan)
         return mean, np.sqrt(square / (count - 1))

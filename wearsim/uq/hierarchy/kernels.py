@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from wearsim.types import FloatArray
 
@@ -78,13 +79,11 @@ class LikelihoodMixture:
 
     def quantile(self, probability: FloatArray) -> FloatArray:
         """Return quantiles of ln K for a flat prior, shape as `probability`."""
-        from scipy.special import ndtr  # noqa: PLC0415  (slow to import)
-
         reach = REACH * np.sqrt(self.variance)
         grid = np.linspace(self.mean - reach, self.mean + reach, 4001)
         below = np.zeros_like(grid)
         for weight, centre, std in zip(self.weight, self.centre, self.std, strict=True):
-            below += weight * ndtr((grid - centre) / std)
+            below += weight * scipy.special.ndtr((grid - centre) / std)
         return np.interp(probability, below, grid)
 
     def deviations(self, uniform: FloatArray) -> FloatArray:
@@ -95,11 +94,11 @@ class LikelihoodMixture:
         uniform : ndarray, shape (2, ...)
             Uniform numbers that choose the part and the value within it.
         """
-        from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
-
         bound = np.cumsum(self.weight)
         part = np.minimum(np.searchsorted(bound, uniform[0]), len(bound) - 1)
-        return np.asarray(self.mean - self.centre[part] + self.std[part] * ndtri(uniform[1]))
+        return np.asarray(
+            self.mean - self.centre[part] + self.std[part] * scipy.special.ndtri(uniform[1])
+        )
 
     def table(self, scatter: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the logarithm of the density of the apparent ln K about the mean m.

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
+import scipy
 
 from wearsim.types import BoolArray, FloatArray
 from wearsim.uq.hierarchy.kernels import LikelihoodMixture
@@ -44,10 +45,8 @@ def simulated_centres(
     -------
     ndarray, shape (sets, tests)
     """
-    from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
-
     numbers = Stream(seed, name, "test").rows(0, sets, 3 * tests).reshape(sets, 3, tests)
-    centres = t * ndtri(numbers[:, 0])
+    centres = t * scipy.special.ndtri(numbers[:, 0])
     for test in range(tests):
         centres[:, test] += kernels[test % len(kernels)].deviations(numbers[:, 1:, test].T)
     return np.asarray(centres)
@@ -167,13 +166,11 @@ class Power:
         Between numbers in the ratio 2 the power is interpolated: its normal quantile against the
         logarithm of the number.
         """
-        from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
-
         low, below, tests = 1, ALPHA, 2
         while (rate := self.rates(tests, t)[0]) < power:
             if tests >= most:
                 return None
             low, below, tests = tests, max(rate, ALPHA), min(2 * tests, most)
-        ends = ndtri([below, power, min(rate, 0.999)])
+        ends = scipy.special.ndtri([below, power, min(rate, 0.999)])
         part = (ends[1] - ends[0]) / (ends[2] - ends[0])
         return max(int(np.ceil(low * (tests / low) ** part)), 2)

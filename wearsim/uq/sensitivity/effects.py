@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from wearsim.types import FloatArray
 from wearsim.uq.distributions.base import Distribution
@@ -99,20 +100,17 @@ def normal_scores(numbers: FloatArray, law: Distribution | None) -> FloatArray:
         Their distribution. Without it, and where it has jumps, the scores are those of the ranks,
         which know the quantiles of the input less well.
     """
-    from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
-    from scipy.stats import rankdata  # noqa: PLC0415  (slow to load)
-
     if law is not None:
-        values = np.asarray(law.quantile(ndtr(_SCORES)))
+        values = np.asarray(law.quantile(scipy.special.ndtr(_SCORES)))
         if (np.diff(values) > 0.0).all():
             return np.asarray(np.interp(numbers, values, _SCORES))
-    return np.asarray(ndtri((rankdata(numbers, axis=0) - 0.5) / len(numbers)))
+    return np.asarray(
+        scipy.special.ndtri((scipy.stats.rankdata(numbers, axis=0) - 0.5) / len(numbers))
+    )
 
 
 def _fitted(values: FloatArray, designs: Mapping[str, FloatArray]) -> dict[str, SignedEffect]:
     """Return the effects of inputs in one fit."""
-    from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
-
     terms = np.column_stack([np.ones(len(values)), *designs.values()])
     inverse = np.linalg.pinv(terms)
     slopes = inverse @ values
@@ -121,7 +119,7 @@ def _fitted(values: FloatArray, designs: Mapping[str, FloatArray]) -> dict[str, 
     by_input, first = {}, 1
     for name, design in designs.items():
         many, changes = design.shape[1] // 2, []
-        for score in (float(ndtri(TAIL)), -float(ndtri(TAIL))):
+        for score in (float(scipy.special.ndtri(TAIL)), -float(scipy.special.ndtri(TAIL))):
             at = np.zeros(terms.shape[1])
             at[first : first + many], at[first + many : first + 2 * many] = score, score**2
             error = math.sqrt(float(((at @ inverse * left_out) ** 2).sum()))

@@ -86,7 +86,10 @@ def two_specimens(
         grid = _common_grid((first, second), most)
         if len(grid) * max(n, m) > _LARGEST:
             return UNKNOWN
-        first_failed, second_failed = (_with_start(item.failed(grid)) for item in (first, second))
+        # from life 0 on, where nothing has failed
+        first_failed, second_failed = (
+            np.insert(item.failed(grid), 0, 0.0, axis=1) for item in (first, second)
+        )
         alive, fails = (
             1.0 - 0.5 * (first_failed[:, 1:] + first_failed[:, :-1]),
             np.diff(second_failed, axis=1),
@@ -208,11 +211,6 @@ def _ends(design: LifeDistribution) -> list[float]:
     at_once, ever = design.failed(np.array([middle / far, middle * far])).mean(axis=0).tolist()
     levels = (at_once + p * (ever - at_once) for p in (1e-7, 1.0 - 1e-7))
     return [design.quantile_of_mean(level) for level in levels]
-
-
-def _with_start(failed: FloatArray) -> FloatArray:
-    """Return probabilities of failure from life 0 on, where nothing has failed."""
-    return np.concatenate([np.zeros((len(failed), 1)), failed], axis=1)
 
 
 def _weighted_quantile(

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from wearsim.types import FloatArray
 from wearsim.uq.survival.scores import ScoreFunction
@@ -156,18 +157,16 @@ class CompetingRisks:
 
     def _below(self, ratio: FloatArray) -> FloatArray:
         """Return the probability of a factor below `ratio` times the reference, (realisations,)."""
-        from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
-
         assert self.score is not None
-        return np.asarray(ndtr((self.score(ratio * self.reference) - self.shift) / self.spread))
+        return np.asarray(
+            scipy.special.ndtr((self.score(ratio * self.reference) - self.shift) / self.spread)
+        )
 
     def _factors(self, chance: FloatArray) -> FloatArray:
         """Return factors over the reference at probabilities, shape (realisations, nodes)."""
-        from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
-
         assert self.score is not None
         shift = np.broadcast_to(np.asarray(self.shift), self.end.shape)[:, None]
-        score = shift + self.spread * ndtri(np.clip(chance, 1e-300, 1.0 - 1e-16))
+        score = shift + self.spread * scipy.special.ndtri(np.clip(chance, 1e-300, 1.0 - 1e-16))
         return np.asarray(np.exp(self.score.log_quantile(score)) / self.reference)
 
     def _no_pit(self, passes: FloatArray, ratio: FloatArray) -> FloatArray:

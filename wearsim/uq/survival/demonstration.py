@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from wearsim.types import FloatArray
 from wearsim.uq.survival.distributions import FactorMixture, LifeDistribution
@@ -52,13 +53,11 @@ def specimens(confidence: float, survival: FloatArray, failures: int = 0) -> int
     >>> [specimens(0.95, np.array([0.9]), failures) for failures in (0, 1, 2)]
     [29, 46, 61]
     """
-    from scipy.special import bdtr  # noqa: PLC0415  (slow to load)
-
     if not np.isfinite(survival).all():
         return None
 
     def chance(count: int) -> float:
-        return float(bdtr(failures, count, 1.0 - survival).mean())
+        return float(scipy.special.bdtr(failures, count, 1.0 - survival).mean())
 
     low, high = failures, failures + 1
     while chance(high) > 1.0 - confidence:
@@ -81,9 +80,7 @@ def pass_probability(count: int, failures: int, failed: FloatArray) -> FloatArra
     failed : ndarray
         Probability that a specimen fails in the test.
     """
-    from scipy.special import bdtr  # noqa: PLC0415  (slow to load)
-
-    return np.asarray(bdtr(failures, count, failed))
+    return np.asarray(scipy.special.bdtr(failures, count, failed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,19 +104,15 @@ class DrawnLives:
 
     def log_quantile(self, probability: float) -> FloatArray:
         """Return the logarithm of the life that a share does not reach, nan if it is not known."""
-        from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
-
-        score = float(ndtri(probability))
+        score = float(scipy.special.ndtri(probability))
         pairs = zip(self.scores, self.logs, strict=True)
         log = np.array([np.interp(score, *pair, right=math.nan) for pair in pairs])
         return np.where(log - self.shift <= math.log(self.most), log - self.shift, math.nan)
 
     def failed(self, log: FloatArray) -> FloatArray:
         """Return the probability of a shorter life than exp(log) of each draw, shape (draws,)."""
-        from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
-
         items = zip(log + self.shift, self.logs, self.scores, strict=True)
-        chance = ndtr(np.array([np.interp(*item) for item in items]))
+        chance = scipy.special.ndtr(np.array([np.interp(*item) for item in items]))
         return np.where(log <= math.log(self.most), chance, math.nan)
 
 
@@ -174,6 +167,4 @@ def _curves(lives: LifeDistribution) -> tuple[FloatArray, FloatArray]:
 
 
 def _scores(failed: FloatArray) -> FloatArray:
-    from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
-
-    return np.asarray(ndtri(np.clip(failed, 1e-12, 1.0 - 1e-12)))
+    return np.asarray(scipy.special.ndtri(np.clip(failed, 1e-12, 1.0 - 1e-12)))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 
 from wearsim.types import BoolArray, FloatArray
 from wearsim.uq.estimation.intervals import Interval, bisect, t_quantile
@@ -199,12 +200,10 @@ class FactorMixture(LifeDistribution):
 
     def failed(self, life: FloatArray) -> FloatArray:
         """Return each realisation's probability of failure before `life`, (m,) to (count, m)."""
-        from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
-
         with np.errstate(divide="ignore", invalid="ignore"):  # a life of 0 is no failure before it
             factor = self.kappa[:, None] / life
         shift = np.broadcast_to(np.asarray(self.shift), self.kappa.shape)[:, None]
-        return np.asarray(ndtr((shift - self.score(factor)) / self.spread))
+        return np.asarray(scipy.special.ndtr((shift - self.score(factor)) / self.spread))
 
     def error(self, life: float, failed: FloatArray) -> tuple[float, float]:
         """Return the standard error of the mean probability, and its degrees of freedom.
@@ -237,12 +236,10 @@ class FactorMixture(LifeDistribution):
 
     def _predicted(self, life: float, widened: float) -> float:
         """Return the effective number by the fits of ln kappa."""
-        from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
-
         shares = float((self.kappa == 0.0).mean()), float(self.is_finite.mean())
         return predicted_number(
             self._fits.values(widened),
-            lambda log: np.asarray(ndtr(-self.needed_score(log, life))),
+            lambda log: np.asarray(scipy.special.ndtr(-self.needed_score(log, life))),
             shares,
             self.count,
         )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
+import scipy
 
 from wearsim.types import BoolArray, FloatArray
 from wearsim.uq.estimation.intervals import Interval, t_interval
@@ -88,18 +89,16 @@ class FittedLives:
 
 def standard_score(family: Family, probability: float) -> float:
     """Return the standardised logarithm of the life that a share does not reach."""
-    from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
-
     if family == "log-normal":
-        return float(ndtri(probability))
+        return float(scipy.special.ndtri(probability))
     return math.log(-math.log1p(-probability))
 
 
 def standard_probability(family: Family, score: FloatArray) -> FloatArray:
     """Return the probability of a smaller standardised logarithm, shape as `score`."""
-    from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
-
-    return np.asarray(ndtr(score) if family == "log-normal" else -np.expm1(-np.exp(score)))
+    return np.asarray(
+        scipy.special.ndtr(score) if family == "log-normal" else -np.expm1(-np.exp(score))
+    )
 
 
 @dataclass(frozen=True)
@@ -128,8 +127,6 @@ class LifeFit(FittedLives):
         -----
         Meeker and Escobar, Statistical Methods for Reliability Data (1998), section 8.3.
         """
-        from scipy.optimize import brentq  # noqa: PLC0415  (slow to load)
-
         w = standard_score(self.family, probability)
         best = self.mu + self.sigma * w
         _, gradient, curvature = self.sample.derivatives(best, math.log(self.sigma), w)
@@ -148,7 +145,11 @@ class LifeFit(FittedLives):
             while excess(far) < 0.0 and abs(far) < _WIDEST:
                 far *= 2.0
             inside = abs(far) < _WIDEST
-            at = brentq(excess, 0.5 * far if abs(far) > 1.0 else 0.0, far) if inside else math.nan
+            at = (
+                scipy.optimize.brentq(excess, 0.5 * far if abs(far) > 1.0 else 0.0, far)
+                if inside
+                else math.nan
+            )
             ends.append(
                 math.exp(best + at * error) if inside else (0.0 if side < 0.0 else math.inf)
             )
@@ -223,9 +224,7 @@ class _Sample:
 
 def _normal(z: FloatArray, observed: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return log density, or log survival where censored, with two derivatives."""
-    from scipy.special import log_ndtr  # noqa: PLC0415  (slow to load)
-
-    survival = log_ndtr(-z)
+    survival = scipy.special.log_ndtr(-z)
     density = -0.5 * z * z - 0.5 * math.log(2.0 * math.pi)
     hazard = np.exp(density - survival)
     return (

@@ -87,10 +87,13 @@ def _simulated(family: Family, count: int, end: float) -> FloatArray:
     values = np.minimum(drawn, end)
     kept = observed.sum(axis=1) >= 2
     location, scale = _fitted(family, values[kept], observed[kept])
-    statistics = []
-    for row, seen, mu, sigma in zip(values[kept], observed[kept], location, scale, strict=True):
-        statistics.append(_statistic(family, (row[seen] - mu) / sigma, count, (end - mu) / sigma))
-    return np.array(statistics)
+    fitted = zip(values[kept], observed[kept], location, scale, strict=True)
+    return np.array(
+        [
+            _statistic(family, (row[seen] - mu) / sigma, count, (end - mu) / sigma)
+            for row, seen, mu, sigma in fitted
+        ]
+    )
 
 
 def _fitted(

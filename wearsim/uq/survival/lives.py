@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 
 from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim.uq.estimation.intervals import CONFIDENCE, UNKNOWN, Interval
@@ -62,12 +63,12 @@ def survival_curve(life: FloatArray, observed: BoolArray) -> SurvivalCurve:
     >>> curve.survival
     array([0.75, 0.5 , 0.25])
     """
-    from scipy.stats import CensoredData, ecdf  # noqa: PLC0415  (slow to load)
-
     if not observed.any():
         none = np.zeros(0)
         return SurvivalCurve(none, none, none, none)
-    function = ecdf(CensoredData(uncensored=life[observed], right=life[~observed])).sf
+    function = scipy.stats.ecdf(
+        scipy.stats.CensoredData(uncensored=life[observed], right=life[~observed])
+    ).sf
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # undefined where the survival is 0 or 1
         band = function.confidence_interval(CONFIDENCE, method="log-log")
@@ -109,13 +110,11 @@ def proportion(count: int, of: int, confidence: float = CONFIDENCE) -> Interval:
     >>> print(f"{found.high:.4f}")
     0.0362
     """
-    from scipy.special import betaincinv  # noqa: PLC0415  (slow to load)
-
     if of == 0:
         return UNKNOWN
     miss = 0.5 * (1.0 - confidence)
-    low = float(betaincinv(count, of - count + 1, miss)) if count else 0.0
-    high = float(betaincinv(count + 1, of - count, 1.0 - miss)) if count < of else 1.0
+    low = float(scipy.special.betaincinv(count, of - count + 1, miss)) if count else 0.0
+    high = float(scipy.special.betaincinv(count + 1, of - count, 1.0 - miss)) if count < of else 1.0
     return Interval(count / of, low, high)
 
 
@@ -146,10 +145,8 @@ def median_positions(count: int) -> FloatArray:
     >>> median_positions(5).round(4)
     array([0.1294, 0.3138, 0.5   , 0.6862, 0.8706])
     """
-    from scipy.special import betaincinv  # noqa: PLC0415  (slow to load)
-
     rank = np.arange(1.0, count + 1.0)
-    return np.asarray(betaincinv(rank, count + 1.0 - rank, 0.5))
+    return np.asarray(scipy.special.betaincinv(rank, count + 1.0 - rank, 0.5))
 
 
 def median_rank(count: int, probability: float) -> float:

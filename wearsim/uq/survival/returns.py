@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from wearsim.types import BoolArray, FloatArray, IntArray
 from wearsim.uq.distributions.two_levels import TwoLevels
@@ -73,9 +74,6 @@ class LifeFunctions:
     """
 
     def __init__(self, lives: FactorMixture, t: float, count: int = _NODES) -> None:
-        from scipy.interpolate import CubicHermiteSpline, PPoly  # noqa: PLC0415  (slow to load)
-        from scipy.special import log_ndtr  # noqa: PLC0415
-
         with np.errstate(divide="ignore"):
             log = np.log(lives.kappa)
         finite, reach = log[np.isfinite(log)], _REACH * t
@@ -87,16 +85,21 @@ class LifeFunctions:
         density = _log_mean(exponent)
         part = np.exp(exponent - density[:, None]) / lives.count
         density -= math.log(scatter * math.sqrt(2.0 * math.pi))
-        failed, survived = _log_mean(log_ndtr(z)), _log_mean(log_ndtr(-z))
+        failed, survived = (
+            _log_mean(scipy.special.log_ndtr(z)),
+            _log_mean(scipy.special.log_ndtr(-z)),
+        )
         slopes = [
             np.exp(density - failed),
             -np.exp(density - survived),
             -(part * inside).sum(axis=1) / scatter,
         ]
         values = np.stack([failed, survived, density], axis=1)
-        spline = CubicHermiteSpline(nodes, values, np.stack(slopes, axis=1))
+        spline = scipy.interpolate.CubicHermiteSpline(nodes, values, np.stack(slopes, axis=1))
         self._ends = nodes[0], nodes[-1]
-        self._splines = [PPoly.construct_fast(spline.c[..., k], nodes) for k in range(3)]
+        self._splines = [
+            scipy.interpolate.PPoly.construct_fast(spline.c[..., k], nodes) for k in range(3)
+        ]
 
     def failed(self, log: FloatArray) -> FloatArray:
         """Return ln P(life < n), shape as `log`."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 
 from wearsim.types import FloatArray
 from wearsim.uq.distributions.two_levels import TwoLevels, weighted_quantiles
@@ -124,13 +125,11 @@ class UncertainLives:
 
     def _failed(self, log: FloatArray) -> FloatArray:
         """Return the probability of a life below exp(log), m = 0, shape (scatters, count)."""
-        from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
-
         mixture, t = self.mixture, self.scatters[:, None]
         with np.errstate(divide="ignore"):
             kappa = np.log(mixture.kappa)
         moved = log[:, None] + t * mixture.shift - kappa
-        return np.asarray(ndtr(moved / (t * mixture.spread)))
+        return np.asarray(scipy.special.ndtr(moved / (t * mixture.spread)))
 
     def _crossings(self, level: FloatArray) -> FloatArray:
         """Return ln life, m = 0, at which the mean probability of each scatter reaches a level."""
@@ -165,14 +164,12 @@ class UncertainLives:
 
     def probabilities(self, life: FloatArray) -> FloatArray:
         """Return the probability of a life below each of `life` for all (m, t), shape (rows, m)."""
-        from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
-
         with np.errstate(divide="ignore"):
             log = self.levels.m[:, None] + np.log(life)
         failed = np.empty_like(log)
         for place, (nodes, scores) in enumerate(zip(*self._table, strict=True)):
             rows = self._owner == place
-            failed[rows] = ndtr(np.interp(log[rows], nodes, scores))
+            failed[rows] = scipy.special.ndtr(np.interp(log[rows], nodes, scores))
         return failed
 
     @cached_property
@@ -181,12 +178,10 @@ class UncertainLives:
 
         Both have the shape (scatters, nodes).
         """
-        from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
-
         reach = _REACH * self.scatters
         nodes = np.linspace(self._logs.min() - reach, self._logs.max() + reach, _NODES, axis=1)
         chances = np.array([self._failed(column).mean(axis=1) for column in nodes.T]).T
-        return nodes, ndtri(np.clip(chances, _LEAST, 1.0 - 2.0**-53))
+        return nodes, scipy.special.ndtri(np.clip(chances, _LEAST, 1.0 - 2.0**-53))
 
 
 def _with_errors(

@@ -100,7 +100,9 @@ def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:
         sizes = _parts(settings.rare // _IMPROVING, [1.0] * len(points))
         return _stages(settings.plain, sizes, names, points)
     counts = [len(places) for places, _ in drawn]
-    shifts = [_shift_of(stage, names) for stage in (plain, *stages)]
+    shifts = [
+        np.array([stage["shift"].get(name, 0.0) for name in names]) for stage in (plain, *stages)
+    ]
     weights = np.exp(mixture_log_weights(scores, [n / sum(counts) for n in counts], shifts))
     event = mixture.failed(np.array([target / settings.per_unit]))[:, 0]
     means, parts = improved_shifts(scores, weights * event, shifts[1:])
@@ -136,10 +138,6 @@ def _stage_scores(
     drawer = Drawer(result.scenario, "monte-carlo", shift=stage["shift"])
     good = np.flatnonzero(result.raw.status[first : first + count] == DONE)
     return first + good, drawn_scores(drawer, names, first, count)[good]
-
-
-def _shift_of(stage: dict[str, Any], names: list[str]) -> FloatArray:
-    return np.array([stage["shift"].get(name, 0.0) for name in names])
 
 
 def _parts(total: int, shares: Sequence[float]) -> list[int]:
