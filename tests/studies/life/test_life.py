@@ -18,6 +18,7 @@ from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.ensemble.file.parts import read_ensemble
 from wearsim.studies.life.api import life, sweep_life
 from wearsim.studies.life.comparison import swept_variable as against
+from wearsim.studies.life.comparison_view import LivesView
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.realisation import LifeRunner
 from wearsim.studies.life.result import LifeResult
@@ -296,6 +297,12 @@ def test_designs_are_compared_with_common_draws(exact: LifeResult, tmp_path: Pat
     short = lives(tmp_path / "short.h5", most=2000).compare(exact)
     assert 0.0 < short.two_specimens.low < short.two_specimens.high < 1.0
     assert short.b10_ratio.value == pytest.approx(1.0, rel=5e-3)
+    low, high = found.b10_ratio_bounds
+    assert low < found.b10_ratio.value < high
+    widths = [math.log(most / least) for least, most in (wider.b_error(10), exact.b_error(10))]
+    assert math.log(high / low) == pytest.approx(sum(widths))
+    rows = LivesView([exact, exact], ["one", "same"]).rows()
+    assert "leave open which is longer" in str(rows[0])
     other = lives(tmp_path / "seed.h5", design().changed({"seed": 5}))
     assert other.compare(exact).same_machine is None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from wearsim.uq.survival.distributions import (
     FactorMixture,
     LifeDistribution,
 )
+
+if TYPE_CHECKING:
+    from wearsim.studies.life.result import LifeResult
 
 
 @dataclass(frozen=True)
@@ -36,12 +39,15 @@ class LifeComparison:
         Probability that a specimen of the first outlives one of the second, drawn separately.
     count : int
         Number of pairs.
+    b10_ratio_bounds : tuple of float
+        Least and greatest ratio of B10 within the numerical errors of both lives.
     """
 
     b10_ratio: Interval
     same_machine: Interval | None
     two_specimens: Interval
     count: int
+    b10_ratio_bounds: tuple[float, float] = (math.nan, math.nan)
 
 
 class _Pair(NamedTuple):
@@ -98,7 +104,7 @@ def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
     return CountedLives(distribution.life[places])
 
 
-def compare_lives(first: LifeValues, second: LifeValues, share: float = 0.1) -> LifeComparison:
+def compare_lives(first: LifeResult, second: LifeResult, share: float = 0.1) -> LifeComparison:
     """Return the comparison of two designs, with `b10_ratio` for lives at a share of failures.
 
     Raises
@@ -117,12 +123,20 @@ def compare_lives(first: LifeValues, second: LifeValues, share: float = 0.1) -> 
         machine = same_machine(*pair.lives, pair.most)
         if first.settings.alone and second.settings.alone:  # for any wear factor
             machine = Interval(machine.value, machine.value, machine.value)
+    bounds = [item.b_error(100.0 * share) for item in (first, second)]
     return LifeComparison(
         quantile_ratio(*pair.distributions, share, pair.most, pair.paired),
         machine,
         two_specimens(*pair.distributions, pair.most, pair.paired),
         pair.common,
+        _ratios(*bounds),
     )
+
+
+def _ratios(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
+    """Return the least and greatest ratio of two ranges of positive numbers."""
+    (low, high), (least, most) = first, second
+    return (low / most if most > 0.0 else math.nan, high / least if least > 0.0 else math.inf)
 
 
 def swept_variable(results: Sequence[Any]) -> DesignVariable | None:

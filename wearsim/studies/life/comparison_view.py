@@ -57,6 +57,7 @@ class LivesView(View):
         for label, comparison in zip(self.labels[1:], self.compared, strict=True):
             of = "" if len(self.compared) == 1 else f", {first} against {label}"
             ratio = f"{first} has {_factor(comparison.b10_ratio)} times the B10 of {label}"
+            ratio += _numerical(*comparison.b10_ratio_bounds)
             same = comparison.same_machine
             rows += [
                 Row(f"B10 ratio{of}", ratio),
@@ -107,12 +108,21 @@ def _factor(ratio: Interval) -> str:
     return with_ends(ratio, "{:.3f}".format)
 
 
+def _numerical(low: float, high: float) -> str:
+    """Return the range of a ratio within numerical errors as a part of a sentence."""
+    if not math.isfinite(low + high):
+        return ""
+    text = f"; {low:.3f} to {high:.3f} within the numerical errors of both lives"
+    return text + (", which leave open which is longer" if low < 1.0 < high else "")
+
+
 def _comparison(comparison: LifeComparison) -> dict[str, Any]:
     return {
         "b10_ratio": asdict(comparison.b10_ratio),
         "same_machine": asdict(comparison.same_machine) if comparison.same_machine else None,
         "two_specimens": asdict(comparison.two_specimens),
         "pairs": comparison.count,
+        "b10_ratio_bounds": list(comparison.b10_ratio_bounds),
     }
 
 
