@@ -5,9 +5,8 @@ from __future__ import annotations
 import doctest
 import inspect
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import pytest
@@ -50,38 +49,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def results() -> dict[object, Any]:
-    """Return the results of examples that write no file, by scenario and arguments."""
-    return {}
-
-
-def computed_once(function: Callable[..., Any], results: dict[object, Any]) -> Callable[..., Any]:
-    """Return a function that gives the same result for the same scenario and arguments."""
-
-    def call(scenario: Any, *arguments: Any, **options: Any) -> Any:
-        if options or not isinstance(scenario, str) or any(isinstance(a, str) for a in arguments):
-            return function(scenario, *arguments, **options)
-        key = function.__name__, Path(scenario).read_text(), repr(arguments)
-        if key not in results:
-            results[key] = function(scenario, *arguments)
-        return results[key]
-
-    return call
-
-
 @pytest.mark.parametrize("name", DOCUMENTED)
 def test_examples_run_as_printed(
-    name: str,
-    files: Path,
-    results: dict[object, Any],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    name: str, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(files, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    for function in (wearsim.run, wearsim.identify):  # whose results many examples begin with
-        monkeypatch.setattr(wearsim, function.__name__, computed_once(function, results))
     text = inspect.getdoc(DOCUMENTED[name]) or ""
     example = doctest.DocTestParser().get_doctest(text, {"wearsim": wearsim}, name, None, 0)
     assert example.examples, f"{name} has no example"
