@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from wearsim.mechanics.numerics.jit import Kernel, not_cached
+from wearsim.mechanics.numerics.jit import Kernel
 from wearsim.operating_system import lock_file
 
 settings.register_profile("wearsim", settings(), deadline=None)
@@ -73,18 +73,24 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     if hasattr(config, "workerinput"):  # one of several processes
-        lock = config.cache.mkdir("kernels") / "lock"
-        Kernel.__call__ = compiled_once(Kernel.__call__, lock)
+        Kernel.__call__ = compiled_once(Kernel.__call__, config.cache.mkdir("kernels"))
 
 
-def compiled_once(call: Any, lock: Path) -> Any:
-    """Return `call` of kernels, by which one process at a time compiles and the next ones read."""
+def compiled_once(call: Any, folder: Path) -> Any:
+    """Return `call` of kernels, by which one process compiles a kernel and the next ones read it.
+
+    A kernel is compiled separately for arguments that are None.
+    """
+    called = set()
 
     def call_or_wait(kernel: Kernel, *arguments: Any) -> Any:
-        if kernel.is_ready or not not_cached({kernel.__name__}):
+        form = kernel, *[argument is None for argument in arguments]
+        if form in called:
             return call(kernel, *arguments)
-        with locked(lock):
-            return call(kernel, *arguments)
+        with locked(folder / kernel.__name__):
+            result = call(kernel, *arguments)
+        called.add(form)
+        return result
 
     return call_or_wait
 

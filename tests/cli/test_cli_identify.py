@@ -10,6 +10,7 @@ import pytest
 from cli_examples import Command
 
 from tests.studies.identify.grooves import RANDOM, TEXT, groove, write
+from wearsim.studies.identify import planning
 
 DEPTHS = """
 [[test]]
@@ -92,14 +93,23 @@ def test_fixed_inputs_do_not_scatter(command: Command, rig: Path):
     assert data["verdict"] == "random"
 
 
-def test_plan_gives_power_by_tests_and_measured_inputs(command: Command, rig: Path, tmp_path: Path):
-    options = ("--plan", rig, "--measured", "creepage=0.05", "-q")
-    done = command("identify", *options, "--draws", 16, "-n", "3", "--figure", "p.png")
+def test_plan_gives_power_by_tests_and_measured_inputs(
+    command: Command, rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    options = ("--plan", rig, "--measured", "creepage=0.05", "-q", "--draws", 64, "-n", "3,8")
+    planned, plan_tests = [], planning.plan_tests
+
+    def plan_once(*arguments: object, **others: object) -> object:
+        planned[:] = planned or [plan_tests(*arguments, **others)]
+        return planned[0]
+
+    monkeypatch.setattr(planning, "plan_tests", plan_once)  # takes seconds
+    done = command("identify", *options, "--figure", "p.png")
     assert done.exit_code == 0, done.output
     assert "inputs as in the scenario" in done.stdout
     assert "creepage.longitudinal measured to 0.05" in done.stdout
     assert (tmp_path / "p.png").exists()
-    data = json.loads(command("identify", *options, "--draws", 64, "-n", "3,8", "--json").stdout)
+    data = json.loads(command("identify", *options, "--json").stdout)
     plain, measured = data["designs"]
     assert measured["scatter_from_inputs"] < plain["scatter_from_inputs"]
     assert measured["power"]["0.4"][0] > plain["power"]["0.4"][0]

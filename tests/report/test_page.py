@@ -35,6 +35,11 @@ def result():
 
 
 @pytest.fixture(scope="module")
+def page_of_run(result):
+    return page_of([result])
+
+
+@pytest.fixture(scope="module")
 def cam():
     return wearsim.run(shipped_scenario("cam-eccentric", {"operation.turns": 20_000}))
 
@@ -78,8 +83,8 @@ def test_columns_are_in_single_precision(result):
             assert all(array.dtype.itemsize <= 4 for array in arrays if array.dtype.kind == "f")
 
 
-def test_page_states_question_answer_error_and_origin(result):
-    page = unescape(page_of([result]))
+def test_page_states_question_answer_error_and_origin(result, page_of_run):
+    page = unescape(page_of_run)
     assert "How deep does the cylinder wear in 9,000 roller passes (3.000 min)?" in page
     assert f"{1e6 * result.depth[-1]:.4g} um ± " in page
     assert "The stated error is that of the steps and strips" in page
@@ -100,10 +105,9 @@ def test_command_of_a_run_has_its_limit(until, written):
     assert f"wearsim run rig-450min.toml --until {written}" in page
 
 
-def test_page_loads_nothing(result):
-    page = page_of([result])
+def test_page_loads_nothing(page_of_run):
     links = Links()
-    links.feed(page)
+    links.feed(page_of_run)
     assert links.found
     assert all(link.startswith("data:") for link in links.found)
 
@@ -214,14 +218,15 @@ def life(tmp_path_factory):
 
 
 def test_life_shows_its_quantiles_and_survival(life):
-    page = unescape(page_of([life]))
+    written = page_of([life])
+    page = unescape(written)
     assert "How many passes does the design last, until the first of: depth 5.000 um?" in page
     found = life.b(10)
     low, value, high = (f"{round(life, -2):,.0f}" for life in (found.low, found.value, found.high))
     assert f"{value} passes [{low}..{high}]" in page
     assert "what moves the life: Sobol indices of its logarithm" in page
     assert "P(life < 20,000 passes)" in page
-    text = first_screen(page_of([life]))
+    text = first_screen(written)
     digits = [f"{float(f'{end:.3g}'):,.0f}" for end in (found.value, found.low, found.high)]
     assert "{} passes, 95 %: {} to {}".format(*digits) in text
     assert "What moves the life" in text

@@ -151,7 +151,7 @@ def test_figure_is_written_completely_or_not_at_all(
         raise OSError("disk full")
 
     with monkeypatch.context() as patch:
-        patch.setattr(figure, "savefig", fail)
+        patch.setattr(figure, "draw", fail)
         with pytest.raises(ResultsFileError, match=r"x\.png: cannot be written \(disk full\)"):
             save_figure(figure, path)
     assert [item.name for item in tmp_path.iterdir()] == ["x.png"]

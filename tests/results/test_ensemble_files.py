@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tracemalloc
 from dataclasses import fields
 from pathlib import Path
@@ -44,25 +45,45 @@ from wearsim.studies.run.result import read_results
 ERROR = "lost contact at 1.2e6 passes: µ = 0.3"
 
 
-@pytest.fixture
-def ensemble_file(tmp_path: Path) -> Path:
-    """Realisations 0 to 3 and 17 are done, 5 failed."""
-    path = tmp_path / "ensemble.h5"
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with an ensemble, of which realisations 0 to 3 and 17 are done, 5 failed."""
+    folder = tmp_path_factory.mktemp("parts")
+    path = folder / "ensemble.h5"
     with EnsembleFile.create(path, some_header(), some_static()) as file:
         file.put([some_outcome(number) for number in (2, 0, 1)])
         file.put([some_outcome(5, error=ERROR), some_outcome(17), some_outcome(3)])
         file.put_state(wall_seconds=2.5, warnings=["slow"], statistics={"a": [1.5]})
-    return path
+    return folder
+
+
+@pytest.fixture(scope="module")
+def merged(parts: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the same ensemble, merged."""
+    folder = tmp_path_factory.mktemp("merged")
+    path = copied(parts, folder)
+    with EnsembleFile.open(path) as file:
+        file.finish(lambda data: ({"finished": False}, {}))
+    assert list(Path(f"{path}.parts").iterdir()) == []
+    return folder
+
+
+def copied(folder: Path, to: Path) -> Path:
+    """Copy the ensemble of a folder to another one, and return its file there."""
+    shutil.copytree(folder, to, dirs_exist_ok=True)
+    return to / "ensemble.h5"
+
+
+@pytest.fixture
+def ensemble_file(parts: Path, tmp_path: Path) -> Path:
+    """A copy of the ensemble in parts."""
+    return copied(parts, tmp_path)
 
 
 @pytest.fixture(params=["parts", "merged"])
-def any_file(request, ensemble_file: Path) -> Path:
-    """The same ensemble, in parts or merged."""
-    if request.param == "merged":
-        with EnsembleFile.open(ensemble_file) as file:
-            file.finish(lambda data: ({"finished": False}, {}))
-        assert list(Path(f"{ensemble_file}.parts").iterdir()) == []
-    return ensemble_file
+def any_file(request, tmp_path: Path) -> Path:
+    """A copy of the ensemble, in parts or merged."""
+    return copied(request.getfixturevalue(request.param), tmp_path)
 
 
 def _error_of(path: Path) -> str:

@@ -19,15 +19,24 @@ from wearsim.studies.ensemble.file.writer import EnsembleFile
 COUNT = 12
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with three parts of two realisations each."""
+    folder = tmp_path_factory.mktemp("written")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(writer, "PART_BYTES", 1)
+        with EnsembleFile.create(folder / "rig.h5", some_header(COUNT), some_static()) as file:
+            for first in (4, 0, 2):
+                file.put([some_outcome(first), some_outcome(first + 1)])
+    return folder
+
+
 @pytest.fixture
-def in_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Three parts with two realisations each."""
+def in_parts(written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the three parts."""
     monkeypatch.setattr(writer, "PART_BYTES", 1)
-    path = tmp_path / "rig.h5"
-    with EnsembleFile.create(path, some_header(COUNT), some_static()) as file:
-        for first in (4, 0, 2):
-            file.put([some_outcome(first), some_outcome(first + 1)])
-    return path
+    shutil.copytree(written, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "rig.h5"
 
 
 def _parts(path: Path) -> list[str]:

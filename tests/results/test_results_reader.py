@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -25,11 +26,16 @@ TEXT = st.text(max_size=40)
 PATH = st.text(st.characters(exclude_characters="\0"), min_size=1, max_size=10)
 
 
-@pytest.fixture
-def run_file(tmp_path: Path) -> Path:
-    path = tmp_path / "run.h5"
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("written") / "run.h5"
     write_results(path, some_run(seed=5))
     return path
+
+
+@pytest.fixture
+def run_file(written: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copy(written, tmp_path))
 
 
 def _error_of(path: Path) -> str:

@@ -13,6 +13,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
@@ -95,8 +96,13 @@ def titled_figure(width: float, height: float, title: str | None = None) -> Iter
 
 def png_of(figure: Figure, dpi: int) -> bytes:
     """Return a figure as the content of a PNG file."""
-    content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=dpi)
+    content, before = io.BytesIO(), figure.dpi
+    canvas: Any = FigureCanvasAgg(figure)
+    figure.dpi = dpi
+    try:
+        canvas.print_png(content)  # savefig would draw twice
+    finally:
+        figure.dpi = before
     return content.getvalue()
 
 
@@ -114,8 +120,12 @@ def save_figure(figure: Figure, path: Path) -> None:
     ResultsFileError
         If it cannot be written; an existing file is then unchanged.
     """
+    kind = path.suffix[1:].lower()
     with replacement(path) as file:
-        figure.savefig(file, format=path.suffix[1:].lower(), dpi=DPI)
+        if kind == "png":
+            file.write(png_of(figure, DPI))
+        else:
+            figure.savefig(file, format=kind, dpi=DPI)
 
 
 def figure_of(sheet: Sheet) -> Figure:

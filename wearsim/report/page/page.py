@@ -84,7 +84,8 @@ def save_text(text: str, path: Path) -> None:
 def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
     """Return the page as HTML; parameters and errors as of `save_page`."""
     try:
-        from bokeh.embed import components  # noqa: PLC0415  (optional)
+        from bokeh.document import Document  # noqa: PLC0415  (optional)
+        from bokeh.embed import components  # noqa: PLC0415
         from bokeh.resources import Resources  # noqa: PLC0415
         from jinja2 import Environment, PackageLoader  # noqa: PLC0415
     except ImportError as error:
@@ -94,6 +95,10 @@ def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
         ) from error
     parts = [part_of(view, measured) for view in views]
     drawn = {figure.id: figure for part in parts for _, figure in part["panels"]}
+    document = Document()
+    with document.models.freeze():  # else Bokeh searches all figures again after each of them
+        for figure in drawn.values():
+            document.add_root(figure)
     script, divisions = components(drawn) if drawn else ("", {})
     template = Environment(
         loader=PackageLoader("wearsim.report.page", "."), autoescape=True, trim_blocks=True

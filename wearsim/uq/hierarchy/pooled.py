@@ -55,6 +55,7 @@ class Hierarchy:
         tables = [kernel.table(t) for kernel in self.kernels]
         self._scale = np.stack([scale for scale, _ in tables])  # (kernels, t)
         self._table = np.stack([table for _, table in tables])
+        self._slope = np.diff(self._table, append=self._table[..., -1:])  # to the next node
         self.owner = np.arange(tests or len(self.kernels)) % len(self.kernels)
 
     def on_grid(self, centres: FloatArray, row: int, count: int) -> tuple[FloatArray, FloatArray]:
@@ -77,18 +78,24 @@ class Hierarchy:
         precision = 1.0 / scale**2
         middle = centres @ precision / precision.sum()
         half = _SPAN / np.sqrt(precision.sum())
-        m = middle[:, None] + np.linspace(-half, half, count)
-        total = np.zeros_like(m)
-        nodes = self._table.shape[2]
+        steps = np.linspace(-half, half, count)
+        last = self._table.shape[2] - 1
+        total = np.zeros((len(centres), count))
         for test, owner in enumerate(self.owner.tolist()):
-            u = (centres[:, test, None] - m) / scale[test]
-            place = np.clip((u + REACH) * ((nodes - 1) / (2.0 * REACH)), 0.0, nodes - 1.001)
-            first = place.astype(np.int64)
-            part = place - first
-            table = self._table[owner, row]
-            total += table[first] * (1.0 - part) + table[first + 1] * part
-            total -= 0.5 * np.maximum(u * u - REACH**2, 0.0)  # a normal tail beyond the table
-        return m, total
+            nodes = last / (2.0 * REACH * scale[test])  # per unit of ln K
+            start = (centres[:, test] - middle) * nodes + 0.5 * last
+            place = start[:, None] - steps * nodes
+            # beyond the table there is a normal tail
+            if min(start.min(), last - start.max()) < half * nodes:
+                u = (place - 0.5 * last) * (2.0 * REACH / last)
+                total -= 0.5 * np.maximum(u * u - REACH**2, 0.0)
+                place = np.clip(place, 0.0, last)
+            first = place.astype(np.intp)
+            place -= first
+            place *= self._slope[owner, row].take(first)
+            total += self._table[owner, row].take(first)
+            total += place
+        return middle[:, None] + steps, total
 
     def integrated(self, centres: FloatArray) -> FloatArray:
         """Return the log likelihood of t of sets of tests, integrated over m with a flat prior.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -45,15 +45,20 @@ class RandomTest:
         files = {**base.files, **self.files}
         return parse_scenario(base.text, f"{self.name}.toml", files.__getitem__, changes)
 
+    @cached_property
+    def unchanged(self) -> Scenario:
+        """Scenario of the test without further changes."""
+        return self.scenario()
+
     @property
     def tolerance(self) -> float:
         """Tolerance of the test."""
-        return self.scenario().evolution.tolerance
+        return self.unchanged.evolution.tolerance
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """Hash of the scenario and its files, without the tolerance and the stepper."""
-        return digest(self.scenario())
+        return digest(self.unchanged)
 
     @property
     def settings(self) -> str:
