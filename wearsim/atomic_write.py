@@ -1,6 +1,8 @@
 """Atomic writing of files, the lock of their writer, and checks of an output path.
 
-After a kill either the old or the new content of a file is complete.
+After a kill either the old or the new content of a file is complete. The lock is that of a file
+beside it, rig.h5.lock for rig.h5: the file itself is replaced while it is locked. The operating
+system releases the lock of a killed process.
 """
 
 from __future__ import annotations
@@ -8,7 +10,7 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -17,6 +19,8 @@ from wearsim.errors import ResultsFileError
 
 #: Added to the name of a file while its new content is written.
 TEMPORARY = ".tmp"
+#: Added to the name of a results file for the file that its writer locks.
+LOCK = ".lock"
 
 _BUFFER = 1 << 18  # bytes
 
@@ -116,7 +120,7 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
     ResultsFileError
         If another process holds the lock, or held it until now and deleted the file.
     """
-    busy = ResultsFileError(f"{path}: is being written by another process")
+    busy = _being_written(path)
     try:
         operating_system.lock_file(file.fileno())
     except OSError as error:
@@ -129,23 +133,106 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
 
 
 def parts_folder(path: str | Path) -> Path:
-    """Return the folder of the part files of an ensemble, and of the lock of its writer."""
+    """Return the folder of the part files of an ensemble."""
     target = Path(path).resolve()  # follows links
     return target.with_name(f"{target.name}.parts")
 
 
+def _being_written(path: str | Path) -> ResultsFileError:
+    """Return the error of a file that another process is writing."""
+    remedy = "wait until it ends, or stop it"
+    what = f"{path}: is being written by another process"
+    return ResultsFileError(what, python=remedy, shell=remedy)
+
+
 def lock_path(path: str | Path) -> Path:
-    """Return the file that the writer of an ensemble locks."""
-    return parts_folder(path) / "lock"
+    """Return the file that the writer of a results file locks."""
+    target = Path(path).resolve()  # follows links
+    return target.with_name(target.name + LOCK)
 
 
-def refuse_if_locked(path: str | Path) -> None:
-    """Refuse an ensemble that another process is writing.
+def acquire_lock(path: str | Path) -> IO[bytes]:
+    """Make this process the only writer of a results file, until `release_lock` or its end.
 
     Parameters
     ----------
     path : str or Path
-        Its file, which need not exist.
+        The file, which need not exist.
+
+    Returns
+    -------
+    binary file
+        The locked file beside it.
+
+    Raises
+    ------
+    ResultsFileError
+        If another process is writing it, or the folder cannot be written.
+    """
+    with os_errors_converted(path):
+        lock = lock_path(path).open("a+b")
+    try:
+        lock_or_refuse(lock, path)
+    except BaseException:
+        lock.close()
+        raise
+    return lock
+
+
+def release_lock(lock: IO[bytes], path: str | Path) -> None:
+    """Let other processes write a results file, and delete the file that was locked for it.
+
+    Parameters
+    ----------
+    lock : binary file
+        The file that `acquire_lock` returned, which may be closed already.
+    path : str or Path
+        The results file.
+    """
+    if lock.closed:
+        return
+    if operating_system.fcntl is None:
+        lock.close()  # Windows deletes no open file
+    with suppress(OSError):  # a file that is left there does not hinder other writers
+        lock_path(path).unlink(missing_ok=True)
+    lock.close()
+
+
+@contextmanager
+def write_lock(path: str | Path, before: os.stat_result | None = None) -> Iterator[None]:
+    """Make this process the only writer of a results file in the context.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, which need not exist.
+    before : os.stat_result, optional
+        Status of the file before its content was read.
+
+    Raises
+    ------
+    ResultsFileError
+        If another process is writing it, or has written it since it was read, or the folder cannot
+        be written.
+    """
+    lock = acquire_lock(path)
+    try:
+        if before is not None:
+            now = Path(path).stat()
+            if (now.st_ino, now.st_mtime_ns) != (before.st_ino, before.st_mtime_ns):
+                raise _being_written(path)
+        yield
+    finally:
+        release_lock(lock, path)
+
+
+def refuse_if_locked(path: str | Path) -> None:
+    """Refuse a results file that another process is writing.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, which need not exist.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 | needed | without it |
 |---|---|
-| lock of the file description (Linux), or `flock` | two writers of one ensemble are not noticed |
+| lock of the file description (Linux), or `flock` | two writers of one file are not noticed |
 | synchronising a folder | after a power failure a file may have its former content |
 | blocking a signal while processes start | workers receive Ctrl-C as well |
 | affinity of a process | all processors of the machine are counted |

@@ -156,7 +156,7 @@ def test_part_with_unknown_realisations_is_an_error(in_parts, tmp_path):
 def test_new_ensemble_ignores_and_deletes_parts_of_the_one_it_replaces(in_parts):
     with EnsembleFile.create(in_parts, some_header(COUNT), some_static()) as file:
         assert (file.status == PENDING).all()
-        assert _parts(in_parts) == ["lock"]
+        assert _parts(in_parts) == []
         file.put([some_outcome(7)])
     assert read_ensemble(in_parts).done.tolist() == [7]
 
@@ -170,7 +170,7 @@ def test_parts_that_were_merged_before_a_kill_are_ignored_and_deleted(in_parts, 
     shutil.copytree(copy, f"{in_parts}.parts")
     assert read_ensemble(in_parts).finished
     with EnsembleFile.open(in_parts) as file:
-        assert _parts(in_parts) == ["lock"]
+        assert _parts(in_parts) == []
         file.clear([3])  # the number of its part is larger than those that were merged
         assert not read_ensemble(in_parts).finished
         file.put([some_outcome(3)])

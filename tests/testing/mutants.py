@@ -306,6 +306,7 @@ class ForgetsHardening(SingleContactModel):
 MUTANTS = {
     "solution-is-complete-and-finite": [
         after(lambda solution, gap: {"power": np.nan}),
+        after(lambda solution, gap: {"dissipation": np.nan * solution.dissipation}),
         after(lambda solution, gap: {"half_length": solution.half_length[1:]}),
         after(lambda solution, gap: {"force_x": np.array([solution.force_x])}),
     ],
@@ -315,6 +316,7 @@ MUTANTS = {
     "zero-outside-the-contact": [
         after(lambda solution, gap: {"dissipation": solution.dissipation + 1e-12}),
         after(lambda solution, gap: {"dissipation": solution.dissipation - 1e-12}),
+        after(lambda solution, gap: {"dissipation": -solution.dissipation}),
         after(lambda solution, gap: {"half_length": 1e3 * solution.half_length}),  # in mm
     ],
     "power-equals-strip-sum": [

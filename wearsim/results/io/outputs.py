@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wearsim.atomic_write import refuse_if_locked, refuse_inputs
+from wearsim.atomic_write import refuse_if_locked, refuse_inputs, write_lock
 from wearsim.errors import ResultsFileError, WearsimError
 
 if TYPE_CHECKING:
@@ -45,22 +46,53 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
         raise _refused(path, "is a folder", "name a file in it")
     if not folder.is_dir():
         raise _refused(path, f"there is no folder {folder}", "make it, or choose another")
-    if target.exists():
-        if not target.is_file():
-            raise _refused(path, "is not a regular file", "choose another")
-        if not force:
-            verb = _continuing(path)
-            known = "already exists and is unfinished" if verb else "already exists"
-            python = f'wearsim.{verb}("{path}") continues it, ' if verb else ""
-            shell = f"`wearsim resume {path}` continues it, " if verb else ""
-            raise ResultsFileError(
-                f"{path}: {known}",
-                python=f"{python}force=True replaces it, output=... chooses another",
-                shell=f"{shell}--force replaces it, -o chooses another",
-            )
-        refuse_if_locked(path)
+    if target.exists() and not target.is_file():
+        raise _refused(path, "is not a regular file", "choose another")
+    refuse_if_locked(path)
+    if not force:
+        _refuse_existing(path)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise _refused(path, f"the folder {folder} is not writable", "choose another")
+
+
+@contextmanager
+def output_lock(path: str | Path | None, force: bool) -> Iterator[None]:
+    """Make this process the only writer of a results file, if there is one, in the context.
+
+    Parameters
+    ----------
+    path : str or Path, optional
+        The file, as checked by `check_output`.
+    force : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    ResultsFileError
+        If another process is writing it, or has written it since it was checked.
+    """
+    if path is None:
+        yield
+        return
+    with write_lock(path):
+        if not force:
+            _refuse_existing(path)
+        yield
+
+
+def _refuse_existing(path: str | Path) -> None:
+    """Raise if a results file exists, with what continues or replaces it."""
+    if not Path(path).resolve().exists():
+        return
+    verb = _continuing(path)
+    known = "already exists and is unfinished" if verb else "already exists"
+    python = f'wearsim.{verb}("{path}") continues it, ' if verb else ""
+    shell = f"`wearsim resume {path}` continues it, " if verb else ""
+    raise ResultsFileError(
+        f"{path}: {known}",
+        python=f"{python}force=True replaces it, output=... chooses another",
+        shell=f"{shell}--force replaces it, -o chooses another",
+    )
 
 
 def _continuing(path: str | Path) -> str:

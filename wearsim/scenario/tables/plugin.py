@@ -24,6 +24,7 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
+from wearsim.plugins.checked_model import built_model
 from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import validate
@@ -127,7 +128,7 @@ class ContactChoice:
 
     def build(self, grid: Grid, materials: tuple[Material, Material]) -> ContactModel:
         """Return a new contact model for strips, and for the materials of cylinder and roller."""
-        return self.spec.factory(self.options, grid, materials)
+        return built_model(self.spec, self.options, grid, materials)
 
 
 @dataclass(frozen=True)

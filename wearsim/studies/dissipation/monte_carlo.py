@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.errors import Interrupted, ScenarioError, SolverError
 from wearsim.results.io.files import write_results
-from wearsim.results.io.outputs import check_output
+from wearsim.results.io.outputs import check_output, output_lock
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.contact.batch import Realisations
@@ -101,7 +101,10 @@ def dissipation(
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
-    with shown_progress(progress, "Counter", on_progress, scenario) as watch:
+    with (
+        output_lock(path, force),
+        shown_progress(progress, "Counter", on_progress, scenario) as watch,
+    ):
         study = _Study(scenario, realisations, path)
         try:
             while study.done < realisations:
@@ -114,7 +117,7 @@ def dissipation(
             if study.done:
                 study.close()
             raise
-    return DissipationResult(study.close(), path)
+        return DissipationResult(study.close(), path)
 
 
 class _Study:

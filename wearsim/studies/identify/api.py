@@ -14,7 +14,7 @@ from wearsim.errors import Mistake, mistake_in
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.results.io.files import write_results
-from wearsim.results.io.outputs import check_output
+from wearsim.results.io.outputs import check_output, output_lock
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.cam_wear import Wanted, size_of
@@ -134,22 +134,25 @@ def identify(
     files = [path for item in items for path in item.files]
     if output is not None:
         check_output(Path(output), force, [*scenario.paths, *files])
-    study = _Study(scenario, items, draws, shared)
-    with shown_progress(progress, "Counter", on_progress, scenario) as watch:
-        rows = study.rows(watch)
-    specimens = specimens_of(rows)
-    seconds = time.monotonic() - started
-    fixed = [key_of(key) for key in fix or ()]
-    given = {
-        "measured": tables_of(items),
-        "draws": draws,
-        "shared": shared,
-        "contained": contained_inputs(study.scenario, items, fixed),
-    }
-    data = content(study.scenario, specimens, negligible, study.notes, created, seconds, **given)
-    data.warnings.extend(study.left_out)
-    if output is not None:
-        write_results(Path(output), data)
+    with output_lock(output, force):
+        study = _Study(scenario, items, draws, shared)
+        with shown_progress(progress, "Counter", on_progress, scenario) as watch:
+            rows = study.rows(watch)
+        specimens = specimens_of(rows)
+        seconds = time.monotonic() - started
+        fixed = [key_of(key) for key in fix or ()]
+        given = {
+            "measured": tables_of(items),
+            "draws": draws,
+            "shared": shared,
+            "contained": contained_inputs(study.scenario, items, fixed),
+        }
+        data = content(
+            study.scenario, specimens, negligible, study.notes, created, seconds, **given
+        )
+        data.warnings.extend(study.left_out)
+        if output is not None:
+            write_results(Path(output), data)
     return IdentificationResult(data, Path(output) if output is not None else None)
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.arguments import checking_argument
-from wearsim.atomic_write import DISK, Storage
+from wearsim.atomic_write import DISK, Storage, write_lock
 from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.state import WearState
-from wearsim.results.io.outputs import check_output
+from wearsim.results.io.outputs import check_output, output_lock
 from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.scenario.parse.toml import apply_overrides
@@ -100,7 +100,10 @@ def run(
         check_output(path, force, scenario.paths)
     scenario, limit = with_end(scenario, limit)
     warnings = limit_warnings(scenario, limit) if limit else []
-    with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
+    with (
+        output_lock(path, force),
+        shown_progress(progress, "RunWatcher", on_event, scenario) as watch,
+    ):
         started = RunInProgress(
             scenario, draw(scenario), path, storage, watch, stop_requested, limit=limit
         )
@@ -144,8 +147,8 @@ def resume(
     Raises
     ------
     ResultsFileError
-        If the file cannot be read, needs a plugin that is not installed, or holds a test that is
-        already past `until`.
+        If the file cannot be read, is being written by another process, needs a plugin that is not
+        installed, or holds a test that is already past `until`.
     ValueError
         If `until` is not a limit.
     SolverError, Interrupted
@@ -164,7 +167,7 @@ def resume(
             f"{path}: holds an ensemble of wear tests, which resume_ensemble continues; expected"
             " a single wear test"
         )
-    data = read_results(path)
+    before, data = path.stat(), read_results(path)
     if allow_deep:
         text = apply_overrides(data.scenario_text, str(path), {"evolution.allow_deep": True})
         data = replace(data, scenario_text=text)
@@ -182,7 +185,10 @@ def resume(
     if data.finished and (reached or (at_end and limit is None)):
         return Result(data, path)
     setup, data = draw(scenario), without_limit_rows(data, state)
-    with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
+    with (
+        write_lock(path, before),
+        shown_progress(progress, "RunWatcher", on_event, scenario) as watch,
+    ):
         return _run_to_limit(
             RunInProgress(scenario, setup, path, storage, watch, stop_requested, data, state, limit)
         )

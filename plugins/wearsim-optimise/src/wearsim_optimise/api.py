@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from wearsim import Scenario, load_scenario
+from wearsim.atomic_write import write_lock
 from wearsim.errors import Interrupted
 from wearsim.plugins import kind_of, quantity
 from wearsim.results.io.files import read_study, write_results
-from wearsim.results.io.outputs import check_output
+from wearsim.results.io.outputs import check_output, output_lock
 from wearsim.results.kinds import as_plugin
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.preparation import origin_of
@@ -168,7 +169,10 @@ def optimise(
         request=request,
     )
     path = None if output is None else Path(output)
-    with shown_progress(progress, "PartWatcher", on_progress, loaded) as watch:
+    with (
+        output_lock(path, force),
+        shown_progress(progress, "PartWatcher", on_progress, loaded) as watch,
+    ):
         hands = workers, scheduler, watch, on_notice or getattr(watch, "notice", None)
         return _Study(loaded, data, path, *hands, stop_requested).finish()
 
@@ -199,16 +203,20 @@ def resume_optimise(
     Raises
     ------
     ResultsFileError
-        If the file cannot be read.
+        If the file cannot be read, or is being written by another process.
     Interrupted
         As in `optimise`.
     """
     path = Path(file)
+    status = path.stat() if path.exists() else None
     data = read_study(path, OptimisationData)
     before = OptimisationResult(data, path)
     if data.finished:
         return before
-    with shown_progress(progress, "PartWatcher", on_progress, before.scenario) as watch:
+    with (
+        write_lock(path, status),
+        shown_progress(progress, "PartWatcher", on_progress, before.scenario) as watch,
+    ):
         hands = workers, scheduler, watch, on_notice or getattr(watch, "notice", None)
         return _Study(before.scenario, data, path, *hands, stop_requested).finish()
 

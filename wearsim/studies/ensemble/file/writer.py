@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -16,11 +16,10 @@ from wearsim.atomic_write import (
     DISK,
     TEMPORARY,
     Storage,
-    lock_or_refuse,
-    lock_path,
+    acquire_lock,
     os_errors_converted,
     parts_folder,
-    refuse_if_locked,
+    release_lock,
 )
 from wearsim.results.content import Array, Arrays
 from wearsim.results.io.stored_file import StoredFile
@@ -55,6 +54,17 @@ if TYPE_CHECKING:
 PART_BYTES = 1 << 21
 
 Completion: TypeAlias = Callable[[EnsembleData], tuple[Mapping[str, Any], Arrays]]
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[IO[bytes]]:
+    """Acquire the lock of an ensemble, and release it if an exception ends the with statement."""
+    lock = acquire_lock(path)
+    try:
+        yield lock
+    except BaseException:
+        release_lock(lock, path)
+        raise
 
 
 class EnsembleFile(AbstractContextManager["EnsembleFile"]):
@@ -128,27 +138,27 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         if static.keys() != names:
             raise ValueError(f"static arrays are {sorted(names)}, got {sorted(static)}")
         path = Path(path)
-        refuse_if_locked(path)
         folder = parts_folder(path)
-        is_new = not folder.exists()
-        # the parts of an ensemble that is replaced count as merged, and are deleted later
-        last = max(part_numbers(path), default=0)
         known = {
             **{name: np.asarray(array, float) for name, array in static.items()},
             "quantile": np.array(QUANTILES),
         }
-        header = replace(header, variables=known, run_id=uuid.uuid4().hex, merged=last)
-        with os_errors_converted(path):
-            folder.mkdir(exist_ok=True)  # before the file, which is incomplete without it
-        try:
-            with hdf5_write.new_file(path, storage) as (file, _):
-                hdf5_write.put_variables(file, header.schema, known, header.reserved)
-                hdf5_write.put_texts(file, ENSEMBLE, header)
-        except BaseException:
-            if is_new:
-                folder.rmdir()
-            raise
-        return cls._locked(path, storage)
+        with _locked(path) as lock:
+            is_new = not folder.exists()
+            # the parts of an ensemble that is replaced count as merged, and are deleted later
+            last = max(part_numbers(path), default=0)
+            header = replace(header, variables=known, run_id=uuid.uuid4().hex, merged=last)
+            with os_errors_converted(path):
+                folder.mkdir(exist_ok=True)  # before the file, which is incomplete without it
+            try:
+                with hdf5_write.new_file(path, storage) as (file, _):
+                    hdf5_write.put_variables(file, header.schema, known, header.reserved)
+                    hdf5_write.put_texts(file, ENSEMBLE, header)
+            except BaseException:
+                if is_new:
+                    folder.rmdir()
+                raise
+            return cls(path, storage, lock)
 
     @classmethod
     def open(cls, path: str | Path, storage: Storage = DISK) -> EnsembleFile:
@@ -168,20 +178,10 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         """
         path = Path(path)
         read_ensemble(path)  # refused before a folder is made
-        return cls._locked(path, storage)
-
-    @classmethod
-    def _locked(cls, path: Path, storage: Storage) -> EnsembleFile:
-        """Lock an existing ensemble and open it; the errors are those of `open`."""
-        with os_errors_converted(path):
-            parts_folder(path).mkdir(exist_ok=True)
-            lock = lock_path(path).open("a+b")
-        try:
-            lock_or_refuse(lock, path)
+        with _locked(path) as lock:
+            with os_errors_converted(path):
+                parts_folder(path).mkdir(exist_ok=True)
             return cls(path, storage, lock)  # as another writer left it
-        except BaseException:
-            lock.close()
-            raise
 
     @property
     def status(self) -> Array:
@@ -264,12 +264,10 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         """Release the ensemble; the folder of its parts is removed if it is finished."""
         if self._lock.closed:
             return
-        with os_errors_converted(self.path):
-            lock_path(self.path).unlink(missing_ok=True)
-        self._lock.close()
         if self.data.finished and not self._stored.parts:
             with suppress(OSError):  # files of others are left there
                 parts_folder(self.path).rmdir()
+        release_lock(self._lock, self.path)
 
     def __exit__(
         self,
