@@ -1,14 +1,13 @@
 """Difference of a contact from a reference model."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import wearsim
 from wearsim.errors import ContactError, PluginError
-from wearsim.plugins import ContactModelSpec, Options, registry
+from wearsim.plugins import ContactModelSpec, Options, SingleContactModel, registry
 from wearsim.plugins.manager import Registry
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.contact import comparison
@@ -61,6 +60,8 @@ class _Elements(Options):
 class _Fails:
     """Reference with a relative error of P_l(y) of 1/mx**2, which fails for given numbers mx."""
 
+    name = "fails"
+
     def __init__(self, unsolved):
         self.options, self.reference, self.unsolved = _Elements, True, unsolved
 
@@ -68,13 +69,16 @@ class _Fails:
         slender = registry().get(ContactModelSpec, "slender")
         model = slender.factory(slender.options(), grid, materials)
 
-        def solve_one(*contact):
-            if options.mx in self.unsolved:
-                raise ContactError("no contact")
-            found = model.solve_one(*contact)
-            return replace(found, dissipation=found.dissipation * (1.0 + options.mx**-2))
+        unsolved = self.unsolved
 
-        return SimpleNamespace(solve_one=solve_one)
+        class Elements(SingleContactModel):
+            def solve_contact(self, *contact):
+                if options.mx in unsolved:
+                    raise ContactError("no contact")
+                found = model.solve_one(*contact)
+                return replace(found, dissipation=found.dissipation * (1.0 + options.mx**-2))
+
+        return Elements()
 
 
 @pytest.mark.parametrize(("unsolved", "taken"), [((), (60, 40)), ((60,), (40, 30))])
