@@ -9,7 +9,14 @@ from types import ModuleType
 from pydantic import Field, model_validator
 
 from wearsim.csv_tables import read_columns
-from wearsim.plugins import ContactModelSpec, LoadSpec, Options, WearLawSpec, hookimpl
+from wearsim.plugins import (
+    ContactModelSpec,
+    LoadSpec,
+    Options,
+    SingleContactModel,
+    WearLawSpec,
+    hookimpl,
+)
 from wearsim.quantities import (
     Duration,
     InputFile,
@@ -19,6 +26,7 @@ from wearsim.quantities import (
     PositiveStiffness,
 )
 from wearsim.scenario import Scenario
+from wearsim.types import ContactSolution
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 
@@ -127,14 +135,32 @@ def _build(options: Options, *others: object) -> tuple[str, Options]:
     return ("built", options)
 
 
+class _Model(SingleContactModel):
+    """Contact model that is built only."""
+
+    def solve_contact(self, *contact: object) -> ContactSolution:
+        raise NotImplementedError
+
+
+#: options of the contact models that were built
+BUILT: list[Options] = []
+
+
+def _build_model(options: Options, *others: object) -> _Model:
+    BUILT.append(options)
+    return _Model()
+
+
 def _plugins() -> ModuleType:
     module = ModuleType("small_plugins")
 
     @hookimpl
     def wearsim_contact_models():
-        yield ContactModelSpec("slender", SlenderOptions, "strips", factory=_build, protocol=2)
         yield ContactModelSpec(
-            "hertz-fastsim", FastsimOptions, "ellipse", factory=_build, protocol=2
+            "slender", SlenderOptions, "strips", factory=_build_model, protocol=2
+        )
+        yield ContactModelSpec(
+            "hertz-fastsim", FastsimOptions, "ellipse", factory=_build_model, protocol=2
         )
 
     @hookimpl

@@ -34,7 +34,7 @@ def test_stations_and_integrals_of_the_cycloidal_cam():
     [
         (
             {"load__preload": "5 N"},
-            r"\[load\] preload: the follower jumps, since .*, got .* segment 4 \(cycl",
+            r"\[load\] preload: the follower jumps, since .*, got .* segment [24] \(cycl",
         ),
         (
             {"cam__base_radius": "5 mm"},

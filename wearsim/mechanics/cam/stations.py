@@ -20,7 +20,7 @@ from wearsim.types import FloatArray, IntArray
 NUMBERS = (7, 13, 25)  # of stations on a panel; every set contains the one before
 _MOST_HALVINGS = 6
 _SAMPLES = 193
-_REFINEMENTS = 4  # samplings about the greatest sample, the last 1e-8 of a panel apart
+_REFINEMENTS = 5  # samplings about the greatest sample, the last 1e-10 of a panel apart
 
 
 @lru_cache
