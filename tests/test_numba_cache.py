@@ -77,6 +77,7 @@ for name in ("rig-450min.toml", "rig-three-rollers.toml"):  # grooves, at whose 
     run(name, wear__cylinder__k_over_h="1e-8 1/Pa")
 law = {{"law": "pressure-life", "reference_passes": 1e6, "reference_pressure": "1 GPa"}}
 run(fatigue={{"slope": 1.1, "cylinder": law | {{"exponent": 8.0, "source": "none"}}}})
+wearsim.run(scenario("cam-eccentric.toml", operation__turns=100))
 run(contact__tangential="fastsim")
 for model in ("hertz-fastsim", "hertz"):
     run(contact__model=model)
