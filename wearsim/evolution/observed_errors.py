@@ -120,7 +120,9 @@ def observed_errors(
     differences, widths = [], []
     for name in observed:
         fine_values, coarse_values = (
-            _over_force(name, courses, len(points))
+            _over_force(
+                name, courses, len(points), 0.0 if load is None else OF_FORCE.get(name, 0.0)
+            )
             for courses, points in ((observed, passes), (coarse.observed, steps))
         )
         fine = _interpolated(at_common, at_passes, fine_values)
@@ -144,7 +146,7 @@ def observed_errors(
     greatest = _greatest_of_last(common, np.concatenate(differences, axis=1))
     part = np.column_stack([np.interp(at_passes, at_common, column) for column in greatest.T])
     columns = np.split(COVER * part, np.cumsum(widths)[:-1], axis=1)
-    of_force = dict(zip(observed, columns, strict=True)).get("normal_force", np.zeros((1, 1)))
+    of_force = dict(zip(observed, columns, strict=True)).get("normal_force")
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
@@ -160,20 +162,21 @@ def observed_errors(
             if name in names
         ]
         relative = np.maximum(estimate, lowest[0][:, None]) if lowest else estimate
-        relative = relative + OF_FORCE.get(name, 0.0) * of_force.max(axis=1, keepdims=True)
+        if load is not None and of_force is not None and name in OF_FORCE:
+            relative = relative + OF_FORCE[name] * of_force.max(axis=1, keepdims=True)
         errors[name] = relative.reshape(values.shape) * scale
         if name == "peak_pressure":
             errors[name] = errors[name] + scale * edge_peaks
     return errors
 
 
-def _over_force(name: str, observed: Mapping[str, Any], points: int) -> FloatArray:
-    """Return an observable over the power of the normal force with which it varies, as columns."""
-    values = np.reshape(observed[name], (points, -1))
-    if name not in OF_FORCE or "normal_force" not in observed:
+def _over_force(name: str, observed: Mapping[str, Any], points: int, exponent: float) -> FloatArray:
+    """Return an observable over a power of the normal force, as columns."""
+    values = np.asarray(observed[name]).reshape(points, -1)
+    if exponent == 0.0 or "normal_force" not in observed:
         return values
     force = np.reshape(observed["normal_force"], (points, -1)).mean(axis=1, keepdims=True)
-    return values / np.where(force > 0.0, force, 1.0) ** OF_FORCE[name]
+    return values / np.where(force > 0.0, force, 1.0) ** exponent
 
 
 def _edge_peaks(
