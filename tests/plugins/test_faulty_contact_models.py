@@ -1,4 +1,4 @@
-"""What a contact model of a plugin returns is checked before it is used."""
+"""Errors of contact models of plugins that return invalid solutions."""
 
 from __future__ import annotations
 

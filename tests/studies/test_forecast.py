@@ -59,7 +59,7 @@ def test_forecast_agrees_with_the_run(name: str, tmp_path: Path) -> None:
 
 
 def test_start_profile_that_fits_the_roller(tmp_path: Path) -> None:
-    """The gap does not rise in the contact, whose middle is known all the same."""
+    """The gap is zero throughout the contact; the groove is centred on its middle."""
     rows = (f"{y},{-max(10.0 - y * y, 0.0)}" for y in np.linspace(-8.0, 8.0, 401))
     profile = tmp_path / "groove.csv"
     profile.write_text("\n".join(["y [mm],height [um]", *rows]))

@@ -25,8 +25,8 @@ VARYING_COVER = 2.0  # further safety factor where inputs vary, so that errors c
 SHARE = 0.7  # part of the tolerance that one step may use
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
 ROUND_OFF = 1e-9  # relative standard deviation up to which a load or an input is constant
-ADHERING = 0.1  # part of a contact that adheres from which it is in partial slip
-MOST_ADHERING = 0.5  # the same above which the power may depend strongly on the load
+# part of a contact that adheres above which the power may depend strongly on the load
+MOST_ADHERING = 0.5
 DEPTHS = ("cylinder_depth", "roller_depth")
 
 
@@ -102,7 +102,8 @@ def variation_bias(
         Half the square of a relative standard deviation up to which the bias is neglected, except
         where most of a contact adheres or the wear is not proportional to the dissipated power. The
         relative bias of the volume is at most half of it, in partial slip; that of the depth is a
-        third of it in a fresh contact, and wears off at the edge of a groove.
+        third of it in a fresh contact; in a groove it is greatest at the edge, where further wear
+        removes it.
 
     Returns
     -------

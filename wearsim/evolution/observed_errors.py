@@ -118,11 +118,10 @@ def observed_errors(
         np.log1p(points / first) for points in (steps, common, passes)
     )
     differences, widths = [], []
+    exponents = OF_FORCE if load is not None and "normal_force" in observed else {}
     for name in observed:
         fine_values, coarse_values = (
-            _over_force(
-                name, courses, len(points), 0.0 if load is None else OF_FORCE.get(name, 0.0)
-            )
+            _over_force(name, courses, len(points), exponents.get(name, 0.0))
             for courses, points in ((observed, passes), (coarse.observed, steps))
         )
         fine = _interpolated(at_common, at_passes, fine_values)
@@ -146,7 +145,7 @@ def observed_errors(
     greatest = _greatest_of_last(common, np.concatenate(differences, axis=1))
     part = np.column_stack([np.interp(at_passes, at_common, column) for column in greatest.T])
     columns = np.split(COVER * part, np.cumsum(widths)[:-1], axis=1)
-    of_force = dict(zip(observed, columns, strict=True)).get("normal_force")
+    estimates = dict(zip(observed, columns, strict=True))
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
@@ -154,16 +153,19 @@ def observed_errors(
     # a life observes the quantities of its limits only
     if crown_radius is not None and observed.keys() >= set(_OF_EDGES):
         edge_peaks = _edge_peaks(observed, crown_radius, spacing)
-    for (name, values), estimate in zip(observed.items(), columns, strict=True):
+    for name, values in observed.items():
         scale = 1.0 if name.endswith("angle") else np.abs(values)
         lowest = [
             bound
             for names, bound in zip((OF_DEPTH, OF_VOLUME), least, strict=True)
             if name in names
         ]
-        relative = np.maximum(estimate, lowest[0][:, None]) if lowest else estimate
-        if load is not None and of_force is not None and name in OF_FORCE:
-            relative = relative + OF_FORCE[name] * of_force.max(axis=1, keepdims=True)
+        relative = estimates[name]
+        if lowest:
+            relative = np.maximum(relative, lowest[0][:, None])
+        if name in exponents:
+            of_force = estimates["normal_force"].max(axis=1, keepdims=True)
+            relative = relative + exponents[name] * of_force
         errors[name] = relative.reshape(values.shape) * scale
         if name == "peak_pressure":
             errors[name] = errors[name] + scale * edge_peaks
@@ -173,7 +175,7 @@ def observed_errors(
 def _over_force(name: str, observed: Mapping[str, Any], points: int, exponent: float) -> FloatArray:
     """Return an observable over a power of the normal force, as columns."""
     values = np.asarray(observed[name]).reshape(points, -1)
-    if exponent == 0.0 or "normal_force" not in observed:
+    if exponent == 0.0:
         return values
     force = np.reshape(observed["normal_force"], (points, -1)).mean(axis=1, keepdims=True)
     return values / np.where(force > 0.0, force, 1.0) ** exponent

@@ -155,7 +155,7 @@ class CheckedModel(SingleContactModel):
 
     @property
     def _returned(self) -> str:
-        """Start of a message about what the model returned."""
+        """Subject and verb of messages: the name of the model in the scenario, "returned"."""
         return f"contact model '{self._name}' returned"
 
     def _check_kind(
@@ -179,7 +179,7 @@ class CheckedModel(SingleContactModel):
                 )
 
     def _fault(self, solution: ContactBatchSolution) -> tuple[int, str, str] | None:
-        """Return the first contact with a value that no solution has, the field and what it is."""
+        """Return number, field and fault of the first contact with an invalid value, or None."""
         values, count = vars(solution), len(solution)
         for name in (*_STRIPS, *_NUMBERS):
             finite = np.isfinite(values[name])

@@ -9,7 +9,6 @@ import numpy as np
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
-from wearsim.evolution.error_estimates import ADHERING
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Past, WearState, separated
 from wearsim.evolution.steppers.conditions import Conditions
@@ -43,6 +42,7 @@ CONVERGED = 500.0  # change of wear over the whole depth, relative to the tolera
 # the same over the wear of the step, in partial slip: the dissipated power then depends on the line
 # loads
 OF_STEP = 5000.0
+ADHERING = 0.1  # part of a contact that adheres from which it is in partial slip
 LEAST_GUESS = 0.1  # first guess of a load over the one before; ratio of its iterates
 # relative change of loads with a spring: part of that in the step, at most this over the tolerance
 # of iterations

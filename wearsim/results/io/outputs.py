@@ -81,7 +81,7 @@ def output_lock(path: str | Path | None, force: bool) -> Iterator[None]:
 
 
 def _refuse_existing(path: str | Path) -> None:
-    """Raise if a results file exists, with what continues or replaces it."""
+    """Raise ResultsFileError if a results file exists; it says how to continue or replace it."""
     if not Path(path).resolve().exists():
         return
     verb = _continuing(path)
