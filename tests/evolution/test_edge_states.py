@@ -14,7 +14,7 @@ from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers import edges
 from wearsim.evolution.steppers.implicit import ImplicitStepper, implicit_step, with_rates
 from wearsim.mechanics.numerics.edge_strips import SETTLED
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 
 THERMAL = {"load__thermal": {"gain": "50 N/W", "time_constant": "2 s"}}
 SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
@@ -64,8 +64,8 @@ def test_edges_are_resolved_under_constant_loads_on_crowned_bodies(three):
     assert edges.resolves_edges(problem, contacts)
     assert not edges.resolves_edges(problem, replace(contacts, separation=None))
     assert not edges.resolves_edges(with_loads(problem, Line()), contacts)
-    path = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.1, 0.2]))
-    varying = replace(problem, varying=(Varying("friction", (0,), (path,)),))
+    path = Paths.through(np.array([0.0, 1.0]), np.array([0.1, 0.2]))
+    varying = replace(problem, varying=(Varying("friction", (0,), path),))
     assert not edges.resolves_edges(varying, contacts)
     assert not edges.resolves_edges(replace(problem, crowned=False), contacts)
     thermal, _, _ = built(**THREE, **THERMAL)

@@ -29,7 +29,7 @@ from wearsim.evolution.steppers.load_errors import (
 )
 from wearsim.evolution.steppers.single_step import volumes_of, wear_per_pass
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, next_steps
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 from wearsim.mechanics.numerics.step_errors import KEEP, LEAST_AIM, LEAST_OF_ENERGY, SHARE
 
 TOLERANCE, TIGHT, STOP = 1e-3, 1e-6, 1e5
@@ -147,8 +147,8 @@ def test_steps_are_doubled_where_inputs_vary_or_lengths_are_given(plain):
     problem, state = plain
     assert len(tried(ImplicitStepper(TOLERANCE, by_doubling=True), problem, state).path) == 2
     assert len(tried(ImplicitStepper(TOLERANCE, 400.0), problem, state).path) == 2
-    path = PiecewiseLinear(np.array([0.0, 1e5]), np.array([0.1, 0.2]))
-    varying = replace(problem, varying=(Varying("friction", (0,), (path,)),))
+    path = Paths.through(np.array([0.0, 1e5]), np.array([0.1, 0.2]))
+    varying = replace(problem, varying=(Varying("friction", (0,), path),))
     assert len(tried(ImplicitStepper(TOLERANCE), varying, state).path) == 2
     counted = edges.with_whole_strips(problem, state.replaced(past_sums=state.past_sums[:, -1:]))
     (end,) = tried(ImplicitStepper(TOLERANCE), problem, counted).path
@@ -202,8 +202,8 @@ def test_doubled_step_has_the_greater_of_two_errors(plain, step, jumps):
 def test_error_of_the_energy_counts_in_doubled_steps_of_a_constant_load():
     stepper, step = ImplicitStepper(TOLERANCE, by_doubling=True), np.array([6.0])
     problem, state = begun(stepper, (2.0, 3.0, 4.0), **PARTIAL)
-    path = PiecewiseLinear(np.array([0.0, 1e9]), np.array([0.1, 0.1 + 1e-6]))
-    varying = replace(problem, varying=(Varying("friction", (0,), (path,)),))
+    path = Paths.through(np.array([0.0, 1e9]), np.array([0.1, 0.1 + 1e-6]))
+    varying = replace(problem, varying=(Varying("friction", (0,), path),))
     later = after(stepper, varying, (2.0, 3.0, 4.0))
     for one, start, counts in ((problem, state, True), (varying, later, False)):
         found = tried(stepper, one, start, 6.0)
@@ -221,8 +221,8 @@ def test_rows_of_a_log_shorter_than_a_step_leave_most_of_its_error(plain, case):
     problem, state = plain
     problem = replace(problem, loads=(Rows(1e-3 if case == "rows" else 0.0),))
     if case == "friction":
-        path = PiecewiseLinear(np.array([0.0, 1e5]), np.array([0.1, 0.4]))
-        problem = replace(problem, varying=(Varying("friction", (0,), (path,)),))
+        path = Paths.through(np.array([0.0, 1e5]), np.array([0.1, 0.4]))
+        problem = replace(problem, varying=(Varying("friction", (0,), path),))
     left, cover = LEAST_AIM_OF_ROWS if case == "rows" else LEAST_AIM, COVER
     cover *= 1.0 if case == "constant" else VARYING_COVER
     grown, step = (state.passes[0] / STOP) ** 0.5, np.array([400.0])

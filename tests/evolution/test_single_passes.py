@@ -28,7 +28,7 @@ from wearsim.evolution.steppers.per_pass import (
     run_in_python,
     run_passes,
 )
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 
 STATE = "cylinder_depth", "roller_depth", "terms", "energy"
 TURN = 60.0 / 1000.0  # s
@@ -75,11 +75,11 @@ def test_passes_equal_a_plain_loop(case, tmp_path):
     bodies, spacing = problem.rollers, problem.grid.spacing
     # of unworn bodies under the first load, or the greatest one of a test with pauses
     offset, known = np.array(rises), 310.0 if problem.pauses else samples[0][1]
-    rising = PiecewiseLinear(np.array([0.0, 2.0]), np.array([0.01, 0.21]))
+    rising = Paths.through(np.array([0.0, 2.0]), np.array([0.01, 0.21]))
     problem = replace(
         problem,
         inputs=problem.inputs.with_values({"normal_force_offset": offset[:, None]}),
-        varying=(Varying("friction", (0,), (rising,)),),
+        varying=(Varying("friction", (0,), rising),),
     )
     state = fresh_state(problem)
     found = run_in_python(problem, run_in_python(problem, state, 4, slipping), 5, slipping)

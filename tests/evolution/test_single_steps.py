@@ -36,7 +36,7 @@ from wearsim.evolution.steppers.stabilised import (
     stabilised_step,
 )
 from wearsim.evolution.steppers.step_doubling import LEAST
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 
 LOAD, FRICTION, SLIP, FACTOR, MODULUS = 300.0, 0.1, 1e-3, 1.1e-11, 2e13  # K/H [1/Pa], [Pa/m]
 RADII = 0.025, 0.02
@@ -128,8 +128,8 @@ def test_explicit_step_is_the_wear_at_its_start(rig):
 
 
 def test_steps_take_the_mean_of_a_varying_friction(rig):
-    path = PiecewiseLinear(np.array([0.0, 200.0]), np.array([FRICTION, 3.0 * FRICTION]))
-    problem = replace(rig.problem, varying=(Varying("friction", (0,), (path,)),))
+    path = Paths.through(np.array([0.0, 200.0]), np.array([FRICTION, 3.0 * FRICTION]))
+    problem = replace(rig.problem, varying=(Varying("friction", (0,), path),))
     passes, state = np.array([2000.0]), fresh_state(problem)
     part = 1.0 + 0.5 * float(problem.time(passes)[0]) / 100.0
     depth = 2000.0 * part * rig.rate(0.0)

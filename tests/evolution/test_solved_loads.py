@@ -27,7 +27,7 @@ from wearsim.evolution.steppers.single_step import (
     wear_per_pass,
     worn_state,
 )
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 
 STIFFNESS = 20e6  # N/m
 SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
@@ -141,8 +141,10 @@ def test_contacts_that_carry_their_loads_are_not_solved_again():
     before = model.solved
     contacts_at(problem, state, loads + 1.0)
     assert model.solved - before == 4 * 3
-    path = PiecewiseLinear(np.array([0.0, 1.0]), np.array([0.1, 0.2]))
-    varying = replace(problem, varying=(Varying("friction", (0,), (path,) * 4),))
+    path = Paths.through(np.array([0.0, 1.0]), np.array([0.1, 0.2]))
+    varying = replace(
+        problem, varying=(Varying("friction", (0,), path.at(np.zeros(4, dtype=np.int64))),)
+    )
     before = model.solved
     contacts_at(varying, state, np.full(problem.shape, 300.0))
     assert model.solved - before == 4 * 3
@@ -196,8 +198,8 @@ def test_contacts_of_an_implicit_step_are_those_of_its_record():
 
 def test_contacts_of_a_record_have_the_friction_of_their_time():
     problem, _, _ = boxed(foundation=True, contact__strips=41)
-    path = PiecewiseLinear(np.array([0.0, 100.0]), np.array([0.1, 0.3]))
-    problem = replace(problem, varying=(Varying("friction", (0,), (path,)),))
+    path = Paths.through(np.array([0.0, 100.0]), np.array([0.1, 0.3]))
+    problem = replace(problem, varying=(Varying("friction", (0,), path),))
     state = fresh_state(problem)
     later = state.replaced(passes=np.array([10.0 * problem.kinematics.pass_rate]))
     contacts, _ = solve_at_record(problem, later, on_profile=True)

@@ -18,7 +18,7 @@ from wearsim.evolution.steppers.damage import _load_nodes, with_damage
 from wearsim.evolution.steppers.loads import descents
 from wearsim.evolution.steppers.single_step import explicit_step, solve_present
 from wearsim.mechanics.fatigue import damage_of_step
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 
 ROOT, STIFFNESS = math.sqrt(3.0), 690e3
 BOTH = fatigue(roller=LAW, remove=True)
@@ -163,8 +163,8 @@ def test_small_loads_are_a_small_part_of_the_mean():
 
 def test_damage_under_a_varying_friction_has_no_point_before():
     problem, _, _ = built(**{**QUICK, **OFFSETS, **BOTH})
-    path = PiecewiseLinear(np.array([0.0, 1e3]), np.array([0.1, 0.2]))
-    problem = replace(problem, varying=(Varying("friction", (0,), (path,)),))
+    path = Paths.through(np.array([0.0, 1e3]), np.array([0.1, 0.2]))
+    problem = replace(problem, varying=(Varying("friction", (0,), path),))
     start, end = stepped_twice(problem)
     found, _ = with_damage(problem, start, end)
     points = np.stack([[np.nan], start.damage_points[1]])
@@ -237,9 +237,9 @@ def test_nodes_of_a_constant_load_are_its_mean_alone():
 
 def test_nodes_contain_the_scatter_of_the_offset():
     problem, _, _ = built(contact__strips=41)
-    path = PiecewiseLinear(np.array([0.0, 2.0]), np.array([0.0, 60.0]))
-    other = PiecewiseLinear(np.array([0.0, 2.0]), np.array([0.1, 0.3]))
-    items = Varying("friction", (0,), (other,)), Varying("normal_force_offset", (0,), (path,))
+    path = Paths.through(np.array([0.0, 2.0]), np.array([0.0, 60.0]))
+    other = Paths.through(np.array([0.0, 2.0]), np.array([0.1, 0.3]))
+    items = Varying("friction", (0,), other), Varying("normal_force_offset", (0,), path)
     problem = replace(with_loads(problem, Scattered(20.0, 10.0, 60.0)), varying=items)
     nodes = _load_nodes(problem, np.zeros(1), np.full(1, 2.0))
     own = 60.0 / math.sqrt(12.0)

@@ -37,7 +37,7 @@ from wearsim.evolution.steppers.loads import (
     with_feedback,
 )
 from wearsim.mechanics.numerics.multistep import GROW, LIMIT, SAFETY
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 from wearsim.mechanics.numerics.step_errors import LEAST_ENERGY
 from wearsim.plugins import Load
 
@@ -204,8 +204,8 @@ def test_exposure_is_the_mean_load_times_friction():
     constant = conditions_of(problem, problem, state, passes)
     assert constant.force[0] == 300.0
     assert constant.own[0] == constant.mean[0] == pytest.approx(300.0 + mean, rel=1e-14, abs=0.0)
-    rising = PiecewiseLinear(np.array([0.0, 100.0]), np.array([0.1, 0.3]))
-    varying = replace(problem, varying=(Varying("friction", (1,), (rising,)),))
+    rising = Paths.through(np.array([0.0, 100.0]), np.array([0.1, 0.3]))
+    varying = replace(problem, varying=(Varying("friction", (1,), rising),))
     here = varying.at_time(*(np.array([n]) / rate for n in (100.0, 300.0)))
     friction = (0.1 + 0.1 + 0.1 + 0.002 * 200.0 / rate) / 3.0
     found = conditions_of(here, varying, state, passes)
@@ -214,7 +214,7 @@ def test_exposure_is_the_mean_load_times_friction():
         == found.mean[0]
         == pytest.approx((300.0 + mean) * friction, rel=1e-12, abs=0.0)
     )
-    creeping = replace(problem, varying=(Varying("longitudinal", (1,), (rising,)),))
+    creeping = replace(problem, varying=(Varying("longitudinal", (1,), rising),))
     found = conditions_of(creeping, creeping, state, passes)
     assert found.own[0] == found.mean[0] == pytest.approx(300.0 + mean, rel=1e-14, abs=0.0)
     line = with_loads(problem, Line(300.0, 4.0, 4.0 * 200.0 / rate / math.sqrt(12.0)))

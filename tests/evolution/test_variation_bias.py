@@ -22,7 +22,7 @@ def varying_load(**changes):
     """Return problem, fresh state, arguments of one long step, and half the relative variance."""
     problem, _, stop = built("rig-ensemble", **changes)
     state, (load,) = fresh_state(problem), problem.varying
-    deviation = load.paths[0].deviation(0.0, problem.time(stop))
+    deviation = load.paths.deviation(np.zeros(1), problem.time(np.full(1, stop)))[0]
     relative = deviation / np.abs(carried_loads(problem, state.contacts)).max()
     return problem, state, (np.zeros(1), np.full(1, stop)), 0.5 * relative**2
 

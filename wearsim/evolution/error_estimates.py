@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.evolution.contacts import with_contacts
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import mean_along, sum_in_order, values_between, worn_volume
+from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.loads import smooth_loads
@@ -170,17 +170,10 @@ def _deviations(
     problem: WearProblem, start: FloatArray, stop: FloatArray
 ) -> list[tuple[str, tuple[int, ...], FloatArray]]:
     """Return field, rollers and standard deviation of all that varies between two times [s]."""
-    load = values_between([load.deviation for load in problem.loads], start, stop)
+    load = problem.load_deviation(start, stop)
     return [
         ("normal_force_offset", tuple(range(problem.rollers)), load),
-        *(
-            (
-                item.name,
-                item.rollers,
-                values_between([path.deviation for path in item.paths], start, stop),
-            )
-            for item in problem.varying
-        ),
+        *((item.name, item.rollers, item.paths.deviation(start, stop)) for item in problem.varying),
     ]
 
 

@@ -170,8 +170,7 @@ class WearProblem:
             roller_drop=None if self.roller_drop is None else part(self.roller_drop, 1),
             slip_profile=None if self.slip_profile is None else part(self.slip_profile, 2),
             varying=tuple(
-                replace(item, paths=tuple(item.paths[number] for number in numbers))
-                for item in self.varying
+                replace(item, paths=item.paths.at(realisations)) for item in self.varying
             ),
         )
         if self.constant_load is not None:  # the history takes many realisations of one test
@@ -332,7 +331,15 @@ class WearProblem:
 
     def mean_force(self, start: FloatArray, stop: FloatArray) -> FloatArray:
         """Return the exact mean of the load before feedback between two times; as `force`."""
+        if self.constant_load is not None:
+            return self.constant_load
         return self.at_stations(values_between([load.mean for load in self.loads], start, stop))
+
+    def load_deviation(self, start: FloatArray, stop: FloatArray) -> FloatArray:
+        """Return the exact standard deviation of the load between two times, (N,) [N]."""
+        if self.constant_load is not None:
+            return np.zeros(len(self.loads))
+        return values_between([load.deviation for load in self.loads], start, stop)
 
     def at_stations(self, force: FloatArray) -> FloatArray:
         """Return the normal force at the stations under a load of each realisation, as `force`."""
@@ -344,7 +351,7 @@ class WearProblem:
             return self
         values: dict[str, FloatArray] = {}
         for item, chosen in zip(self.varying, self._varying_contacts, strict=True):
-            mean = values_between([path.mean for path in item.paths], start, stop)
+            mean = item.paths.mean(start, stop)
             before = values.get(item.name, getattr(self.inputs, item.name))
             values[item.name] = np.where(chosen, mean, before)
         return self.with_inputs(replace(self.inputs, **values))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 
 from wearsim.mechanics.cam import Extreme, Stations, greatest, greatest_value
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 from wearsim.types import FloatArray, IntArray
 
 
@@ -94,13 +94,13 @@ class Varying:
         Field of `ContactInputs`.
     rollers : tuple of int
         Rollers of the problem that it acts on.
-    paths : tuple of PiecewiseLinear
-        Its value over time [s], one path per realisation.
+    paths : Paths
+        Its value over time [s].
     """
 
     name: str
     rollers: tuple[int, ...]
-    paths: tuple[PiecewiseLinear, ...]
+    paths: Paths
 
 
 @dataclass(frozen=True)

@@ -308,9 +308,19 @@ class WearState:
         realisations = self.passes.size
         if places.size == realisations:
             return others
-        order = np.arange(realisations)
-        order[places] = realisations + np.arange(places.size)
-        return joined_states([self, others]).at(order)
+        arrays = {n: getattr(self, n).copy() for n in _AXES if getattr(self, n) is not None}
+        for name, values in arrays.items():
+            values[(slice(None),) * _AXES[name] + (places,)] = getattr(others, name)
+        # the coarse-step solution of a test begins as the test itself
+        both = self.auxiliary.keys() | others.auxiliary.keys()
+        pairs = {
+            name: (getattr(self, name) or self, getattr(others, name) or others) for name in both
+        }
+        return self.replaced(
+            contacts=self.contacts.with_others(self.contacts_of(places), others.contacts),
+            **arrays,
+            **{name: before.with_others(places, after) for name, (before, after) in pairs.items()},
+        )
 
     @property
     def irreducible(self) -> FloatArray:

@@ -9,7 +9,6 @@ import re
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 import urllib.error
@@ -23,6 +22,7 @@ import pytest
 from typer.testing import CliRunner
 
 import wearsim
+from tests.interruptible import interruptible
 from wearsim.cli.app import app
 from wearsim_explore.server import Exploration, design_of
 
@@ -208,7 +208,7 @@ def children(of: int) -> list[int]:
 def test_nothing_is_left_behind(rig: Path, how: signal.Signals, tmp_path: Path) -> None:
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    command = [sys.executable, "-m", "wearsim", "explore", str(rig), "--no-browser"]
+    command = interruptible("-m", "wearsim", "explore", rig, "--no-browser")
     process = subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
@@ -226,7 +226,7 @@ def test_nothing_is_left_behind(rig: Path, how: signal.Signals, tmp_path: Path) 
         time.sleep(0.05)
     assert started
     process.send_signal(how)
-    code = process.wait(20)
+    code = process.wait(60)
     process.stdout.close()
     assert code == (-signal.SIGKILL if how == signal.SIGKILL else 0)
     for _ in range(200):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths, PiecewiseLinear
 
 
 @settings(max_examples=50, deadline=None)
@@ -33,3 +33,23 @@ def test_empty_interval_has_its_value_and_no_deviation():
     assert path.mean(0.5, 0.5) == 2.0
     assert path.deviation(0.5, 0.5) == 0.0
     assert path.extremes(0.5, 1.5) == (2.0, 4.0)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 10**6))
+def test_paths_of_realisations_are_as_those_of_single_ones(seed):
+    random = np.random.default_rng(seed)
+    time, value = np.array([0.0, 0.2, 1.9, 2.6, 5.0]), random.uniform(-2.0, 3.0, (4, 5))
+    start = np.array([0.0, *random.uniform(0.0, 2.0, 3)])
+    stop = start + np.array([0.0, 0.0, *random.uniform(0.0, 3.0, 2)])
+    paths = Paths.joined([Paths.through(time, value[:1]), Paths.through(time, value[1:])])
+    single = [PiecewiseLinear(time, row) for row in value]
+    for name in ("mean", "deviation"):
+        expected = [
+            getattr(path, name)(*span) for path, *span in zip(single, start, stop, strict=True)
+        ]
+        np.testing.assert_allclose(getattr(paths, name)(start, stop), expected, atol=1e-7)
+        chosen = np.array([2, 0, 2])
+        some = getattr(paths.at(chosen), name)(start[chosen], stop[chosen])
+        np.testing.assert_array_equal(some, getattr(paths, name)(start, stop)[chosen])
+    np.testing.assert_array_equal(paths.at(np.array([3])).of_first(start), single[3].at(start))

@@ -18,7 +18,6 @@ from wearsim.evolution.fatigue import (
 )
 from wearsim.evolution.pauses import at_rest
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import values_between
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import displacement_at, mean_force, with_feedback
 from wearsim.mechanics.fatigue import damage_of_step
@@ -154,7 +153,7 @@ def _load_nodes(
     variance, below, above = np.square(deviation), mean - low, high - mean
     for item in problem.varying:
         if item.name == "normal_force_offset":
-            own = values_between([path.deviation for path in item.paths], start, stop)
+            own = item.paths.deviation(start, stop)
             variance, reach = variance + np.square(own), _NORMAL * own
             below, above = below + reach, above + reach
     varies = (variance > 0.0) & (below > 0.0) & (above > 0.0)

@@ -153,7 +153,7 @@ def smooth_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) ->
         Start and length of the step [passes].
     """
     start, stop = problem.time(first), problem.time(first + passes)
-    deviation = values_between([load.deviation for load in problem.loads], start, stop)
+    deviation = problem.load_deviation(start, stop)
     if problem.pauses or not deviation.any():
         return np.zeros(len(first), dtype=np.bool_)
     loads = problem.force(start), problem.force(stop)
@@ -165,7 +165,7 @@ def smooth_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) ->
 def abrupt_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) -> BoolArray:
     """Return whether each load before feedback varies by more than a trend; as `smooth_loads`."""
     start, stop = problem.time(first), problem.time(first + passes)
-    deviation = values_between([load.deviation for load in problem.loads], start, stop)
+    deviation = problem.load_deviation(start, stop)
     mean = values_between([load.mean for load in problem.loads], start, stop)
     return np.asarray((deviation > ABRUPT * mean) & ~smooth_loads(problem, first, passes))
 

@@ -132,7 +132,7 @@ def _passes(
     times = (state.passes[0] + np.arange(count, dtype=np.float64) + 0.5) / kinematics.pass_rate
     inputs = problem.inputs.at(rollers)
     for item in problem.varying:
-        inputs = inputs.with_value_of(item, rollers, item.paths[0].at(times)[:, None])
+        inputs = inputs.with_value_of(item, rollers, item.paths.of_first(times)[:, None])
     if redraw is not None:
         inputs = redraw(inputs, first)
     force = problem.at_stations(problem.loads[0].force(times)).reshape(-1, count).T

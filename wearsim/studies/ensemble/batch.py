@@ -26,6 +26,7 @@ from wearsim.evolution.strip_errors import (
     coarse_courses,
     strip_errors,
 )
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 from wearsim.plugins import BODIES
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import observables_of_track
@@ -69,6 +70,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
     first, second = one.kinematics, other.kinematics
     arrays = [(getattr(one, name), getattr(other, name)) for name in _ARRAYS]
     varying = [[(item.name, item.rollers) for item in problem.varying] for problem in (one, other)]
+    paths = [[item.paths for item in problem.varying] for problem in (one, other)]
     return (
         one.grid is other.grid
         and one.model is other.model
@@ -79,6 +81,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
         and all(getattr(first, name) == getattr(second, name) for name in _RADII)
         and first.track.matches(second.track)
         and varying[0] == varying[1]
+        and all(np.array_equal(a.time, b.time) for a, b in zip(*paths, strict=True))
         and (one.constant_load is None) == (other.constant_load is None)
         and [item.most for item in one.growth] == [item.most for item in other.growth]
     )
@@ -99,7 +102,7 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
         inputs=ContactInputs(*columns),
         growth=tuple(item for problem in problems for item in problem.growth),
         varying=tuple(
-            replace(items[0], paths=tuple(path for item in items for path in item.paths))
+            replace(items[0], paths=Paths.joined([item.paths for item in items]))
             for items in zip(*(problem.varying for problem in problems), strict=True)
         ),
     )

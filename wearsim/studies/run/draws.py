@@ -12,7 +12,7 @@ import scipy
 
 from wearsim.errors import CapabilityError, mistake_in
 from wearsim.evolution.quantities import Varying
-from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.mechanics.numerics.piecewise_linear import Paths
 from wearsim.plugins import Process
 from wearsim.scenario import RandomInput, Scenario, realise, require_run
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
@@ -25,6 +25,7 @@ from wearsim.uq.sampling.sobol import Stream
 LISTED = {OFFSET, YAW, TILT}  # a scenario may give one per roller
 LONGEST_PATH = 5_000_000  # samples of a process
 BLOCK = 4096  # realisations that are drawn at once
+AHEAD = 64  # realisations drawn with one after the first; they are usually the next ones
 
 
 def draw(scenario: Scenario) -> Setup:
@@ -133,6 +134,8 @@ class Drawer:
             correlations=correlations,
             replicates=replicates,
         )
+        self._last = total or math.inf
+        self._drawn: dict[int, dict[str, FloatArray]] = {}
 
     @property
     def groups(self) -> list[str]:
@@ -175,12 +178,8 @@ class Drawer:
             scenario = replace(scenario, sampling=table)
         numbers = dict.fromkeys((item.name for item in scenario.random), realisation)
         numbers |= sources or {}
-        columns = {n: self.columns(n, 1) for n in sorted({numbers[i.name] for i in self.items})}
-        values = {
-            key: np.asarray(columns[numbers[item.name]][key][0])
-            for item in self.items
-            for key in item.keys
-        }
+        drawn = {n: self._values(n) for n in sorted({numbers[item.name] for item in self.items})}
+        values = {key: drawn[numbers[item.name]][key] for item in self.items for key in item.keys}
         listed = {
             key: tuple(float(value) for value in array) if array.ndim else float(array)
             for key, array in values.items()
@@ -199,6 +198,19 @@ class Drawer:
                 item.name: _means(scenario, item, of_input) for item, of_input in paths.items()
             },
         )
+
+    def _values(self, realisation: int) -> dict[str, FloatArray]:
+        """Return the values of one realisation, as `columns`, drawn with those after it."""
+        if realisation not in self._drawn:
+            ahead = AHEAD if self._drawn else 1
+            count = int(min(ahead, max(self._last - realisation, 1)))
+            columns = self.columns(realisation, count)
+            if len(self._drawn) > BLOCK:
+                self._drawn = {}
+            for place in range(count):
+                values = {key: np.asarray(column[place]) for key, column in columns.items()}
+                self._drawn[realisation + place] = values
+        return self._drawn[realisation]
 
     def uniforms(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the uniform numbers of consecutive realisations by name, (count, dimension)."""
@@ -298,12 +310,13 @@ def _paths(scenario: Scenario, item: RandomInput, realisation: int) -> list[Vary
     for block, group in enumerate(groups):
         uniforms = partial(stream.uniforms, realisation=realisation, block=block)
         value = process.path(points, uniforms) - origin(item.name, item.mean[0])
-        paths.append(Varying(CONTACT_FIELDS[item.name], group, (PiecewiseLinear(times, value),)))
+        paths.append(Varying(CONTACT_FIELDS[item.name], group, Paths.through(times, value)))
     return paths
 
 
 def _means(scenario: Scenario, item: RandomInput, paths: list[Varying]) -> FloatArray:
     """Return the mean of a process over the test, one or one for each roller [SI]."""
     start = origin(item.name, item.mean[0])
-    means = np.array([path.paths[0].mean(0.0, scenario.total_time) + start for path in paths])
+    whole = np.zeros(1), np.full(1, scenario.total_time)
+    means = np.array([path.paths.mean(*whole)[0] + start for path in paths])
     return means if item.persistence == "per-roller" else means[0]

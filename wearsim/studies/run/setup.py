@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.evolution.quantities import OneStation, Varying
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
-from wearsim.plugins import JointDistribution, WearLaw
+from wearsim.plugins import BODIES, JointDistribution, WearLaw
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
@@ -93,10 +93,10 @@ class Setup:
         time = self.scenario.total_time
         for item in self.varying:
             if item.name == name:
-                (path,) = item.paths
-                signed = _changes_sign(path.value)
-                path_mean = np.abs(path.value).mean() if signed else path.mean(0.0, time)
-                sizes.append(abs(float(path_mean)))
+                values, whole = item.paths.value, (np.zeros(1), np.full(1, time))
+                signed = _changes_sign(values)
+                mean_of_path = np.abs(values).mean() if signed else item.paths.mean(*whole)[0]
+                sizes.append(abs(float(mean_of_path)))
         for random in self.passes:
             if len(random.keys) == 1 and CONTACT_FIELDS[random.keys[0]] == name:
                 values = random.scalar.quantile(_MIDPOINTS)
@@ -111,7 +111,7 @@ class Setup:
         name : str
             Field of `ContactInputs`.
         """
-        paths = [item.paths[0].value for item in self.varying if item.name == name]
+        paths = [item.paths.value for item in self.varying if item.name == name]
         limits = [
             limits
             for random in self.passes
@@ -343,11 +343,14 @@ class Setup:
         friction_slip : float
             Friction coefficient times slip.
         """
-        scenario = self.scenario
+        scenario, speed = self.scenario, self.scenario.rolling_speed
+        share = self.turn.mean_radius / scenario.roller.radius / scenario.operation.rollers
+        cylinder, roller = (law.depth_per_dissipation(body, speed) for body in BODIES)
+        if cylinder is not None and roller is not None:
+            return (cylinder + share * roller) * friction_slip * speed
         modulus = scenario.pair.contact_modulus
         curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
         half_length = np.sqrt(4.0 * line_load / (np.pi * modulus * curvature))
-        speed = scenario.rolling_speed
         dissipation = friction_slip * line_load * speed
         sliding = ContactSolution(
             y=np.zeros_like(line_load),
@@ -364,7 +367,6 @@ class Setup:
             longitudinal_creepage=0.0,
             iterations=0,
         )
-        share = self.turn.mean_radius / scenario.roller.radius / scenario.operation.rollers
         depth = law.depth_per_pass("cylinder", sliding, speed)
         depth = depth + share * law.depth_per_pass("roller", sliding, speed)
         return float((depth / line_load).max())
