@@ -221,6 +221,19 @@ def test_peak_pressure_under_a_load_that_varies_is_that_of_rigid_bodies(
     assert (np.abs(pressure - expected) < stated).mean() >= 0.92
 
 
+def test_no_roller_wears_strips_beyond_its_edges() -> None:
+    changes = {
+        "operation.duration": "4500 min",
+        "roller.offset": ["-0.4 mm", "0.1 mm", "0.5 mm"],
+        "creepage.yaw": ["0 mrad", "1 mrad", "-2 mrad"],
+    }
+    result = run({**changes, "evolution.strip_error": True})
+    fine = run({**PLAIN, **changes, "contact.strips": 401, "evolution.tolerance": 1e-4})
+    stated, pressure = result.errors["peak_pressure"][-1], result.peak_pressure[-1]
+    assert (np.abs(pressure - fine.peak_pressure[-1]) < stated).all()
+    assert (stated < 0.06 * pressure).all()
+
+
 @pytest.mark.slow
 def test_abrupt_edge_of_a_tightly_crowned_groove_is_part_of_the_stated_error() -> None:
     crowned = {"roller.crown_radius": "30 mm", "load.normal_force": "50 N"}

@@ -42,6 +42,9 @@ GROOVE = 4.0  # worn descent over the elastic approach from which edges are reso
 # more: where much of it adheres, wear is greatest at the edge, the line load is not uniform up to
 # the layer in which it falls, and errors of the power add up
 MOST_ADHESION, CEASING_ADHESION = 0.4, 0.5
+# strips at an edge that a step may cross, and line load beyond them over the greatest of a roller
+CROSSED, MOST_BEYOND = 4, 0.2
+LEAST_CROSSED = 0.5  # strips that an edge crosses in a step which is shortened
 #: fields of a state about the edges of contacts; not a number in tests that do not resolve them
 FIELDS = "separation", "part", "whole_steps"
 
@@ -80,6 +83,25 @@ def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
     sums = np.concatenate([state.past_wear.sum(axis=-1), state.past_sums], axis=1)
     counts = np.where(loaded, SETTLED, 0.0)
     return state.replaced(separation=None, part=1.0 * loaded, whole_steps=counts, past_sums=sums)
+
+
+def beyond_edges(start: WearState, end: WearState) -> BoolArray:
+    """Return in which tests a roller has come to carry much load beyond its edges, (N,).
+
+    Where the edge of a roller crosses much of a strip in a step, the strip protrudes until it is
+    worn, and the solution may be one in which another roller wears it that is not close to it.
+    """
+    assert start.part is not None
+    assert end.part is not None
+    shape = end.part.shape
+    near = start.contacts.line_load.reshape(shape) > 0.0
+    load = end.contacts.line_load.reshape(shape)
+    for _ in range(CROSSED):
+        near[..., 1:] |= near[..., :-1].copy()
+        near[..., :-1] |= near[..., 1:].copy()
+    beyond = np.where(near, 0.0, load).max(axis=-1) > MOST_BEYOND * load.max(axis=-1)
+    crossed = np.where(near, np.maximum(end.part - start.part, 0.0), 0.0).sum(axis=-1)
+    return np.asarray(beyond.any(axis=(0, 1)) & (crossed.max(axis=(0, 1)) > LEAST_CROSSED))
 
 
 def unresolved(state: WearState) -> BoolArray:

@@ -292,7 +292,8 @@ def implicit_step(
     Raises
     ------
     StepError
-        If the iteration for the contacts does not converge.
+        If the iteration for the contacts does not converge, or a roller that is not close to some
+        strips wears them.
     """
     if state.past_spans is None:
         state = with_rates(problem, state)
@@ -316,6 +317,12 @@ def implicit_step(
             raise
         start = state if whole else edges.without_edges(here, state)
         return step_by_formula(here, start, passes, conditions, np.ones_like(order))[0]
+    several_rollers = problem.shape[1] > 1 and problem.shape[0] == 1
+    if several_rollers and end.separation is not None and edges.beyond_edges(state, end).any():
+        raise StepError(
+            f"a roller carries load beyond its edges after a step from pass {state.passes[0]:.0f}",
+            end.to_arrays(),
+        )
     # strips that leave the contact: their depth can decrease from the third order on
     for lower in (2, 1) if decreased.nonzero()[0].size else ():
         again: IntArray = (decreased & (np.asarray(end.order) > lower)).nonzero()[0]
