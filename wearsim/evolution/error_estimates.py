@@ -12,7 +12,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Step
-from wearsim.evolution.steppers.loads import smooth_loads
+from wearsim.evolution.steppers.loads import load_deviation, smooth_loads
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
 from wearsim.mechanics.numerics.linearised_wear import difference_sizes
 from wearsim.mechanics.numerics.step_errors import DEPTH_EXPONENT, VOLUME_EXPONENT
@@ -170,7 +170,7 @@ def _deviations(
     problem: WearProblem, start: FloatArray, stop: FloatArray
 ) -> list[tuple[str, tuple[int, ...], FloatArray]]:
     """Return field, rollers and standard deviation of all that varies between two times [s]."""
-    load = problem.load_deviation(start, stop)
+    load = load_deviation(problem, start, stop)
     return [
         ("normal_force_offset", tuple(range(problem.rollers)), load),
         *((item.name, item.rollers, item.paths.deviation(start, stop)) for item in problem.varying),

@@ -331,15 +331,7 @@ class WearProblem:
 
     def mean_force(self, start: FloatArray, stop: FloatArray) -> FloatArray:
         """Return the exact mean of the load before feedback between two times; as `force`."""
-        if self.constant_load is not None:
-            return self.constant_load
         return self.at_stations(values_between([load.mean for load in self.loads], start, stop))
-
-    def load_deviation(self, start: FloatArray, stop: FloatArray) -> FloatArray:
-        """Return the exact standard deviation of the load between two times, (N,) [N]."""
-        if self.constant_load is not None:
-            return np.zeros(len(self.loads))
-        return values_between([load.deviation for load in self.loads], start, stop)
 
     def at_stations(self, force: FloatArray) -> FloatArray:
         """Return the normal force at the stations under a load of each realisation, as `force`."""

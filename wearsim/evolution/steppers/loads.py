@@ -137,8 +137,17 @@ def displacement_at(
 
 def mean_force(problem: WearProblem, state: WearState, passes: FloatArray) -> FloatArray:
     """Return the exact mean over a step of the load before feedback, shape (N,) [N]."""
+    if problem.constant_load is not None:
+        return problem.constant_load
     start, stop = problem.time(state.passes), problem.time(state.passes + passes)
     return problem.mean_force(start, stop)
+
+
+def load_deviation(problem: WearProblem, start: FloatArray, stop: FloatArray) -> FloatArray:
+    """Return the exact standard deviation of each load between two times [s], shape (N,) [N]."""
+    if problem.constant_load is not None:
+        return np.zeros(len(problem.loads))
+    return values_between([load.deviation for load in problem.loads], start, stop)
 
 
 def smooth_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) -> BoolArray:
@@ -153,7 +162,7 @@ def smooth_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) ->
         Start and length of the step [passes].
     """
     start, stop = problem.time(first), problem.time(first + passes)
-    deviation = problem.load_deviation(start, stop)
+    deviation = load_deviation(problem, start, stop)
     if problem.pauses or not deviation.any():
         return np.zeros(len(first), dtype=np.bool_)
     loads = problem.force(start), problem.force(stop)
@@ -165,7 +174,7 @@ def smooth_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) ->
 def abrupt_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) -> BoolArray:
     """Return whether each load before feedback varies by more than a trend; as `smooth_loads`."""
     start, stop = problem.time(first), problem.time(first + passes)
-    deviation = problem.load_deviation(start, stop)
+    deviation = load_deviation(problem, start, stop)
     mean = values_between([load.mean for load in problem.loads], start, stop)
     return np.asarray((deviation > ABRUPT * mean) & ~smooth_loads(problem, first, passes))
 
