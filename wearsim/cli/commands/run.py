@@ -48,8 +48,8 @@ Until = Annotated[
         metavar="LIMIT",
         help="Stop a wear test where it first reaches a limit: 'depth 50 um', 'roller_depth 5 um',"
         " 'lift_error 30 um', 'volume 12 mm^3', 'width 14 mm', 'peak_pressure 900 MPa',"
-        " 'clearance 60 um', 'damage 1', 'pitting 0.1', '12 h' or '2e6 passes'. A shorter test"
-        " is extended.",
+        " 'clearance 60 um', 'damage 1', 'pitting 0.1', '12 h', '2e6 passes' or '5e5 turns'. A"
+        " shorter test is extended.",
         show_default=False,
     ),
 ]
