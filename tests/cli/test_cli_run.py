@@ -50,6 +50,17 @@ def test_quiet_shows_no_progress(command: Command, scenario: Path) -> None:
     assert "depth" in result.stdout
 
 
+@pytest.mark.parametrize("options", [(), ("--quiet",)], ids=["progress", "quiet"])
+def test_warning_of_a_run_is_written_once(
+    command: Command, scenario: Path, options: tuple[str, ...]
+) -> None:
+    first = command("run", scenario, "--until", "5000 passes", *options)
+    for result in (first, command("resume", "short.h5", *options)):
+        lines = [line for line in result.stderr.splitlines() if line.startswith("warning")]
+        assert [line for line in lines if "estimated error of depth" in line]
+        assert len(set(lines)) == len(lines)
+
+
 def test_json_is_the_end_state_and_all_of_stdout(command: Command, scenario: Path) -> None:
     data = json.loads(command("run", scenario, "--json", "-o", "x.h5", *WITHOUT_STRIPS).stdout)
     found = open_results("x.h5")

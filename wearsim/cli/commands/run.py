@@ -78,7 +78,8 @@ def run(
             if getattr(wearsim.open_results(path), "failure", ""):
                 error.add_note(f"the last accepted step is kept: wearsim show {path}")
         raise
-    show_view(result.view, json=json, files={"results file": result.path}, known=loaded.notes)
+    known = *loaded.notes, *watch.warnings
+    show_view(result.view, json=json, files={"results file": result.path}, known=known)
 
 
 def resume(
@@ -147,7 +148,8 @@ def resume(
     if isinstance(watch, progress.EnsembleWatcher):
         show_ensemble(result, json, None, watch.workers)
     else:
-        show_view(result.view, json=json, files={"results file": result.path})
+        files = {"results file": result.path}
+        show_view(result.view, json=json, files=files, known=watch.warnings)
 
 
 def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
