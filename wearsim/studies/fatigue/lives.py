@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wearsim.evolution.limits import OF_FATIGUE
 from wearsim.report.text import NOTHING, count, rounded_lives, shown
 from wearsim.report.view import Row, Rows
 from wearsim.studies.fatigue.view import source_rows, sources
@@ -16,6 +17,7 @@ from wearsim.types import FloatArray
 from wearsim.uq.survival.competing import CompetingRisks, course_places
 
 if TYPE_CHECKING:
+    from wearsim.scenario import Scenario
     from wearsim.studies.life.values import LifeValues
 
 _LEAST = 1e-9  # passes at the end of a course, at least: a limit may be reached at once
@@ -46,6 +48,13 @@ def course_of(
     passes, damage = np.array([(first, rate * first), *points]).T
     logs = PchipInterpolator(np.log(passes), np.log(damage))(np.log(places))
     return np.asarray(np.exp(logs))
+
+
+def other_end(scenario: Scenario) -> str:
+    """Return what ends lives beside pitting: "wear", "a limit of damage", or both."""
+    given = scenario.limit.given
+    wear = ["wear"] if given.keys() - set(OF_FATIGUE) else []
+    return " or ".join([*wear, *(f"a limit of {name}" for name in OF_FATIGUE if name in given)])
 
 
 def competing_risks(result: LifeValues) -> CompetingRisks | None:
@@ -123,6 +132,7 @@ def competing_data(result: LifeValues) -> dict[str, Any]:
     return {
         "wear_or_pitting": {
             "lives": {f"b{share:g}": lives_of(result, share / 100.0) for share in shares},
+            "other_end": other_end(result.scenario),
             "first_by_pitting": level.pitting,
             "first_by_wear": level.wear,
             "sources": sources(result.scenario),
@@ -137,13 +147,13 @@ def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | N
         return None
     shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
     lives = [lives_of(result, share / 100.0) for share in shares]
-    level = risks.at(math.inf)
+    level, other = risks.at(math.inf), other_end(result.scenario)
     names = {
-        "both": ("wear or pitting", 1.0 - level.survival),
+        "both": (f"{other} or pitting", 1.0 - level.survival),
         "without_wear": ("pitting, of bodies that do not wear", None),
-        "without_pitting": ("wear, of bodies that do not pit", None),
+        "without_pitting": (f"{other}, of bodies that do not pit", None),
         "pitting": ("pitting first", level.pitting),
-        "wear": ("wear first", level.wear),
+        "wear": (f"{other} first", level.wear),
     }
     cells = [
         [
@@ -173,8 +183,8 @@ def fatigue_of_lives(result: LifeValues) -> Rows:
     if first is not None:
         part = first.at(result.most * result.settings.per_unit)
         text = (
-            f"{shown(part.pitting, '%', 3)} by pitting and {shown(part.wear, '%', 3)} by wear"
-            f" within {count(result.most)} {result.unit}"
+            f"{shown(part.pitting, '%', 3)} by pitting and {shown(part.wear, '%', 3)} by"
+            f" {other_end(result.scenario)} within {count(result.most)} {result.unit}"
         )
         rows.insert(0, Row("first end", text))
     return rows
