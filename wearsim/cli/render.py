@@ -52,9 +52,10 @@ def show_view(
         _write_tables(view, written, stored, brief)
         if not stored and (line := view.line()):
             typer.echo(printable(line))
-        write_notes(
-            *([text for text in texts if text not in known] for texts in (view.notes, view.warnings))
-        )
+        fresh = [
+            [text for text in said if text not in known] for said in (view.notes, view.warnings)
+        ]
+        write_notes(*fresh)
     if view.failures:
         note(f"warning: {view.failures}")
 
