@@ -36,6 +36,7 @@ from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, observables_of_track
 from wearsim.studies.contact.comparison import REFERENCE, error_above_tolerance
+from wearsim.studies.effort import large_records
 from wearsim.studies.failures import (
     explained,
     failures_explained,
@@ -125,7 +126,8 @@ class RunInProgress:
         }
         if data is None:
             means = setup if setup.scenario is scenario else Setup(scenario)
-            for text in plausibility_warnings(means):
+            large = large_records(scenario, self.problem, path)
+            for text in [*plausibility_warnings(means), *([large] if large else [])]:
                 self.warn(text)
             self._write()
             self._last_write = 0.0  # it has imported the library that writes
