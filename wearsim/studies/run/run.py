@@ -173,9 +173,11 @@ def resume(
         data = replace(data, scenario_text=text)
     check_plugins(path, data)
     stored = stored_scenario(data)
-    text = data.until or None if until is None and not data.finished else until
-    with checking_argument("until"):
-        limit = None if text is None else Limit.parse(text, stored.operation.rollers)
+    end = data.until or None if until is None and not data.finished else until
+    limit: Limit | None = None
+    if end is not None:
+        with checking_argument("until"):
+            limit = Limit.parse(end, stored.operation.rollers)
     reached = is_at_limit(path, data, limit)
     if limit is not None and not reached and until is not None:
         limit_warnings(stored, limit)
