@@ -60,3 +60,21 @@ def test_figure_of_an_ensemble_starts_from_the_start_profile(result, tmp_path):
     assert axes.get_ylabel() == "height above nominal [um]"
     lowest = shown(-float(lines["mean"].min()) * 1e-6, "um")
     assert f"worn since the start, mean profile {lowest} below nominal" in figure.get_suptitle()
+
+
+@pytest.mark.parametrize("passes", [3000, 100_000])
+def test_depth_below_nominal_states_an_error_that_holds(result, passes):
+    """The start profile has its lowest point in the middle of a strip or between two strips."""
+
+    def run(**changes):
+        changes = {name.replace("__", "."): value for name, value in changes.items()}
+        return wearsim.run(result.scenario.changed({"operation.passes": passes, **changes}))
+
+    fine = run(contact__strips=801, evolution__tolerance=1e-5, evolution__strip_error=False)
+    for strips in (80, 81, 121):
+        coarse = run(contact__strips=strips)
+        below, error = coarse.depth_below_nominal[-1], coarse.depth_below_nominal_error
+        assert abs(below - fine.depth_below_nominal[-1]) <= error < 0.06 * below, strips
+        assert coarse.final["depth_below_nominal_error_m"] == error
+        (row,) = [row for row in coarse.view.rows() if row.label == "depth below nominal"]
+        assert row.text.endswith(f" ± {shown(error, 'um', 2)}")

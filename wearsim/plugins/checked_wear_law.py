@@ -69,8 +69,12 @@ class CheckedWearLaw(WearLaw):
         if not (is_numeric(depth) and np.shape(depth) == shape):
             self._refuse_kind(what, depth, f"an array of the shape {shape}")
         if not (np.isfinite(depth).all() and depth.min() >= -ROUNDING * depth.max()):
-            state = {"half_length": solution.half_length, "line_load": solution.line_load}
-            state |= {"dissipation": solution.dissipation, "rolling_speed": rolling_speed}
+            state: dict[str, Any] = {
+                "half_length": solution.half_length,
+                "line_load": solution.line_load,
+                "dissipation": solution.dissipation,
+                "rolling_speed": rolling_speed,
+            }
             self._refuse_value(what, depth, "m", state)
         return depth
 
