@@ -14,10 +14,12 @@ from wearsim.report.text import NOTHING, count, rounded_lives, shown
 from wearsim.report.view import Row, Rows
 from wearsim.studies.fatigue.view import source_rows, sources
 from wearsim.types import FloatArray
+from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.competing import CompetingRisks, course_places
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
+    from wearsim.studies.life.result import LifeResult
     from wearsim.studies.life.values import LifeValues
 
 _LEAST = 1e-9  # passes at the end of a course, at least: a limit may be reached at once
@@ -140,13 +142,17 @@ def competing_data(result: LifeValues) -> dict[str, Any]:
     }
 
 
-def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | None:
-    """Return heads and cells of the table of wear and pitting; None without fatigue."""
+def competing_table(result: LifeResult) -> tuple[list[str], list[list[str]]] | None:
+    """Return heads and cells of the table of wear and pitting; None without fatigue.
+
+    Lives have the digits that the interval of the life of the same share leaves.
+    """
     risks = competing_risks(result)
     if risks is None:
         return None
     shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
     lives = [lives_of(result, share / 100.0) for share in shares]
+    intervals = [result.b(share) for share in shares]
     level, other = risks.at(math.inf), other_end(result.scenario)
     names = {
         "both": (f"{other} or pitting", 1.0 - level.survival),
@@ -159,8 +165,8 @@ def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | N
         [
             words,
             *(
-                _life(lives_of_share[name])
-                for lives_of_share in lives
+                _life(lives_of_share[name], interval)
+                for lives_of_share, interval in zip(lives, intervals, strict=True)
                 if lives_of_share is not None
             ),
             NOTHING if last is None else shown(last, "%", 3),
@@ -170,8 +176,13 @@ def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | N
     return [f"life [{result.unit}]", *(f"B{share:g}" for share in shares), "at last"], cells
 
 
-def _life(life: float) -> str:
-    return "infinite" if math.isinf(life) else rounded_lives(life)[0]
+def _life(life: float, interval: Interval) -> str:
+    """Return a life with the digits of another one, or two where that has no interval."""
+    if math.isinf(life):
+        return "infinite"
+    part = interval.half_width / interval.value if interval.value > 0.0 else math.nan
+    part = min(part, 1.0) if math.isfinite(part) else 1.0
+    return rounded_lives((1.0 - part) * life, life, (1.0 + part) * life)[1]
 
 
 def fatigue_of_lives(result: LifeValues) -> Rows:
