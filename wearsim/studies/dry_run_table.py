@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.report.text import PER_SI, lapse, limit_unit
+from wearsim.report.text import PER_SI, lapse, limit_unit, shown
 from wearsim.studies.dry_run import Data
 from wearsim.studies.fatigue.unworn import unworn_text
 from wearsim.units import in_engineers_unit
@@ -262,7 +262,7 @@ def _forecast_rows(forecast: Data) -> TableRows:
         wear += f", lift error {_rounded(forecast['lift_error_m'] * 1e6)} um"
     if "damage" in forecast:
         wear += f", damage {_rounded(forecast['damage'])}, probability of pitting"
-        wear += f" {_rounded(forecast['pitting'])}"
+        wear += f" {shown(forecast['pitting'], '%', 2)}"
     time = lapse(float(f"{forecast['wall_time_s']:.2g}"))
     effort = (
         f"{_rounded(forecast['steps'])} steps, {time},"
