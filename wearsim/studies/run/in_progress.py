@@ -270,6 +270,12 @@ class RunInProgress:
             elif strips > 0.5 * relative:
                 strips_here = self.scenario.contact.strips or self.present.grid.strips
                 remedy = f"more contact.strips than {strips_here} decrease it"
+                cylinder = self.scenario.cylinder
+                if cylinder.profile is not None and cylinder.profile_filter is None:
+                    remedy += (
+                        ", or where the start profile is rough a filter, cylinder.profile_filter ="
+                        ' "0.8 mm" (ISO 16610-21)'
+                    )
             elif stations > 0.5 * relative:
                 remedy = "more cam.stations decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
