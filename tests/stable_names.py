@@ -17,12 +17,13 @@ import wearsim
 FOLDER = Path(__file__).parents[1] / "docs" / "stable"
 MODULES = (
     *("wearsim", "wearsim.plugins", "wearsim.types", "wearsim.contact_batch", "wearsim.errors"),
-    *("wearsim.report", "wearsim.testing", "wearsim.atomic_write", "wearsim.cli.progress"),
-    *("wearsim.cli.render", "wearsim.cli.shared", "wearsim.report.panels", "wearsim.report.text"),
-    *("wearsim.report.view", "wearsim.results.content", "wearsim.results.io.files"),
-    *("wearsim.results.io.outputs", "wearsim.results.kinds", "wearsim.results.study_view"),
-    *("wearsim.results.viewed", "wearsim.studies.execution.factory"),
-    *("wearsim.studies.preparation", "wearsim.studies.progress"),
+    *("wearsim.arguments", "wearsim.report", "wearsim.testing", "wearsim.atomic_write"),
+    *("wearsim.cli.progress", "wearsim.cli.render", "wearsim.cli.shared", "wearsim.report.panels"),
+    *("wearsim.report.text", "wearsim.report.view", "wearsim.results.content"),
+    *("wearsim.results.io.files", "wearsim.results.io.outputs", "wearsim.results.kinds"),
+    *("wearsim.results.study_view", "wearsim.results.viewed"),
+    *("wearsim.studies.execution.factory", "wearsim.studies.preparation"),
+    "wearsim.studies.progress",
 )
 
 

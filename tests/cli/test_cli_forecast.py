@@ -1,11 +1,14 @@
 """Forecast and refusals of `wearsim check`, and limits and deep grooves of `run` and `resume`."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from cli_examples import SCENARIOS, Command
 
+import wearsim
+from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.studies.opening import open_results
 
 FREE = """\
@@ -49,6 +52,42 @@ def test_check_refuses_a_roller_that_skids(command: Command, scenario: Path) -> 
     result = command("check", scenario)
     assert result.exit_code == 1
     assert "lower creepage.bearing_torque = 700 N mm to below 600 N mm" in result.stderr
+
+
+def test_records_of_gigabytes_give_a_warning_with_a_remedy(
+    command: Command, scenario: Path
+) -> None:
+    long = ("--set", "operation.duration=450 min", "--set")
+    (warning,) = re.findall(
+        r"warning: outputs\.every_passes = 1: 1,350,001 records make a results file of .*",
+        command("check", scenario, *long, "outputs.every_passes=1").stderr,
+    )
+    least = int(re.findall(r"at least (\d+) makes one below 1 GB", warning)[0])
+    assert least > 1
+    enough = command("check", scenario, *long, f"outputs.every_passes={least}")
+    assert "outputs" not in enough.stderr
+    timed = command("check", scenario, *long, "outputs.every=0.02 s").stderr
+    assert "warning: outputs.every = " in timed
+    numbered = command("check", scenario, *long, "outputs.records=1000000").stderr
+    assert "warning: outputs.records = 1000000: 1,000,001 records" in numbered
+
+
+def test_run_warns_of_records_of_gigabytes(scenario: Path) -> None:
+    output, large = (
+        scenario.with_name("x.h5"),
+        {"operation.duration": "450 min", "outputs.every_passes": 1},
+    )
+    with pytest.raises(Interrupted):
+        wearsim.run(wearsim.load_scenario(scenario, large), output, stop_requested=lambda: True)
+    assert any("1,350,001 records" in text for text in open_results(output).warnings)
+
+
+def test_run_is_refused_where_the_disk_has_no_place_for_its_records(scenario: Path) -> None:
+    output = scenario.with_name("x.h5")
+    larger = {"operation.duration": "1e9 min", "outputs.every_passes": 1}
+    with pytest.raises(ResultsFileError, match=r"x\.h5: outputs\.every_passes = 1: .* GB left"):
+        wearsim.run(wearsim.load_scenario(scenario, larger), output)
+    assert not output.exists()
 
 
 def test_check_warns_of_a_deep_groove(command: Command, scenario: Path) -> None:

@@ -21,7 +21,7 @@ def test_results_file_is_named_after_the_scenario(command: Command, scenario: Pa
     assert found.finished
     assert found.passes[-1] == 6000
     assert result.stdout.startswith("a short [test]")
-    assert f"{found.depth[-1] * 1e6:.4g} um" in result.stdout
+    assert found.view.rows()[0].text in result.stdout
     assert "short.h5" in result.stdout
 
 
@@ -48,6 +48,17 @@ def test_quiet_shows_no_progress(command: Command, scenario: Path) -> None:
     result = command("run", scenario, "--quiet", *WITHOUT_STRIPS)
     assert result.stderr == ""
     assert "depth" in result.stdout
+
+
+@pytest.mark.parametrize("options", [(), ("--quiet",)], ids=["progress", "quiet"])
+def test_warning_of_a_run_is_written_once(
+    command: Command, scenario: Path, options: tuple[str, ...]
+) -> None:
+    first = command("run", scenario, "--until", "5000 passes", *options)
+    for result in (first, command("resume", "short.h5", *options)):
+        lines = [line for line in result.stderr.splitlines() if line.startswith("warning")]
+        assert [line for line in lines if "estimated error of depth" in line]
+        assert len(set(lines)) == len(lines)
 
 
 def test_json_is_the_end_state_and_all_of_stdout(command: Command, scenario: Path) -> None:

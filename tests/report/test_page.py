@@ -86,7 +86,7 @@ def test_columns_are_in_single_precision(result):
 def test_page_states_question_answer_error_and_origin(result, page_of_run):
     page = unescape(page_of_run)
     assert "How deep does the cylinder wear in 9,000 roller passes (3.000 min)?" in page
-    assert f"{1e6 * result.depth[-1]:.4g} um ± " in page
+    assert f"{1e6 * result.depth[-1]:.4g} ± " in page
     assert "The stated error is that of the steps and strips" in page
     assert "It does not contain the errors of the contact model" in page
     assert "numpy " in page

@@ -60,3 +60,35 @@ def test_figure_of_an_ensemble_starts_from_the_start_profile(result, tmp_path):
     assert axes.get_ylabel() == "height above nominal [um]"
     lowest = shown(-float(lines["mean"].min()) * 1e-6, "um")
     assert f"worn since the start, mean profile {lowest} below nominal" in figure.get_suptitle()
+
+
+def test_warning_of_a_rough_start_profile_names_a_filter_that_helps(result, tmp_path):
+    rng, y = np.random.default_rng(1), np.linspace(-12.0, 12.0, 2401)
+    height = rng.normal(0.0, 1.0, 2401) - np.maximum(20.0 - y**2, 0.0)
+    rows = "\n".join(f"{place},{value}" for place, value in zip(y, height, strict=True))
+    (tmp_path / "rough.csv").write_text(f"y [mm],height [um]\n{rows}\n")
+    changes = {"cylinder.profile": str(tmp_path / "rough.csv"), "operation.passes": 3000}
+    rough = wearsim.run(wearsim.load_scenario(SCENARIOS / "rig-450min.toml", changes))
+    (warning,) = [text for text in rough.warnings if text.startswith("estimated error")]
+    assert 'cylinder.profile_filter = "0.8 mm"' in warning
+    filtered = wearsim.run(rough.scenario.changed({"cylinder.profile_filter": "0.8 mm"}))
+    assert filtered.depth_error[-1] < 0.2 * rough.depth_error[-1]
+    assert not any("profile_filter" in text for text in filtered.warnings)
+
+
+@pytest.mark.parametrize("passes", [3000, 100_000])
+def test_depth_below_nominal_states_an_error_that_holds(result, passes):
+    """The start profile has its lowest point in the middle of a strip or between two strips."""
+
+    def run(**changes):
+        changes = {name.replace("__", "."): value for name, value in changes.items()}
+        return wearsim.run(result.scenario.changed({"operation.passes": passes, **changes}))
+
+    fine = run(contact__strips=801, evolution__tolerance=1e-5, evolution__strip_error=False)
+    for strips in (80, 81, 121):
+        coarse = run(contact__strips=strips)
+        below, error = coarse.depth_below_nominal[-1], coarse.depth_below_nominal_error
+        assert abs(below - fine.depth_below_nominal[-1]) <= error < 0.06 * below, strips
+        assert coarse.final["depth_below_nominal_error_m"] == error
+        (row,) = [row for row in coarse.view.rows() if row.label == "depth below nominal"]
+        assert row.text.endswith(f" ± {shown(error, 'um', 2)}")

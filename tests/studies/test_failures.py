@@ -6,8 +6,9 @@ import pytest
 from study_examples import short
 
 import wearsim
-from wearsim.errors import CapabilityError, ContactError
+from wearsim.errors import CapabilityError, ContactError, ScenarioError
 from wearsim.studies.automatic import with_chosen_model
+from wearsim.studies.dry_run import dry_run
 
 
 def free(torque: str, **overrides: object) -> wearsim.Scenario:
@@ -40,6 +41,27 @@ def test_too_many_strips_name_their_number_and_the_greatest() -> None:
         wearsim.solve_contact(short(**many))
     most = int(str(failed.value).rsplit(" ", 1)[1])
     assert wearsim.solve_contact(short(**{**many, "contact.strips": most - 50})).power > 0.0
+
+
+def most_strips(**overrides: object) -> int:
+    """Return the greatest number of strips that the error of 200,000 strips suggests."""
+    with pytest.raises(ScenarioError, match=r"\[contact\] strips: .*, got 200000") as refused:
+        dry_run(automatic(contact__strips=200_000, **overrides))
+    return int(str(refused.value).rsplit(" ", 1)[1])
+
+
+def test_strips_that_lower_no_error_are_refused_before_any_contact() -> None:
+    most = most_strips(contact__model="hertz")  # the cheapest
+    assert most == most_strips()
+    cheap = {"contact.model": "hertz", "contact.strips": most}
+    assert dry_run(automatic(**cheap))["test"]["strips"] == most
+    with pytest.raises(ScenarioError, match="more than 1200 strips per half-width"):
+        dry_run(automatic(**cheap | {"contact.strips": most + most // 100}))
+
+
+def test_strips_whose_equations_exceed_the_memory_are_refused() -> None:
+    most = most_strips(contact__width="500 mm")
+    assert 3.99e9 < 8 * most**2 <= 4e9
 
 
 def test_contact_longer_than_wide_is_named_instead_of_automatic_strips() -> None:

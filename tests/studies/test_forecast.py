@@ -26,6 +26,7 @@ TESTS = {
     "explicit": ("rig-450min", {"evolution.stepper": "explicit", "operation.passes": 20_000}),
     "pass by pass": ("rig-450min", {"evolution.stepper": "per-pass", "operation.passes": 9000}),
     "FASTSIM": ("rig-450min", {"contact.tangential": "fastsim"}),
+    "many records": ("rig-450min", {"outputs.every_passes": 675}),
     "cam": ("cam-eccentric", {}),
     "swinging follower": ("cam-swinging", {}),
 }

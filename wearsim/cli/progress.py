@@ -52,6 +52,8 @@ class Display:
         Display on a terminal, disabled elsewhere.
     columns : float
         Greatest length of the text.
+    warnings : list of str
+        Warnings of the result that were shown.
     """
 
     def __init__(
@@ -83,6 +85,7 @@ class Display:
         self._notebook: Any = None  # output of a notebook
         self._kernels, self._reports, self._compiling, self._open = kernels, 0, False, ExitStack()
         self.stop_requested: Callable[[], bool] | None = None
+        self.warnings: list[str] = []
 
     @property
     def callbacks(self) -> dict[str, Any]:
@@ -209,6 +212,7 @@ class RunWatcher(Display):
             self._show_step(event)
         elif isinstance(event, Warned):
             self.write(f"warning: {event.message}", also_quiet=True)
+            self.warnings.append(event.message)
         elif isinstance(event, Finished):
             self.show(f"done in {lapse(event.wall_seconds)}", always=True)
 

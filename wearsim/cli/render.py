@@ -37,7 +37,7 @@ def show_view(
     files : mapping of str to object, optional
         Files that were written, by what they are, and the workers.
     known : collection of str
-        Notes that were shown before.
+        Notes and warnings that were shown before.
     more : dict of str to object, optional
         Further fields of the JSON.
     stored : bool
@@ -52,7 +52,10 @@ def show_view(
         _write_tables(view, written, stored, brief)
         if not stored and (line := view.line()):
             typer.echo(printable(line))
-        write_notes([text for text in view.notes if text not in known], view.warnings)
+        fresh = [
+            [text for text in said if text not in known] for said in (view.notes, view.warnings)
+        ]
+        write_notes(*fresh)
     if view.failures:
         note(f"warning: {view.failures}")
 

@@ -22,8 +22,8 @@ from wearsim.units import QuantityError, as_written
 
 _EXAMPLES = (
     '"depth 50 um", "roller depth 5 um", "lift error 30 um", "volume 12 mm^3", "width 14 mm",'
-    ' "peak pressure 900 MPa", "clearance 60 um", "damage 1", "12 h" or'
-    ' "2e6 passes"'
+    ' "peak pressure 900 MPa", "clearance 60 um", "damage 1", "12 h",'
+    ' "2e6 passes" or "5e5 turns"'
 )
 _LOCATED = 1e-9  # relative error of the quantity at a limit
 _MOST_TRIALS = 100
@@ -95,10 +95,15 @@ class Limit:
     threshold: float = 1e-6
 
     @classmethod
-    def parse(cls, text: str | float) -> Limit:
+    def parse(cls, text: str | float, rollers: int = 1) -> Limit:
         """Return the limit of a text: "depth 50 um", "lift_error 30 um" or "lift_error=30um".
 
-        A number is a time [s].
+        Parameters
+        ----------
+        text : str or float
+            A number is a time [s].
+        rollers : int
+            Roller passes in a turn of the cylinder or cam.
 
         Raises
         ------
@@ -112,11 +117,11 @@ class Limit:
         words = " ".join(re.sub("(?<=[A-Za-z])_(?=[A-Za-z])", " ", words).split())
         parts = re.fullmatch(r"([A-Za-z ]*?) ?([^A-Za-z ].*)", words)
         kind = parts[1].lower().removeprefix("worn ") if parts else "nothing"
-        passes = re.fullmatch(rf"({NUMBER.pattern}) ?(?:roller )?passes", words)
-        if passes:
-            kind, value = "passes", float(passes[1])
-            if value % 1.0:
-                raise ValueError(f"'{text}' is not a whole number of passes")
+        counted = re.fullmatch(rf"({NUMBER.pattern}) ?(?:roller )?(passes|turns)", words)
+        if counted:
+            if float(counted[1]) % 1.0:
+                raise ValueError(f"'{text}' is not a whole number of {counted[2]}")
+            kind, value = "passes", float(counted[1]) * (rollers if counted[2] == "turns" else 1)
         elif parts and kind in {"", *_QUANTITIES} - {"passes"}:
             try:
                 value = _value(parts[2], _QUANTITIES[kind or "time"][0])

@@ -31,7 +31,7 @@ _NUMBERS = (
     *("force_x", "force_y", "spin_moment", "approach", "peak_pressure"),
     *("adhesion_fraction", "power", "longitudinal_creepage", "iterations"),
 )
-_ROUNDING = 1e-9  # of the greatest dissipation: a negative one that is no error of the model
+ROUNDING = 1e-9  # of the greatest value: a negative one that is no error of a plugin
 
 
 def built_model(
@@ -53,8 +53,8 @@ def built_model(
     model = spec.factory(options, grid, materials)
     if not isinstance(model, ContactModel):
         raise PluginError(
-            f"the factory of contact model '{spec.name}' returned {_described(model)}, expected a"
-            " ContactModel"
+            f"the factory of contact model '{spec.name}' returned {described_value(model)},"
+            " expected a ContactModel"
         )
     if type(model).__module__.partition(".")[0] == "wearsim":  # its models check themselves
         return model
@@ -164,7 +164,7 @@ class CheckedModel(SingleContactModel):
         """Raise a PluginError unless a solution has a type, and its fields their shapes."""
         if not isinstance(solution, kind):
             raise PluginError(
-                f"{self._returned} {_described(solution)}, expected a {kind.__name__}"
+                f"{self._returned} {described_value(solution)}, expected a {kind.__name__}"
             )
         shapes = {"y": (strips,)} | dict.fromkeys(_STRIPS, (*contacts, strips))
         shapes |= dict.fromkeys(_NUMBERS, contacts)
@@ -172,10 +172,10 @@ class CheckedModel(SingleContactModel):
             shapes["separation"] = (*contacts, strips)
         for name, shape in shapes.items():
             value = getattr(solution, name)
-            if not (_is_numeric(value) and np.shape(value) == shape):
+            if not (is_numeric(value) and np.shape(value) == shape):
                 wanted = f"an array of the shape {shape}" if shape else "a number"
                 raise PluginError(
-                    f"{self._returned} {_described(value)} as {name}, expected {wanted}"
+                    f"{self._returned} {described_value(value)} as {name}, expected {wanted}"
                 )
 
     def _fault(self, solution: ContactBatchSolution) -> tuple[int, str, str] | None:
@@ -187,7 +187,7 @@ class CheckedModel(SingleContactModel):
                 number = int(np.argmin(finite.reshape(count, -1).all(axis=1)))
                 return number, name, f"{name} that is not finite"
         least = solution.dissipation.min(axis=1)
-        negative = least < -_ROUNDING * solution.dissipation.max(axis=1, initial=0.0)
+        negative = least < -ROUNDING * solution.dissipation.max(axis=1, initial=0.0)
         if negative.any():
             number = int(np.argmax(negative))
             return number, "dissipation", f"a negative dissipation of {least[number]:.4g} W/m"
@@ -206,12 +206,12 @@ class CheckedModel(SingleContactModel):
         return ContactError(f"{self._returned} {what}", state)
 
 
-def _is_numeric(value: object) -> bool:
+def is_numeric(value: object) -> bool:
     """Return whether a value is a real number or an array of such numbers."""
     return isinstance(value, Real) or (isinstance(value, np.ndarray) and value.dtype.kind in "fiu")
 
 
-def _described(value: object) -> str:
+def described_value(value: object) -> str:
     """Return a value that was returned, as the object of a sentence."""
     if isinstance(value, np.ndarray):
         return f"an array of the shape {value.shape} and type {value.dtype}"

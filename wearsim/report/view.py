@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from wearsim.report.text import by_roller, shown, with_interval
+from wearsim.report.text import by_roller, shown, with_error, with_interval
 from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
@@ -64,8 +64,9 @@ class Row(NamedTuple):
             return self.quantity
         if isinstance(self.quantity, Interval):
             return with_interval(self.quantity, self.unit)
-        stated = "" if self.error is None else f" ± {shown(self.error, self.unit, 2)}"
-        return by_roller(self.quantity, self.unit) + stated
+        if self.error is None:
+            return by_roller(self.quantity, self.unit)
+        return with_error(np.asarray(self.quantity), self.error, self.unit)
 
 
 Rows: TypeAlias = list[Row]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.report.text import PER_SI, lapse, limit_unit
+from wearsim.report.text import PER_SI, lapse, limit_unit, shown
 from wearsim.studies.dry_run import Data
 from wearsim.studies.fatigue.unworn import unworn_text
 from wearsim.units import in_engineers_unit
@@ -240,26 +240,29 @@ def _pitting_rows(track: _Cylinder) -> TableRows:
     return [("pitting without wear", text), *sources]
 
 
-def _rounded(value: float, digits: int = 2) -> str:
-    """Return a number to some digits, without an exponent."""
-    return f"{float(f'{value:.{digits}g}'):,.12g}"
+def _rounded(value: float) -> str:
+    """Return a number to two digits, without an exponent."""
+    return f"{float(f'{value:.2g}'):,.12g}"
 
 
 def _forecast_rows(forecast: Data) -> TableRows:
-    """Return rows on the wear at the end of a run, and what it takes."""
-    depths = f"{_rounded(forecast['depth_m'] * 1e6, 3)} um"
+    """Return rows on the wear at the end of a run, and what it takes.
+
+    A forecast carries two digits: depths are within 12 % of those of the test.
+    """
+    depths = f"{_rounded(forecast['depth_m'] * 1e6)} um"
     if forecast["roller_depth_m"]:
-        depths += f", roller {_rounded(forecast['roller_depth_m'] * 1e6, 3)} um"
+        depths += f", roller {_rounded(forecast['roller_depth_m'] * 1e6)} um"
     wear = (
-        f"depth {depths}, groove {forecast['width_m'] * 1e3:.3g} mm wide, peak pressure"
-        f" {forecast['peak_pressure_Pa'] / 1e6:.3g} MPa, energy"
-        f" {forecast['dissipated_energy_J']:.4g} J"
+        f"depth {depths}, groove {_rounded(forecast['width_m'] * 1e3)} mm wide, peak pressure"
+        f" {_rounded(forecast['peak_pressure_Pa'] / 1e6)} MPa, energy"
+        f" {_rounded(forecast['dissipated_energy_J'])} J"
     )
     if forecast["lift_error_m"] is not None:
-        wear += f", lift error {_rounded(forecast['lift_error_m'] * 1e6, 3)} um"
+        wear += f", lift error {_rounded(forecast['lift_error_m'] * 1e6)} um"
     if "damage" in forecast:
-        wear += f", damage {forecast['damage']:.3g}, probability of pitting"
-        wear += f" {forecast['pitting']:.3g}"
+        wear += f", damage {_rounded(forecast['damage'])}, probability of pitting"
+        wear += f" {shown(forecast['pitting'], '%', 2)}"
     time = lapse(float(f"{forecast['wall_time_s']:.2g}"))
     effort = (
         f"{_rounded(forecast['steps'])} steps, {time},"

@@ -7,13 +7,15 @@ fits to measured runs, which they meet within a factor of three.
 from __future__ import annotations
 
 import math
+import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from wearsim.errors import ContactError
+from wearsim.errors import ContactError, ResultsFileError
 from wearsim.evolution.limits import OF_FATIGUE, Limit
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import FALLEN, SMALL, preload_of
@@ -23,6 +25,7 @@ from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
 from wearsim.studies.forecast import WearForecast
 from wearsim.studies.schedule import RecordSchedule
+from wearsim.units import in_engineers_unit
 
 DEEP = 1e-3  # m, a depth of which `check` warns
 FEWEST_LOADED = 5  # strips in contact, with which the error is about 2 %
@@ -41,6 +44,7 @@ _CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
 _HALVINGS = 20  # for the passes at which a limit is reached
 _BISECTIONS = 5  # for the pass of a failure
 _OF_REFERENCE = 6.0  # time of a step by exact theory, over a solve of its unworn contacts
+_RECORD = 2.7  # time of a record between two steps, over a solve of the unworn contacts
 _PASS = 0.06  # time of a pass in compiled code, over a solve
 _STABLE = 0.03  # wear of the longest stable step, over the line load through pi E*
 _STEPS_OF_RESTART = 2.0  # of the stepper, where skids of a cam's roller have moved
@@ -50,6 +54,8 @@ _START = 1.0  # of the process: imports and kernels read from the disk [s]
 _SYSTEM = 4.0  # bytes of a coefficient between two strips, few of which are in contact
 _MEMORY = 210e6  # of a process with its kernels [bytes]
 _CHECKPOINT, _ROW, _FILE = 25, 40, 60e3  # arrays, numbers of a row, bytes besides
+_OF_FILE = 5.0  # memory over the size of the results file
+LARGE = 1e9  # bytes, size of the records of which `check` and `run` warn
 
 
 @dataclass(frozen=True)
@@ -189,12 +195,54 @@ def _warnings(
     if isinstance(forecast.failure, ContactError) and solved < scenario.total_passes:
         what = forecast.failure.message
         yield f"forecast of the contacts: after about {solved:.2g} passes {what}"
+    if text := large_records(scenario, forecast.problem):
+        yield text
     if effort.seconds > LONG:
         less = f"a higher evolution.tolerance than {scenario.evolution.tolerance:g}"
         if scenario.contact.model != "slender":
             less += " or contact.model = 'slender'"
         time = lapse(float(f"{effort.seconds:.2g}"))
         yield f"forecast of the time: about {time}; {less} takes less"
+
+
+def records_of(scenario: Scenario, problem: WearProblem) -> tuple[float, float]:
+    """Return the number of records of a run, and the size of one on its first strips [bytes]."""
+    passes = float(scenario.total_passes)
+    schedule = RecordSchedule.of(scenario, passes)
+    count = (passes / schedule.interval if schedule.interval else schedule.count) + 1.0
+    stations, rollers = problem.shape[0], problem.rollers
+    return count, 8.0 * (3.0 * stations * rollers + stations + rollers) * problem.grid.strips
+
+
+def large_records(scenario: Scenario, problem: WearProblem, file: Path | None = None) -> str:
+    """Return a warning of records that exceed `LARGE`, or an empty text.
+
+    Raises
+    ------
+    ResultsFileError
+        If the disk of the results file has no place for them.
+    """
+    count, size = records_of(scenario, problem)
+    times, outputs = count * size / LARGE, scenario.outputs
+    if times <= 1.0:
+        return ""
+    if outputs.every_passes is not None:
+        given = f"every_passes = {outputs.every_passes}"
+        fewer = f"at least {math.ceil(outputs.every_passes * times)}"
+    elif outputs.every is not None:
+        given = f"every = {in_engineers_unit(outputs.every, 's')}"
+        fewer = f"at least {in_engineers_unit(outputs.every * times, 's', 3)}"
+    else:
+        given, fewer = f"records = {count - 1.0:.0f}", f"at most {math.floor(count / times)}"
+    text = (
+        f"outputs.{given}: {count:,.0f} records make a results file of"
+        f" {size * count / 1e9:,.2g} GB and take {_OF_FILE * size * count / 1e9:,.2g} GB of memory;"
+        f" {fewer} makes one below {LARGE / 1e9:g} GB"
+    )
+    free = math.inf if file is None else shutil.disk_usage(file.absolute().parent).free
+    if count * size > free:
+        raise ResultsFileError(f"{file}: {text}, and the disk has {free / 1e9:.3g} GB left")
+    return text
 
 
 def restarts_of(problem: WearProblem, depth: float) -> float:
@@ -229,8 +277,7 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     relative = wear["clearance"] / forecast.elastic
     steps = _STEPS * (1.0 + relative) ** _STEPS_POWER
     steps *= (scenario.evolution.tolerance / DEFAULT_TOLERANCE) ** _TOLERANCE_POWER
-    schedule = RecordSchedule.of(scenario, passes)
-    records = (passes / schedule.interval if schedule.interval else schedule.count) + 1.0
+    records, record = records_of(scenario, problem)
     if stepper == "stabilised":
         steps *= _STEPS_OF_STABILISED
     if problem.has_spring:
@@ -246,7 +293,7 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     groove, solve = forecast.seconds_of_groove, forecast.seconds
     stages = _STAGES if stepper == "stabilised" else 1.0
     stations, contacts, _ = problem.shape
-    strips, rollers = problem.grid.strips, problem.rollers
+    strips = problem.grid.strips
     if stepper == "stabilised":
         stages *= _SOLVES_OF_SPRING if problem.has_spring else 1.0
         per_step = stages * max(_STAGE * groove, solve)
@@ -260,15 +307,17 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
         per_step += (_OF_REFERENCE if scenario.contact.spec.reference else 2.0) * solve
         if contacts > 1:
             per_step += _COUPLED * stations * float(contacts * strips) ** 3
-    record = (3.0 * stations * rollers + stations + rollers) * strips
     row = _ROW + 25.0 * stations * contacts * (stations > 1)
     rows = row * (records if stepper == "per-pass" else steps)
-    size = _FILE + 8.0 * (records * record + _CHECKPOINT * stations * contacts * strips + rows)
+    size = _FILE + records * record + 8.0 * (_CHECKPOINT * stations * contacts * strips + rows)
     system = (contacts * strips) ** 2 if stepper == "implicit" else 0.0
     return Effort(
         steps=math.ceil(steps),
         solves=math.ceil(steps * stages) * problem.contacts_each,
-        seconds=_START + steps * per_step + restarts * (_STATIONS + _SOLVES_OF_RESTART * groove),
-        memory=_MEMORY + 5.0 * size + _SYSTEM * system,
+        seconds=_START
+        + steps * per_step
+        + restarts * (_STATIONS + _SOLVES_OF_RESTART * groove)
+        + _RECORD * max(records - steps, 0.0) * solve,
+        memory=_MEMORY + _OF_FILE * size + _SYSTEM * system,
         file_size=size,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -55,31 +56,56 @@ evaluations = 10
     assert json.loads(done.stdout)["quantities"]["pressure_angle"] < 0.1571
 
 
+LIMITED = (*VARY, "--minimise", "outer_radius", "--subject-to")
+
+
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("options", "option", "message"),
     [
-        ((), "nothing is varied"),
-        (VARY, "one objective or two"),
-        ((*VARY, "--minimise", "outer_radios"), "did you mean 'outer_radius'"),
-        ((*VARY, "--minimise", "cam.depth"), "no quantity is named 'cam.depth'"),
-        (("--vary", "cam.base_radius=40mm:25mm", *GOAL), "is not above the lower one"),
-        (("--vary", "cam.base_radios=25mm:45mm", *GOAL), "base_radios"),
-        ((*VARY, "--minimise", "outer_radius", "--subject-to", "peak_pressure < 3 mm"), "3 mm"),
-        (
-            (*VARY, "--minimise", "outer_radius", "--subject-to", "peak_pressure < 3"),
-            "lacks a unit",
-        ),
-        ((*VARY, *GOAL, "--tolerance", "roller.radius=1mm"), "not the tolerance of a"),
-        ((*VARY, *GOAL, "--method", "best"), "is no method"),
-        ((*VARY, *VARY, *GOAL), "varied twice"),
-        ((*VARY, "--maximise", "life.b10"), "one limit or more"),
+        ((), "--vary", "nothing is varied"),
+        (VARY, "--maximise", "one objective or two"),
+        ((*VARY, "--minimise", "outer_radios"), "", "did you mean 'outer_radius'"),
+        ((*VARY, "--minimise", "cam.depth"), "", "no quantity is named 'cam.depth'"),
+        (("--vary", "cam.base_radius=40mm:25mm", *GOAL), "--vary", "is not above the lower one"),
+        (("--vary", "cam.base_radios=25mm:45mm", *GOAL), "--vary", "[cam] base_radios: unknown"),
+        (("--vary", "cam.base_radius=25:45", *GOAL), "--vary", "needs a unit"),
+        (("--vary", "cam.material=steel,butter", *GOAL), "--vary", "butter"),
+        ((*LIMITED, "peak_pressure < 3 mm"), "--subject-to", "3 mm"),
+        ((*LIMITED, "peak_pressure < 3"), "--subject-to", "lacks a unit"),
+        ((*LIMITED, "peak_pressure"), "--subject-to", "is not a constraint"),
+        ((*VARY, *GOAL, "--tolerance", "roller.radius=1mm"), "--tolerance", "not the tolerance of"),
+        ((*VARY, *GOAL, "--method", "best"), "--method", "is no method"),
+        ((*VARY, *VARY, *GOAL), "--vary", "varied twice"),
+        ((*VARY, "--maximise", "life.b10"), "", "one limit or more"),
     ],
 )
-def test_bad_input_is_one_clear_error(command, options, message):
+def test_bad_input_is_one_clear_error_of_its_option(command, options, option, message):
     done = command("optimise", CAM, *options, *FAST)
     assert done.exit_code == 2, done.output
     flat = " ".join(done.stderr.replace("│", " ").split())
     assert message in flat, done.stderr
+    assert (f"Invalid value for {option}:" in flat) == bool(option), done.stderr
+
+
+def test_mistake_of_the_table_names_file_and_key(command, tmp_path):
+    text = shipped_scenario("cam-cycloidal").text + (
+        '\n[optimise]\nvary = ["cam.base_radius=45mm:25mm"]\nminimise = ["outer_radius"]\n'
+    )
+    (tmp_path / "design.toml").write_text(text)
+    done = command("optimise", "design.toml", *FAST)
+    assert done.exit_code == 2
+    assert done.stderr.startswith("design.toml: [optimise] vary: 'cam.base_radius=45mm:25mm'")
+
+
+def test_designs_after_the_search_do_not_count_against_its_budget(command):
+    loud = ("--evaluations", 10, "--starts", 1, "--scheduler", "serial")
+    done = command("optimise", CAM, *VARY, *GOAL, *loud)
+    assert done.exit_code == 0, done.output
+    shown = re.findall(r"(\d+) of (\d+), designs", done.stderr)
+    assert all(int(number) <= int(most) == 10 for number, most in shown)
+    (stated,) = re.findall(r"budget +(\d+) of at most 10 designs in the search", done.stdout)
+    assert int(stated) <= 10
+    assert f"\n{stated} of at most 10 designs in the search and " in done.stdout
 
 
 def test_random_value_cannot_be_varied(command):

@@ -37,6 +37,14 @@ def test_concentric_cam_equals_the_cylinder_bit_for_bit():
     assert worn.values("lift_error")[-1] == 0.0
 
 
+def test_run_of_a_cam_stops_and_is_extended_by_turns(tmp_path):
+    scenario = prescribed(**{**SHORT, "operation__turns": 100}, operation__rollers=2)
+    stopped = wearsim.run(scenario, tmp_path / "cam.h5", until="30 turns")
+    assert (stopped.values("turns")[-1], stopped.passes[-1]) == (30.0, 60.0)
+    longer = wearsim.resume(tmp_path / "cam.h5", until="150 turns")
+    assert (longer.values("turns")[-1], longer.finished) == (150.0, True)
+
+
 def closed_form(force: np.ndarray, turns: float) -> np.ndarray:
     """Return the depth in full slip at a constant load [m]."""
     per_load = 1.1e-11 * 0.1 * 1e-3

@@ -9,7 +9,7 @@ import pytest
 
 import wearsim
 from wearsim.scenario.examples import shipped_scenario
-from wearsim.studies.fatigue.lives import competing_risks, lives_of
+from wearsim.studies.fatigue.lives import competing_risks, lives_of, other_end
 from wearsim.studies.life.settings import with_limits
 from wearsim.studies.opening import export_csv
 
@@ -112,6 +112,30 @@ def test_limit_of_damage_ends_lives_which_are_then_counted():
     assert "damage depends on the wear factor and on the passes" in found.settings.reason
     assert found.first_limits["damage"] == 1.0
     assert found.at_end("damage") == pytest.approx([2e-4] * 2, rel=1e-5)
+
+
+def test_limit_of_damage_alone_is_no_wear_in_the_table_and_figure():
+    found = wearsim.life(RIG("rig-life", {**CHANGES, "limit": {"damage": 2e-4}}), 2, workers=1)
+    (table,) = [item for item in found.view.details() if "at last" in item.heads]
+    names = [row[0] for row in table.rows]
+    assert names == [
+        "a limit of damage or pitting",
+        "pitting, of bodies that do not wear",
+        "a limit of damage, of bodies that do not pit",
+        "pitting first",
+        "a limit of damage first",
+    ]
+    (ends,) = [row.text for row in found.view.study() if row.label == "first end"]
+    assert "by pitting and" in ends
+    assert "by a limit of damage within" in ends
+    assert found.view.data()["wear_or_pitting"]["other_end"] == "a limit of damage"
+    panel = found.view.panels().panels["wear or pitting"]
+    assert "wear" not in panel.title + panel.caption + "".join(mark.label for mark in panel.marks)
+
+
+def test_wear_is_named_beside_a_limit_of_pitting():
+    limited = with_limits(RIG("rig-life", {"fatigue": FATIGUE}), ["pitting 0.1"])
+    assert other_end(limited) == "wear or a limit of pitting"
 
 
 def test_limits_without_a_unit_are_given_as_texts():

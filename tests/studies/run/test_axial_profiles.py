@@ -275,7 +275,7 @@ def test_mistakes_in_forms_are_reported(name):
 
 def test_form_in_words_has_its_options():
     text = described_form(line(k1=1.5, drop="20 um").roller.axial_profile)
-    assert text == "logarithmic, design_load 5000 N, drop 0.02 mm, k1 1.5"
+    assert text == "logarithmic, design load 5 kN, drop 20 um, k1 1.5"
 
 
 RANDOM = {

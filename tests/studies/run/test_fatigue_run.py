@@ -131,9 +131,20 @@ def test_check_states_pitting_without_wear_and_the_sources():
     life = 1e6 * (700e6 / pressure) ** 8
     assert found["cylinder_passes"] == pytest.approx(life, rel=1e-2)
     assert found["passes"] < found["cylinder_passes"]
-    assert "to a probability of 0.1" in rows["pitting without wear"]
+    assert "to a probability of 10 %" in rows["pitting without wear"]
     assert rows["fatigue of the rollers"] == "a test"
     assert "pitting without wear" not in dict(plan(dry_run(short())))
+
+
+def test_probability_of_pitting_has_the_error_of_the_damage():
+    result = wearsim.run(short(**FATIGUE))
+    final, slope = result.final, result.scenario.fatigue.slope
+    chance, damage, error = (final[name] for name in ("pitting", "damage", "damage_error"))
+    exponent = np.log1p(-chance) / damage**slope
+    beyond = 1.0 - np.exp(exponent * (damage + error) ** slope)
+    (text,) = [row.text for row in result.view.rows() if row.label == "probability of pitting"]
+    stated = float(text.removesuffix(" %").split(" ± ")[1]) / 100.0
+    assert stated == pytest.approx(beyond - chance, rel=0.1)
 
 
 def test_cam_states_lives_and_stresses_at_every_angle():

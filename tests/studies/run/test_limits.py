@@ -69,6 +69,8 @@ def test_limit_is_read(text: str | float, quantity: str, value: float) -> None:
         ("-3 min", "must be above zero"),
         ("0 passes", "must be above zero"),
         ("1.5 passes", "is not a whole number of passes"),
+        ("1.5 turns", "is not a whole number of turns"),
+        ("100 kturns", "'100 kturns' is not a limit, expected one such as"),
         (float("nan"), "not a"),
     ],
 )
@@ -129,11 +131,20 @@ def test_interrupted_run_resumes_to_its_limit(path: Path) -> None:
     assert run_differences(resumed, studies.run(scenario, until="depth 0.9 um")) == []
 
 
-@pytest.mark.parametrize("text", ["4 min", "12000 passes"])
+@pytest.mark.parametrize("text", ["4 min", "12000 passes", "4000 turns"])
 def test_later_end_extends_the_test(text: str) -> None:
     result = studies.run(short(), until=text)
     assert (result.passes[-1], result.finished, result.until) == (12_000.0, True, "")
     assert result.raw.total_passes == 12_000
+
+
+def test_run_stops_at_a_turn_of_three_rollers_and_keeps_its_limit(path: Path) -> None:
+    with pytest.raises(Interrupted):
+        studies.run(short(), path, until="1041 turns", stop_requested=after(2))
+    resumed = studies.resume(path)
+    assert (resumed.passes[-1], resumed.until) == (3123.0, "1041 turns")
+    assert run_differences(resumed, studies.run(short(), until="1041 turns")) == []
+    assert studies.resume(path, until="4e3 turns").passes[-1] == 12_000.0
 
 
 def test_depth_after_the_end_extends_the_test(path: Path) -> None:

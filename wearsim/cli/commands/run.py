@@ -48,8 +48,8 @@ Until = Annotated[
         metavar="LIMIT",
         help="Stop a wear test where it first reaches a limit: 'depth 50 um', 'roller_depth 5 um',"
         " 'lift_error 30 um', 'volume 12 mm^3', 'width 14 mm', 'peak_pressure 900 MPa',"
-        " 'clearance 60 um', 'damage 1', 'pitting 0.1', '12 h' or '2e6 passes'. A shorter test"
-        " is extended.",
+        " 'clearance 60 um', 'damage 1', 'pitting 0.1', '12 h', '2e6 passes' or '5e5 turns'. A"
+        " shorter test is extended.",
         show_default=False,
     ),
 ]
@@ -78,7 +78,8 @@ def run(
             if getattr(wearsim.open_results(path), "failure", ""):
                 error.add_note(f"the last accepted step is kept: wearsim show {path}")
         raise
-    show_view(result.view, json=json, files={"results file": result.path}, known=loaded.notes)
+    known = *loaded.notes, *watch.warnings
+    show_view(result.view, json=json, files={"results file": result.path}, known=known)
 
 
 def resume(
@@ -147,7 +148,8 @@ def resume(
     if isinstance(watch, progress.EnsembleWatcher):
         show_ensemble(result, json, None, watch.workers)
     else:
-        show_view(result.view, json=json, files={"results file": result.path})
+        files = {"results file": result.path}
+        show_view(result.view, json=json, files=files, known=watch.warnings)
 
 
 def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from pydantic import Field
@@ -13,10 +13,9 @@ from wearsim.errors import ScenarioError
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.plugins import AxialPair, AxialProfile, AxialProfileSpec, Options, registry
 from wearsim.scenario.axial_gap import AxialGap
-from wearsim.scenario.parse.fields import amount, target_of
 from wearsim.scenario.parse.mistakes import Mistakes, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.units import QuantityError
+from wearsim.units import QuantityError, in_engineers_unit
 
 if TYPE_CHECKING:
     from wearsim.scenario.tables.bodies import Cylinder, Roller
@@ -39,10 +38,21 @@ class AxialTable(Options):
 
 @dataclass(frozen=True)
 class AxialChoice:
-    """A form along the axis with its options."""
+    """A form along the axis with its options.
+
+    Parameters
+    ----------
+    form : str
+        Name of the form.
+    options : Options
+        Its options.
+    given : mapping of str to object
+        The options that a scenario gives, as it writes them.
+    """
 
     form: str
     options: Options
+    given: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def build(self, pair: AxialPair) -> AxialProfile:
         """Return the profile for a pair of bodies."""
@@ -52,7 +62,8 @@ class AxialChoice:
 def crown(radius: float) -> AxialChoice:
     """Return a circular crown."""
     options: Any = registry().get(AxialProfileSpec, "crown").options
-    return AxialChoice("crown", options.model_construct(radius=radius))
+    written = {"radius": in_engineers_unit(radius, "m")}
+    return AxialChoice("crown", options.model_construct(radius=radius), written)
 
 
 def straight() -> AxialChoice:
@@ -83,7 +94,7 @@ def read_axial(mistakes: Mistakes, key: AxialKey | None, table: str) -> AxialCho
         return None
     spec = mistakes.find_plugin(AxialProfileSpec, named.form, place, "form")
     options = validate(mistakes, spec.options, rest, place, AxialTable) if spec else None
-    return None if options is None else AxialChoice(named.form, options)
+    return None if options is None else AxialChoice(named.form, options, rest)
 
 
 def pair_of(roller: Roller, cylinder: Cylinder, elastic: ElasticPair | None = None) -> AxialPair:
@@ -141,12 +152,10 @@ def _built(
 
 
 def described_form(choice: AxialChoice) -> str:
-    """Return a form in words: its name and the options that are given."""
-    texts = []
-    for key in sorted(choice.options.model_fields_set):
-        value, field = getattr(choice.options, key), type(choice.options).model_fields[key]
-        target = target_of(field)
-        if isinstance(value, float):
-            value = amount(value, target.quantity if target else None)
-        texts.append(f"{key} {getattr(value, 'path', value)}")
+    """Return a form in words: its name and the options that are given, without random ones."""
+    texts = [
+        f"{key.replace('_', ' ')} {value}"
+        for key, value in sorted(choice.given.items())
+        if not isinstance(value, Mapping)
+    ]
     return ", ".join([choice.form, *texts])

@@ -25,6 +25,7 @@ from wearsim.plugins import (
     registry,
 )
 from wearsim.plugins.checked_model import built_model
+from wearsim.plugins.checked_wear_law import built_wear_law
 from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import validate
@@ -183,7 +184,7 @@ class WearChoice:
     @cached_property
     def built(self) -> WearLaw:
         """The wear law."""
-        return self.spec.factory(self.options)
+        return built_wear_law(self.spec, self.options)
 
 
 #: model of the table's own keys, key with the name of the plugin, kind of plugin

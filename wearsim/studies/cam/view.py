@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.mechanics.cam import extreme, surface_points
-from wearsim.report.text import NOTHING, PER_SI, in_unit, shown
+from wearsim.report.text import NOTHING, PER_SI, count, in_unit, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import harmonic_depth
@@ -129,7 +129,7 @@ class CamView(View):
         lives = lives_at(turn.scenario, np.array(study.max_peak_pressure[:1]))
         if lives is not None:
             turns = float(lives[0]) / turn.scenario.operation.rollers
-            text = shown(turns, "1", 3) if np.isfinite(turns) else "infinite"
+            text = count(float(f"{turns:.3g}")) if np.isfinite(turns) else "infinite"
             text += f" turns at {turn.place(study.max_peak_pressure[1])}, which decides"
             rows += [Row("pitting of the cam without wear", text), *source_rows(turn.scenario)]
         if study.weight is not None:

@@ -9,13 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wearsim.evolution.limits import OF_FATIGUE
 from wearsim.report.text import NOTHING, count, rounded_lives, shown
 from wearsim.report.view import Row, Rows
 from wearsim.studies.fatigue.view import source_rows, sources
 from wearsim.types import FloatArray
+from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.competing import CompetingRisks, course_places
 
 if TYPE_CHECKING:
+    from wearsim.scenario import Scenario
+    from wearsim.studies.life.result import LifeResult
     from wearsim.studies.life.values import LifeValues
 
 _LEAST = 1e-9  # passes at the end of a course, at least: a limit may be reached at once
@@ -46,6 +50,13 @@ def course_of(
     passes, damage = np.array([(first, rate * first), *points]).T
     logs = PchipInterpolator(np.log(passes), np.log(damage))(np.log(places))
     return np.asarray(np.exp(logs))
+
+
+def other_end(scenario: Scenario) -> str:
+    """Return what ends lives beside pitting: "wear", "a limit of damage", or both."""
+    given = scenario.limit.given
+    wear = ["wear"] if given.keys() - set(OF_FATIGUE) else []
+    return " or ".join([*wear, *(f"a limit of {name}" for name in OF_FATIGUE if name in given)])
 
 
 def competing_risks(result: LifeValues) -> CompetingRisks | None:
@@ -123,6 +134,7 @@ def competing_data(result: LifeValues) -> dict[str, Any]:
     return {
         "wear_or_pitting": {
             "lives": {f"b{share:g}": lives_of(result, share / 100.0) for share in shares},
+            "other_end": other_end(result.scenario),
             "first_by_pitting": level.pitting,
             "first_by_wear": level.wear,
             "sources": sources(result.scenario),
@@ -130,27 +142,31 @@ def competing_data(result: LifeValues) -> dict[str, Any]:
     }
 
 
-def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | None:
-    """Return heads and cells of the table of wear and pitting; None without fatigue."""
+def competing_table(result: LifeResult) -> tuple[list[str], list[list[str]]] | None:
+    """Return heads and cells of the table of wear and pitting; None without fatigue.
+
+    Lives have the digits that the interval of the life of the same share leaves.
+    """
     risks = competing_risks(result)
     if risks is None:
         return None
     shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
     lives = [lives_of(result, share / 100.0) for share in shares]
-    level = risks.at(math.inf)
+    intervals = [result.b(share) for share in shares]
+    level, other = risks.at(math.inf), other_end(result.scenario)
     names = {
-        "both": ("wear or pitting", 1.0 - level.survival),
+        "both": (f"{other} or pitting", 1.0 - level.survival),
         "without_wear": ("pitting, of bodies that do not wear", None),
-        "without_pitting": ("wear, of bodies that do not pit", None),
+        "without_pitting": (f"{other}, of bodies that do not pit", None),
         "pitting": ("pitting first", level.pitting),
-        "wear": ("wear first", level.wear),
+        "wear": (f"{other} first", level.wear),
     }
     cells = [
         [
             words,
             *(
-                _life(lives_of_share[name])
-                for lives_of_share in lives
+                _life(lives_of_share[name], interval)
+                for lives_of_share, interval in zip(lives, intervals, strict=True)
                 if lives_of_share is not None
             ),
             NOTHING if last is None else shown(last, "%", 3),
@@ -160,8 +176,13 @@ def competing_table(result: LifeValues) -> tuple[list[str], list[list[str]]] | N
     return [f"life [{result.unit}]", *(f"B{share:g}" for share in shares), "at last"], cells
 
 
-def _life(life: float) -> str:
-    return "infinite" if math.isinf(life) else rounded_lives(life)[0]
+def _life(life: float, interval: Interval) -> str:
+    """Return a life with the digits of another one, or two where that has no interval."""
+    if math.isinf(life):
+        return "infinite"
+    part = interval.half_width / interval.value if interval.value > 0.0 else math.nan
+    part = min(part, 1.0) if math.isfinite(part) else 1.0
+    return rounded_lives((1.0 - part) * life, life, (1.0 + part) * life)[1]
 
 
 def fatigue_of_lives(result: LifeValues) -> Rows:
@@ -173,8 +194,8 @@ def fatigue_of_lives(result: LifeValues) -> Rows:
     if first is not None:
         part = first.at(result.most * result.settings.per_unit)
         text = (
-            f"{shown(part.pitting, '%', 3)} by pitting and {shown(part.wear, '%', 3)} by wear"
-            f" within {count(result.most)} {result.unit}"
+            f"{shown(part.pitting, '%', 3)} by pitting and {shown(part.wear, '%', 3)} by"
+            f" {other_end(result.scenario)} within {count(result.most)} {result.unit}"
         )
         rows.insert(0, Row("first end", text))
     return rows

@@ -23,7 +23,7 @@ from wearsim.report.panels import (
     worn_limits,
 )
 from wearsim.report.text import shown
-from wearsim.studies.fatigue.lives import competing_risks
+from wearsim.studies.fatigue.lives import competing_risks, other_end
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -94,6 +94,8 @@ def pitting_panel(result: Result) -> Panel:
 def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) -> Panel:
     """Return the probability of wear first, of pitting first and of either, against the life.
 
+    Limits of damage and pitting are named in place of wear.
+
     Parameters
     ----------
     designs : sequence of (LifeValues, str, str)
@@ -101,12 +103,13 @@ def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) 
     axis : Axis
         Of the life.
     """
-    title, marks, text = "Ended by wear or by pitting", list[Mark](), ""
+    ends = dict.fromkeys(other_end(result.scenario) for result, _, _ in designs)
+    title, marks, text = f"Ended by {' or '.join(ends)} or by pitting", list[Mark](), ""
     for result, label, colour in designs:
         risks = competing_risks(result)
         if risks is None:
             continue
-        level = risks.at(math.inf)
+        level, other = risks.at(math.inf), other_end(result.scenario)
         ended = 1.0 - level.survival
         low, high = (risks.life(share * ended, risks.either) for share in _ENDS)
         if not 0.0 < low < high < math.inf:
@@ -114,7 +117,7 @@ def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) 
         passes = np.geomspace(low, high, _POINTS)
         levels = np.array([risks.at(life) for life in passes.tolist()])
         curves = {
-            "wear first": (levels[:, 2], "-", BLUE),
+            f"{other} first": (levels[:, 2], "-", BLUE),
             "pitting first": (levels[:, 1], "--", ORANGE),
             "both": (1.0 - levels[:, 0], ":", BLACK),
         }
@@ -123,10 +126,10 @@ def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) 
             lives = passes / result.settings.per_unit
             marks.append(Line(lives, share, dash, colour=drawn, label=name))
         text += f" {label}:" if label else ""
-        text += f" At last {shown(level.wear, '%', 3)} end by wear and"
+        text += f" At last {shown(level.wear, '%', 3)} end by {other} and"
         text += f" {shown(level.pitting, '%', 3)} by pitting."
     if not marks:
-        return message(title, "no life ended by wear or by pitting")
+        return message(title, "no life ended")
     return Panel(
         title,
         Axis(axis.name, axis.unit, axis.per_si, log=True),

@@ -11,7 +11,7 @@ from wearsim.evolution.fatigue import effective_damage, greatest_damages
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
 from wearsim.mechanics.fatigue import ORTHOGONAL, greatest_von_mises
-from wearsim.report.text import shown
+from wearsim.report.text import count, shown
 from wearsim.scenario import Scenario
 from wearsim.types import FloatArray
 
@@ -108,9 +108,9 @@ def unworn_text(data: dict[str, Any], body: str, unit: str, size: float) -> str:
 
     def life(name: str) -> str:
         passes = data[name]
-        return "infinite" if passes is None else f"{shown(passes / size, '1', 3)} {unit}"
+        return "infinite" if passes is None else f"{count(float(f'{passes / size:.3g}'))} {unit}"
 
-    text = f"{life('passes')} to a probability of {data['probability']:g}"
+    text = f"{life('passes')} to a probability of {100.0 * data['probability']:g} %"
     place = f" at {shown(data['angle_rad'], 'deg')}" if "angle_rad" in data else ""
     parts = [
         f"{name} {life(key)}{where}"

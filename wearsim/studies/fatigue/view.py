@@ -31,17 +31,23 @@ def fatigue_rows(result: Result, body: str) -> Rows:
     """
     if not result.raw.fatigue:
         return []
-    final = result.final
-    damage, error = (np.asarray(final[name], dtype=float) for name in ("damage", "damage_error"))
-    greatest = f"{body} {shown(_most(final['cylinder_damage']), '1')}"
+    final, scenario = result.final, fatigue_scenario(result)
+    names = "damage", "damage_error", "pitting"
+    damage, error, pitting = (np.asarray(final[name], dtype=float) for name in names)
+    greatest = f"{body} {shown(_most(final['cylinder_damage']), '1', 3)}"
     if "damage_angle_rad" in final:
         greatest += f" at {shown(_most(final['damage_angle_rad']), 'deg')}"
-    greatest += f", roller {shown(_most(final['roller_damage']), '1')}"
+    greatest += f", roller {shown(_most(final['roller_damage']), '1', 3)}"
+    of_pitting = None
+    if scenario is not None and scenario.fatigue is not None and damage.any():
+        survival = 1.0 - pitting  # 1 - (1 - P_ref)^(D^e), whose derivative by D is taken
+        slope = -survival * np.log(survival) * scenario.fatigue.slope / damage
+        of_pitting = float(np.max(slope * error))
     return [
         Row("effective damage", with_error(damage, float(np.max(error)), "1")),
         Row("greatest damage", greatest),
-        Row("probability of pitting", np.asarray(final["pitting"], dtype=float), "%"),
-        *source_rows(fatigue_scenario(result)),
+        Row("probability of pitting", with_error(pitting, of_pitting, "%")),
+        *source_rows(scenario),
     ]
 
 

@@ -6,13 +6,16 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from wearsim.report.text import NOTHING, count, rounded_lives, shown
+from wearsim.report.text import NOTHING, cells, rounded_lives, shown
 from wearsim.report.view import Table
 from wearsim.studies.life.result import LifeResult
+from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.fits import FittedLives
 from wearsim.uq.survival.goodness import AndersonDarling, anderson_darling
 
 _SMALL = 0.01  # probability below which it is not stated
+_SIGMAS = 1.96  # of a normal distribution, half-width of an interval of 95 %
+_AT_SCALE = -math.expm1(-1.0)  # probability of a life below the scale parameter of Weibull
 
 
 def fit_tables(result: LifeResult) -> list[Table]:
@@ -37,18 +40,26 @@ def fit_tables(result: LifeResult) -> list[Table]:
 
 def _cells(result: LifeResult, fit: FittedLives, best: FittedLives) -> list[str]:
     """Return the cells of a fit: lives with intervals, AIC above the best one, parameters."""
-    cells = []
-    for share in result.settings.shares:
-        life = fit.interval(share / 100.0)
-        low, value, high = rounded_lives(life.low, life.value, life.high)
-        cells.append(value if life.low == life.high else f"{value} ({low}..{high})")
-    scale = f"{count(math.exp(fit.mu))} {result.unit}"
-    parameters = (
-        f"median {scale}, sigma {fit.sigma:.3f}"
-        if fit.family == "log-normal"
-        else f"scale {scale}, shape {1.0 / fit.sigma:.3f}"
-    )
-    return [fit.family, *cells, f"{fit.aic - best.aic:+.1f}", parameters]
+    lives = [_life(fit, share / 100.0) for share in result.settings.shares]
+    return [fit.family, *lives, f"{fit.aic - best.aic:+.1f}", _parameters(fit)]
+
+
+def _life(fit: FittedLives, probability: float) -> str:
+    """Return a quantile with its 95 % interval."""
+    life = fit.interval(probability)
+    low, value, high = rounded_lives(life.low, life.value, life.high)
+    return value if life.low == life.high else f"{value} ({low}..{high})"
+
+
+def _parameters(fit: FittedLives) -> str:
+    """Return the parameters of a fit with 95 % intervals."""
+    factor = math.exp(_SIGMAS * math.sqrt(max(float(fit.covariance[1, 1]), 0.0)))
+    if fit.family == "log-normal":
+        location, name, value = f"median {_life(fit, 0.5)}", "sigma", fit.sigma
+    else:
+        location, name, value = f"scale {_life(fit, _AT_SCALE)}", "shape", 1.0 / fit.sigma
+    text, interval = cells(Interval(value, value / factor, value * factor), "1")
+    return f"{location}, {name} {text}" + (f" ({interval})" if interval else "")
 
 
 def _test_text(test: AndersonDarling | None) -> str:

@@ -26,7 +26,7 @@ from wearsim.evolution.strips import Surfaces
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.stations import cam_stations
-from wearsim.studies.run.grid import growth_of, strips_of_run
+from wearsim.studies.run.grid import check_number_of_strips, growth_of, strips_of_run
 from wearsim.studies.run.nodes import MAX_NODES, PassQuadrature, minimum_nodes, redrawing
 from wearsim.studies.run.setup import CylinderTurn, Setup
 from wearsim.studies.start.heights import roller_height, start_height
@@ -256,7 +256,10 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
     ------
     CapabilityError
         If the model does not support the scenario's creepage or its creep factor.
+    ScenarioError
+        If there are too many strips.
     """
+    check_number_of_strips(scenario, grid)
     creepage, factor = scenario.creepage, scenario.friction.creep_factor
     model = scenario.contact.build(grid, scenario.materials)
     needs = {

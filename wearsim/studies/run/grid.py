@@ -13,7 +13,9 @@ from wearsim.evolution.strips import JOINED, LEAST_LOADED, Growth, Surfaces, sam
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
-from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
+from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE, LEAST_TOLERANCE
+from wearsim.studies.plausibility import greatest_load
+from wearsim.studies.preparation import MOST_BYTES
 from wearsim.studies.roller_ends import (
     STRIPS_BEYOND,
     ends_roller,
@@ -152,6 +154,38 @@ def strips_per_half_width(half_width: float, tolerance: float, groove: float = 0
         per_half_width = min(per_half_width, STRIPS_PER_GROOVE * half_width / groove)
     per_half_width *= np.sqrt(DEFAULT_TOLERANCE / tolerance)
     return float(np.clip(per_half_width, FEWEST_PER_HALF_WIDTH, STRIPS_PER_HALF_WIDTH))
+
+
+def check_number_of_strips(scenario: Scenario, grid: Grid) -> None:
+    """Raise an error if a scenario has more strips than lower its error, or than memory holds.
+
+    The error due to the strips is proportional to the square of their width, and contacts are not
+    solved accurately enough for one below `LEAST_TOLERANCE`. With wear compliance a contact has a
+    coefficient for every two strips.
+
+    Raises
+    ------
+    ScenarioError
+        With the greatest number of strips.
+    """
+    chosen = scenario.contact.strips or 0
+    if chosen <= MOST_STRIPS:
+        return
+    half_width = Setup(scenario).widest_patch(greatest_load(scenario)).b
+    if not scenario.axial_gap.is_crowned:
+        half_width *= PART_OF_FORM
+    useful = STRIPS_PER_HALF_WIDTH * math.sqrt(DEFAULT_TOLERANCE / LEAST_TOLERANCE)
+    finest, size = half_width / useful, 8.0 * grid.strips**2
+    if grid.spacing < finest:
+        what = f"more than {useful:.0f} strips per half-width of a contact do not lower the error"
+        most = chosen * grid.spacing / finest
+    elif size > MOST_BYTES and scenario.contact.spec.capabilities.wear_compliance:
+        what = f"the equations of a contact would take {size / 1e9:,.4g} GB of memory"
+        most = chosen * math.sqrt(MOST_BYTES / size)
+    else:
+        return
+    at_most = f"at most {math.floor(most)}"
+    raise mistake_in(scenario.file, what, str(chosen), at_most, table="contact", key="strips")
 
 
 def strips_of_run(setup: Setup) -> Grid:

@@ -36,6 +36,7 @@ from wearsim.results.io.files import write_results
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import at_every_station, observables_of_track
 from wearsim.studies.contact.comparison import REFERENCE, error_above_tolerance
+from wearsim.studies.effort import large_records
 from wearsim.studies.failures import (
     explained,
     failures_explained,
@@ -125,7 +126,8 @@ class RunInProgress:
         }
         if data is None:
             means = setup if setup.scenario is scenario else Setup(scenario)
-            for text in plausibility_warnings(means):
+            large = large_records(scenario, self.problem, path)
+            for text in [*plausibility_warnings(means), *([large] if large else [])]:
                 self.warn(text)
             self._write()
             self._last_write = 0.0  # it has imported the library that writes
@@ -268,6 +270,12 @@ class RunInProgress:
             elif strips > 0.5 * relative:
                 strips_here = self.scenario.contact.strips or self.present.grid.strips
                 remedy = f"more contact.strips than {strips_here} decrease it"
+                cylinder = self.scenario.cylinder
+                if cylinder.profile is not None and cylinder.profile_filter is None:
+                    remedy += (
+                        ", or where the start profile is rough a filter, cylinder.profile_filter ="
+                        ' "0.8 mm" (ISO 16610-21)'
+                    )
             elif stations > 0.5 * relative:
                 remedy = "more cam.stations decrease it"
             beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))

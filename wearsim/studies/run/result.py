@@ -12,17 +12,11 @@ import numpy as np
 from wearsim.errors import WearsimError, unknown_name
 from wearsim.evolution.limits import SAME_VALUE, Limit
 from wearsim.levelling import ComputedProfile
-from wearsim.results.content import (
-    Array,
-    Arrays,
-    Schema,
-    Stored,
-    StudyData,
-    StudyResult,
-)
+from wearsim.results.content import Array, Arrays, Schema, Stored, StudyData, StudyResult
 from wearsim.results.io.files import read_study
 from wearsim.studies.fatigue.observables import final_fatigue
 from wearsim.studies.run.schema import ALL_VARIABLES, ESTIMATED, MARKS, RUN, run_schema
+from wearsim.studies.start.heights import excess_between_strips
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
@@ -402,6 +396,12 @@ class Result(StudyResult[RunData]):
         return deepest[:, 0] if deepest.shape[1] == 1 else deepest
 
     @property
+    def depth_below_nominal_error(self) -> float:
+        """Estimated error of `depth_below_nominal` at the end, that between strips included [m]."""
+        below = self.raw.records["cylinder_depth_profile"][-1] - self.start_height
+        return float(np.max(self.depth_error[-1])) + excess_between_strips(below)
+
+    @property
     def steps(self) -> int:
         """Number of accepted steps; the history may have fewer rows."""
         return int(np.sum(self.raw.checkpoint.get("steps", len(self.passes) - 1)))
@@ -421,7 +421,10 @@ class Result(StudyResult[RunData]):
         last.update({name: last[name].max(axis=0) for name in per_roller})
         deepest = np.maximum(last["depth"], last["roller_depth"])
         rollers = self.raw.static["multiplicity"] @ self.raw.history["roller_worn_volume"][-1]
-        below = {"depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1]))}
+        below: dict[str, Number] = {
+            "depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1])),
+            "depth_below_nominal_error_m": self.depth_below_nominal_error,
+        }
 
         def with_units(*names: str) -> dict[str, Number]:
             return {_key(name): _number(last[name]) for name in names}

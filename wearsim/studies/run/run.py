@@ -57,8 +57,8 @@ def run(
     until : str or float, optional
         Limit at which the run stops: "depth 50 um", "roller depth 5 um", "lift error 30 um",
         "volume 12 mm^3", "width 14 mm", "peak pressure 900 MPa", "clearance 60 um", "damage 1",
-        "pitting 0.1", "12 h" or "2e6 passes"; a number is a time [s]. A test that ends before its
-        limit is extended.
+        "pitting 0.1", "12 h", "2e6 passes" or "5e5 turns"; a number is a time [s]. A test that ends
+        before its limit is extended.
     force : bool
         Overwrite an existing file.
     progress : bool
@@ -94,7 +94,7 @@ def run(
     """
     scenario = with_chosen_model(as_scenario(scenario), test=True)
     with checking_argument("until"):
-        limit = None if until is None else Limit.parse(until)
+        limit = None if until is None else Limit.parse(until, scenario.operation.rollers)
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
@@ -172,15 +172,17 @@ def resume(
         text = apply_overrides(data.scenario_text, str(path), {"evolution.allow_deep": True})
         data = replace(data, scenario_text=text)
     check_plugins(path, data)
-    with checking_argument("until"):
-        limit = None if until is None else Limit.parse(until)
-    if limit is None and data.until and not data.finished:
-        limit = Limit.parse(data.until)
+    stored = stored_scenario(data)
+    end = data.until or None if until is None and not data.finished else until
+    limit: Limit | None = None
+    if end is not None:
+        with checking_argument("until"):
+            limit = Limit.parse(end, stored.operation.rollers)
     reached = is_at_limit(path, data, limit)
     if limit is not None and not reached and until is not None:
-        limit_warnings(stored_scenario(data), limit)
+        limit_warnings(stored, limit)
     state = WearState.from_arrays(data.checkpoint)
-    scenario, limit = with_end(stored_scenario(data), limit)
+    scenario, limit = with_end(stored, limit)
     at_end = not data.until and scenario.total_passes == float(state.passes[0])
     if data.finished and (reached or (at_end and limit is None)):
         return Result(data, path)

@@ -111,7 +111,8 @@ class RunView(StudyView[Result]):
         answers = {"depth": (float(np.max(result.depth[-1])), "um")}
         rows = [Row("depth", result.depth[-1], "um", error, answers)]
         if result.start_height.any():
-            below = Row("depth below nominal", result.depth_below_nominal[-1], "um")
+            errors["depth_below_nominal"] = result.depth_below_nominal_error
+            below = stated("depth below nominal", "depth_below_nominal", "um")
             rows = [rows[0]._replace(label="depth worn since the start"), below]
         if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
             rows.insert(1, stated("roller depth", "roller_depth", "um"))

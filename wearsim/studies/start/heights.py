@@ -96,3 +96,14 @@ def roller_height(scenario: Scenario, rollers: Sequence[int], s: FloatArray) -> 
         assert profile is not None
         height[place] = np.interp(s[place], profile.y, profile.height)
     return height
+
+
+def excess_between_strips(values: FloatArray) -> float:
+    """Return by how much the greatest of values, (..., strips), may be exceeded between strips.
+
+    It is half the greatest difference from a neighbour: that of a straight line to the edge of the
+    strip.
+    """
+    *row, strip = np.unravel_index(values.argmax(), values.shape)
+    near = values[tuple(row)][max(strip - 1, 0) : strip + 2]
+    return 0.5 * float(np.ptp(near))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from wearsim import Scenario, load_scenario
+from wearsim.arguments import ArgumentError
 from wearsim.atomic_write import write_lock
-from wearsim.errors import Interrupted
+from wearsim.errors import InfeasibleCamError, Interrupted, ScenarioError, mistake_in
 from wearsim.plugins import kind_of, quantity
 from wearsim.results.io.files import read_study, write_results
 from wearsim.results.io.outputs import check_output, output_lock
@@ -37,6 +39,7 @@ from wearsim_optimise.variables import (
     from_table,
     overrides,
     parse_variable,
+    start_of,
 )
 
 Watcher = Callable[[int, int, str], object]
@@ -142,8 +145,10 @@ def optimise(
     """
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
     table: Any = loaded.tables.get("optimise")
+    lists = {"vary": vary, "subject_to": subject_to, "tolerance": tolerance}
     request = _request(
         loaded,
+        {name for name, texts in lists.items() if not texts},
         vary=vary or (table.vary if table else ()),
         maximise=_listed(maximise) or (() if minimise or not table else table.maximise),
         minimise=_listed(minimise) or (() if maximise or not table else table.minimise),
@@ -229,28 +234,71 @@ def _given(value: int | None, default: int | None) -> int | None:
     return default if value is None else value
 
 
-def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
-    """Return the request as plain data; raise a ValueError for arguments that cannot be read."""
-    variables = [parse_variable(text) for text in given["vary"]]
+@contextmanager
+def _checking(argument: str, scenario: Scenario, from_table: Container[str]) -> Iterator[None]:
+    """Turn a ValueError into that of an argument, or a mistake of [optimise] that gives it."""
+    try:
+        yield
+    except ValueError as error:
+        if argument in from_table and "optimise" in scenario.tables:
+            raise mistake_in(scenario.file, str(error), table="optimise", key=argument) from error
+        raise ArgumentError(argument, str(error)) from error
+
+
+def _variables(scenario: Scenario, texts: Sequence[str]) -> list[Variable]:
+    """Return the variables of texts; raise a ValueError if the scenario cannot have them."""
+    variables = [parse_variable(text) for text in texts]
     if not variables:
         raise ValueError("nothing is varied; name a variable, such as cam.base_radius=35mm:60mm")
     check_variables(variables, scenario)
+    designs = [overrides(variables, start_of(scenario, variables))]
     for variable in variables:  # a choice that no scenario can have is an error at once
-        for number in range(len(variable.choices)):
-            scenario.changed(overrides([variable], [number]))
+        designs += [overrides([variable], [number]) for number in range(len(variable.choices))]
+    for design in designs:
+        try:
+            scenario.changed(design)
+        except InfeasibleCamError:  # the search leads away from it
+            pass
+        except ScenarioError as error:
+            raise ValueError("; ".join(map(str, error.mistakes))) from error
+    return variables
+
+
+def _request(scenario: Scenario, from_table: Container[str], **given: Any) -> dict[str, Any]:
+    """Return the request as plain data.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    from_table : container of str
+        Names of arguments that are not given, but taken from the table [optimise].
+    **given
+        Values by argument.
+
+    Raises
+    ------
+    ArgumentError, ScenarioError
+        For values that cannot be read.
+    """
+    with _checking("vary", scenario, from_table):
+        variables = _variables(scenario, given["vary"])
     objectives = [(name, 1) for name in given["maximise"]]
     objectives += [(name, -1) for name in given["minimise"]]
     if not 1 <= len(objectives) <= 2:
-        raise ValueError(
+        raise ArgumentError(
+            "maximise",
             f"one objective or two are needed, got {len(objectives)}; name a quantity to maximise"
-            " or minimise, such as life.b10"
+            " or minimise, such as life.b10",
         )
     if len({name for name, _ in objectives}) < len(objectives):
-        raise ValueError(f"'{objectives[0][0]}' is given as two objectives; delete one of them")
+        text = f"'{objectives[0][0]}' is given as two objectives; delete one of them"
+        raise ArgumentError("minimise", text)
     if len(objectives) == 2 and given["then"]:
-        raise ValueError("a second choice goes with one objective, not with a front of two")
+        text = "a second choice goes with one objective, not with a front of two"
+        raise ArgumentError("then", text)
     if given["method"] not in METHODS:
-        raise ValueError(f"'{given['method']}' is no method, expected one of {', '.join(METHODS)}")
+        text = f"'{given['method']}' is no method, expected one of {', '.join(METHODS)}"
+        raise ArgumentError("method", text)
     evaluations = given["evaluations"] or _BASE + _PER_VARIABLE * len(variables)
     for name, value, lowest in (
         ("evaluations", evaluations, 3),
@@ -258,18 +306,22 @@ def _request(scenario: Scenario, **given: Any) -> dict[str, Any]:
         ("realisations", given["realisations"], 1),
     ):
         if value < lowest:
-            raise ValueError(f"{name} must be {lowest} or more, got {value}")
+            raise ArgumentError(name, f"{name} must be {lowest} or more, got {value}")
+    with _checking("subject_to", scenario, from_table):
+        constraints = [asdict(parse_constraint(text)) for text in given["subject_to"]]
+    with _checking("tolerance", scenario, from_table):
+        widths = _tolerances(given["tolerance"], variables)
     return {
         "variables": [as_table(variable) for variable in variables],
         "objectives": [list(item) for item in objectives],
-        "constraints": [asdict(parse_constraint(text)) for text in given["subject_to"]],
+        "constraints": constraints,
         "then": given["then"],
         "evaluations": evaluations,
         "starts": given["starts"],
         "method": given["method"],
         "realisations": given["realisations"],
         "most": given["most"],
-        "tolerances": _tolerances(given["tolerance"], variables),
+        "tolerances": widths,
         "confirm": given["confirm"],
     }
 
@@ -408,8 +460,8 @@ class _Study:
             write_results(self.path, self._content(finished=False))
         designs = self._designs
         if self._watch is not None and designs is not None:
-            total = max(self.plan.evaluations, designs.runs + 1)
-            self._watch(min(designs.runs + 1, total), total, self._progress(designs))
+            most = self.plan.evaluations
+            self._watch(min(designs.runs + 1, most), most, self._progress(designs))
 
     def _progress(self, designs: Designs) -> str:
         """Return the best design so far in words."""

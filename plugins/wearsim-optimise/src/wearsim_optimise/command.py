@@ -20,7 +20,6 @@ from wearsim.cli.shared import (
     check_ending,
     check_figure,
     checked_scheduler,
-    checking,
     read_scenario,
     refuse_same_file,
     results_option,
@@ -163,10 +162,7 @@ def optimise(
 
     if best is not None:
         refuse_inputs(best, loaded.paths, option="--best")
-    with (
-        checking("SCENARIO"),
-        watching(PartWatcher, loaded, quiet, PARTS) as watch,
-    ):
+    with watching(PartWatcher, loaded, quiet, PARTS) as watch:
         result = study(
             loaded,
             vary or (),

@@ -61,6 +61,16 @@ class Design:
         return values
 
     @property
+    def is_searched(self) -> bool:
+        """Whether the search has asked for it, and not what follows the search."""
+        return self.purpose in {"start", "search", "then", "front"}
+
+    @property
+    def counts(self) -> bool:
+        """Whether it counts against the budget: a wear test was run for it, or was not needed."""
+        return self.is_searched and self.status in {"evaluated", "failed"}
+
+    @property
     def is_evaluated(self) -> bool:
         """Whether all quantities are known."""
         known = bool(self.losses) and all(map(math.isfinite, self.losses))
@@ -141,12 +151,8 @@ class Designs:
 
     @property
     def runs(self) -> int:
-        """Number of designs of the search for which a wear test was run, or was not needed."""
-        searched = {"start", "search", "then", "front"}
-        return sum(
-            design.purpose in searched and design.status in {"evaluated", "failed"}
-            for design in self.all
-        )
+        """Number of designs that count against the budget of the search."""
+        return sum(design.counts for design in self.all)
 
     def use(self, goals: Goals) -> None:
         """Apply goals to all designs; designs that violate limits before wear are not run."""

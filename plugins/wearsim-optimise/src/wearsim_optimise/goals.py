@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from wearsim.arguments import ArgumentError
 from wearsim.plugins import QuantityError, kind_of, quantity
 from wearsim.report.text import PER_SI, shown
 
@@ -85,7 +86,7 @@ class Goals:
 
         Raises
         ------
-        ValueError
+        ArgumentError
             If its unit is not that of the quantity.
         """
         unit = self.named[constraint.name]["unit"]
@@ -97,13 +98,14 @@ class Goals:
             if unit in {"1", "%"}:
                 return plain
             example = f"{constraint.name} {constraint.sign} {plain:g} {unit}"
-            raise ValueError(f"'{constraint.text}' lacks a unit, expected one such as '{example}'")
+            text = f"'{constraint.text}' lacks a unit, expected one such as '{example}'"
+            raise ArgumentError("subject_to", text)
         if unit == "%" and constraint.limit.endswith("%"):
             return 0.01 * float(constraint.limit.removesuffix("%"))
         try:
             return quantity(constraint.limit, kind_of(unit).unit if unit not in {"1", "%"} else "1")
         except (QuantityError, ValueError) as error:
-            raise ValueError(f"'{constraint.text}': {error}") from error
+            raise ArgumentError("subject_to", f"'{constraint.text}': {error}") from error
 
     def loss(self, number: int, value: float) -> float:
         """Return an objective as a number to be made small: its logarithm where it is positive."""

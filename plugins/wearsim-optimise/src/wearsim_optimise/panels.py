@@ -121,7 +121,7 @@ def _front(result: OptimisationResult) -> Panel:
 def _progress(result: OptimisationResult) -> Panel:
     """Return the objective of the best feasible design so far."""
     name = result.goals.objectives[0][0]
-    searched = [d for d in result.designs if d.purpose in {"start", "search", "then", "front"}]
+    searched = [design for design in result.designs if design.is_searched]
     best, numbers, values = None, [], []
     for design in searched:
         if design.is_feasible and (best is None or design.loss < best.loss):

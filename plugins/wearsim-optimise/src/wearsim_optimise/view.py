@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.report.text import NOTHING, PER_SI, count, lapse, shown
+from wearsim.report.text import NOTHING, PER_SI, count, count_of, lapse, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table
 from wearsim.results.study_view import StudyView
 from wearsim_optimise.designs import Design
@@ -138,7 +138,7 @@ class OptimisationView(StudyView[OptimisationResult]):
         return [
             Row("variables", bounds),
             Row("designs", f"{words}; {feasible} feasible"),
-            Row("budget", f"at most {request['evaluations']} designs, {request['starts']} starts"),
+            Row("budget", f"{self._searched()}, {count_of(request['starts'], 'start')}"),
             Row("realisations", f"{request['realisations']}, common draws, seed {result.raw.seed}"),
             Row("contact model", result.described_model),
             Row("wall time", lapse(result.raw.wall_seconds)),
@@ -248,12 +248,22 @@ class OptimisationView(StudyView[OptimisationResult]):
     def line(self) -> str:
         """Return designs, realisations and time on one line."""
         result = self.result
-        evaluated = sum(design.is_evaluated for design in result.designs)
         ended = ", converged" if result.raw.converged else ", not converged"
         return (
-            f"{count(evaluated)} of {count(len(result.designs))} designs evaluated"
-            f"{ended if result.raw.best else ''}, {lapse(result.raw.wall_seconds)}"
+            f"{self._searched()}{ended if result.raw.best else ''},"
+            f" {lapse(result.raw.wall_seconds)}"
         )
+
+    def _searched(self) -> str:
+        """Return how much of its budget the search took, and the number of further designs."""
+        designs = self.result.designs
+        used, most = (
+            sum(design.counts for design in designs),
+            self.result.raw.request["evaluations"],
+        )
+        further = sum(not design.is_searched for design in designs)
+        text = f"{count(used)} of at most {count(most)} designs in the search"
+        return text + (f" and {count(further)} around the best" if further else "")
 
     def columns(self) -> Mapping[str, Columns]:
         """Return all designs."""
