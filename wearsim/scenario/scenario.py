@@ -34,6 +34,7 @@ from wearsim.types import Material
 
 Drawn: TypeAlias = float | tuple[float, ...]
 
+DEEPEST = 0.1  # worn depth over the radius of the roller, up to which the surfaces are shallow
 _NO_LENGTH = Mistake(
     "operation",
     "duration or passes",
@@ -283,6 +284,11 @@ class Scenario:
     def materials(self) -> tuple[Material, Material]:
         """Materials of cylinder and roller."""
         return self.cylinder.material, self.roller.material
+
+    @cached_property
+    def greatest_valid_depth(self) -> float:
+        """Greatest depth for which models are valid, inf if deeper ones are allowed [m]."""
+        return math.inf if self.evolution.allow_deep else DEEPEST * self.roller.radius
 
     @cached_property
     def rolling_speed(self) -> float:
