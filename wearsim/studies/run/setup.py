@@ -245,9 +245,10 @@ class Setup:
     @cached_property
     def drawn_shift(self) -> float:
         """Greatest distance by which the drawn tilt moves contacts [m]."""
-        if not self.scenario.creepage.tilt_shifts_contact:
+        tilts = self.range_of("tilt")
+        if not (self.scenario.creepage.tilt_shifts_contact and any(tilts)):
             return 0.0
-        return float(np.abs(self.tilt_shift(self.range_of("tilt"))).max())
+        return float(np.abs(self.tilt_shift(tilts)).max())
 
     @cached_property
     def shift(self) -> float:
