@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -67,7 +68,7 @@ class Grid:
         offsets = np.arange(strips, dtype=np.float64) - 0.5 * (strips - 1)
         return cls(y=centre + offsets * spacing, spacing=spacing)
 
-    @property
+    @cached_property
     def strips(self) -> int:
         """Number of strips."""
         return self.y.size

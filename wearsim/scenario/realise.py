@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from wearsim.scenario.parse.mistakes import Mistakes, replace_numbers
 from wearsim.scenario.scenario import Drawn, Scenario
-from wearsim.scenario.tables.axial import check_axial
+from wearsim.scenario.tables.axial import combine_bodies
 from wearsim.scenario.tables.plain import check_angles, check_lists
 from wearsim.scenario.tables.plugin import LoadChoice, check_load
 
@@ -68,7 +68,7 @@ def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
     if "load" in sections:
         check_load(mistakes, sections["load"])
     if bodies:
-        check_axial(mistakes, {"roller": scenario.roller, "cylinder": scenario.cylinder})
+        sections = combine_bodies(mistakes, vars(scenario)) | sections
     mistakes.raise_any()
     return replace(
         scenario,

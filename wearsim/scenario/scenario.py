@@ -11,13 +11,12 @@ from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError, mistake_in
-from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
+from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.plugins import Options
 from wearsim.profiles import split_name
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import RandomInput
 from wearsim.scenario.parse.toml import flat, parse_fields, reader_in
-from wearsim.scenario.tables.axial import axial_gap
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.cam import Cam, LubricantTable
 from wearsim.scenario.tables.fatigue import FatigueChoice
@@ -35,6 +34,7 @@ from wearsim.types import Material
 
 Drawn: TypeAlias = float | tuple[float, ...]
 
+DEEPEST = 0.1  # worn depth over the radius of the roller, up to which the surfaces are shallow
 _NO_LENGTH = Mistake(
     "operation",
     "duration or passes",
@@ -64,6 +64,10 @@ class Scenario:
         Content of every file it names, by the path as written in the scenario.
     roller, cylinder, operation, load, friction, creepage, contact, evolution, outputs, sampling
         The tables; a random input is represented by its mean.
+    pair : ElasticPair
+        Combined elastic constants of cylinder and roller.
+    axial_gap : AxialGap
+        Gap of roller and cylinder along the axis, without start profiles.
     limit : LimitTable
         Limits of wear.
     wear : WearChoice, optional
@@ -108,6 +112,8 @@ class Scenario:
     evolution: EvolutionTable
     outputs: OutputsTable
     sampling: SamplingTable
+    pair: ElasticPair
+    axial_gap: AxialGap
     limit: LimitTable = field(default_factory=LimitTable)
     fatigue: FatigueChoice | None = None
     cam: Cam | None = None
@@ -280,14 +286,9 @@ class Scenario:
         return self.cylinder.material, self.roller.material
 
     @cached_property
-    def pair(self) -> ElasticPair:
-        """Combined elastic constants of cylinder and roller."""
-        return combine(*self.materials)
-
-    @cached_property
-    def axial_gap(self) -> AxialGap:
-        """Gap of roller and cylinder along the axis, without start profiles."""
-        return axial_gap(self.roller, self.cylinder, self.pair)
+    def greatest_valid_depth(self) -> float:
+        """Greatest depth for which models are valid, inf if deeper ones are allowed [m]."""
+        return math.inf if self.evolution.allow_deep else DEEPEST * self.roller.radius
 
     @cached_property
     def rolling_speed(self) -> float:

@@ -30,7 +30,6 @@ from wearsim.studies.run.assemble import build_problem, chosen_stepper, prepared
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import contact_grid, wider_grid
 from wearsim.studies.run.in_progress import RunInProgress
-from wearsim.studies.run.inputs import load_range
 from wearsim.studies.run.recorder import Event, Stepped
 from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray, Grid
@@ -245,7 +244,8 @@ def _looked_at(scenario: Scenario, test: bool) -> tuple[list[_State], str]:
 
 def _single(scout: Scenario) -> _State:
     """Return the contact of the first roller at the start of the load."""
-    setup, force = Setup(scout), load_range(scout, 0.0)[0]
+    setup = Setup(scout)
+    force = setup.load_range(0.0)[0]
     grid = contact_grid(setup, force)
     state = _unworn(scout, grid)
     if not state.indicators and (wider := wider_grid(setup, grid, force)):

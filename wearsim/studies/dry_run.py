@@ -19,7 +19,7 @@ from wearsim.studies.plausibility import plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw, units_of
 from wearsim.studies.run.grid import start_of_run
-from wearsim.studies.run.inputs import load_file, load_range
+from wearsim.studies.run.inputs import load_file
 from wearsim.studies.run.setup import Setup
 
 Data = dict[str, Any]
@@ -57,7 +57,7 @@ def dry_run(scenario: Scenario) -> Data:
     is_run = scenario.has_length and scenario.wear is not None
     scenario = with_chosen_model(scenario, is_run)
     load, means = scenario.load.built, Setup(scenario)
-    low, high = load_range(scenario, scenario.total_time if is_run else 0.0)
+    low, high = means.load_range(scenario.total_time if is_run else 0.0)
     roller, cylinder = scenario.roller, scenario.cylinder
     crowned = roller.axial_profile.form == "crown"
     patch, patch_load = means.hardest_patch(high)

@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import ContactError, ResultsFileError
+from wearsim.errors import ContactError, ResultsFileError, SolverError
 from wearsim.evolution.limits import OF_FATIGUE, Limit
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import FALLEN, SMALL, preload_of
 from wearsim.report.text import lapse
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
-from wearsim.studies.failures import explained, failures_explained, length_key, too_deep
+from wearsim.studies.failures import explained, length_key, too_deep
 from wearsim.studies.forecast import WearForecast
 from wearsim.studies.schedule import RecordSchedule
 from wearsim.units import in_engineers_unit
@@ -98,8 +98,10 @@ def forecast_data(
         If the contacts of the unworn bodies or of the predicted groove have no solution.
     """
     passes = float(scenario.total_passes)
-    with failures_explained(scenario):
+    try:
         forecast = WearForecast(scenario, problem)
+    except SolverError as error:
+        raise explained(error, scenario) from error.__cause__
     wear = forecast.at(passes)
     failure = forecast.failure
     if failure and failure.cause == "skid" and forecast.passes_solved < _CERTAIN * passes:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from wearsim.errors import SolverError, StepError
 from wearsim.mechanics.slender.influence import HIGHEST
@@ -12,8 +10,6 @@ from wearsim.scenario import Scenario
 from wearsim.studies.plausibility import greatest_load
 from wearsim.studies.run.setup import Setup
 from wearsim.units import in_engineers_unit
-
-DEEPEST = 0.1  # worn depth over the radius of the roller, up to which the surfaces are shallow
 
 
 def explained(
@@ -41,24 +37,10 @@ def explained(
     return type(error)(f"{when}{message}", error.state, remedy=remedy, cause=error.cause)
 
 
-@contextmanager
-def failures_explained(scenario: Scenario) -> Iterator[None]:
-    """Explain the failures of contacts of unworn bodies in the context."""
-    try:
-        yield
-    except SolverError as error:
-        raise explained(error, scenario) from error.__cause__
-
-
-def greatest_valid_depth(scenario: Scenario) -> float:
-    """Return the greatest depth for which models are valid, inf if deeper ones are allowed [m]."""
-    return math.inf if scenario.evolution.allow_deep else DEEPEST * scenario.roller.radius
-
-
 def too_deep(scenario: Scenario, depth: float) -> str:
     """Return that a worn depth [m] is beyond the validity of the models, or an empty text."""
     radius = scenario.roller.radius
-    if depth <= greatest_valid_depth(scenario):
+    if depth <= scenario.greatest_valid_depth:
         return ""
     return (
         f"the worn depth of {depth * 1e3:.4g} mm exceeds a tenth of roller.radius ="

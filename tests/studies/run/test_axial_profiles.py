@@ -59,7 +59,8 @@ def rig(overrides: dict[str, object] | None = None) -> Scenario:
 
 
 def roller_profile(scenario: Scenario):
-    return scenario.roller.axial_profile.build(pair_of(scenario.roller, scenario.cylinder))
+    pair = pair_of(scenario.roller, scenario.cylinder, scenario.pair)
+    return scenario.roller.axial_profile.build(pair)
 
 
 def test_lundberg_carries_a_uniform_load():

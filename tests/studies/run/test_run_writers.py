@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 
@@ -11,8 +12,9 @@ import pytest
 from study_examples import run_differences, short
 
 from wearsim import operating_system
-from wearsim.atomic_write import lock_path
+from wearsim.atomic_write import lock_path, write_lock
 from wearsim.errors import Interrupted, ResultsFileError
+from wearsim.results.io import outputs
 from wearsim.results.io.outputs import check_output, output_lock
 from wearsim.studies.opening import open_results
 from wearsim.studies.run import run as studies
@@ -79,13 +81,21 @@ def test_lock_ends_with_its_process_and_not_before(path: Path) -> None:
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_file_written_after_its_check_is_not_replaced(path: Path) -> None:
-    check_output(path, force=False)
-    studies.run(short(), path)
-    before = path.read_bytes()
+def test_file_written_after_its_check_is_not_replaced(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = []
+
+    def meanwhile(file: Path) -> AbstractContextManager[None]:
+        monkeypatch.setattr(outputs, "write_lock", write_lock)
+        studies.run(short(), file)
+        written.append(file.read_bytes())
+        return write_lock(file)
+
+    monkeypatch.setattr(outputs, "write_lock", meanwhile)
     with pytest.raises(ResultsFileError, match="already exists"), output_lock(path, force=False):
         pytest.fail("the file may be replaced")
-    assert path.read_bytes() == before
+    assert written == [path.read_bytes()]
 
 
 def test_file_written_while_resume_reads_it_is_not_replaced(

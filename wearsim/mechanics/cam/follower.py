@@ -128,7 +128,7 @@ class Follower:
                 f" circle, whose radius is {1e3 * radius:.6g} mm"
             )
 
-    @property
+    @cached_property
     def swings(self) -> bool:
         """Whether the follower is an arm."""
         return self.kind == "swinging"
@@ -146,7 +146,7 @@ class Follower:
             return math.acos((c * c + arm * arm - radius * radius) / (2.0 * c * arm))
         return math.sqrt(radius * radius - self.offset * self.offset)
 
-    @property
+    @cached_property
     def lever(self) -> float:
         """Displacement of the roller's centre per lift: 1, or the length of the arm [m]."""
         return self.arm_length if self.swings else 1.0

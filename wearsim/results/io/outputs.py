@@ -56,24 +56,27 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
 
 
 @contextmanager
-def output_lock(path: str | Path | None, force: bool) -> Iterator[None]:
+def output_lock(
+    path: str | Path | None, force: bool, inputs: Iterable[Path] = ()
+) -> Iterator[None]:
     """Make this process the only writer of a results file, if there is one, in the context.
 
     Parameters
     ----------
     path : str or Path, optional
-        The file, as checked by `check_output`.
-    force : bool
-        Whether an existing file may be replaced.
+        The file.
+    force, inputs
+        As of `check_output`.
 
     Raises
     ------
     ResultsFileError
-        If another process is writing it, or has written it since it was checked.
+        As `check_output`, or if another process has written it since it was checked.
     """
     if path is None:
         yield
         return
+    check_output(path, force, inputs)
     with write_lock(path):
         if not force:
             _refuse_existing(path)

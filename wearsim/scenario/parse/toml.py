@@ -29,7 +29,7 @@ from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.scenario.tables.axial import AxialTable, check_axial
+from wearsim.scenario.tables.axial import AxialTable, combine_bodies
 from wearsim.scenario.tables.bodies import (
     CylinderTable,
     RollerTable,
@@ -331,7 +331,7 @@ def parse_fields(
     sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
     owned = _read_owned(mistakes, data)
     assemble_cam(mistakes, sections)
-    sections |= check_axial(mistakes, sections)
+    sections |= combine_bodies(mistakes, sections)
     check_limits(mistakes, data, sections["limit"])
     check_lists(mistakes, data)
     check_correlation(mistakes, sections["sampling"])
@@ -345,7 +345,7 @@ def parse_fields(
         "text": text,
         "files": files,
         "notes": (
-            *dundurs_note(sections["roller"], sections["cylinder"], sections["contact"]),
+            *dundurs_note(sections["pair"], sections["contact"]),
             *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
             *_unused_sampling_note(data, random),
             *mistakes.notes,

@@ -97,33 +97,31 @@ def read_axial(mistakes: Mistakes, key: AxialKey | None, table: str) -> AxialCho
     return None if options is None else AxialChoice(named.form, options, rest)
 
 
-def pair_of(roller: Roller, cylinder: Cylinder, elastic: ElasticPair | None = None) -> AxialPair:
-    """Return the pair for which axial profiles are designed; elastic constants if known."""
-    elastic = elastic or combine(cylinder.material, roller.material)
+def pair_of(roller: Roller, cylinder: Cylinder, elastic: ElasticPair) -> AxialPair:
+    """Return the pair for which axial profiles are designed."""
     curvature = 1.0 / cylinder.radius + 1.0 / roller.radius
     return AxialPair(roller.width, elastic.contact_modulus, curvature)
 
 
-def axial_gap(roller: Roller, cylinder: Cylinder, elastic: ElasticPair) -> AxialGap:
-    """Return the gap of two bodies along their axis, without start profiles."""
-    pair = pair_of(roller, cylinder, elastic)
-    forms = roller.axial_profile.build(pair), cylinder.axial_profile.build(pair)
-    return AxialGap(*forms, roller.width, roller.radius)
-
-
-def check_axial(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Roller]:
-    """Add the mistakes of both forms; return the roller with the width of its form.
+def combine_bodies(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what roller and cylinder make together, or nothing after adding mistakes of a form.
 
     Parameters
     ----------
     mistakes : Mistakes
     sections : mapping of str to object
         The tables that have been read; None after mistakes in them.
+
+    Returns
+    -------
+    dict of str to object
+        Fields of a `Scenario`: `pair`, `axial_gap`, and the roller with the width of its form.
     """
     roller, cylinder = sections["roller"], sections["cylinder"]
     if roller is None or cylinder is None or not (roller.radius and cylinder.radius):
         return {}
-    profile = _built(mistakes, "roller", roller.axial_profile, pair_of(roller, cylinder))
+    elastic = combine(cylinder.material, roller.material)
+    profile = _built(mistakes, "roller", roller.axial_profile, pair_of(roller, cylinder, elastic))
     if profile is not None and math.isfinite(profile.length):
         width, length = roller.width, profile.length
         if width is None:
@@ -131,8 +129,12 @@ def check_axial(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Ro
         elif width > _WIDER * length:
             most = f"at most {1e3 * length:.6g} mm, the length of roller.axial_profile"
             mistakes.add("roller", "width", "exceeds its profile", f"{1e3 * width:.6g} mm", most)
-    _built(mistakes, cylinder.name, cylinder.axial_profile, pair_of(roller, cylinder))
-    return {"roller": roller}
+    pair = pair_of(roller, cylinder, elastic)
+    other = _built(mistakes, cylinder.name, cylinder.axial_profile, pair)
+    if profile is None or other is None:
+        return {}
+    gap = AxialGap(profile, other, roller.width, roller.radius)
+    return {"roller": roller, "pair": elastic, "axial_gap": gap}
 
 
 def _built(

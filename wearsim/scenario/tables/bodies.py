@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from wearsim.errors import ScenarioError
-from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.plugins import Options
 from wearsim.profiles import (
     ROW_CHOICES,
@@ -358,12 +358,11 @@ def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | N
     return Cylinder(radius, table.material, profile, table.profile.path, table.profile_filter, form)
 
 
-def dundurs_note(roller: Roller, cylinder: Cylinder, contact: ContactChoice) -> list[str]:
+def dundurs_note(pair: ElasticPair, contact: ContactChoice) -> list[str]:
     """Return a note if the coupling of pressure and traction is neglected but not negligible.
 
     In line contact a pressure p changes the slip by 2 beta p/E*, with Dundurs' constant beta.
     """
-    pair = combine(cylinder.material, roller.material)
     if getattr(contact.options, "coupling", False) or abs(pair.dundurs) <= DUNDURS_LIMIT:
         return []
     slip = 2.0 * abs(pair.dundurs) * COUPLING_PRESSURE / pair.contact_modulus

@@ -125,8 +125,9 @@ class CamTurn:
 
     def at(self, panel: Panel, theta: FloatArray) -> Point:
         """Return the state at angles within a panel [rad]."""
-        inner = np.full(len(theta), self.is_inner(panel))
-        return self._loaded(self.rolling(panel, theta), theta, inner)
+        inner = self.is_inner(panel)
+        kinematics = self._path.at(panel.segment, theta, inner)
+        return self._loaded(kinematics, theta, np.full(len(theta), inner))
 
     def rolling(self, panel: Panel, theta: FloatArray) -> RollerKinematics:
         """Return the motion of the roller at angles within a panel [rad]."""
@@ -196,9 +197,7 @@ class CamTurn:
         if not self.free:
             return []
         if inertia == 0.0:
-            ratio, theta = extreme(
-                self.panels, lambda p, x: self.drag(self.at(p, x)) / self._greatest_torque(p, x)
-            )
+            ratio, theta = extreme(self.panels, self._demand)
             if ratio > 1.0:
                 what = "exceeds the torque that friction transmits, and the roller stops at"
                 what += f" {math.degrees(theta):.4g} deg"
@@ -207,9 +206,10 @@ class CamTurn:
         scale = inertia * self.speed**2
 
         def rolling(panel: Panel, theta: FloatArray) -> Rolling:
-            point, most = self.at(panel, theta), self._greatest_torque(panel, theta)
+            point = self.at(panel, theta)
             kinematics, drag = point.kinematics, self.drag(point) / scale
-            return Rolling(kinematics.spin, kinematics.spin_per_rad, drag, most / scale)
+            most = self._greatest_torque(point) / scale
+            return Rolling(kinematics.spin, kinematics.spin_per_rad, drag, most)
 
         try:
             return skid_arcs(self.panels, rolling)
@@ -217,11 +217,15 @@ class CamTurn:
             remedy = "a smaller inertia, bearing torque or speed, or a greater load"
             raise self._mistake("roller", "inertia", str(error), None, remedy) from error
 
-    def _greatest_torque(self, panel: Panel, theta: FloatArray) -> FloatArray:
+    def _greatest_torque(self, point: Point) -> FloatArray:
         """Return the greatest torque that friction transmits to the roller [N m]."""
         friction = self.scenario.friction.coefficient
-        force = self.carried(self.at(panel, theta))
-        return np.asarray(friction * force * self.scenario.roller.radius)
+        return np.asarray(friction * self.carried(point) * self.scenario.roller.radius)
+
+    def _demand(self, panel: Panel, theta: FloatArray) -> FloatArray:
+        """Return the traction of a rolling free roller, over the limit of friction."""
+        point = self.at(panel, theta)
+        return np.asarray(np.abs(self.torque(point)) / self._greatest_torque(point))
 
     @cached_property
     def parts(self) -> tuple[Panel, ...]:
@@ -296,14 +300,7 @@ class CamTurn:
     @cached_property
     def greatest_demand(self) -> float:
         """Greatest traction of a rolling free roller, over the limit of friction; at most 1."""
-        if not self.free:
-            return 0.0
-
-        def demand(panel: Panel, theta: FloatArray) -> FloatArray:
-            torque = np.abs(self.torque(self.at(panel, theta)))
-            return np.asarray(torque / self._greatest_torque(panel, theta))
-
-        return min(extreme(self.panels, demand)[0], 1.0)
+        return min(extreme(self.panels, self._demand)[0], 1.0) if self.free else 0.0
 
     @cached_property
     def greatest_skid(self) -> float:
@@ -348,7 +345,7 @@ class CamTurn:
         depth = force if self.cam.groove else force ** (2.0 / 3.0)
         rows = [depth, force * travel, travel]
         if self.free:
-            most = np.maximum(self._greatest_torque(panel, theta), 1e-300)
+            most = np.maximum(self._greatest_torque(point), 1e-300)
             middle = np.full(len(theta), 0.5 * (panel.start + panel.stop))
             slip = self.slip(theta, middle)
             demand = np.clip(self.torque(point) / most, -1.0, 1.0)

@@ -30,7 +30,6 @@ from wearsim.studies.run.grid import realisation_grid, wider_grid
 from wearsim.studies.run.inputs import (
     FIELDS,
     contact_values,
-    load_range,
 )
 from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray
@@ -201,8 +200,8 @@ class Realisations:
             what = "has many contacts, and this study solves one"
             remedy = "wearsim cam for its contacts, or wearsim ensemble"
             raise mistake_in(scenario.file, what, None, remedy, table="cam")
-        mean_load, self._setup = load_range(scenario, 0.0)[0], Setup(scenario)
-        setup = self._setup
+        self._setup = setup = Setup(scenario)
+        mean_load = setup.load_range(0.0)[0]
         self._once, field, self.notes = acting_inputs(scenario)
         drawer = Drawer(self._once, scenario.sampling.plan, count)
         self.values, self.units = drawer.columns(0, count), units_of(self._once)

@@ -27,7 +27,6 @@ from wearsim.studies.failures import explained
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid, wider_grid
-from wearsim.studies.run.inputs import load_range
 from wearsim.studies.run.setup import Setup
 from wearsim.types import (
     ContactFields,
@@ -164,7 +163,8 @@ def study_contact(
             raise TypeError(f"profile must be a Profile or the path of a file, got a {kind}")
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
     scenario = with_chosen_model(scenario, test=False)
-    setup, force = Setup(scenario), load_range(scenario, 0.0)[0]
+    setup = Setup(scenario)
+    force = setup.load_range(0.0)[0]
     grid, notes = contact_grid(setup, force), scenario.notes
     model, gap, curvature, point = _contact(scenario, grid)
     try:

@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.errors import Interrupted, ScenarioError, SolverError
 from wearsim.results.io.files import write_results
-from wearsim.results.io.outputs import check_output, output_lock
+from wearsim.results.io.outputs import output_lock
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.contact.batch import Realisations
@@ -99,10 +99,8 @@ def dissipation(
     scenario = with_chosen_model(as_scenario(scenario), test=False)
     realisations = checked_count(scenario, realisations)
     path = Path(output) if output is not None else None
-    if path is not None:
-        check_output(path, force, scenario.paths)
     with (
-        output_lock(path, force),
+        output_lock(path, force, scenario.paths),
         shown_progress(progress, "Counter", on_progress, scenario) as watch,
     ):
         study = _Study(scenario, realisations, path)

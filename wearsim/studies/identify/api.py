@@ -14,7 +14,7 @@ from wearsim.errors import Mistake, mistake_in
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.results.io.files import write_results
-from wearsim.results.io.outputs import check_output, output_lock
+from wearsim.results.io.outputs import output_lock
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.cam_wear import Wanted, size_of
@@ -132,9 +132,7 @@ def identify(
     width = quantity(shoulders, "m") if isinstance(shoulders, str) else shoulders
     items = _measurements(tests, before, choice, width, curvature)
     files = [path for item in items for path in item.files]
-    if output is not None:
-        check_output(Path(output), force, [*scenario.paths, *files])
-    with output_lock(output, force):
+    with output_lock(output, force, [*scenario.paths, *files]):
         study = _Study(scenario, items, draws, shared)
         with shown_progress(progress, "Counter", on_progress, scenario) as watch:
             rows = study.rows(watch)

@@ -24,7 +24,7 @@ from wearsim.evolution.steppers.stabilised import StabilisedStepper
 from wearsim.evolution.strip_errors import COARSE_TAPER, LOOSER, LOOSEST
 from wearsim.evolution.strips import Surfaces
 from wearsim.plugins import ContactModel
-from wearsim.scenario import Scenario
+from wearsim.scenario import FatigueChoice, Scenario
 from wearsim.studies.cam.stations import cam_stations
 from wearsim.studies.run.grid import check_number_of_strips, growth_of, strips_of_run
 from wearsim.studies.run.nodes import MAX_NODES, PassQuadrature, minimum_nodes, redrawing
@@ -210,7 +210,7 @@ def assemble_problem(
             multiplicity=multiplicity,
         ),
         laws=(scenario.wear.built,) if scenario.wear is not None else (),
-        fatigue=_fatigue(scenario),
+        fatigue=_fatigue(scenario, scenario.fatigue) if scenario.fatigue else None,
         varying=tuple(
             replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
             for item in setup.varying
@@ -234,11 +234,8 @@ def assemble_problem(
     return problem, stepper, name
 
 
-def _fatigue(scenario: Scenario) -> Fatigue | None:
-    """Return the fatigue of the bodies of a scenario, None without the table [fatigue]."""
-    choice = scenario.fatigue
-    if choice is None:
-        return None
+def _fatigue(scenario: Scenario, choice: FatigueChoice) -> Fatigue:
+    """Return the fatigue of the bodies of a scenario."""
     modulus = scenario.pair.contact_modulus
     return Fatigue(
         {body: law.build(modulus) for body, law in choice.laws.items()},
@@ -403,7 +400,9 @@ def surfaces(
     height = start_height(scenario, grid, angles)
     if form.has_crowned_cylinder:
         height = height - form.cylinder_drop(grid.y)
-    drop = form.roller_drop(s) - roller_height(scenario, rollers, s)
+    drop = form.roller_drop(s)
+    if roller.profiles:
+        drop = drop - roller_height(scenario, rollers, s)
     # leading axes: stations, rollers, realisations
     height = height if height.ndim == 1 else height[:, None, None]
     gap = drop - height

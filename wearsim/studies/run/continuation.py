@@ -12,7 +12,7 @@ from wearsim.errors import ResultsFileError, ScenarioError, mistake_in
 from wearsim.evolution.limits import OF_FATIGUE, SAME_VALUE, Limit
 from wearsim.evolution.state import WearState
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.failures import DEEPEST
+from wearsim.scenario.scenario import DEEPEST
 from wearsim.studies.forecast import WearForecast
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw

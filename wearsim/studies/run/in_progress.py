@@ -39,8 +39,6 @@ from wearsim.studies.contact.comparison import REFERENCE, error_above_tolerance
 from wearsim.studies.effort import large_records
 from wearsim.studies.failures import (
     explained,
-    failures_explained,
-    greatest_valid_depth,
     too_deep_failure,
 )
 from wearsim.studies.plausibility import plausibility_warnings
@@ -97,7 +95,6 @@ class RunInProgress:
         if data is not None:
             grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
         self.scenario, self.setup, self.path, self.storage = scenario, setup, path, storage
-        self._valid_depth = greatest_valid_depth(scenario)
         self.problem, self.stepper, self.stepper_name = assemble_problem(setup, grid)
         self.on_event: Watcher = on_event or (lambda event: None)
         self._watched = on_event is not None
@@ -110,12 +107,16 @@ class RunInProgress:
         self.wall_before = 0.0 if data is None else data.wall_seconds
         self.started = self._written = time.monotonic()  # time of the last checkpoint too
         self.record_base = self.stop if data is None else float(data.checkpoint["record_base"])
+        try:
+            state = fresh_state(self.problem) if state is None else state
+        except SolverError as error:
+            raise explained(error, scenario) from error.__cause__
         self.recorder = Recorder(
             self.problem,
             self.stepper,
             RecordSchedule.of(scenario, self.record_base),
             scenario.outputs.width_threshold,
-            self._fresh() if state is None else state,
+            state,
             None if data is None else data.history,
             None if data is None else data.records,
         )
@@ -134,11 +135,6 @@ class RunInProgress:
         else:
             for text in changed_origins(data, scenario):
                 self.warn(text)
-
-    def _fresh(self) -> WearState:
-        """Return the state before the first pass."""
-        with failures_explained(self.scenario):
-            return fresh_state(self.problem)
 
     def finish(self) -> Result:
         """Step to the end of the test and return the result."""
@@ -345,7 +341,7 @@ class RunInProgress:
     def _check_depth(self, state: WearState) -> None:
         """End the run if a groove is deeper than the model is valid for, unless that is allowed."""
         depth = float(np.maximum.reduce(state.stacked, axis=None))
-        if depth <= self._valid_depth:
+        if depth <= self.scenario.greatest_valid_depth:
             return
         less = f"the limit {self.limit.text}" if self.limit else ""
         resuming = "; with the option allow_deep, resume continues" if self.path else ""

@@ -13,7 +13,7 @@ from wearsim.atomic_write import DISK, Storage, write_lock
 from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.state import WearState
-from wearsim.results.io.outputs import check_output, output_lock
+from wearsim.results.io.outputs import output_lock
 from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.scenario.parse.toml import apply_overrides
@@ -93,15 +93,15 @@ def run(
     >>> kept = wearsim.run("rig.toml", "rig.h5")  # writes the file as well
     """
     scenario = with_chosen_model(as_scenario(scenario), test=True)
-    with checking_argument("until"):
-        limit = None if until is None else Limit.parse(until, scenario.operation.rollers)
     path = Path(output) if output is not None else None
-    if path is not None:
-        check_output(path, force, scenario.paths)
-    scenario, limit = with_end(scenario, limit)
-    warnings = limit_warnings(scenario, limit) if limit else []
+    limit, warnings = None, []
+    if until is not None:
+        with checking_argument("until"):
+            limit = Limit.parse(until, scenario.operation.rollers)
+        scenario, limit = with_end(scenario, limit)
+        warnings = limit_warnings(scenario, limit) if limit else []
     with (
-        output_lock(path, force),
+        output_lock(path, force, scenario.paths),
         shown_progress(progress, "RunWatcher", on_event, scenario) as watch,
     ):
         started = RunInProgress(

@@ -11,13 +11,14 @@ import numpy as np
 
 from wearsim.evolution.quantities import OneStation, Varying
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
+from wearsim.models.loads import FollowerLoad
 from wearsim.plugins import BODIES, JointDistribution, WearLaw
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.cam.point import Point
 from wearsim.studies.cam.turn import CamTurn, turn_of
-from wearsim.studies.run.inputs import load_range, origin
+from wearsim.studies.run.inputs import load_mistake, origin
 from wearsim.studies.start.heights import StartExtent, roller_profile, start_extent
 from wearsim.types import ContactSolution, FloatArray
 
@@ -183,8 +184,43 @@ class Setup:
         ScenarioError
             If the load is not defined for the whole test, or not positive.
         """
-        load = load_range(self.scenario, self.scenario.total_time)[1]
+        load = self.load_range(self.scenario.total_time)[1]
         return load + self.range_of("normal_force_offset")[1]
+
+    def load_range(self, stop: float) -> tuple[float, float]:
+        """Return the least and greatest load up to `stop` [s], before any feedback [N].
+
+        Raises
+        ------
+        ScenarioError
+            If the load is not defined for the whole time, or is not positive outside of pauses.
+        """
+        scenario, load = self.scenario, self.scenario.load.built
+        if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
+            got = f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min"
+            expected = f"0 to {stop / 60.0:.6g} min: a longer log or a shorter operation.duration"
+            raise load_mistake(scenario, "the log does not cover the test", got, expected)
+        low, high = load.extremes(0.0, stop)
+        if isinstance(load, FollowerLoad):
+            low, high = turn_of(scenario).normal_range
+            return (low if low > 0.0 else high), high  # where N changes sign, the flank changes
+        if scenario.load.terms:
+            return low, high
+        if high <= 0.0:
+            when = f"never above zero up to {stop / 60.0:.6g} min" if stop else "zero at the start"
+            what = f"the load is {when}, and there is no contact"
+            raise load_mistake(scenario, what, f"{high:.6g} N", "a load above zero")
+        if low < 0.0 or (low == 0.0 and not len(load.pauses)):
+            before, after = 0.0, stop
+            for _ in range(60):  # the first time of the least load, of any kind of load
+                middle = 0.5 * (before + after)
+                reached = load.extremes(0.0, middle)[0] <= low
+                before, after = (before, middle) if reached else (middle, after)
+            what = "the load falls to zero or below, and contact is lost"
+            got = f"{low:.6g} N at {after / 60.0:.6g} min"
+            expected = "a load above zero at all times, or zero for a pause in a log"
+            raise load_mistake(scenario, what, got, expected)
+        return low, high
 
     @cached_property
     def patch(self) -> HertzContact:
@@ -209,9 +245,10 @@ class Setup:
     @cached_property
     def drawn_shift(self) -> float:
         """Greatest distance by which the drawn tilt moves contacts [m]."""
-        if not self.scenario.creepage.tilt_shifts_contact:
+        tilts = self.range_of("tilt")
+        if not (self.scenario.creepage.tilt_shifts_contact and any(tilts)):
             return 0.0
-        return float(np.abs(self.tilt_shift(self.range_of("tilt"))).max())
+        return float(np.abs(self.tilt_shift(tilts)).max())
 
     @cached_property
     def shift(self) -> float:
@@ -250,7 +287,7 @@ class Setup:
         """Return the distance by which tilt [rad] moves the contact of unworn bodies [m]."""
         gap, half = self.scenario.axial_gap, 0.0
         if not gap.is_crowned:
-            half = self.widest_patch(load_range(self.scenario, 0.0)[1]).b
+            half = self.widest_patch(self.load_range(0.0)[1]).b
         return gap.shift(np.asarray(tilt, dtype=np.float64), half)
 
     @cached_property

@@ -77,8 +77,8 @@ def start_height(scenario: Scenario, grid: Grid, angles: FloatArray | None = Non
     return height if angles is None else np.broadcast_to(height, (len(angles), len(height)))
 
 
-def roller_height(scenario: Scenario, rollers: Sequence[int], s: FloatArray) -> FloatArray | float:
-    """Return the height of rollers above nominal before wear, 0 without start profiles [m].
+def roller_height(scenario: Scenario, rollers: Sequence[int], s: FloatArray) -> FloatArray:
+    """Return the height of rollers with start profiles above nominal before wear [m].
 
     Parameters
     ----------
@@ -88,8 +88,6 @@ def roller_height(scenario: Scenario, rollers: Sequence[int], s: FloatArray) -> 
     s : ndarray, shape (rollers, realisations, strips)
         Axial distance from the apex [m].
     """
-    if not scenario.roller.profiles:
-        return 0.0
     height = np.empty_like(s)
     for place, number in enumerate(rollers):
         profile = roller_profile(scenario, number)

@@ -16,7 +16,7 @@ from wearsim.atomic_write import write_lock
 from wearsim.errors import InfeasibleCamError, Interrupted, ScenarioError, mistake_in
 from wearsim.plugins import kind_of, quantity
 from wearsim.results.io.files import read_study, write_results
-from wearsim.results.io.outputs import check_output, output_lock
+from wearsim.results.io.outputs import output_lock
 from wearsim.results.kinds import as_plugin
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.preparation import origin_of
@@ -162,8 +162,6 @@ def optimise(
         tolerance=tolerance or (table.tolerance if table else ()),
         confirm=confirm,
     )
-    if output is not None:
-        check_output(output, force, loaded.paths)
     origin = origin_of(loaded)
     data = OptimisationData(
         **{**origin, "plugins": [*origin["plugins"], as_plugin("optimisation")]},
@@ -175,7 +173,7 @@ def optimise(
     )
     path = None if output is None else Path(output)
     with (
-        output_lock(path, force),
+        output_lock(path, force, loaded.paths),
         shown_progress(progress, "PartWatcher", on_progress, loaded) as watch,
     ):
         hands = workers, scheduler, watch, on_notice or getattr(watch, "notice", None)

@@ -22,7 +22,6 @@ from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import is_compiled
 from wearsim.evolution.strips import same_strips
 from wearsim.studies.run.draws import draw
-from wearsim.studies.run.inputs import load_range
 from wearsim.studies.run.setup import Setup
 from wearsim.types import FloatArray, Grid
 from wearsim_bench.stated_errors.random_tests import TRUE_TOLERANCE, RandomTest
@@ -225,7 +224,8 @@ def final_grid(test: RandomTest, until: float) -> tuple[Grid, float, float]:
     ones are not worn.
     """
     scenario = test.scenario()
-    means, load = Setup(scenario), load_range(scenario, scenario.total_time)[1]
+    means = Setup(scenario)
+    load = means.load_range(scenario.total_time)[1]
     load += draw(scenario).range_of("normal_force_offset")[1]
     patch, centre = means.widest_patch(load).b, means.centre
     shift = float(np.abs(means.positions - centre).max())
