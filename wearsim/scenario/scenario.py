@@ -113,7 +113,7 @@ class Scenario:
     outputs: OutputsTable
     sampling: SamplingTable
     pair: ElasticPair
-    axial_gap: AxialGap
+    axial_gap: AxialGap = field(repr=False)  # follows from the bodies
     limit: LimitTable = field(default_factory=LimitTable)
     fatigue: FatigueChoice | None = None
     cam: Cam | None = None
