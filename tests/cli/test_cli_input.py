@@ -250,7 +250,8 @@ def test_contact_prints_engineering_units(command: Command) -> None:
     rows = {line[:24].strip(): line[24:].strip() for line in result.stdout.splitlines()}
     assert rows["patch length 2a"] == "0.2726 mm"
     assert rows["peak pressure"] == "680.2 MPa"
-    assert rows["dissipated power"] == "0.07387 W"
+    data = json.loads(command("contact", SCENARIOS / "mean-contact.toml", "--json").stdout)
+    assert rows["dissipated power"] == f"0.07387 ± {data['power_error_W']:.1e} W"
     assert rows["spin moment"] == "0 N mm"
     width, unit = rows["patch width"].split()
     assert (float(width), unit) == (pytest.approx(3.0898, rel=3e-3), "mm")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from study_examples import short
 
@@ -57,6 +59,14 @@ def test_strips_that_lower_no_error_are_refused_before_any_contact() -> None:
     assert dry_run(automatic(**cheap))["test"]["strips"] == most
     with pytest.raises(ScenarioError, match="more than 1200 strips per half-width"):
         dry_run(automatic(**cheap | {"contact.strips": most + most // 100}))
+
+
+def test_ensemble_on_too_many_strips_is_refused_before_its_tests(tmp_path: Path) -> None:
+    friction = {"distribution": "uniform", "low": 0.1, "high": 0.2}
+    many = automatic(contact__strips=200_000, friction__coefficient=friction)
+    with pytest.raises(ScenarioError, match="more than 1200 strips per half-width"):
+        wearsim.ensemble(many, 3, tmp_path / "tests.h5", scheduler="serial")
+    assert not (tmp_path / "tests.h5").exists()
 
 
 def test_strips_whose_equations_exceed_the_memory_are_refused() -> None:

@@ -26,7 +26,13 @@ from wearsim.studies.kernels import kernels_of
 from wearsim.studies.roller_ends import ends_roller
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
-from wearsim.studies.run.grid import lattice, shared_strips, start_of, strips_of_run
+from wearsim.studies.run.grid import (
+    check_number_of_strips,
+    lattice,
+    shared_strips,
+    start_of,
+    strips_of_run,
+)
 from wearsim.types import FloatArray, Grid
 
 if TYPE_CHECKING:
@@ -182,7 +188,7 @@ def profile_axis(scenario: Scenario) -> Grid:
     for number in range(AXIS_REALISATIONS if scenario.random else 1):
         try:
             setup = drawer.draw(number)
-            strips_of_run(setup)
+            check_number_of_strips(setup.scenario, strips_of_run(setup))
             reach.append(abs(setup.centre) + setup.final)
         except WearsimError as failure:
             error = error or failure
