@@ -19,7 +19,6 @@ from wearsim.uq.survival.competing import CompetingRisks, course_places
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
-    from wearsim.studies.life.result import LifeResult
     from wearsim.studies.life.values import LifeValues
 
 _LEAST = 1e-9  # passes at the end of a course, at least: a limit may be reached at once
@@ -142,17 +141,19 @@ def competing_data(result: LifeValues) -> dict[str, Any]:
     }
 
 
-def competing_table(result: LifeResult) -> tuple[list[str], list[list[str]]] | None:
+def competing_table(
+    result: LifeValues, life_of_share: Callable[[float], Interval]
+) -> tuple[list[str], list[list[str]]] | None:
     """Return heads and cells of the table of wear and pitting; None without fatigue.
 
-    Lives have the digits that the interval of the life of the same share leaves.
+    Lives have the digits that the interval of `life_of_share`, of a share in percent, leaves.
     """
     risks = competing_risks(result)
     if risks is None:
         return None
     shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
     lives = [lives_of(result, share / 100.0) for share in shares]
-    intervals = [result.b(share) for share in shares]
+    intervals = [life_of_share(share) for share in shares]
     level, other = risks.at(math.inf), other_end(result.scenario)
     names = {
         "both": (f"{other} or pitting", 1.0 - level.survival),
