@@ -178,6 +178,13 @@ def test_limit_that_is_never_reached_is_reported(path: Path) -> None:
     assert "log" in _warning(logged)
 
 
+def test_warning_of_the_error_at_a_limit_states_that_of_the_results() -> None:
+    scenario = load_scenario(SCENARIOS / "cam-eccentric.toml", overrides={"contact.strips": 41})
+    result = studies.run(scenario, until="1e5 turns")
+    (warning,) = (text for text in result.warnings if "estimated error" in text)
+    assert f"depth: {100.0 * result.final['relative_depth_error']:.2g} %" in warning
+
+
 def test_limit_of_each_test_of_a_batch_is_that_of_the_test_alone() -> None:
     limit, problems, alone = Limit.parse("depth 0.6 um"), [], []
     for force in ("250 N", "300 N", "350 N"):

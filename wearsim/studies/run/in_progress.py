@@ -13,13 +13,10 @@ import numpy as np
 
 from wearsim.atomic_write import Storage
 from wearsim.errors import Interrupted, ResultsFileError, SolverError, failure_text
-from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.observables import (
-    depth_error_by_stations,
     present_batch,
-    volume_error_by_stations,
 )
 from wearsim.evolution.observed_errors import (
     load_before_feedback,
@@ -27,7 +24,6 @@ from wearsim.evolution.observed_errors import (
     relative_crown_radius,
 )
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.relocation import located
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state
 from wearsim.evolution.strip_errors import Course, coarse_courses, strip_errors
 from wearsim.evolution.strips import on_grid, same_strips
@@ -233,27 +229,23 @@ class RunInProgress:
         )
 
     def _check_errors(self) -> None:
-        """Warn if estimated errors exceed the tolerance."""
+        """Warn if estimated errors of the results exceed the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        problem = located(self.present, state)
-        sizes = greatest_depth(state.depths), volume_of(problem, state.depths)
-        errors = state.depth_error, state.volume_error
-        by_strips = np.nan_to_num(self.recorder.errors_by_strips[:, -1:])
-        by_stations = [
-            of(problem, state) for of in (depth_error_by_stations, volume_error_by_stations)
-        ]
+        last = {name: values[-1] for name, values in self.recorder.history.items()}
+        rollers = self.present.kinematics.multiplicity @ last["roller_worn_volume"]
+        depth = np.maximum(last["depth"], last["roller_depth"].max(axis=0))
+        sizes = {"depth": depth, "volume": last["worn_volume"] + rollers}
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
-        for kind, name in enumerate(("depth", "worn volume")):
+        for kind, (name, size) in enumerate(sizes.items()):
             parts = [
-                errors[kind] + by_strips[kind] + by_stations[kind],
+                last[f"{name}_error"],
                 state.quadrature[kind],
                 SIGMAS * np.sqrt(state.scatter[kind]),
-                by_strips[kind],
-                by_stations[kind],
+                np.nan_to_num(last[f"{name}_error_by_strips"]),
+                last.get(f"{name}_error_by_stations", np.zeros(1)),
             ]
-            size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
             relative, quadrature, scatter, strips, stations = (
-                float((part / size).max()) for part in parts
+                float((part / np.where(size > 0.0, size, np.inf)).max()) for part in parts
             )
             if relative <= tolerance:
                 continue
@@ -274,7 +266,8 @@ class RunInProgress:
                     )
             elif stations > 0.5 * relative:
                 remedy = "more cam.stations decrease it"
-            beyond.setdefault(remedy, []).append((name, f"{100.0 * relative:.2g} %"))
+            words = "worn volume" if name == "volume" else name
+            beyond.setdefault(remedy, []).append((words, f"{100.0 * relative:.2g} %"))
         for remedy, texts in beyond.items():
             names, errors_text = map(" and ".join, zip(*texts, strict=True))
             self.warn(
