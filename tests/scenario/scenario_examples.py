@@ -14,6 +14,7 @@ from wearsim.plugins import (
     LoadSpec,
     Options,
     SingleContactModel,
+    WearLaw,
     WearLawSpec,
     hookimpl,
 )
@@ -26,7 +27,7 @@ from wearsim.quantities import (
     PositiveStiffness,
 )
 from wearsim.scenario import Scenario
-from wearsim.types import ContactSolution
+from wearsim.types import ContactSolution, FloatArray
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 
@@ -142,13 +143,25 @@ class _Model(SingleContactModel):
         raise NotImplementedError
 
 
-#: options of the contact models that were built
+class _Law(WearLaw):
+    """Wear law that is built only."""
+
+    def depth_per_pass(self, *contact: object) -> FloatArray:
+        raise NotImplementedError
+
+
+#: options of the contact models and wear laws that were built
 BUILT: list[Options] = []
 
 
 def _build_model(options: Options, *others: object) -> _Model:
     BUILT.append(options)
     return _Model()
+
+
+def _build_law(options: Options) -> _Law:
+    BUILT.append(options)
+    return _Law()
 
 
 def _plugins() -> ModuleType:
@@ -166,7 +179,7 @@ def _plugins() -> ModuleType:
     @hookimpl
     def wearsim_wear_laws():
         yield WearLawSpec(
-            "archard-dissipation", ArchardOptions, "Archard", factory=_build, protocol=2
+            "archard-dissipation", ArchardOptions, "Archard", factory=_build_law, protocol=2
         )
 
     @hookimpl

@@ -11,7 +11,7 @@ import pytest
 from scenario_examples import BUILT, GOOD, Parse
 
 from wearsim.errors import ScenarioError
-from wearsim.plugins import ContactModel
+from wearsim.plugins import ContactModel, WearLaw
 from wearsim.scenario import Scenario, parse_scenario, require_run
 from wearsim.types import Material
 
@@ -106,7 +106,8 @@ def test_plugins_are_built_with_their_options(parse: Parse) -> None:
     scenario = parse(('model = "slender"', 'model = "hertz-fastsim"\nmx = 7\nstrips = 41'))
     assert isinstance(scenario.contact.build(None, ()), ContactModel)
     assert BUILT[-1] == scenario.contact.options
-    assert scenario.wear.built == ("built", scenario.wear.options)
+    assert isinstance(scenario.wear.built, WearLaw)
+    assert BUILT[-1] == scenario.wear.options
     assert (scenario.contact.options.mx, scenario.contact.strips) == (7, 41)
 
 
