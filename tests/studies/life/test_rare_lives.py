@@ -194,7 +194,7 @@ def test_subset_simulation_follows_where_importance_sampling_fails(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     spread = math.hypot(math.log(1.2), math.log(2.0) / math.sqrt(3.0))
-    options: dict[str, Any] = {"target": target_of(1e-2, spread), "most": 1e8, "rare": 400}
+    options: dict[str, Any] = {"target": target_of(0.1, spread), "most": 1e8, "rare": 400}
     result = lives(tmp_path / "both.h5", many(), 40, **options)
     first, second = result.rare_estimates.values()
     assert list(result.rare_estimates) == [IMPORTANCE, SUBSET]
@@ -202,7 +202,7 @@ def test_subset_simulation_follows_where_importance_sampling_fails(
     assert second.is_reliable
     assert second.tests <= 400
     assert result.rare == second
-    assert second.probability.low < 1e-2 < second.probability.high
+    assert second.probability.low < 0.1 < second.probability.high
     found = result.view.data()["rare"]
     assert found["method"] == SUBSET
     assert found["probability"]["value"] == second.probability.value
