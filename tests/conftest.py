@@ -109,11 +109,30 @@ def locked(path: Path) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def few_repetitions() -> Iterator[None]:
+    """Reduce what takes far longer than the small studies of the tests, and is tested by itself.
+
+    That are the draws that determine the axis of an ensemble, and the simulated sets of tests for
+    the power of an identification.
+    """
+    from wearsim.studies.ensemble import realisation
+    from wearsim.studies.identify.planning import plan_tests
+    from wearsim.uq.hierarchy.verdict import Power
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(realisation, "AXIS_REALISATIONS", 8)
+        for function in (Power.__init__, plan_tests):
+            patch.setitem(function.__kwdefaults__, "sets", 200)
+        yield
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """Leave the objects of the collection of tests, which remain, out of all garbage collections.
 
-    A garbage collection would go through a million of them.
+    A garbage collection would go through a million of them. Later ones are fewer than by default,
+    as most objects of a test are released without them.
     """
     gc.disable()
     try:
@@ -121,4 +140,5 @@ def pytest_collection() -> Generator[None, object, object]:
     finally:
         gc.collect()
         gc.freeze()
+        gc.set_threshold(20_000, 20, 20)
         gc.enable()

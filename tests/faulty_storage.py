@@ -100,3 +100,12 @@ def some_of_each(stages: list[str]) -> list[int]:
     writes = [number for number, stage in enumerate(stages) if stage.endswith("write")]
     chosen = {*writes[:4], *writes[4:-4:9], *writes[-4:]}
     return [n for n, stage in enumerate(stages) if not stage.endswith("write") or n in chosen]
+
+
+def one_of_each(stages: list[str]) -> list[int]:
+    """Return the number of one call per stage, in turn the first, the middle and the last."""
+    chosen = []
+    for turn, name in enumerate(dict.fromkeys(stages)):
+        calls = [number for number, stage in enumerate(stages) if stage == name]
+        chosen.append(calls[(0, len(calls) // 2, -1)[turn % 3]])
+    return sorted(chosen)

@@ -55,7 +55,8 @@ def test_no_module_prints():
 
 
 def test_every_module_has_a_docstring():
-    bare = [str(path) for path in MODULES if not ast.get_docstring(tree(path))]
+    # the whole module takes seconds to parse
+    bare = [str(path) for path in MODULES if not re.match(r'r?"""\s*[^\s"]', path.read_text())]
     assert not bare
 
 

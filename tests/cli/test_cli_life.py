@@ -166,10 +166,10 @@ def test_sweep_of_words_has_no_lives_against_the_design(command: Command, slim: 
     assert found["designs"][0]["variable"] is None
 
 
-def test_file_answers_another_target(command: Command, slim: Path) -> None:
-    command("life", slim, "-n", 12, "-o", "one.h5", *HERE)
+def test_file_answers_another_target(command: Command, pair: Path) -> None:
+    file = pair / "slim-life.h5"
     one, other = (
-        life_of(command, "one.h5", "--target", target)["probability_before_target"]["value"]
+        life_of(command, file, "--target", target)["probability_before_target"]["value"]
         for target in ("1800", "40 s")
     )
     assert 0.0 < one < other

@@ -213,7 +213,7 @@ def life(tmp_path_factory):
     folder = tmp_path_factory.mktemp("life")
     scenario = shipped_scenario("rig-life", {"contact.strips": 61})
     return wearsim.life(
-        scenario, 40, folder / "life.h5", limits=["depth 5 um"], target=20_000, **SERIAL
+        scenario, 24, folder / "life.h5", limits=["depth 5 um"], target=20_000, **SERIAL
     )
 
 
@@ -243,7 +243,7 @@ def test_command_of_a_life_has_its_options(life, tmp_path):
     options = repeated(page_of([life.with_settings(target=1_234_567.0)]), tmp_path)
     assert options[:2] == ["life", "rig-life.toml"]
     given = dict(zip(options[2::2], options[3::2], strict=True))
-    assert (given["-n"], given["--b"], given["--target"]) == ("40", "1,10,50", "1234567")
+    assert (given["-n"], given["--b"], given["--target"]) == ("24", "1,10,50", "1234567")
     assert float(given["--max"]) == life.most
 
 
@@ -254,7 +254,7 @@ def test_command_of_an_ensemble_has_its_precision(tmp_path):
 
 def test_two_lives_are_compared(life, tmp_path):
     scenario = shipped_scenario("rig-life", {"contact.strips": 61, "friction.coefficient": 0.15})
-    other = wearsim.life(scenario, 40, tmp_path / "rough.h5", limits=["depth 5 um"], **SERIAL)
+    other = wearsim.life(scenario, 24, tmp_path / "rough.h5", limits=["depth 5 um"], **SERIAL)
     page = unescape(page_of([life, other]))
     assert "Which design lasts more passes?" in page
     assert f"{life.compare(other).b10_ratio.value:.2f}"[:3] in page

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ensemble_examples import finish, some_header, some_outcome, some_static
 
-from tests.faulty_storage import WatchedStorage, some_of_each
+from tests.faulty_storage import WatchedStorage, one_of_each, some_of_each
 from wearsim.atomic_write import DISK, Storage
 from wearsim.studies.ensemble.file import writer
 from wearsim.studies.ensemble.file.data import Outcome
@@ -76,17 +76,15 @@ def kill_at_stages(
 ) -> None:
     """Kill the work on a copy of `start`, or without a file; print file, signal and stage.
 
-    The kills are at every file operation, or at the first, middle and last of each kind.
+    The kills are at every file operation, or at one of each kind.
     """
     stages: list[str] = []
     if start:
         copy_of(start, folder / f"{kind}.h5")
     work(folder / f"{kind}.h5", WatchedStorage(stages.append))
-    for at in some_of_each(stages):
+    for at in some_of_each(stages) if every else one_of_each(stages):
         name = stages[at]
-        calls = [number for number, stage in enumerate(stages) if stage == name]
-        chosen = every or at in {calls[0], calls[len(calls) // 2], calls[-1]}
-        if chosen and name.startswith("before"):  # a "before" follows each "after" at once
+        if name.startswith("before"):  # a "before" follows each "after" at once
             target = folder / f"{kind}-{at}.h5"
             if start:
                 copy_of(start, target)

@@ -38,9 +38,11 @@ def kill_while_writing(path: Path, at: int) -> int:
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     stages = stages_of_a_write(folder / "whole.h5")
+    write_results(folder / "old.h5", some_run(seed=1))
+    old = (folder / "old.h5").read_bytes()
     for number in some_of_each(stages):
         name, target = stages[number], folder / f"{number}.h5"
         if number % 2 == 0:  # with and without an old file
-            write_results(target, some_run(seed=1))
+            target.write_bytes(old)
         killed_by = kill_while_writing(target, number)
         sys.stdout.write(f"{number},{killed_by},{name}\n")

@@ -41,9 +41,11 @@ def go(scenario: Scenario, count: int, path: Path, storage: Storage = DISK) -> i
 
 
 def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) -> None:
-    """Kill an ensemble at every third write stage, or one of each kind, of each of its writers.
+    """Kill an ensemble at every sixth write stage, or one of each kind, of each of its writers.
 
-    The names of all stages are printed first. Every fifth is killed again when it is resumed.
+    No kill comes after a write, since one comes before the next operation; with one of each kind
+    this holds for all operations. The names of all stages are printed first. Every fifth is killed
+    again when it is resumed.
     """
     whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
     stages = stages_of(lambda storage: go(scenario, count, folder / "whole.h5", storage))
@@ -54,9 +56,9 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) ->
     numbers = []
     for start, stop in itertools.pairwise(bounds):
         numbers += [start + number for number in chosen_of(stages[start:stop], extent)]
-    for turn, number in enumerate(numbers):
-        if stages[number] == "after write":  # the next stage is killed before its write
-            continue
+    left_out = "after" if extent == "each stage" else "after write"
+    chosen = [number for number in numbers if not stages[number].startswith(left_out)]
+    for turn, number in enumerate(chosen):
         path = folder / f"{number}.h5"
         again = [7 * number % 30] if turn % 5 == 0 else []
         killed = []
@@ -87,7 +89,7 @@ def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) ->
 
 if __name__ == "__main__":
     driver.BatchSizes = batches_of(1)
-    realisation.GRID_REALISATIONS = 3  # computed again after every kill
+    realisation.AXIS_REALISATIONS = 3  # drawn again after every kill
     mode, where = sys.argv[1], Path(sys.argv[2])
     tests = small(passes=400, contact__strips=31)
     if mode == "stages":

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from study_examples import LOADS, ROLLERS, run_differences, short
 
-from tests.faulty_storage import WatchedStorage
+from tests.faulty_storage import WatchedStorage, one_of_each
 from wearsim.atomic_write import DISK, Storage
 from wearsim.scenario import Scenario
 from wearsim.studies.opening import open_results
@@ -113,15 +113,6 @@ def killing(at: int) -> Storage:
             os.kill(os.getpid(), signal.SIGKILL)
 
     return WatchedStorage(kill)
-
-
-def one_of_each(stages: list[str]) -> list[int]:
-    """Return the number of one call per stage, in turn the first, the middle and the last."""
-    chosen = []
-    for turn, name in enumerate(dict.fromkeys(stages)):
-        calls = [number for number, stage in enumerate(stages) if stage == name]
-        chosen.append(calls[(0, len(calls) // 2, -1)[turn % 3]])
-    return sorted(chosen)
 
 
 def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:

@@ -28,8 +28,8 @@ def scenario(
         "load.preload": "200 N",
         "load.stiffness": "60 N/mm",
         "load.feedback": feedback,
-        "contact.strips": 31,
-        "evolution.tolerance": 5e-3,
+        "contact.strips": 21,
+        "evolution.tolerance": 1e-2,
     }
     return wearsim.load_scenario(SCENARIOS / "cam-cycloidal.toml", values)
 

@@ -374,13 +374,14 @@ def test_lives_are_read_in_passes_and_time() -> None:
 
 
 def test_rare_end_of_life_agrees_with_the_exact_factor(tmp_path: Path, exact: LifeResult) -> None:
-    scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"})
+    quick = {"evolution__strip_error": False}
+    scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"}, **quick)
     found = lives(tmp_path / "rare.h5", scenario, 40, target=250, rare=600)
     rare = found.rare
     assert found.count == 40
     assert rare is not None
     assert rare.is_reliable
-    many = lives(tmp_path / "many.h5", count=40, target=250, rare=200).rare
+    many = lives(tmp_path / "many.h5", design(**quick), 40, target=250, rare=200).rare
     assert many is not None
     assert many.probability.value < 2e-3
     assert rare.probability.low < many.probability.high
@@ -393,15 +394,17 @@ def test_stopped_rare_events_continue_bit_for_bit(tmp_path: Path) -> None:
     factor = {**LOGNORMAL, "median": "1e-20 1/Pa"}
     quick = {"evolution__tolerance": 5e-2, "evolution__strip_error": False}
     scenario = design(wear__roller__k_over_h=factor, **quick)
-    whole = lives(tmp_path / "whole.h5", scenario, 20, target=250, rare=200)
+    # subset simulation is stopped in test_rare_lives.py, without tests
+    options: dict[str, Any] = {"target": 250, "rare": 200, "rare_method": "importance"}
+    whole = lives(tmp_path / "whole.h5", scenario, 20, **options)
     path, calls = tmp_path / "stopped.h5", []
 
     def stop() -> bool:
         calls.append(1)
-        return len(read_ensemble(path).status) > 80 and len(calls) % 2 == 0
+        return len(read_ensemble(path).status) > 20 and len(calls) % 2 == 0
 
     with pytest.raises(Interrupted):
-        lives(path, scenario, 20, target=250, rare=200, stop_requested=stop)
+        lives(path, scenario, 20, stop_requested=stop, **options)
     assert not read_ensemble(path).finished
     result = resume_ensemble(path, scheduler="serial")
     assert differences(result, whole) == []

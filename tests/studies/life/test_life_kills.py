@@ -44,8 +44,9 @@ def counted(stages: list[str], last: int | None = None) -> WatchedStorage:
 
 def study(path: Path, storage: WatchedStorage) -> LifeResult:
     """Run a study with tests for rare ends of life."""
-    scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"})
-    return life(scenario, COUNT, path, target=600, rare=RARE, scheduler="serial", storage=storage)
+    quick = {"evolution__tolerance": 5e-2, "evolution__strip_error": False}
+    scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"}, **quick)
+    return life(scenario, COUNT, path, target=1200, rare=RARE, scheduler="serial", storage=storage)
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from study_examples import LOADS, STEPPERS, run_differences, short
 
-from tests.faulty_storage import WatchedStorage, some_of_each
+from tests.faulty_storage import WatchedStorage, one_of_each
 from wearsim.errors import (
     CapabilityError,
     Interrupted,
@@ -109,7 +109,7 @@ def test_interrupt_while_writing_leaves_resumable_file(path: Path) -> None:
     starts = [number for number, stage in enumerate(stages) if stage == "before open"]
     assert len(starts) == 4  # initial state, two steps, finished
     write = stages[starts[1] : starts[2]]
-    within_a_write = [starts[1] + 1 + number for number in some_of_each(write)]
+    within_a_write = [starts[1] + 1 + number for number in one_of_each(write)]
     at_the_end = range(len(stages) - 3, len(stages) + 1)  # around the rename and after it
     for at in (*within_a_write, *at_the_end):
         interrupting = WatchedStorage(InterruptAtCall(lambda _: None, at))
