@@ -148,8 +148,9 @@ class RunInProgress:
             if not self.reached:  # the test on coarse strips may take as long as the last steps
                 self._write_in_time(FIRST_CHECKPOINT)
             self._estimate_strip_errors()
-            self._check_errors()
-            self._write(finished=True)
+            data = self.data(finished=True)
+            self._check_errors(data)
+            self._write(data)
         except KeyboardInterrupt:
             self._interrupt()
         except (Interrupted, ResultsFileError):
@@ -167,7 +168,7 @@ class RunInProgress:
                 raise
             raise failure from error
         self.on_event(Finished(self._wall()))
-        return Result(self.data(finished=True), self.path)
+        return Result(data, self.path)
 
     def extended(
         self, scenario: Scenario, setup: Setup, data: RunData, state: WearState
@@ -180,8 +181,9 @@ class RunInProgress:
         """Return the result of a run that does not reach its limit, with a warning."""
         text = "" if self.limit is None else self.limit.text
         self.warn(f"limit {text} is not reached: {reason}")
-        self._write(finished=True)
-        return Result(self.data(finished=True), self.path)
+        data = self.data(finished=True)
+        self._write(data)
+        return Result(data, self.path)
 
     def _estimate_strip_errors(self) -> None:
         """Estimate the errors due to the strips by the same test on coarse ones."""
@@ -228,10 +230,10 @@ class RunInProgress:
             feedback=problem.has_spring or bool(problem.terms),
         )
 
-    def _check_errors(self) -> None:
-        """Warn if estimated errors of the results exceed the tolerance."""
+    def _check_errors(self, data: RunData) -> None:
+        """Warn if estimated errors in the data of a finished run exceed the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        last = {name: values[-1] for name, values in self.recorder.history.items()}
+        last = {name: values[-1] for name, values in data.history.items()}
         rollers = self.present.kinematics.multiplicity @ last["roller_worn_volume"]
         depth = np.maximum(last["depth"], last["roller_depth"].max(axis=0))
         sizes = {"depth": depth, "volume": last["worn_volume"] + rollers}
@@ -397,11 +399,12 @@ class RunInProgress:
     def _wall(self) -> float:
         return self.wall_before + time.monotonic() - self.started
 
-    def _write(self, finished: bool = False) -> None:
+    def _write(self, data: RunData | None = None) -> None:
+        """Write the results file, if there is one; by default that of a run in progress."""
         if self.path is None:
             return
         begin = time.monotonic()
-        write_results(self.path, self.data(finished), self.storage)
+        write_results(self.path, data or self.data(finished=False), self.storage)
         self._written = time.monotonic()
         self._last_write = self._written - begin
         self.on_event(Checkpointed(str(self.path), self._passes))
