@@ -111,10 +111,10 @@ def locked(path: Path) -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def few_repetitions() -> Iterator[None]:
-    """Reduce what takes far longer than the small studies of the tests, and is tested by itself.
+    """Reduce the number of repetitions of two computations that have tests of their own.
 
-    That are the draws that determine the axis of an ensemble, and the simulated sets of tests for
-    the power of an identification.
+    They are the draws that determine the axis of an ensemble, and the simulated sets of tests that
+    give the power of an identification; both take longer than the small studies of the tests.
     """
     from wearsim.studies.ensemble import realisation
     from wearsim.studies.identify.planning import plan_tests

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from wearsim.plugins.contact_model import (
     naming_contact,
     refuse_unclaimed,
 )
-from wearsim.plugins.specs import ContactModelSpec
+from wearsim.plugins.specs import ContactModelSpec, WearLawSpec
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -26,6 +27,7 @@ from wearsim.types import (
     OperatingPoint,
 )
 
+Built = TypeVar("Built")
 _STRIPS = ("half_length", "line_load", "dissipation")
 _NUMBERS = (
     *("force_x", "force_y", "spin_moment", "approach", "peak_pressure"),
@@ -50,15 +52,7 @@ def built_model(
     PluginError
         If the factory returns no contact model.
     """
-    model = spec.factory(options, grid, materials)
-    if not isinstance(model, ContactModel):
-        raise PluginError(
-            f"the factory of contact model '{spec.name}' returned {described_value(model)},"
-            " expected a ContactModel"
-        )
-    if type(model).__module__.partition(".")[0] == "wearsim":  # its models check themselves
-        return model
-    return CheckedModel(model, spec.name)
+    return built_plugin(spec, ContactModel, CheckedModel, options, grid, materials)
 
 
 class CheckedModel(SingleContactModel):
@@ -204,6 +198,40 @@ class CheckedModel(SingleContactModel):
         """Return the error of a contact, with the state that led to it and the value returned."""
         state = {"point": point, "gap": gap, "normal_force": point.normal_force, name: value}
         return ContactError(f"{self._returned} {what}", state)
+
+
+def built_plugin(
+    spec: ContactModelSpec | WearLawSpec,
+    expected: type[Any],
+    checked: Callable[[Any, str], Built],
+    *arguments: Any,
+) -> Built:
+    """Return what the factory of a plugin builds, with checks of its values if it is third-party.
+
+    Parameters
+    ----------
+    spec : ContactModelSpec or WearLawSpec
+    expected : type
+        Class of which the factory must return an object.
+    checked : callable
+        Returns the object with checks, from the object and the name of the plugin.
+    *arguments
+        Arguments of the factory.
+
+    Raises
+    ------
+    PluginError
+        If the factory returns an object of another class.
+    """
+    built = spec.factory(*arguments)
+    if not isinstance(built, expected):
+        raise PluginError(
+            f"the factory of {spec.kind} '{spec.name}' returned {described_value(built)}, expected"
+            f" a {expected.__name__}"
+        )
+    own: Built = built
+    is_own = type(built).__module__.partition(".")[0] == "wearsim"
+    return own if is_own else checked(built, spec.name)
 
 
 def is_numeric(value: object) -> bool:

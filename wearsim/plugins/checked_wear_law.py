@@ -1,4 +1,4 @@
-"""Checks of what the wear laws of plugins return."""
+"""Checks of the depths that wear laws of plugins compute."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from wearsim.errors import PluginError, SolverError
-from wearsim.plugins.checked_model import ROUNDING, described_value, is_numeric
+from wearsim.plugins.checked_model import ROUNDING, built_plugin, described_value, is_numeric
 from wearsim.plugins.laws import Body, WearLaw
 from wearsim.plugins.manager import registry
 from wearsim.plugins.specs import WearLawSpec
@@ -15,7 +15,7 @@ from wearsim.types import ContactSolution, FloatArray
 
 
 def built_wear_law(spec: WearLawSpec, options: Any) -> WearLaw:
-    """Return a new wear law; what one that is not of wearsim returns is checked.
+    """Return a new wear law; the depths of one that is not of wearsim are checked.
 
     Parameters
     ----------
@@ -28,19 +28,11 @@ def built_wear_law(spec: WearLawSpec, options: Any) -> WearLaw:
     PluginError
         If the factory returns no wear law.
     """
-    law = spec.factory(options)
-    if not isinstance(law, WearLaw):
-        raise PluginError(
-            f"the factory of wear law '{spec.name}' returned {described_value(law)}, expected a"
-            " WearLaw"
-        )
-    if type(law).__module__.partition(".")[0] == "wearsim":
-        return law
-    return CheckedWearLaw(law, spec.name)
+    return built_plugin(spec, WearLaw, CheckedWearLaw, options)
 
 
 class CheckedWearLaw(WearLaw):
-    """Wear law of a plugin whose values are checked before they are used.
+    """Wear law of a plugin whose depths are checked before they are used.
 
     Parameters
     ----------

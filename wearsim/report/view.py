@@ -53,9 +53,11 @@ class Row(NamedTuple):
     answers: Mapping[str, tuple[float | None, str]] = {}
 
     @classmethod
-    def answer(cls, label: str, name: str, value: float, unit: str) -> Row:
+    def answer(
+        cls, label: str, name: str, value: float, unit: str, error: float | None = None
+    ) -> Row:
         """Return the row of one number [SI] that other studies ask for by a name."""
-        return cls(label, value, unit, answers={name: (value, unit)})
+        return cls(label, value, unit, error, {name: (value, unit)})
 
     @property
     def text(self) -> str:

@@ -246,9 +246,9 @@ def _rounded(value: float) -> str:
 
 
 def _forecast_rows(forecast: Data) -> TableRows:
-    """Return rows on the wear at the end of a run, and what it takes.
+    """Return rows on the forecast wear at the end of a run, and on its time, memory and file size.
 
-    A forecast carries two digits: depths are within 12 % of those of the test.
+    Values have two digits: forecast depths are within 12 % of those of the test.
     """
     depths = f"{_rounded(forecast['depth_m'] * 1e6)} um"
     if forecast["roller_depth_m"]:

@@ -54,6 +54,16 @@ def test_rows_and_json_state_damage_limits_and_sources(result):
     assert "#" not in tables["cylinder_depth_profiles.csv"]
 
 
+@pytest.mark.filterwarnings("error")
+def test_certain_pitting_is_stated_without_warnings():
+    law = {**PITTING, "reference_passes": 1e-3}
+    certain = wearsim.run(short(fatigue={"slope": 1.125, "cylinder": law, "roller": law}, **COARSE))
+    assert certain.values("pitting")[-1] == 1.0
+    (text,) = (row.text for row in certain.view.rows() if row.label == "probability of pitting")
+    assert text.startswith("100")
+    assert "nan" not in text
+
+
 def test_scenario_without_fatigue_shows_nothing_of_it():
     plain = wearsim.run(short(**COARSE))
     assert not [name for name in plain.raw.variables if "damage" in name or "pitting" in name]

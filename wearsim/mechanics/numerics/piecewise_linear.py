@@ -105,10 +105,10 @@ class Paths:
     @classmethod
     def joined(cls, paths: Sequence[Paths]) -> Paths:
         """Return the paths of several tests, all with the same times."""
-        columns = zip(
-            *((p.value[p.row], p.area[p.row], p.square[p.row]) for p in paths), strict=True
+        value, area, square = (
+            np.concatenate([getattr(item, name)[item.row] for item in paths])
+            for name in ("value", "area", "square")
         )
-        value, area, square = map(np.concatenate, columns)
         return cls(paths[0].time, value, area, square, np.arange(len(value)))
 
     def at(self, realisations: IntArray) -> Paths:

@@ -104,7 +104,7 @@ def pair_of(roller: Roller, cylinder: Cylinder, elastic: ElasticPair) -> AxialPa
 
 
 def combine_bodies(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what roller and cylinder make together, or nothing after adding mistakes of a form.
+    """Return fields of a scenario that follow from both bodies; none after mistakes in a form.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def combine_bodies(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str,
     Returns
     -------
     dict of str to object
-        Fields of a `Scenario`: `pair`, `axial_gap`, and the roller with the width of its form.
+        `pair`, `axial_gap`, and the roller with the width of its form.
     """
     roller, cylinder = sections["roller"], sections["cylinder"]
     if roller is None or cylinder is None or not (roller.radius and cylinder.radius):

@@ -65,15 +65,9 @@ class ContactView(View):
         moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
         width = shown(self._width, "mm") if self.edges else NOTHING
         length = 2.0 * float(solution.half_length.max())
-        errors = {
-            "peak_pressure": _times(study.pressure_error, solution.peak_pressure),
-            "power": _times(study.grid_error, solution.power),
-        }
-
-        def stated(label: str, name: str, unit: str) -> Row:
-            value = float(getattr(solution, name))
-            return Row(label, value, unit, errors[name], {name: (value, unit)})
-
+        pressure, power = solution.peak_pressure, solution.power
+        pressure_error = _times(study.pressure_error, pressure)
+        power_error = _times(study.grid_error, power)
         return [
             *(Row(*pair) for pair in self.start.items()),
             Row("contact model", study.described_model),
@@ -86,12 +80,12 @@ class ContactView(View):
             Row("spin", f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"),
             Row.answer("patch length 2a", "patch_length", length, "mm"),
             Row("patch width", width, answers={"patch_width": (self._width, "mm")}),
-            stated("peak pressure", "peak_pressure", "MPa"),
+            Row.answer("peak pressure", "peak_pressure", pressure, "MPa", pressure_error),
             Row.answer("approach", "approach", solution.approach, "um"),
             Row.answer("longitudinal force", "force_x", solution.force_x, "N"),
             Row.answer("lateral force", "force_y", solution.force_y, "N"),
             Row.answer("spin moment", "spin_moment", moment, "N mm"),
-            stated("dissipated power", "power", "W"),
+            Row.answer("dissipated power", "power", power, "W", power_error),
             Row("adhesion fraction", round(solution.adhesion_fraction, _DIGITS), "%"),
         ]
 

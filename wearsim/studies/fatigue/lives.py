@@ -52,7 +52,7 @@ def course_of(
 
 
 def other_end(scenario: Scenario) -> str:
-    """Return what ends lives beside pitting: "wear", "a limit of damage", or both."""
+    """Return the causes other than pitting that end lives: "wear", "a limit of damage", or both."""
     given = scenario.limit.given
     wear = ["wear"] if given.keys() - set(OF_FATIGUE) else []
     return " or ".join([*wear, *(f"a limit of {name}" for name in OF_FATIGUE if name in given)])

@@ -40,7 +40,8 @@ def fatigue_rows(result: Result, body: str) -> Rows:
     greatest += f", roller {shown(_most(final['roller_damage']), '1', 3)}"
     of_pitting = None
     if scenario is not None and scenario.fatigue is not None and damage.any():
-        survival = 1.0 - pitting  # 1 - (1 - P_ref)^(D^e), whose derivative by D is taken
+        # P = 1 - (1 - P_ref)^(D^e) is differentiated by D; P may be one to round-off
+        survival = np.maximum(1.0 - pitting, np.finfo(float).tiny)
         slope = -survival * np.log(survival) * scenario.fatigue.slope / damage
         of_pitting = float(np.max(slope * error))
     return [

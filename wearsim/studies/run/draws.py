@@ -134,7 +134,7 @@ class Drawer:
             correlations=correlations,
             replicates=replicates,
         )
-        self._last = total or math.inf
+        self._total = total or math.inf
         self._drawn: dict[int, dict[str, FloatArray]] = {}
 
     @property
@@ -203,7 +203,7 @@ class Drawer:
         """Return the values of one realisation, as `columns`, drawn with those after it."""
         if realisation not in self._drawn:
             ahead = AHEAD if self._drawn else 1
-            count = int(min(ahead, max(self._last - realisation, 1)))
+            count = int(min(ahead, max(self._total - realisation, 1)))
             columns = self.columns(realisation, count)
             if len(self._drawn) > BLOCK:
                 self._drawn = {}

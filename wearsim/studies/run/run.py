@@ -173,8 +173,9 @@ def resume(
         data = replace(data, scenario_text=text)
     check_plugins(path, data)
     stored = stored_scenario(data)
-    end = data.until or None if until is None and not data.finished else until
-    limit: Limit | None = None
+    end, limit = until, None
+    if until is None and data.until and not data.finished:
+        end = data.until
     if end is not None:
         with checking_argument("until"):
             limit = Limit.parse(end, stored.operation.rollers)

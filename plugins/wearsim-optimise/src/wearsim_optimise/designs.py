@@ -62,7 +62,7 @@ class Design:
 
     @property
     def is_searched(self) -> bool:
-        """Whether the search has asked for it, and not what follows the search."""
+        """Whether it is a design of the search; others are evaluated after the search."""
         return self.purpose in {"start", "search", "then", "front"}
 
     @property
