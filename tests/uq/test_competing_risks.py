@@ -66,16 +66,16 @@ def test_quadrature_has_converged():
 
 def test_without_damage_only_wear_ends_lives():
     never = risks(1e9, damage=np.zeros((1, len(course_places()))), rate=np.zeros(1))
-    life = never.life(0.1, lambda n: 1.0 - never.at(n).survival)
+    life = never.life(0.1, "both").value
     assert life == pytest.approx(1.4e6 * math.exp(SIGMA * norm.ppf(0.1)), rel=1e-6)
-    assert math.isinf(never.life(0.1, lambda n: never.at(n).pitting))
+    assert math.isinf(never.life(0.1, "pitting").value)
 
 
 def test_life_without_wear_is_that_of_the_weibull_distribution():
     one = risks(2e5)
-    assert one.life(0.1, one.without_wear) == pytest.approx(2e6, rel=1e-8)
+    assert one.life(0.1, "without_wear").value == pytest.approx(2e6, rel=1e-8)
     half = 2e6 * (math.log(0.5) / math.log(0.9)) ** (1.0 / SLOPE)
-    assert one.life(0.5, one.without_wear) == pytest.approx(half, rel=1e-8)
+    assert one.life(0.5, "without_wear").value == pytest.approx(half, rel=1e-8)
 
 
 def test_incidence_of_pitting_levels_off_below_one():
@@ -83,7 +83,7 @@ def test_incidence_of_pitting_levels_off_below_one():
     level = one.at(math.inf)
     assert 0.0 < level.pitting < 0.02
     assert level.survival == pytest.approx(0.0, abs=1e-12)
-    assert math.isinf(one.life(0.1, lambda n: one.at(n).pitting))
+    assert math.isinf(one.life(0.1, "pitting").value)
 
 
 def test_counted_lives_without_a_factor():
@@ -94,3 +94,43 @@ def test_counted_lives_without_a_factor():
     found = one.at(1.5e6)
     assert found.survival == pytest.approx(0.5 * alive[0], rel=1e-9)
     assert found.wear == pytest.approx(0.5 * alive[1], rel=1e-9)
+
+
+def of_loads(scores, ratio=1.0, **law):
+    """Return risks of tests whose limit and damage depend on loads, given by normal scores."""
+    load = np.exp(0.15 * scores)
+    end, rate = 1.4e6 / load**1.5 / ratio, 4e-7 * load**3
+    level = np.broadcast_to(4e5 / ratio, load.shape)[:, None]
+    damage = rate[:, None] * level * -np.expm1(-end[:, None] * course_places() / level)
+    return CompetingRisks(damage, end, load > 0.0, rate, SLOPE, 0.1, **law)
+
+
+LAW = {"score": score_function(WearFactor()), "reference": MEDIAN}
+
+
+@pytest.mark.parametrize("cause", ["both", "wear", "without_wear", "pitting"])
+@pytest.mark.parametrize("integrated", [True, False])
+def test_intervals_of_lives_contain_the_truth(integrated, cause):
+    share, studies = (0.005 if cause == "pitting" else 0.1), 40
+    truth = of_loads(norm.ppf((np.arange(400) + 0.5) / 400), **LAW).life(share, cause).value
+    rng = np.random.default_rng(5)
+    within = 0
+    for scores, factors in rng.standard_normal((studies, 2, 40)):
+        tests = (scores, 1.0) if integrated else (scores, np.exp(SIGMA * factors))
+        life = of_loads(*tests, **(LAW if integrated else {})).life(share, cause)
+        assert life.low > 0.0
+        assert life.low <= life.value <= life.high
+        within += life.low <= truth <= life.high
+    assert within >= 34  # fewer have a probability of 0.003 at 95 %
+
+
+def test_lives_have_no_interval_where_nothing_else_is_random():
+    life = risks(2e5, alone=True).life(0.1, "both")
+    assert life.low == life.value == life.high
+    one = risks(2e5).life(0.1, "both")
+    assert (one.low, one.high) == (0.0, math.inf)
+
+
+def test_bodies_without_damage_never_pit():
+    never = risks(1e9, damage=np.zeros((1, len(course_places()))), rate=np.zeros(1))
+    assert math.isinf(never.life(0.1, "without_wear").value)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import wearsim
+from wearsim.report.text import rounded_lives
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.fatigue.lives import competing_risks, lives_of, other_end
 from wearsim.studies.life.settings import with_limits
@@ -39,7 +40,7 @@ def lives():
 
 
 def test_life_with_both_is_shorter_than_with_either(lives):
-    found = lives_of(lives, 0.1)
+    found = {name: life.value for name, life in lives_of(lives, 0.1).items()}
     assert lives.is_exact
     assert found["both"] < min(found["without_wear"], found["without_pitting"])
     assert found["without_pitting"] == pytest.approx(lives.b(10).value, rel=1e-3)
@@ -58,6 +59,9 @@ def test_incidences_add_up_and_are_shown_with_their_source(lives):
     rows = {row[0]: row for row in table.rows}
     assert rows["pitting first"][1] == "infinite"
     data = view.data()["wear_or_pitting"]
+    low, high = data["intervals"]["b10"]["both"]
+    assert low < data["lives"]["b10"]["both"] < high
+    assert f"[{rounded_lives(low, high)[0]}.." in rows["wear or pitting"][1]
     assert data["first_by_pitting"] == level.pitting
     assert data["sources"] == {"cylinder": "invented for a test"}
 
@@ -102,6 +106,25 @@ def test_course_of_the_damage_is_that_of_a_run(lives):
     assert found[-1] == pytest.approx(run.values("damage")[-1], rel=1e-2)
     middle = np.interp(0.1 * passes, run.passes, run.values("damage"))
     assert found[-21] == pytest.approx(middle, rel=1e-2)
+
+
+def test_lives_beyond_the_censoring_are_not_known():
+    """Tests whose damage course ends at the maximum do not show that the share is never reached."""
+    changes = {**CHANGES, "wear.cylinder.k_over_h": "1.1e-11 1/Pa"}
+    found = wearsim.life(RIG("rig-life", changes), 3, most=2e5, workers=1)
+    assert found.censored == 3
+    for name, life in lives_of(found, 0.1).items():
+        assert math.isnan(life.value) == (name != "without_wear"), name
+    (table,) = [item for item in found.view.details() if "at last" in item.heads]
+    cells = {row[0]: row[1] for row in table.rows}
+    assert cells["wear or pitting"] == cells["pitting first"] == "above 200,000"
+
+
+def test_posterior_gives_lives_without_intervals(lives, tmp_path):
+    rows = ["median [1/Pa],scatter,weight", "1.0e-11,0.3,2", "1.3e-11,0.5,1"]
+    (tmp_path / "K.csv").write_text("\n".join(rows))
+    for life in lives_of(lives.with_posterior(tmp_path / "K.csv"), 0.1).values():
+        assert (life.low, life.high) == (0.0, math.inf)
 
 
 def test_limit_of_damage_ends_lives_which_are_then_counted():

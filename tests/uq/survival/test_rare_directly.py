@@ -279,16 +279,16 @@ def test_competing_risks_of_realisations_are_integrals_over_the_factor() -> None
         assert found.survival == pytest.approx((alive * ~wears).mean(), abs=2e-4)
         assert found.wear == pytest.approx((alive * wears).mean(), abs=2e-4)
         assert found.pitting == pytest.approx(1.0 - alive.mean(), abs=2e-4)
-        assert risks.either(life) == pytest.approx(1.0 - found.survival)
+        assert risks.before(life, "both").mean() == pytest.approx(1.0 - found.survival)
     small = risks.at(1.0).pitting
     known = 1.0 - np.exp(math.log(0.8) * rate**SLOPE).mean()
     assert small == pytest.approx(known, rel=0.01)
     assert risks.at(0.0) == pytest.approx((1.0, 0.0, 0.0))
     plain = np.exp(math.log(0.8) * (rate * 7e5) ** SLOPE)
-    assert risks.without_wear(7e5) == pytest.approx(1.0 - plain.mean())
+    assert risks.before(7e5, "without_wear").mean() == pytest.approx(1.0 - plain.mean())
     for share in (1e-4, 0.3):
-        life = risks.life(share, risks.either)
-        assert risks.either(life) == pytest.approx(share, rel=1e-6)
+        life = risks.life(share, "both").value
+        assert risks.before(life, "both").mean() == pytest.approx(share, rel=1e-6)
 
 
 def test_counted_risks_end_by_the_earlier_of_both() -> None:

@@ -89,7 +89,7 @@ def competing_risks(result: LifeValues) -> CompetingRisks | None:
     )
 
 
-def lives_of(result: LifeValues, share: float) -> dict[str, float] | None:
+def lives_of(result: LifeValues, share: float) -> dict[str, Interval]:
     """Return lives of a share with wear and pitting, without wear and without pitting.
 
     Parameters
@@ -100,27 +100,29 @@ def lives_of(result: LifeValues, share: float) -> dict[str, float] | None:
 
     Returns
     -------
-    dict of str to float
-        In the unit of lives; infinite if the share is never reached. None without fatigue.
+    dict of str to Interval
+        In the unit of lives; infinite if the share is never reached, nan beyond the censoring. With
+        a posterior of the wear factor the intervals are unknown. Empty without fatigue.
     """
     risks = competing_risks(result)
     if risks is None:
-        return None
-    scale = 1.0 / result.settings.per_unit
-    incidences = {
-        "both": risks.either,
-        "without_wear": risks.without_wear,
-        "without_pitting": _without_pitting(risks),
-        "pitting": lambda life: risks.at(life).pitting,
-        "wear": lambda life: risks.at(life).wear,
-    }
-    return {name: scale * risks.life(share, incidence) for name, incidence in incidences.items()}
-
-
-def _without_pitting(risks: CompetingRisks) -> Callable[[float], float]:
-    """Return the probability of wear before a life, of bodies that do not pit."""
+        return {}
     never = replace(risks, damage=np.zeros_like(risks.damage))
-    return lambda life: never.at(life).wear
+    lives = {
+        "both": risks.life(share, "both"),
+        "without_wear": risks.life(share, "without_wear"),
+        "without_pitting": never.life(share, "wear"),
+        "pitting": risks.life(share, "pitting"),
+        "wear": risks.life(share, "wear"),
+    }
+    per_unit, all_worn = result.settings.per_unit, bool(risks.worn.all())
+    for name, life in lives.items():
+        ends = (0.0, math.inf) if result.levels else (life.low / per_unit, life.high / per_unit)
+        lives[name] = Interval(life.value / per_unit, *ends)
+        # the courses of tests that end without wear end there too
+        if not all_worn and name != "without_wear":
+            lives[name] = lives[name].censored(result.most)
+    return lives
 
 
 def competing_data(result: LifeValues) -> dict[str, Any]:
@@ -129,10 +131,17 @@ def competing_data(result: LifeValues) -> dict[str, Any]:
     if risks is None:
         return {}
     level = risks.at(math.inf)
-    shares = result.settings.shares
+    lives = {f"b{share:g}": lives_of(result, share / 100.0) for share in result.settings.shares}
     return {
         "wear_or_pitting": {
-            "lives": {f"b{share:g}": lives_of(result, share / 100.0) for share in shares},
+            "lives": {
+                share: {name: life.value for name, life in of_share.items()}
+                for share, of_share in lives.items()
+            },
+            "intervals": {
+                share: {name: [life.low, life.high] for name, life in of_share.items()}
+                for share, of_share in lives.items()
+            },
             "other_end": other_end(result.scenario),
             "first_by_pitting": level.pitting,
             "first_by_wear": level.wear,
@@ -142,18 +151,19 @@ def competing_data(result: LifeValues) -> dict[str, Any]:
 
 
 def competing_table(
-    result: LifeValues, life_of_share: Callable[[float], Interval]
+    result: LifeValues, error_of_share: Callable[[float], tuple[float, float]]
 ) -> tuple[list[str], list[list[str]]] | None:
     """Return heads and cells of the table of wear and pitting; None without fatigue.
 
-    Lives have the digits that the interval of `life_of_share`, of a share in percent, leaves.
+    Lives without a sampling interval have the digits that the numerical error of `error_of_share`,
+    of a share in percent, leaves.
     """
     risks = competing_risks(result)
     if risks is None:
         return None
     shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
     lives = [lives_of(result, share / 100.0) for share in shares]
-    intervals = [life_of_share(share) for share in shares]
+    errors = [error_of_share(share) for share in shares]
     level, other = risks.at(math.inf), other_end(result.scenario)
     names = {
         "both": (f"{other} or pitting", 1.0 - level.survival),
@@ -166,9 +176,8 @@ def competing_table(
         [
             words,
             *(
-                _life(lives_of_share[name], interval)
-                for lives_of_share, interval in zip(lives, intervals, strict=True)
-                if lives_of_share is not None
+                _cell(of_share[name], error, result.most)
+                for of_share, error in zip(lives, errors, strict=True)
             ),
             NOTHING if last is None else shown(last, "%", 3),
         ]
@@ -177,13 +186,19 @@ def competing_table(
     return [f"life [{result.unit}]", *(f"B{share:g}" for share in shares), "at last"], cells
 
 
-def _life(life: float, interval: Interval) -> str:
-    """Return a life with the digits of another one, or two where that has no interval."""
-    if math.isinf(life):
-        return "infinite"
-    part = interval.half_width / interval.value if interval.value > 0.0 else math.nan
-    part = min(part, 1.0) if math.isfinite(part) else 1.0
-    return rounded_lives((1.0 - part) * life, life, (1.0 + part) * life)[1]
+def _cell(life: Interval, error: tuple[float, float], most: float) -> str:
+    """Return a life with its interval; `error` is another one at its numerical bounds."""
+    low, value, high = rounded_lives(life.low, life.value, life.high)
+    if math.isnan(life.value):
+        return f"above {count(most)}"
+    if math.isinf(life.value):
+        return f"infinite [from {low}]" if 0.0 < life.low < math.inf else "infinite"
+    if life.low == life.high:
+        part = (error[1] - error[0]) / (error[1] + error[0]) if error[0] > 0.0 else 0.0
+        return rounded_lives((1.0 - part) * life.value, life.value, (1.0 + part) * life.value)[1]
+    if life.low > 0.0 or math.isfinite(life.high):
+        return f"{value} [{low}..{high}]" if math.isfinite(life.high) else f"{value} [from {low}]"
+    return rounded_lives(0.0, life.value)[1]  # two digits, as the interval is not known
 
 
 def fatigue_of_lives(result: LifeValues) -> Rows:

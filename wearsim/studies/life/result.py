@@ -179,7 +179,7 @@ class LifeResult(LifeValues):
         uncertain = self.uncertain_life(percent)
         if uncertain is None:
             return self._b(percent, "life")
-        return self._within_censoring(uncertain.interval)
+        return uncertain.interval.censored(self.most)
 
     def uncertain_life(self, percent: float) -> UncertainLife | None:
         """Return the life of a percentage with what is not known of the wear factor.
@@ -233,17 +233,7 @@ class LifeResult(LifeValues):
         if not self.is_exact:
             lives = self._lives(name)
             return life_quantile(np.minimum(lives, self.most), np.isfinite(lives), share)
-        return self._within_censoring(self._distribution(name).quantile(share))
-
-    def _within_censoring(self, quantile: Interval) -> Interval:
-        """Return a life with its interval, unknown beyond the censoring."""
-        if quantile.value <= self.most:
-            return Interval(
-                quantile.value,
-                quantile.low,
-                quantile.high if quantile.high <= self.most else math.inf,
-            )
-        return Interval(math.nan, min(quantile.low, self.most), math.inf)
+        return self._distribution(name).quantile(share).censored(self.most)
 
     def lower_bound(self, percent: float) -> float:
         """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown.

@@ -127,7 +127,7 @@ class LifeView(RealisationsView[LifeResult]):
         result = self.result
         if not result.count:
             return []
-        competing = competing_table(result, result.b)
+        competing = competing_table(result, result.b_error)
         lines = [
             [name.replace("_", " "), shown(share, "%", 3), self._angle(name)]
             for name, share in result.first_limits.items()

@@ -37,6 +37,12 @@ class Interval:
         """Half the width of the interval."""
         return 0.5 * (self.high - self.low)
 
+    def censored(self, most: float) -> Interval:
+        """Return the estimate and the interval of a life, unknown beyond the censoring `most`."""
+        if self.value <= most:
+            return Interval(self.value, self.low, self.high if self.high <= most else math.inf)
+        return Interval(math.nan, min(self.low, most), math.inf)
+
     def within(self, least: float, greatest: float) -> Interval:
         """Return the estimate and the interval restricted to the possible range of values."""
         return Interval(

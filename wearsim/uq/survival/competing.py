@@ -16,20 +16,27 @@ the damage does, since wear lowers the pressure.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cache, cached_property
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import scipy
 
 from wearsim.types import FloatArray
+from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.survival.distributions import logit_interval
+from wearsim.uq.survival.effective import LEAST_NUMBER, effective_number
 from wearsim.uq.survival.scores import ScoreFunction
 
 POINTS, DECADES = 121, 6.0  # of a course, over the passes before its end
 NODES = 32  # of the quadrature over each part of the distribution function
-_HALVINGS = 200
-_EQUAL = 1e-9  # relative width of an interval that holds a life
+_EQUAL = 1e-10  # relative error of a life
+_SHORTEST = 1e-30  # life below which it is zero, over the median one
+
+Cause = Literal["both", "pitting", "wear", "without_wear"]
+"""Ends of lives: the first of wear and pitting, each of them if it is first, pitting of bodies that
+do not wear."""
 
 
 def course_places() -> FloatArray:
@@ -37,12 +44,19 @@ def course_places() -> FloatArray:
     return np.asarray(10.0 ** np.linspace(-DECADES, 0.0, POINTS))
 
 
+@cache
+def _quadrature(nodes: int) -> tuple[FloatArray, FloatArray]:
+    """Return places from 0 to 1 and weights of Gauss's quadrature."""
+    x, weight = np.polynomial.legendre.leggauss(nodes)
+    return 0.5 * (1.0 + x), 0.5 * weight
+
+
 class Incidence(NamedTuple):
     """Probabilities of survival and, cause-specific, of pitting and of wear as the first end."""
 
-    survival: float
-    pitting: float
-    wear: float
+    survival: Any
+    pitting: Any
+    wear: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +84,8 @@ class CompetingRisks:
         Wear factor of the courses.
     shift, spread : ndarray or float, float
         Of the score given the other inputs, see `FactorMixture`.
+    alone : bool
+        Whether nothing else is random, so that lives have no sampling error.
     """
 
     damage: FloatArray
@@ -82,6 +98,7 @@ class CompetingRisks:
     reference: float = 1.0
     shift: FloatArray | float = 0.0
     spread: float = 1.0
+    alone: bool = False
 
     @property
     def constant(self) -> float:
@@ -89,7 +106,7 @@ class CompetingRisks:
         return -math.log1p(-self.probability)
 
     def at(self, life: float, nodes: int = NODES) -> Incidence:
-        """Return the probabilities at a life [passes].
+        """Return the probabilities at a life [passes], the means over the realisations.
 
         Parameters
         ----------
@@ -98,10 +115,14 @@ class CompetingRisks:
         nodes : int
             Of the quadrature.
         """
+        survival, _, wear = (float(part.mean()) for part in self.of_realisations(life, nodes))
+        return Incidence(survival, 1.0 - survival - wear, wear)
+
+    def of_realisations(self, life: float, nodes: int = NODES) -> Incidence:
+        """Return the probabilities of `at` of each realisation, of shape (realisations,)."""
         if self.score is None:
             return self._counted(life)
-        x, weight = np.polynomial.legendre.leggauss(nodes)
-        part, weight = 0.5 * (1.0 + x), 0.5 * weight
+        part, weight = _quadrature(nodes)
         border = self._below(self.end / life if life > 0.0 else np.full_like(self.end, np.inf))
         border = np.where(self.worn, border, 1.0)[:, None]
         if math.isinf(life):
@@ -112,47 +133,73 @@ class CompetingRisks:
         late = self._no_pit(np.broadcast_to(self.end[:, None], high.shape), high)
         survival = border[:, 0] * (alive @ weight)
         wear = (1.0 - border[:, 0]) * (late @ weight)
-        means = float(survival.mean()), float(wear.mean())
-        return Incidence(means[0], 1.0 - means[0] - means[1], means[1])
+        return Incidence(survival, 1.0 - survival - wear, wear)
 
-    def either(self, life: float) -> float:
-        """Return the probability of an end by wear or by pitting before a life."""
-        return 1.0 - self.at(life).survival
+    def before(self, life: float, cause: Cause) -> FloatArray:
+        """Return each realisation's probability of an end before a life, shape (realisations,)."""
+        if cause == "without_wear":
+            with np.errstate(invalid="ignore"):  # bodies without damage never pit
+                damage = np.where(self.rate > 0.0, self.rate * life, 0.0)
+            return np.asarray(-np.expm1(-self.constant * damage**self.slope))
+        found = self.of_realisations(life)
+        return np.asarray(1.0 - found.survival if cause == "both" else getattr(found, cause))
 
-    def without_wear(self, life: float) -> float:
-        """Return the probability of pitting before a life of bodies that do not wear."""
-        survives = np.exp(-self.constant * (self.rate * life) ** self.slope)
-        return float(1.0 - survives.mean())
-
-    def life(self, share: float, incidence: Callable[[float], float]) -> float:
-        """Return the life at which a rising incidence reaches a share; infinite if it never does.
+    def life(self, share: float, cause: Cause) -> Interval:
+        """Return the life [passes] that a share of the specimens does not reach, with its interval.
 
         Parameters
         ----------
         share : float
-        incidence : callable
-            Function of the life [passes].
+            0.1 for B10.
+        cause : str
+
+        Returns
+        -------
+        Interval
+            Infinite where the incidence levels off below the share. The ends are those of
+            `LifeDistribution.quantile`; unknown if the effective number of realisations is too
+            small.
         """
-        if incidence(math.inf) < share:
+        value = self._reached(share, cause)
+        if self.alone:
+            return Interval(value, value, value)
+        # just above, so that a step of the probability is included
+        chances = self.before(value * (1.0 + _EQUAL), cause)
+        count, mean = len(chances), float(chances.mean())
+        variance = float(chances.var(ddof=1)) if count > 1 else math.inf
+        few = effective_number(count, mean, variance) < LEAST_NUMBER
+        if count < 2 or (few and self.score is not None):
+            return Interval(value, 0.0, math.inf)
+        ends = logit_interval(share, math.sqrt(variance / count), count - 1)
+        low, high = self._reached(ends.low, cause), self._reached(ends.high, cause)
+        return Interval(value, min(low, value), max(high, value))
+
+    def _reached(self, share: float, cause: Cause) -> float:
+        """Return the life at which the mean probability of an end reaches a share."""
+
+        def excess(log: float) -> float:
+            return float(self.before(math.exp(log), cause).mean()) - share
+
+        if float(self.before(math.inf, cause).mean()) < share:
             return math.inf
-        high = float(np.median(self.end))
-        while incidence(high) < share:
-            high *= 4.0
-        low = 0.0
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high) if low == 0.0 else math.sqrt(low * high)
-            low, high = (middle, high) if incidence(middle) < share else (low, middle)
-            if high - low <= _EQUAL * high:
-                break
-        return high
+        start = math.log(float(np.median(self.end)))
+        low = high = start
+        while excess(high) < 0.0:
+            low, high = high, high + math.log(4.0)
+        while excess(low) >= 0.0:
+            low, high = low - math.log(4.0), low
+            if low < start + math.log(_SHORTEST):
+                return 0.0
+        root = float(scipy.optimize.brentq(excess, low, high, xtol=0.5 * _EQUAL))
+        return math.exp(root if excess(root) >= 0.0 else min(root + _EQUAL, high))
 
     def _counted(self, life: float) -> Incidence:
-        """Return the probabilities at a life with the factor of each realisation."""
+        """Return the probabilities of realisations at a life, with their own factors."""
         factors = np.ones((len(self.end), 1))
         ended = self.worn.astype(np.bool_) & (self.end <= life)
         passes = np.minimum(life, self.end)[:, None]
         alive = self._no_pit(passes, factors)[:, 0]
-        survival, wear = float(np.mean(alive * ~ended)), float(np.mean(alive * ended))
+        survival, wear = alive * ~ended, alive * ended
         return Incidence(survival, 1.0 - survival - wear, wear)
 
     def _below(self, ratio: FloatArray) -> FloatArray:
@@ -169,6 +216,11 @@ class CompetingRisks:
         score = shift + self.spread * scipy.special.ndtri(np.clip(chance, 1e-300, 1.0 - 1e-16))
         return np.asarray(np.exp(self.score.log_quantile(score)) / self.reference)
 
+    @cached_property
+    def _logs(self) -> FloatArray:
+        """Logarithms of the damage."""
+        return np.log(np.maximum(self.damage, 1e-300))
+
     def _no_pit(self, passes: FloatArray, ratio: FloatArray) -> FloatArray:
         """Return the probability of no pit, (realisations, nodes).
 
@@ -183,9 +235,8 @@ class CompetingRisks:
         least = self.end[:, None] * 10.0**-DECADES
         place = np.log10(np.maximum(passes, least) / least) / step
         first = np.minimum(place.astype(np.int64), POINTS - 2)
-        logs = np.log(np.maximum(self.damage, 1e-300))
         rows = np.arange(len(self.end))[:, None]
-        low, high = logs[rows, first], logs[rows, first + 1]
+        low, high = self._logs[rows, first], self._logs[rows, first + 1]
         damage = np.exp(low + (place - first) * (high - low))
         # before its first point, damage is proportional to the passes
         damage *= np.minimum(passes / least, 1.0) / ratio
