@@ -158,9 +158,7 @@ def step_by_formula(
         of_bodies,
         of_contacts,
     )
-    of_step: tuple[Any, ...] = (
-        *(bodies, resolved, gap, depths, past.part, of_bodies, of_contacts),
-    )
+    of_step = bodies, resolved, gap, depths, past.part, of_bodies, of_contacts
     base, guess = of_bodies[3], of_bodies[4]
     assert state.wear_exponents is not None
     of_strips = state.wear_exponents.copy()
@@ -171,8 +169,7 @@ def step_by_formula(
     for iteration in range(1, MAX_FIXED_POINT + 1):
         about = np.empty((5, *shape))
         compliance = np.empty((realisations, bodies.shape[0], 2, strips))
-        given: tuple[Any, ...] = (line_load, wear, exponents, about, compliance)
-        linearise_step(*of_step, *given)
+        linearise_step(*of_step, line_load, wear, exponents, about, compliance)
         batch = contact_batch(problem, about[2], loads.used, *separated(guess, stations))
         warm = contacts if near is None or iteration > 1 else near
         solved = solve_compliant(problem, batch, compliance, warm, active)
@@ -181,8 +178,21 @@ def step_by_formula(
         apart = (
             past.separation if apart is None or not past.separation.size else kernel_input(apart)
         )
-        given += solved.line_load, apart, new, of_tests[0], most, active, worn
-        rest, opening, depth = compare_step(*of_step, *given)
+        rest, opening, depth = compare_step(
+            *of_step,
+            line_load,
+            wear,
+            exponents,
+            about,
+            compliance,
+            solved.line_load,
+            apart,
+            new,
+            of_tests[0],
+            most,
+            active,
+            worn,
+        )
         used, guess, change = guess, base + worn, rest
         # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
         relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
@@ -219,12 +229,30 @@ def step_by_formula(
     fields = np.empty((3, *past.part.shape) if past.part.size else (0, 0, 0))
     past_wear, past_sums = np.empty(past.wear.shape), np.empty(past.sums.shape)
     past_feedback = np.empty(past.feedback.shape)
-    ended: list[Any] = [past.separation, past.whole_steps, share, contacts.line_load, new, worn]
-    ended += of_tests, sums, loads.feedback if loads.vary else feedback
-    ended += kernel_input(contacts.power), problem.power_weights / problem.kinematics.pass_rate
-    ended += past.wear, past.sums, past.feedback
-    ended += energy, ends, fields, past_wear, past_sums, past_feedback, decreased
-    end_step(*of_step, *ended)
+    end_step(
+        *of_step,
+        past.separation,
+        past.whole_steps,
+        share,
+        contacts.line_load,
+        new,
+        worn,
+        of_tests,
+        sums,
+        loads.feedback if loads.vary else feedback,
+        kernel_input(contacts.power),
+        problem.power_weights / problem.kinematics.pass_rate,
+        past.wear,
+        past.sums,
+        past.feedback,
+        energy,
+        ends,
+        fields,
+        past_wear,
+        past_sums,
+        past_feedback,
+        decreased,
+    )
     by_contact, edges = (*problem.shape, strips), past[4:]
     others: dict[str, Any] = {}
     if past.part.size:
