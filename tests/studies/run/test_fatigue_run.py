@@ -155,6 +155,7 @@ def test_probability_of_pitting_has_the_error_of_the_damage():
     (text,) = [row.text for row in result.view.rows() if row.label == "probability of pitting"]
     stated = float(text.removesuffix(" %").split(" ± ")[1]) / 100.0
     assert stated == pytest.approx(beyond - chance, rel=0.1)
+    assert final["pitting_error"] == pytest.approx(stated, rel=0.06)  # of two digits
 
 
 def test_cam_states_lives_and_stresses_at_every_angle():

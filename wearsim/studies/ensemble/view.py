@@ -43,9 +43,9 @@ from wearsim.results.study_view import (
 from wearsim.studies.ensemble.file.data import Band, Effect, EnsembleData
 from wearsim.studies.ensemble.file.schema import ALL_OBSERVABLES, FAILED, KEPT, LIFE, PENDING
 from wearsim.studies.ensemble.result import EnsembleResult
+from wearsim.studies.fatigue.observables import fatigue_scenario
 from wearsim.studies.fatigue.view import (
     fatigue_data,
-    fatigue_scenario,
     source_rows,
     with_sources,
 )

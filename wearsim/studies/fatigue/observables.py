@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wearsim.errors import WearsimError
 from wearsim.evolution.fatigue import effective_damage, fatigue_of, greatest_damages
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.studies.cam.observables import at_every_station
 from wearsim.types import FloatArray
+
+if TYPE_CHECKING:
+    from wearsim.results.content import StudyResult
+    from wearsim.scenario import Scenario
 
 
 def fatigue_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
@@ -66,20 +71,40 @@ def fatigue_curves(problem: WearProblem, state: WearState) -> list[dict[str, Flo
     ]
 
 
-def final_fatigue(last: Mapping[str, Any]) -> dict[str, FloatArray]:
+def fatigue_scenario(result: StudyResult[Any]) -> Scenario | None:
+    """Return the scenario of a result; None without fatigue, or a plugin that is not installed."""
+    try:
+        return result.scenario if result.raw.fatigue else None
+    except WearsimError:
+        return None
+
+
+def final_fatigue(result: StudyResult[Any], last: Mapping[str, Any]) -> dict[str, FloatArray]:
     """Return the observables of fatigue at the end of a run by their keys in JSON.
+
+    The error of the probability of pitting is nan where the scenario cannot be read.
 
     Parameters
     ----------
+    result : StudyResult
     last : mapping of str to ndarray
         Last row of the history, by variable.
     """
     if "damage" not in last:
         return {}
+    damage, error, pitting = (
+        np.asarray(last[name]) for name in ("damage", "damage_error", "pitting")
+    )
+    scenario = fatigue_scenario(result)
+    slope = scenario.fatigue.slope if scenario is not None and scenario.fatigue else np.nan
+    # P = 1 - (1 - P_ref)^(D^e) is differentiated by D; P may be one to round-off
+    survival = np.maximum(1.0 - pitting, np.finfo(float).tiny)
+    relative = np.divide(error, damage, out=np.zeros_like(error), where=damage > 0.0)
     names = "damage", "damage_error", "pitting", "cylinder_damage", "roller_damage"
     angle = {"damage_angle_rad": np.asarray(last.get("damage_angle"))}
     return {
         **{name: np.asarray(last[name]) for name in names},
+        "pitting_error": -survival * np.log(survival) * slope * relative,
         "roller_damage": np.asarray(last["roller_damage"]).max(axis=0),
         **(angle if "damage_angle" in last else {}),
     }

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.errors import WearsimError
 from wearsim.report.text import shown, with_error
 from wearsim.report.view import Column, Row, Rows
+from wearsim.studies.fatigue.observables import fatigue_scenario
 
 if TYPE_CHECKING:
     from wearsim.results.content import StudyResult
@@ -31,37 +31,26 @@ def fatigue_rows(result: Result, body: str) -> Rows:
     """
     if not result.raw.fatigue:
         return []
-    final, scenario = result.final, fatigue_scenario(result)
-    names = "damage", "damage_error", "pitting"
-    damage, error, pitting = (np.asarray(final[name], dtype=float) for name in names)
+    final = result.final
+    names = "damage", "damage_error", "pitting", "pitting_error"
+    damage, error, pitting, of_pitting = (np.asarray(final[name], dtype=float) for name in names)
     greatest = f"{body} {shown(_most(final['cylinder_damage']), '1', 3)}"
     if "damage_angle_rad" in final:
         greatest += f" at {shown(_most(final['damage_angle_rad']), 'deg')}"
     greatest += f", roller {shown(_most(final['roller_damage']), '1', 3)}"
-    of_pitting = None
-    if scenario is not None and scenario.fatigue is not None and damage.any():
-        # P = 1 - (1 - P_ref)^(D^e) is differentiated by D; P may be one to round-off
-        survival = np.maximum(1.0 - pitting, np.finfo(float).tiny)
-        slope = -survival * np.log(survival) * scenario.fatigue.slope / damage
-        of_pitting = float(np.max(slope * error))
     return [
         Row("effective damage", with_error(damage, float(np.max(error)), "1")),
         Row("greatest damage", greatest),
-        Row("probability of pitting", with_error(pitting, of_pitting, "%")),
-        *source_rows(scenario),
+        Row(
+            "probability of pitting",
+            with_error(pitting, float(np.max(of_pitting)), "%"),
+        ),
+        *source_rows(fatigue_scenario(result)),
     ]
 
 
 def _most(value: float | list[float]) -> float:
     return float(np.max(value))
-
-
-def fatigue_scenario(result: StudyResult[Any]) -> Scenario | None:
-    """Return the scenario of a result; None without fatigue, or a plugin that is not installed."""
-    try:
-        return result.scenario if result.raw.fatigue else None
-    except WearsimError:
-        return None
 
 
 def source_rows(scenario: Scenario | None) -> Rows:

@@ -437,7 +437,7 @@ class Result(StudyResult[RunData]):
             **with_units("width", "worn_volume", "roller_depth", "roller_worn_volume"),
             **with_units("dissipated_energy", "power", "normal_force", "peak_pressure"),
             **with_units("descent", "elastic_approach"),
-            **{name: _number(value) for name, value in final_fatigue(last).items()},
+            **{name: _number(value) for name, value in final_fatigue(self, last).items()},
             **with_units("depth_error", "volume_error"),
             **self._final_errors(last),
             "relative_profile_error": _number(last["profile_error"]),

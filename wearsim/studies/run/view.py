@@ -25,11 +25,11 @@ from wearsim.report.text import (
 )
 from wearsim.report.view import Column, Columns, Frame, Overview, Row, Rows, width_row
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
+from wearsim.studies.fatigue.observables import fatigue_scenario
 from wearsim.studies.fatigue.view import (
     EXCLUDED as NO_FATIGUE,
     fatigue_data,
     fatigue_rows,
-    fatigue_scenario,
     with_sources,
 )
 from wearsim.studies.run.result import Result
