@@ -11,7 +11,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 import tomlkit
-from bokeh.models import ColumnDataSource, Plot
+from bokeh.models import ColumnDataSource, NoOverlap, Plot
 from made_up_ensembles import made_up
 
 import wearsim
@@ -81,6 +81,13 @@ def test_columns_are_in_single_precision(result):
         for source in figure.select(ColumnDataSource):
             arrays = [v for v in source.data.values() if isinstance(v, np.ndarray)]
             assert all(array.dtype.itemsize <= 4 for array in arrays if array.dtype.kind == "f")
+
+
+def test_labels_of_axes_do_not_overlap(life):
+    """The ticks of a probability plot are denser than their labels, such as 4,000,000."""
+    for figure in plots_of([life]).values():
+        for axis in (*figure.xaxis, *figure.yaxis):
+            assert isinstance(axis.major_label_policy, NoOverlap)
 
 
 def test_page_states_question_answer_error_and_origin(result, page_of_run):

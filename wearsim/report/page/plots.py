@@ -10,6 +10,7 @@ import numpy as np
 from bokeh.models.annotations import BoxAnnotation, ColorBar, Label, Span as Rule
 from bokeh.models.axes import LinearAxis
 from bokeh.models.formatters import BasicTickFormatter, NumeralTickFormatter
+from bokeh.models.labeling import NoOverlap
 from bokeh.models.mappers import LinearColorMapper
 from bokeh.models.ranges import DataRange1d, Range1d
 from bokeh.models.sources import ColumnDataSource
@@ -96,7 +97,7 @@ def draw(panel: Panel) -> Any:
         plot.add_layout(LinearAxis(y_range_name="right", axis_label=label), "right")
     for axis in (*plot.xaxis, *plot.yaxis):
         axis.update(axis_label_text_font_style="normal", axis_label_text_font_size="14px")
-        axis.update(major_label_text_font_size="13px", **_TEXT)
+        axis.update(major_label_text_font_size="13px", major_label_policy=NoOverlap(), **_TEXT)
     plot.grid.grid_line_color = "#e4e4e4"
     draw_marks(plot, panel)
     for legend in plot.legend:
