@@ -85,7 +85,7 @@ def test_columns_are_in_single_precision(result):
 
 def test_labels_of_axes_do_not_overlap(life):
     """The ticks of a probability plot are denser than their labels, such as 4,000,000."""
-    for figure in plots_of([life]).values():
+    for figure in plots_of(life).values():
         for axis in (*figure.xaxis, *figure.yaxis):
             assert isinstance(axis.major_label_policy, NoOverlap)
 
