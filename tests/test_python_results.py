@@ -200,7 +200,7 @@ def test_results_compare_and_hash_by_identity(scenario: Scenario, results: dict)
         ([2e-3, 1e-3], [0, 0], "reverse both arrays"),
         ([0, 1e-3], [0, 0, 0], "2 values of y and 3 of height"),
         ([-9.0, 9.0], [0, 0], "y: has a range that cannot be, got 18 m, expected metres"),
-        ([-9e-3, 9e-3], [0, -50], "height: has a range that cannot be, got 50 m, expected metres"),
+        ([-9e-3, 9e-3], [0, -50], "range that cannot be, got 50 m over 0.018 m of y, expected me"),
         ([0, float("nan")], [0, 0], "y: is not finite at point 1"),
         ([0], [0], "y: is not a sequence of points"),
         ("ab", [0, 0], "y: is not a sequence of numbers"),

@@ -33,8 +33,8 @@ _NAMES = (
     ' = ["Y", "Z"] or, in a tests file, columns; a minus sign before Z makes it a depth'
 )
 _UNITS = (
-    "its unit in the header, as in height [um], or by --units mm,um or, in a scenario,"
-    ' profile_units = ["mm", "um"]'
+    "the right units in the header, as in y [mm], height [um], or by --units mm,um or, in a"
+    ' scenario, profile_units = ["mm", "um"]'
 )
 _CLEARLY = 3.0  # heights above the ends of a profile over those below
 _INSTALL = "pip install 'wearsim[surfaces]'"

@@ -138,7 +138,9 @@ class Profile:
             span = float(np.ptp(getattr(self, name)))
             if span > most:
                 expected = "metres: multiply mm by 1e-3, um by 1e-6"
-                raise _profile_error(name, "has a range that cannot be", f"{span:g} m", expected)
+                over = "" if name == "y" else f" over {np.ptp(self.y):.4g} m of y"
+                got = f"{span:.4g} m{over}"
+                raise _profile_error(name, "has a range that cannot be", got, expected)
 
     def __repr__(self) -> str:
         y, height = self.y * 1e3, self.height * 1e6

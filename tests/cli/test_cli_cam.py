@@ -69,6 +69,23 @@ def test_rounding_of_zeros_is_not_printed(command: Command) -> None:
     assert re.findall(r"e-(?:1[2-9]|2\d)", shown) == []
 
 
+def test_lives_far_below_the_greatest_are_printed(command: Command) -> None:
+    law = (
+        '{law = "pressure-life", reference_passes = 2e8, reference_pressure = "800 MPa",'
+        ' exponent = 40, endurance_pressure = "300 MPa", source = "made up"}'
+    )
+    fatigue = ("--set", "fatigue.slope=1.1", "--set", f"fatigue.cylinder={law}")
+    path, angles = str(SCENARIOS / "cam-groove.toml"), ("--at", "96 deg,130 deg,136.6 deg")
+    pressures = data(command, path, *angles, *fatigue)["stations"]["peak_pressure_Pa"]
+    lines = command("cam", path, *angles, *fatigue).stdout.splitlines()
+    start = next(number for number, line in enumerate(lines) if "pitting [turns]" in line)
+    heads, *rows = lines[start : start + 4]
+    place = len(re.split("  +", heads[: heads.index("pitting [turns]")].rstrip()))
+    lives = [re.split("  +", row)[place] for row in rows]
+    assert lives[:2] == [f"{2e8 * (8e8 / pressure) ** 40:.3e}" for pressure in pressures[:2]]
+    assert lives[2] == "-"
+
+
 def test_table_and_figure(command: Command) -> None:
     done = command("cam", CAM, "--at", "10 deg,135 deg", "-o", "cam.png")
     assert done.exit_code == 0, done.output

@@ -87,6 +87,9 @@ def test_check_shows_profile_and_log(command: Command, scenario: Path) -> None:
     assert data["log"]["span_s"] == [0.0, 300.0]
     assert data["test"]["passes"] == 6000
     assert data["warnings"][0].startswith("log.csv: has a gap")
+    shorter = command("check", scenario, *settings, "--set", "operation.duration=89 s")
+    assert shorter.exit_code == 0
+    assert "has a gap" not in shorter.stderr
 
 
 def test_check_shows_offsets_of_rollers(command: Command) -> None:

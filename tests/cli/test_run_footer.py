@@ -32,6 +32,20 @@ def test_footer_of_a_run_has_its_stepping_error(command, scenario):
     assert part == pytest.approx(100.0 * stated, rel=0.05)
 
 
+def test_error_of_a_deeper_roller_names_the_depth_to_which_it_is_related(command, scenario):
+    wears = "wear.roller.k_over_h=1.1e-9 1/Pa"
+    few = ("--set", wears, "--set", "contact.strips=21", "--set", "evolution.tolerance=1e-5")
+    done = command("run", scenario, "-o", "short.h5", "-q", *few)
+    result = wearsim.open_results("short.h5")
+    part = 100.0 * result.final["relative_depth_error"]
+    assert part == pytest.approx(100.0 * result.depth_error[-1] / result.roller_depth[-1].max())
+    related = re.escape(f"{part:.2g}") + r"\d* % of the roller depth"
+    assert re.search(f"depth within {related} \\(steps", last_line(done))
+    assert re.search(rf"estimated error of depth +[\d.]+ um, {related} *\n", done.stdout)
+    warning = f"estimated error of depth.*: {related}.*, above the tolerance of 0.001 %"
+    assert any(re.search(warning, text) for text in result.warnings)
+
+
 def test_per_pass_run_has_no_stepping_error(command, scenario):
     changes = ("--set", "evolution.stepper=per-pass", "--set", "operation.passes=30")
     line = last_line(command("run", scenario, "-o", "short.h5", "-q", *changes))

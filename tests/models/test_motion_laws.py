@@ -92,7 +92,7 @@ def test_closed_spline_of_a_turn():
 def test_corner_of_a_table_is_an_error_with_its_angle():
     degrees = np.linspace(0.0, 90.0, 61)
     text = table(np.abs(degrees - 45.0) / 10.0, degrees)
-    with pytest.raises(ScenarioError, match=r"slope of the lift jumps at, got 45 deg"):
+    with pytest.raises(ScenarioError, match=r"slope of the lift jumps, got a corner at 45 deg"):
         law("table", math.pi / 2.0, 0.0, files={"t.csv": text}, file="t.csv")
 
 

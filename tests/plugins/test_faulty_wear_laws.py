@@ -28,23 +28,23 @@ DEPTHS: dict[str, tuple[Fault, type[WearsimError], str]] = {
     "nan": (
         lambda depth: np.where(depth > 0.0, np.nan, 0.0),
         SolverError,
-        "a depth_per_pass of the cylinder that is not finite",
+        "values of depth_per_pass of the cylinder that are not finite",
     ),
     "negative": (
         lambda depth: -depth,
         SolverError,
-        r"a negative depth_per_pass of the cylinder, down to -\d.* m$",
+        r"negative values of depth_per_pass of the cylinder, down to -\d.* m; correct the plugin",
     ),
 }
 #: faults of the factor of a linear law
 FACTORS: dict[str, tuple[Any, type[WearsimError], str]] = {
-    "array": (np.ones(3), PluginError, r"an array of the shape \(3,\) .*, expected a number or No"),
+    "array": (np.ones(3), PluginError, r"an array of the shape \(3,\) .*, expected a number;"),
     "text": ("4e-12", PluginError, "a str as depth_per_dissipation of the cylinder, expected a"),
-    "nan": (np.nan, SolverError, "a depth_per_dissipation of the cylinder that is not finite"),
+    "nan": (np.nan, SolverError, "values of depth_per_dissipation of the cylinder that are not"),
     "negative": (
         -4e-12,
         SolverError,
-        r"a negative depth_per_dissipation .*, down to -4e-12 m\^2/W",
+        r"negative values of depth_per_dissipation .*, down to -4e-12 m\^2/W",
     ),
 }
 

@@ -11,7 +11,9 @@ from pydantic import Field, model_validator
 from wearsim.csv_tables import read_columns
 from wearsim.plugins import (
     ContactModelSpec,
+    Load,
     LoadSpec,
+    LoadTerm,
     Options,
     SingleContactModel,
     WearLaw,
@@ -132,10 +134,6 @@ class ArchardOptions(Options):
     roller: Factor = Field(description="The roller.")
 
 
-def _build(options: Options, *others: object) -> tuple[str, Options]:
-    return ("built", options)
-
-
 class _Model(SingleContactModel):
     """Contact model that is built only."""
 
@@ -150,7 +148,27 @@ class _Law(WearLaw):
         raise NotImplementedError
 
 
-#: options of the contact models and wear laws that were built
+class _Load(Load):
+    """Load that is built only."""
+
+    def force(self, time: FloatArray) -> FloatArray:
+        raise NotImplementedError
+
+    def mean(self, start: float, stop: float) -> float:
+        raise NotImplementedError
+
+
+class _Term(LoadTerm):
+    """Load term that is built only."""
+
+    def advance(self, *state: object) -> FloatArray:
+        raise NotImplementedError
+
+    def mean_force(self, *state: object) -> FloatArray:
+        raise NotImplementedError
+
+
+#: options of the plugins that were built
 BUILT: list[Options] = []
 
 
@@ -162,6 +180,16 @@ def _build_model(options: Options, *others: object) -> _Model:
 def _build_law(options: Options) -> _Law:
     BUILT.append(options)
     return _Law()
+
+
+def _build_load(options: Options) -> _Load:
+    BUILT.append(options)
+    return _Load()
+
+
+def _build_term(options: Options) -> _Term:
+    BUILT.append(options)
+    return _Term()
 
 
 def _plugins() -> ModuleType:
@@ -184,11 +212,11 @@ def _plugins() -> ModuleType:
 
     @hookimpl
     def wearsim_loads():
-        yield LoadSpec("constant", ConstantOptions, "constant", factory=_build, protocol=2)
-        yield LoadSpec("spring", SpringOptions, "spring", factory=_build, protocol=2)
-        yield LoadSpec("recorded", RecordedOptions, "log", factory=_build, protocol=2)
+        yield LoadSpec("constant", ConstantOptions, "constant", factory=_build_load, protocol=2)
+        yield LoadSpec("spring", SpringOptions, "spring", factory=_build_load, protocol=2)
+        yield LoadSpec("recorded", RecordedOptions, "log", factory=_build_load, protocol=2)
         yield LoadSpec(
-            "thermal", ThermalOptions, "thermal", factory=_build, role="term", protocol=2
+            "thermal", ThermalOptions, "thermal", factory=_build_term, role="term", protocol=2
         )
 
     module.wearsim_contact_models = wearsim_contact_models

@@ -137,7 +137,7 @@ def test_corner_of_a_lift_table_is_refused(tmp_path):
     degrees = np.arange(0.0, 360.0, 2.0)
     rows = np.stack([degrees, 5.0 - np.abs(degrees - 180.0) / 36.0], axis=1)
     (tmp_path / "points.csv").write_text(points("angle [deg], lift [mm]", rows))
-    with pytest.raises(ScenarioError, match="slope of the lift jumps at, got 180 deg"):
+    with pytest.raises(ScenarioError, match="slope of the lift jumps, got a corner at 180 deg"):
         read(with_file("lift"), tmp_path)
 
 

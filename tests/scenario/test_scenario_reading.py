@@ -11,7 +11,7 @@ import pytest
 from scenario_examples import BUILT, GOOD, Parse
 
 from wearsim.errors import ScenarioError
-from wearsim.plugins import ContactModel, WearLaw
+from wearsim.plugins import ContactModel, Load, LoadTerm, WearLaw
 from wearsim.scenario import Scenario, parse_scenario, require_run
 from wearsim.types import Material
 
@@ -98,8 +98,10 @@ def test_terms_are_added_to_a_load(parse: Parse) -> None:
     term = '\n[load.thermal]\ngain = "50 N/W"\ntime_constant = "20 min"\n'
     load = parse(('normal_force = "300 N"\n', f'normal_force = "300 N"\n{term}')).load
     assert [(item.name, item.options.gain) for item in load.terms] == [("thermal", 50.0)]
-    assert load.built == ("built", load.options)
-    assert load.terms[0].built == ("built", load.terms[0].options)
+    assert isinstance(load.built, Load)
+    assert BUILT[-1] == load.options
+    assert isinstance(load.terms[0].built, LoadTerm)
+    assert BUILT[-1] == load.terms[0].options
 
 
 def test_plugins_are_built_with_their_options(parse: Parse) -> None:

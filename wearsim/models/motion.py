@@ -374,9 +374,9 @@ def refuse_kinks(
         noise /= math.sqrt(count)
     corners, _ = kinks(angle, lift, noise)
     if len(corners):
-        got = ", ".join(f"{math.degrees(at):.6g} deg" for at in corners[:3])
+        got = "a corner at " + ", ".join(f"{math.degrees(at):.6g} deg" for at in corners[:3])
         expected = f"a {name} without corners, or more points where it turns sharply"
-        what = f"the slope of the {name} jumps at"
+        what = f"the slope of the {name} jumps"
         raise mistake_in(path, what, got, expected)
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from numbers import Real
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution, SharedWear
 from wearsim.errors import ContactError, PluginError
+from wearsim.plugins.checked import ROUNDING, built_plugin, described_value, is_numeric
 from wearsim.plugins.contact_model import (
     ContactModel,
     PassLoop,
@@ -17,7 +16,7 @@ from wearsim.plugins.contact_model import (
     naming_contact,
     refuse_unclaimed,
 )
-from wearsim.plugins.specs import ContactModelSpec, WearLawSpec
+from wearsim.plugins.specs import ContactModelSpec
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -27,13 +26,11 @@ from wearsim.types import (
     OperatingPoint,
 )
 
-Built = TypeVar("Built")
 _STRIPS = ("half_length", "line_load", "dissipation")
 _NUMBERS = (
     *("force_x", "force_y", "spin_moment", "approach", "peak_pressure"),
     *("adhesion_fraction", "power", "longitudinal_creepage", "iterations"),
 )
-ROUNDING = 1e-9  # of the greatest value: a negative one that is no error of a plugin
 
 
 def built_model(
@@ -198,49 +195,3 @@ class CheckedModel(SingleContactModel):
         """Return the error of a contact, with the state that led to it and the value returned."""
         state = {"point": point, "gap": gap, "normal_force": point.normal_force, name: value}
         return ContactError(f"{self._returned} {what}", state)
-
-
-def built_plugin(
-    spec: ContactModelSpec | WearLawSpec,
-    expected: type[Any],
-    checked: Callable[[Any, str], Built],
-    *arguments: Any,
-) -> Built:
-    """Return what the factory of a plugin builds, with checks of its values if it is third-party.
-
-    Parameters
-    ----------
-    spec : ContactModelSpec or WearLawSpec
-    expected : type
-        Class of which the factory must return an object.
-    checked : callable
-        Returns the object with checks, from the object and the name of the plugin.
-    *arguments
-        Arguments of the factory.
-
-    Raises
-    ------
-    PluginError
-        If the factory returns an object of another class.
-    """
-    built = spec.factory(*arguments)
-    if not isinstance(built, expected):
-        raise PluginError(
-            f"the factory of {spec.kind} '{spec.name}' returned {described_value(built)}, expected"
-            f" a {expected.__name__}"
-        )
-    own: Built = built
-    is_own = type(built).__module__.partition(".")[0] == "wearsim"
-    return own if is_own else checked(built, spec.name)
-
-
-def is_numeric(value: object) -> bool:
-    """Return whether a value is a real number or an array of such numbers."""
-    return isinstance(value, Real) or (isinstance(value, np.ndarray) and value.dtype.kind in "fiu")
-
-
-def described_value(value: object) -> str:
-    """Return a value that was returned, as the object of a sentence."""
-    if isinstance(value, np.ndarray):
-        return f"an array of the shape {value.shape} and type {value.dtype}"
-    return repr(value) if value is None or isinstance(value, Real) else f"a {type(value).__name__}"

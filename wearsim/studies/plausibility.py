@@ -200,6 +200,8 @@ def _of_cam(scenario: Scenario) -> list[str]:
 
 def _of_log(scenario: Scenario) -> Iterator[str]:
     gaps: FloatArray = scenario.load.built.gaps
+    if scenario.has_length:
+        gaps = gaps[gaps[:, 0] < scenario.total_time]
     file = load_file(scenario)
     if file and len(gaps):
         how = getattr(scenario.load.options, "gaps", "interpolate")

@@ -125,9 +125,15 @@ def test_reversed_sign_is_refused(tmp_path: Path):
 
 def test_wrong_units_are_refused(tmp_path: Path):
     y, height = groove(np.random.default_rng(1))
-    message = r"t\.csv: column height: has a range that cannot be, got .* m, expected its unit"
+    message = (
+        r"t\.csv: column height: has a range that cannot be, got 0\.0\d+ m over 0\.0\d+ m of y,"
+    )
     with pytest.raises(ScenarioError, match=message):
         trace(write(tmp_path / "t.csv", y, height, "y [mm],height [mm]"))
+    # a unit of y may be the wrong one
+    message = r"got [\d.]+e-05 m over [\d.]+e-05 m of y, expected the right units .* y \[mm"
+    with pytest.raises(ScenarioError, match=message):
+        trace(write(tmp_path / "t.csv", y, height, "y [um],height [um]"))
 
 
 def test_width_at_half_depth_of_a_parabola():

@@ -12,6 +12,8 @@ from pydantic import Field
 from wearsim.errors import ScenarioError
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.plugins import AxialPair, AxialProfile, AxialProfileSpec, Options, registry
+from wearsim.plugins.checked import built_plugin
+from wearsim.plugins.checked_laws import CheckedAxialProfile
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.mistakes import Mistakes, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import validate
@@ -56,7 +58,8 @@ class AxialChoice:
 
     def build(self, pair: AxialPair) -> AxialProfile:
         """Return the profile for a pair of bodies."""
-        return registry().get(AxialProfileSpec, self.form).factory(self.options, pair)
+        spec = registry().get(AxialProfileSpec, self.form)
+        return built_plugin(spec, AxialProfile, CheckedAxialProfile, self.options, pair)
 
 
 def crown(radius: float) -> AxialChoice:

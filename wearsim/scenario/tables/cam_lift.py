@@ -31,7 +31,7 @@ from wearsim.scenario.tables.cam_points import (
     smoothed_points,
 )
 from wearsim.types import FloatArray
-from wearsim.units import ANGLE, LENGTH, QuantityError
+from wearsim.units import ANGLE, LENGTH, QuantityError, in_engineers_unit
 
 if TYPE_CHECKING:
     from wearsim.scenario.tables.cam import CamTable
@@ -60,8 +60,9 @@ def motion_of_lift(
     assert table.lift is not None
     tolerance, path = _tolerance(table.lift_tolerance, follower), table.lift.path
     read = read_lift_table(table.lift.text, path, table.columns, table.units, follower)
-    angle, lift = one_turn(path, *read)
-    return motion_of_table(notes, path, angle, lift, "rad" if follower.swings else "m", tolerance)
+    unit = "rad" if follower.swings else "m"
+    angle, lift = one_turn(path, *read, unit)
+    return motion_of_table(notes, path, angle, lift, unit, tolerance)
 
 
 def _tolerance(text: str | None, follower: Follower) -> float | None:
@@ -122,8 +123,10 @@ def read_lift_table(
     return columns[angle], lifts
 
 
-def one_turn(path: str, angle: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a table from its first angle to the same one after a turn [rad]."""
+def one_turn(
+    path: str, angle: FloatArray, values: FloatArray, unit: str
+) -> tuple[FloatArray, FloatArray]:
+    """Return a table of lifts in `unit` from its first angle to the same one after a turn [rad]."""
     turn = float(angle[-1] - angle[0])
     if abs(turn - math.tau) > 1e-9:
         step = float(np.diff(angle).max())
@@ -135,7 +138,7 @@ def one_turn(path: str, angle: FloatArray, values: FloatArray) -> tuple[FloatArr
     noise = estimated_noise(angle[:-1], values[:-1])
     allowed = max(1e-9 * float(np.ptp(values)), _CLOSED * math.sqrt(2.0) * noise)
     if abs(values[-1] - values[0]) > allowed:
-        got = f"{values[0]:.6g} and {values[-1]:.6g}"
+        got = " and ".join(in_engineers_unit(values[k], unit) for k in (0, -1))
         what = "the lift does not close: its first and last value differ"
         raise mistake_in(path, what, got, "equal values at 0 and 360 deg")
     return angle, values

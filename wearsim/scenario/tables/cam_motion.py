@@ -18,7 +18,9 @@ from wearsim.mechanics.cam import (
     tangent_cam,
     three_arc_cam,
 )
-from wearsim.plugins import MotionLawSpec, Options
+from wearsim.plugins import MotionLaw, MotionLawSpec, Options
+from wearsim.plugins.checked import built_plugin
+from wearsim.plugins.checked_laws import CheckedMotionLaw
 from wearsim.quantities import Quantity
 from wearsim.scenario.parse.mistakes import Mistakes, split_keys, validate_options
 from wearsim.scenario.parse.random_inputs import validate
@@ -141,7 +143,15 @@ def _from_law(mistakes: Mistakes, place: str, raw: dict[str, object], unit: str)
         mistakes.add(place, "rise", *_parts(error))
         return None
     try:
-        law = spec.factory(options, entry.angle, rise, unit)
+        law = built_plugin(
+            spec,
+            MotionLaw,
+            lambda law, name: CheckedMotionLaw(law, name, entry.angle),
+            options,
+            entry.angle,
+            rise,
+            unit,
+        )
     except QuantityError as error:
         mistakes.add(place, "", *_parts(error))
     except ScenarioError as error:

@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from wearsim.plugins import BODIES, Body, FatigueLaw, FatigueLawSpec, Options, registry
+from wearsim.plugins.checked import built_plugin
+from wearsim.plugins.checked_laws import CheckedFatigueLaw
 from wearsim.quantities import PositivePressure, Quantity
 from wearsim.scenario.parse.mistakes import Mistakes, split_keys
 from wearsim.scenario.parse.random_inputs import validate
@@ -77,7 +79,8 @@ class FatigueLawChoice:
 
     def build(self, contact_modulus: float) -> FatigueLaw:
         """Return a new fatigue law for bodies with the contact modulus E* [Pa]."""
-        return registry().get(FatigueLawSpec, self.law).factory(self.options, contact_modulus)
+        spec = registry().get(FatigueLawSpec, self.law)
+        return built_plugin(spec, FatigueLaw, CheckedFatigueLaw, self.options, contact_modulus)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 from pydantic import Field
 
@@ -24,8 +24,10 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
+from wearsim.plugins.checked import built_plugin
+from wearsim.plugins.checked_laws import CheckedWearLaw
+from wearsim.plugins.checked_loads import CheckedLoad, CheckedLoadTerm
 from wearsim.plugins.checked_model import built_model
-from wearsim.plugins.checked_wear_law import built_wear_law
 from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import validate
@@ -142,7 +144,8 @@ class TermChoice:
     @cached_property
     def built(self) -> LoadTerm:
         """The term."""
-        return cast("LoadTerm", registry().get(LoadSpec, self.name).factory(self.options))
+        spec = registry().get(LoadSpec, self.name)
+        return built_plugin(spec, LoadTerm, CheckedLoadTerm, self.options)
 
 
 @dataclass(frozen=True)
@@ -166,7 +169,8 @@ class LoadChoice:
     @cached_property
     def built(self) -> Load:
         """The load, without its terms."""
-        return cast("Load", registry().get(LoadSpec, self.kind).factory(self.options))
+        spec = registry().get(LoadSpec, self.kind)
+        return built_plugin(spec, Load, CheckedLoad, self.options)
 
 
 @dataclass(frozen=True)
@@ -184,7 +188,7 @@ class WearChoice:
     @cached_property
     def built(self) -> WearLaw:
         """The wear law."""
-        return built_wear_law(self.spec, self.options)
+        return built_plugin(self.spec, WearLaw, CheckedWearLaw, self.options)
 
 
 #: model of the table's own keys, key with the name of the plugin, kind of plugin

@@ -161,7 +161,7 @@ class CamView(View):
         values = self._columns()
         shown_columns = [column for column in _TABLE if column[1] in values]
         cells = [
-            [in_unit(value, unit) for value in _without_rounding(values[key][1])]
+            [in_unit(value, unit) for value in _without_rounding(key, values[key][1])]
             for _, key, unit in shown_columns
         ]
         rows = zip(*cells, self._segment_names(), strict=True)
@@ -301,8 +301,10 @@ class CamView(View):
         )
 
 
-def _without_rounding(values: FloatArray) -> list[float]:
+def _without_rounding(key: str, values: FloatArray) -> list[float]:
     """Return values, with 0 for those that are zero to the rounding of the greatest."""
+    if key == "pitting_life_turns":  # a high power of the pressure, often infinite
+        return [float(value) for value in values]
     size = np.abs(values)
     return [float(value) for value in np.where(size > 1e-11 * size.max(), values, 0.0)]
 

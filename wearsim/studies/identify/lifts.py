@@ -76,7 +76,7 @@ def _lift(path: Path, item: Measurement, follower: Follower) -> tuple[FloatArray
         raise mistake_in(str(path), what) from error
     choice = item.choice
     angle, lift = read_lift_table(text, str(path), choice.columns, choice.units, follower)
-    angle, lift = one_turn(str(path), angle, lift)
+    angle, lift = one_turn(str(path), angle, lift, "rad" if follower.swings else "m")
     return angle, lift * follower.lever
 
 

@@ -269,7 +269,9 @@ class RunInProgress:
             elif stations > 0.5 * relative:
                 remedy = "more cam.stations decrease it"
             words = "worn volume" if name == "volume" else name
-            beyond.setdefault(remedy, []).append((words, f"{100.0 * relative:.2g} %"))
+            of_roller = name == "depth" and (size > last["depth"]).any()
+            whose = " of the roller depth" if of_roller else ""
+            beyond.setdefault(remedy, []).append((words, f"{100.0 * relative:.2g} %{whose}"))
         for remedy, texts in beyond.items():
             names, errors_text = map(" and ".join, zip(*texts, strict=True))
             self.warn(

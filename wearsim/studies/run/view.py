@@ -133,10 +133,16 @@ class RunView(StudyView[Result]):
         ]
         if error is None:
             return [*rows, Row("error of depth", NO_STEPPING_ERROR)]
-        # the error refers to the greatest depth on either body
-        depth = float(max(np.max(result.depth[-1]), np.max(result.roller_depth[-1])))
-        part = f", {shown(error / depth, '%', 2)}" if depth > 0.0 else ""
+        depth, whose = self._greatest_depth()
+        part = f", {shown(error / depth, '%', 2)}{whose}" if depth > 0.0 else ""
         return [*rows, Row("estimated error of depth", f"{shown(error, 'um', 2)}{part}")]
+
+    def _greatest_depth(self) -> tuple[float, str]:
+        """Return the depth to which its error is related, and whose it is if not the cylinder's."""
+        depth, roller = (
+            float(np.max(values[-1])) for values in (self.result.depth, self.result.roller_depth)
+        )
+        return (roller, " of the roller depth") if roller > depth else (depth, "")
 
     def study(self) -> Rows:
         """Return rows on the test, its failure, and the effort of the computation."""
@@ -210,9 +216,9 @@ class RunView(StudyView[Result]):
         error, has_steps = "no stepping error", result.stepper != "per-pass"
         known = bool(np.isfinite(result.profile_error_by_strips[-1]).all())
         if has_steps or known:
-            depth = max(np.max(result.depth[-1]), np.max(result.roller_depth[-1]))
+            depth, whose = self._greatest_depth()
             volume = np.max(result.worn_volume[-1])
-            text, parts = within("depth", np.max(result.depth_error[-1]), depth), "steps"
+            text, parts = within("depth", np.max(result.depth_error[-1]), depth) + whose, "steps"
             if known:
                 parts = "steps and strips"
                 by = (
