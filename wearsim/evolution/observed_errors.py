@@ -16,7 +16,8 @@ compared, or the whole force where that differs less.
 At the edge of a groove the line load falls within a layer to zero. Where the layer is shorter than
 the contact is long, the contact is shorter there under the same load, and its pressure higher.
 Neither strips wider than the contact is long nor those of the coarse test resolve this peak, which
-is added to the error of the pressure.
+is added to the error of the pressure. Ends of rollers have such a peak where the groove reaches
+them, under a line load that wear has made uniform.
 """
 
 from __future__ import annotations
@@ -79,6 +80,7 @@ def observed_errors(
     by_strips: FloatArray,
     crown_radius: FloatArray | None = None,
     spacing: float = math.inf,
+    roller_width: float = math.inf,
     load: Callable[[FloatArray], FloatArray] | None = None,
     feedback: bool = True,
 ) -> dict[str, FloatArray]:
@@ -98,6 +100,8 @@ def observed_errors(
         See `relative_crown_radius` [m]; None where peaks at edges are not estimated.
     spacing : float
         Width of the strips at the end [m].
+    roller_width : float
+        Width of the rollers without their edges [m].
     load : callable, optional
         Returns the load before feedback at some passes [N]; None for a constant one.
     feedback : bool
@@ -153,6 +157,8 @@ def observed_errors(
     # a life observes the quantities of its limits only
     if crown_radius is not None and observed.keys() >= set(_OF_EDGES):
         edge_peaks = _edge_peaks(observed, crown_radius, spacing)
+    if math.isfinite(roller_width) and observed.keys() >= {"width", *_OF_EDGES}:
+        edge_peaks = np.maximum(edge_peaks, _end_peaks(observed, roller_width - 2.0 * spacing))
     for name, values in observed.items():
         scale = 1.0 if name.endswith("angle") else np.abs(values)
         lowest = [
@@ -199,6 +205,14 @@ def _edge_peaks(
         in_groove = worn / (worn + elastic)
     peak = ABRUPT_EDGE * np.maximum(1.0 - layer, 0.0) * in_groove * np.minimum(width, 1.0)
     return np.asarray(np.nan_to_num(peak).reshape(shape))
+
+
+def _end_peaks(observed: Mapping[str, FloatArray], width: float) -> FloatArray:
+    """Return relative peaks at ends of rollers that the groove has reached, as pressures."""
+    worn, elastic = (np.maximum(observed[name], 0.0) for name in ("descent", "elastic_approach"))
+    reached = observed["width"].reshape(len(worn), -1).max(axis=1) >= width
+    in_groove = np.divide(worn, worn + elastic, out=np.zeros_like(worn), where=worn > 0.0)
+    return np.asarray(ABRUPT_EDGE * in_groove * reached.reshape(-1, *[1] * (worn.ndim - 1)))
 
 
 def _greatest_of_last(passes: FloatArray, errors: FloatArray) -> FloatArray:

@@ -25,6 +25,12 @@ def ends_roller(scenario: Scenario, low: float, high: float) -> bool:
     return bool(low < offsets.min() - half or high > offsets.max() + half)
 
 
+def width_between_edges(scenario: Scenario) -> float:
+    """Return the width of a roller without its rounded or cut edges [m]; infinite if not given."""
+    roller = scenario.roller
+    return (roller.width or math.inf) - 2.0 * (roller.edge_radius or roller.chamfer or 0.0)
+
+
 def roller_grid(scenario: Scenario, strips: int, away: float = 0.0) -> Grid:
     """Return strips over the width of all rollers, and further ones beyond their ends.
 

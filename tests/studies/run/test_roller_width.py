@@ -11,6 +11,7 @@ from tests.evolution import SCENARIOS
 from wearsim.errors import CapabilityError, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, load_scenario
+from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.dissipation.monte_carlo import dissipation
 from wearsim.studies.ensemble.api import ensemble
@@ -134,6 +135,21 @@ def test_realisations_of_one_contact_end_with_the_roller(tmp_path: Path) -> None
     assert spacing * len(result.y) == pytest.approx(WIDTH + 4.0 * spacing, rel=1e-9)
     full = 0.1 * LOAD * result.scenario.rolling_speed * 1e-3
     assert result.values("power") == pytest.approx(full, rel=0.02)
+
+
+@pytest.mark.parametrize("edge", [{}, {"roller.edge_radius": "0.5 mm"}])
+def test_error_of_the_peak_pressure_contains_that_at_the_ends(edge: dict[str, object]) -> None:
+    """The contact is shorter at an end under the same line load, which coarse strips average."""
+    changes = {"roller.width": "8 mm", "operation.passes": 300_000, **edge}
+    coarse, fine, inside = (
+        studies.run(shipped_scenario("rig-450min", {**changes, "contact.strips": strips, **other}))
+        for strips, other in ((41, {}), (241, {}), (41, {"operation.passes": 3000}))
+    )
+    peaks = [float(run.peak_pressure[-1].max()) for run in (coarse, fine, inside)]
+    errors = [float(run.errors["peak_pressure"][-1].max()) for run in (coarse, fine, inside)]
+    assert peaks[1] > 1.05 * peaks[0]
+    assert abs(peaks[1] - peaks[0]) < errors[0]
+    assert errors[2] < 0.1 * peaks[2]  # before the groove reaches the ends
 
 
 @pytest.mark.parametrize("model", ["hertz", "hertz-fastsim", "semi-hertzian"])

@@ -32,6 +32,7 @@ from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import observables_of_track
 from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.fatigue.observables import fatigue_curves
+from wearsim.studies.roller_ends import width_between_edges
 from wearsim.studies.run.assemble import coarse_stepper
 from wearsim.studies.run.recorder import history_row
 from wearsim.studies.run.setup import Setup
@@ -369,6 +370,7 @@ def add_strip_errors(
                 np.concatenate([fresh, by_strips], axis=1),
                 None if crown is None else crown[:, number],
                 course.grid.spacing,
+                width_between_edges(runs[0].scenario),
             )
             added[number] = errors, {name: values[-1] for name, values in stated.items()}
             result.scalars["depth_error"] += float(errors[0])

@@ -39,6 +39,7 @@ from wearsim.studies.failures import (
 )
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
+from wearsim.studies.roller_ends import width_between_edges
 from wearsim.studies.run.assemble import assemble_problem, coarse_stepper
 from wearsim.studies.run.continuation import earlier_warnings
 from wearsim.studies.run.draws import units_of
@@ -225,7 +226,7 @@ class RunInProgress:
         self.recorder.strip_errors = errors
         self.recorder.observed_errors = observed_errors(
             *(coarse, passes, self.recorder.observed, np.array(sizes), errors),
-            *(None if crown is None else crown[:, 0], spacing),
+            *(None if crown is None else crown[:, 0], spacing, width_between_edges(self.scenario)),
             partial(load_before_feedback, problem) if varies else None,
             feedback=problem.has_spring or bool(problem.terms),
         )
