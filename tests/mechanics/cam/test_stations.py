@@ -210,6 +210,17 @@ def test_choice_halves_panels_and_is_scaled_by_the_whole_turn():
     assert many.numbers == (13,)
 
 
+def test_extreme_of_equal_values_is_the_first():
+    halves = Panel(0, 0.0, math.pi, dwell=False), Panel(1, math.pi, math.tau, dwell=False)
+
+    def quantity(panel, theta):  # the same value in both, but for its rounding error
+        return np.sin(theta) ** 2 * (1.0 + panel.segment * 1e-15)
+
+    value, angle = extreme(halves, quantity)
+    assert value == pytest.approx(1.0, rel=1e-14)
+    assert angle == pytest.approx(0.5 * math.pi, abs=1e-6)
+
+
 def test_extreme_skips_values_that_are_not_defined():
     def quantity(panel, theta):
         return np.where(theta > 3.0, np.nan, theta)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -103,9 +104,14 @@ def estimate(path: Path, probability: float, tests: int, seed: int, method: str)
     return lives(path, scenario, 400, target=target, most=1e8, rare=tests, rare_method=method)
 
 
+@cache
+def drawn_design() -> Scenario:
+    return design(wear__roller__k_over_h=ROLLER)
+
+
 def by_draws(probability: float, tests: int, seed: int, plain: int = 400) -> RareProbability:
     """Return the estimate of subset simulation from the draws of a study, without its file."""
-    drawer = Drawer(design(wear__roller__k_over_h=ROLLER, seed=seed), "monte-carlo")
+    drawer = Drawer(replace(drawn_design(), seed=seed), "monte-carlo")
     numbers = drawer.uniforms(0, plain + tests)
     scores = np.column_stack([ndtri(numbers[name][:, 0]) for name in SPREADS])
     spreads = np.array(list(SPREADS.values()))

@@ -123,6 +123,18 @@ def test_wrong_tables_are_refused(folder: Path, text: str, words: str):
     assert words in str(caught.value)
 
 
+def test_table_is_read_again_where_its_content_changes(folder: Path):
+    table = {"distribution": "posterior", "file": "changed.csv"}
+
+    def read(median: str) -> wearsim.Scenario:
+        (folder / "changed.csv").write_text(f"{HEADER}{median},0.2,1\n{median},0.3,1\n")
+        return scenario(folder, wear__cylinder__k_over_h=table)
+
+    first, again, other = read("1e-11"), read("1e-11"), read("2e-11")
+    assert again.random[0].distribution is first.random[0].distribution
+    assert other.random[0].mean[0] == pytest.approx(2.0 * first.random[0].mean[0], rel=1e-12)
+
+
 def test_shell_goes_from_tests_to_lives(folder: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(folder)
 

@@ -8,6 +8,7 @@ DOI 10.1137/S0036144502417715.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -19,8 +20,9 @@ from wearsim.types import FloatArray, IntArray
 
 NUMBERS = (7, 13, 25)  # of stations on a panel; every set contains the one before
 _MOST_HALVINGS = 6
-_SAMPLES = 193
-_REFINEMENTS = 5  # samplings about the greatest sample, the last 1e-10 of a panel apart
+_SAMPLES = 193  # of a panel
+_REFINED, _REFINEMENTS = 33, 7  # samples about the greatest one; the last 2e-11 of a panel apart
+_EQUAL = 1e-13  # relative difference of equal values of two panels
 
 
 @lru_cache
@@ -244,7 +246,7 @@ def choose_stations(
 def extreme(
     panels: Sequence[Panel], quantity: Callable[[Panel, FloatArray], FloatArray]
 ) -> tuple[float, float]:
-    """Return the greatest value of a quantity over a turn, and its angle [rad].
+    """Return the greatest value of a quantity over a turn, and its angle [rad], the first if equal.
 
     Parameters
     ----------
@@ -254,13 +256,16 @@ def extreme(
     """
     best = -np.inf, 0.0
     for panel in panels:
-        low, high = panel.start, panel.stop
-        for _ in range(1 if panel.dwell else _REFINEMENTS):
-            angles = np.linspace(low, high, _SAMPLES)
+        found, low, high, samples = (-np.inf, 0.0), panel.start, panel.stop, _SAMPLES
+        for _ in range(1 if panel.dwell else 1 + _REFINEMENTS):
+            angles = np.linspace(low, high, samples)
             values = quantity(panel, angles)
             values = np.where(np.isnan(values), -np.inf, values)
             place = int(values.argmax())
-            if values[place] > best[0]:
-                best = float(values[place]), float(angles[place])
-            low, high = angles[max(place - 1, 0)], angles[min(place + 1, _SAMPLES - 1)]
+            if values[place] > found[0]:
+                found = float(values[place]), float(angles[place])
+            low, high = angles[max(place - 1, 0)], angles[min(place + 1, samples - 1)]
+            samples = _REFINED
+        if found[0] > best[0] and not math.isclose(found[0], best[0], rel_tol=_EQUAL):
+            best = found
     return best

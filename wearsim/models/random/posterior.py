@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -45,6 +46,7 @@ class PosteriorOptions(Options):
         return self._levels
 
 
+@lru_cache(maxsize=16)  # a study reads its scenario many times; quantiles need a table
 def read_levels(file: InputFile, unit: str, over: float) -> TwoLevels:
     """Return the distribution that a file holds; raise a ScenarioError for mistakes."""
     columns = {"median": unit, "scatter": "1", "weight": "1"}

@@ -105,7 +105,9 @@ class TwoLevels(Distribution):
         below, above = np.zeros(_POINTS), np.zeros(_POINTS)
         for place, log in enumerate(logs):
             score = (log - self.m) / self.t
-            below[place], above[place] = self.weight @ ndtr(score), self.weight @ ndtr(-score)
+            tail, is_below = ndtr(-np.abs(score)), score < 0.0
+            below[place] = self.weight @ np.where(is_below, tail, 1.0 - tail)
+            above[place] = self.weight @ np.where(is_below, 1.0 - tail, tail)
         with np.errstate(divide="ignore"):
             scores = np.where(below < 0.5, ndtri(below), -ndtri(above))
         known = np.isfinite(scores)
