@@ -343,9 +343,10 @@ def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
     lines = []
     for label, result in zip(labels, results, strict=True):
         for share in result.settings.shares:
-            ends = result.b_error(share)
-            low, high = rounded_lives(*ends)
-            error = f"{low}..{high}" if all(map(math.isfinite, ends)) else NOTHING
+            ends, value = result.b_error(share), result.b(share).value
+            parts = [100.0 * (end / value - 1.0) if value > 0.0 else math.nan for end in ends]
+            low, high = (f"{part:+.2g}" if part else "0" for part in parts)
+            error = f"{low}..{high} %" if all(map(math.isfinite, parts)) else NOTHING
             lines.append([f"{label} B{share:g}".strip(), *life_cells(result, share), error])
     return Table(
         "", lines, [f"life [{results[0].unit}]", "estimate", "95 % interval", "numerical error"]
