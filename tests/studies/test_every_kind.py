@@ -150,3 +150,10 @@ def test_keys_of_the_json_of_every_kind_are_listed() -> None:
     found, listed = json_of_every_kind(), stored("json-keys")
     changed = sorted(set(found) ^ set(listed))
     assert found == listed, f"stable names have changed, see docs/compatibility.md: {changed}"
+
+
+@pytest.mark.parametrize("name", ["identification", "dissipation", "life", "run", "cam", "contact"])
+def test_rows_state_numbers_by_name(name: str) -> None:
+    answers = made(name, 0).view.answers()
+    assert answers
+    assert any(answer.value > 0.0 for answer in answers.values())

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 # One SI unit in each engineering unit.
 PER_SI = {
     **dict.fromkeys(("1", "turns", "m/s", "m/s^2", "m/s^3", "s", "N", "N m", "W", "J"), 1.0),
+    "1/Pa": 1.0,
     "%": 1e2,
     "um": 1e6,
     "mm": 1e3,

@@ -83,7 +83,10 @@ class DissipationView(StudyView[DissipationResult]):
         """Return mean, ranges and standard deviation of the power, the mean first."""
         power = self.result.summaries["power"]
         rows = [
-            Row("mean dissipated power", power.mean, "W", power.mean_interval.half_width),
+            Row.answer(
+                *("mean dissipated power", "mean_power", power.mean, "W"),
+                power.mean_interval.half_width,
+            ),
             Row("inputs at their means", self.result.mean_problem_power, "W"),
         ]
         if power.count == 1 or power.is_constant:
@@ -102,7 +105,7 @@ class DissipationView(StudyView[DissipationResult]):
             rows.append(Row(name, f"{values} W (95 % confidence: {confidence})"))
         extremes = f"{in_unit(power.least, 'W')} to {shown(power.greatest, 'W')}"
         rows.append(Row("dissipated power, all", extremes))
-        return [*rows, Row("standard deviation", power.std, "W")]
+        return [*rows, Row.answer("standard deviation", "std_power", power.std, "W")]
 
     def study(self) -> Rows:
         """Return rows on realisations, method and effort."""

@@ -99,8 +99,12 @@ class IdentificationView(StudyView[IdentificationResult]):
             Row("verdict", result.verdict_words),
             Row("scatter of ln K/H seen", NOTHING if seen is None else f"{seen:.3f}"),
             Row("scatter that inputs explain", f"{summary['scatter_from_inputs']:.3f}"),
-            Row("scatter t of ln K/H itself", scatter),
-            Row("Bayes factor of t = 0", factor),
+            Row("scatter t of ln K/H itself", scatter, answers={"scatter_of_k": (t["value"], "1")}),
+            Row(
+                "Bayes factor of t = 0",
+                factor,
+                answers={"bayes_factor": (summary["bayes_factor"], "1")},
+            ),
             Row("by the scale of the prior", sensitivity),
         ]
         if ratio is not None:
@@ -109,8 +113,16 @@ class IdentificationView(StudyView[IdentificationResult]):
         decide = summary["to_decide"]
         return [
             *rows,
-            Row("K/H, median of specimens", _wear_factor(middle, ("value", "low", "high"))),
-            Row("K/H, next specimen", _wear_factor(following, _NEXT)),
+            Row(
+                "K/H, median of specimens",
+                _wear_factor(middle, ("value", "low", "high")),
+                answers={"k_over_h_median": (middle["value"], "1/Pa")},
+            ),
+            Row(
+                "K/H, next specimen",
+                _wear_factor(following, _NEXT),
+                answers={"k_over_h_next": (following["median_per_Pa"], "1/Pa")},
+            ),
             Row(
                 "what would decide" if decide["needed"] else "power of the tests",
                 deciding(decide, len(result.raw.specimens)),
