@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from copy import copy
 from functools import lru_cache
 from typing import Self
 
@@ -63,19 +64,21 @@ def read_levels(file: InputFile, unit: str, over: float) -> TwoLevels:
     remarks = {match["name"].strip(): match["value"].strip() for match in matches if match}
     count = remarks.get(SPECIMENS, "0")
     contained = [key.strip() for key in remarks.get(CONTAINED, "").split(",") if key.strip()]
-    return TwoLevels(
+    levels = TwoLevels(
         np.log(read["median"] / over),
         read["scatter"],
         read["weight"],
         int(count) if count.isdecimal() else 0,
         contained,
     )
+    levels.quantile(np.array([0.5]))  # computes the table that copies share
+    return levels
 
 
 SPECS = (
     RandomInputSpec(
         name="posterior",
-        factory=lambda options: options.levels,
+        factory=lambda options: copy(options.levels),
         options=PosteriorOptions,
         summary="log-normal with an uncertain median and scatter, from identify --posterior",
         protocol=2,
