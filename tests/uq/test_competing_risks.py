@@ -97,7 +97,7 @@ def test_counted_lives_without_a_factor():
 
 
 def of_loads(scores, ratio=1.0, **law):
-    """Return risks of tests whose limit and damage depend on loads, given by normal scores."""
+    """Return risks of tests with log-normal loads, on which wear and damage depend."""
     load = np.exp(0.15 * scores)
     end, rate = 1.4e6 / load**1.5 / ratio, 4e-7 * load**3
     level = np.broadcast_to(4e5 / ratio, load.shape)[:, None]

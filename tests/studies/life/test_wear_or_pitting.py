@@ -109,7 +109,7 @@ def test_course_of_the_damage_is_that_of_a_run(lives):
 
 
 def test_lives_beyond_the_censoring_are_not_known():
-    """Tests whose damage course ends at the maximum do not show that the share is never reached."""
+    """A test that ends at the maximum number of passes does not show that a share never fails."""
     changes = {**CHANGES, "wear.cylinder.k_over_h": "1.1e-11 1/Pa"}
     found = wearsim.life(RIG("rig-life", changes), 3, most=2e5, workers=1)
     assert found.censored == 3
