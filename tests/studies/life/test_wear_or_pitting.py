@@ -40,6 +40,7 @@ def lives():
 
 
 def test_life_with_both_is_shorter_than_with_either(lives):
+    assert lives_of(lives, 0.1)["without_pitting"] == lives.b(10)
     found = {name: life.value for name, life in lives_of(lives, 0.1).items()}
     assert lives.is_exact
     assert found["both"] < min(found["without_wear"], found["without_pitting"])

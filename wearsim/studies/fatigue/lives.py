@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from wearsim.report.view import Row, Rows
 from wearsim.studies.fatigue.view import source_rows, sources
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.survival.competing import CompetingRisks, course_places
+from wearsim.uq.survival.competing import Cause, CompetingRisks, course_places
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
@@ -107,21 +106,24 @@ def lives_of(result: LifeValues, share: float) -> dict[str, Interval]:
     risks = competing_risks(result)
     if risks is None:
         return {}
-    never = replace(risks, damage=np.zeros_like(risks.damage))
-    lives = {
-        "both": risks.life(share, "both"),
-        "without_wear": risks.life(share, "without_wear"),
-        "without_pitting": never.life(share, "wear"),
-        "pitting": risks.life(share, "pitting"),
-        "wear": risks.life(share, "wear"),
-    }
     per_unit, all_worn = result.settings.per_unit, bool(risks.worn.all())
+
+    def of(cause: Cause) -> Interval:
+        life = risks.life(share, cause)
+        return Interval(life.value / per_unit, life.low / per_unit, life.high / per_unit)
+
+    lives = {
+        "both": of("both"),
+        "without_wear": of("without_wear"),
+        "without_pitting": result.distribution.quantile(share),
+        "pitting": of("pitting"),
+        "wear": of("wear"),
+    }
     for name, life in lives.items():
-        ends = (0.0, math.inf) if result.levels else (life.low / per_unit, life.high / per_unit)
-        lives[name] = Interval(life.value / per_unit, *ends)
+        known = Interval(life.value, 0.0, math.inf) if result.levels else life
         # the courses of tests that end without wear end there too
-        if not all_worn and name != "without_wear":
-            lives[name] = lives[name].censored(result.most)
+        beyond = not all_worn and name != "without_wear"
+        lives[name] = known.censored(result.most) if beyond else known
     return lives
 
 
