@@ -38,6 +38,7 @@ class StoredFile:
         self._file = file
         self._size: int = file.id.get_filesize()
         self._read = 0  # [bytes]
+        self._folders: dict[tuple[bytes, ...], Any] = {}
         self._checked: dict[str, h5py.Dataset] = {}  # arrays that have not been read yet
 
     @property
@@ -125,21 +126,26 @@ class StoredFile:
         ValueError
             As `dataset`; or if it is too long.
         """
-        from h5py import h5a  # noqa: PLC0415  (takes 0.2 s to import)
+        from h5py import h5a, h5s  # noqa: PLC0415  (takes 0.2 s to import)
 
         dataset = self.dataset(name)
         del self._checked[name]  # an open array keeps what was read in a buffer
         chosen = (slice(chosen, chosen + 1),) if isinstance(chosen, int) else chosen
+        shape, chunks = dataset.shape, dataset.chunks
         lengths = [
-            len(range(*part.indices(length)))
-            for part, length in zip(chosen, dataset.shape, strict=False)
+            len(range(*part.indices(length))) for part, length in zip(chosen, shape, strict=False)
         ]
-        numbers = math.prod([*lengths, *dataset.shape[len(lengths) :]])
+        numbers = math.prod([*lengths, *shape[len(lengths) :]])
         # a chunk is read as a whole
-        least = math.prod(dataset.chunks) if dataset.chunks and numbers else 0
-        self._claim(name, max(numbers, least) * dataset.dtype.itemsize, SPARE)
-        values = np.asarray(dataset[chosen])
-        if least and not h5a.exists(dataset.id, ZEROS.encode()):
+        least = math.prod(chunks) if chunks and numbers else 0
+        dtype = dataset.dtype
+        self._claim(name, max(numbers, least) * dtype.itemsize, SPARE)
+        if chosen:
+            values = np.asarray(dataset[chosen])
+        else:
+            values = np.empty(shape, dtype)
+            dataset.id.read(h5s.ALL, h5s.ALL, values)
+        if chunks and numbers and not h5a.exists(dataset.id, ZEROS.encode()):
             _check_zeros(name, dataset, chosen, values)
         return values
 
@@ -176,9 +182,12 @@ class StoredFile:
 
         *parents, last = name.encode("utf-8", ERRORS).split(b"/")
         folder = self._file.id  # of the root
+        if parents and (path := tuple(parents)) in self._folders:
+            return self._folders[path], last
         for parent in parents:
             _check_link(folder, parent, name)
             folder = h5py.h5g.open(folder, parent)
+        self._folders[tuple(parents)] = folder
         return folder, last
 
 
@@ -199,6 +208,8 @@ def _check_zeros(
     shape, lengths = dataset.shape, dataset.chunks
     region = [slice(*part.indices(length)) for part, length in zip(chosen, shape, strict=False)]
     region += [slice(0, length) for length in shape[len(region) :]]
+    if lengths == shape == values.shape and not only_zeros(values):
+        return  # a single chunk
     starts = [part.start for part in region]
     for block in dataset.iter_chunks(tuple(region)):
         part = tuple(slice(b.start - s, b.stop - s) for b, s in zip(block, starts, strict=True))

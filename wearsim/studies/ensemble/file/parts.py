@@ -220,7 +220,7 @@ def write_part(
 
     with hdf5_write.new_file(part, storage) as (file, _):
         hdf5_write.put_labels(
-            file, format=PART.format, format_version=PART.version, **{RUN_ID: run_id}
+            file.id, format=PART.format, format_version=PART.version, **{RUN_ID: run_id}
         )
         for name, array in rows.items():
             hdf5_write.put_array(file, name, array)
