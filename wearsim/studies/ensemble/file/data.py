@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -50,7 +50,7 @@ class StoredRows(Mapping[str, "Array"]):
 
     def __init__(
         self,
-        read: Callable[[Callable[[StoredFile], Array]], Array],
+        read: Callable[[Callable[[StoredFile], Arrays]], Arrays],
         schema: Schema,
         parts: list[Part],
         is_unchanged: Callable[[], bool] = lambda: False,
@@ -95,15 +95,30 @@ class StoredRows(Mapping[str, "Array"]):
         places = (slice(start, stop), *rest)
         key = (name, *((place.start, place.stop, place.step) for place in places))
         if key in self._kept and self._is_unchanged():
-            rows = self._kept[key].copy()
+            rows = {name: self._kept[key].copy()}
         else:
-            rows = self._read(lambda file: file.array(name, places))
-            if (start, stop) == (0, None) and rows.nbytes <= _SMALL:
-                self._kept[key] = rows.copy()
+            rows = self._of_file([name], places)
+            if (start, stop) == (0, None) and rows[name].nbytes <= _SMALL:
+                self._kept[key] = rows[name].copy()
         if is_row(self._schema.variables[name]):
-            for part in self.parts:
-                part.put_rows(rows, name, start, *rest)
+            self._put_parts(rows, start, *rest)
+        return rows[name]
+
+    def block(self, names: Iterable[str], start: int, stop: int | None) -> Arrays:
+        """Return the same rows of several variables, for which each file is opened once.
+
+        The parameters and errors are those of `rows`; `names` have one row per realisation.
+        """
+        rows = self._of_file(names, (slice(start, stop),))
+        self._put_parts(rows, start)
         return rows
+
+    def _of_file(self, names: Iterable[str], places: tuple[slice, ...]) -> Arrays:
+        return self._read(lambda file: {name: file.array(name, places) for name in names})
+
+    def _put_parts(self, rows: Arrays, start: int, *rest: slice) -> None:
+        for part in self.parts:
+            part.put_rows(rows, start, *rest)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -75,26 +75,31 @@ class Part:
     errors: dict[int, str]
     state: dict[str, Any]
 
-    def put_rows(self, rows: Array, name: str, start: int, *rest: slice) -> None:
-        """Replace those rows of a variable that are in this part.
+    def put_rows(self, rows: Arrays, start: int, *rest: slice) -> None:
+        """Replace those rows of variables that are in this part.
 
         Parameters
         ----------
-        rows : ndarray
-            Consecutive rows.
-        name : str
-            The variable.
+        rows : dict of str to ndarray
+            Consecutive rows of each variable, of the same realisations.
         start : int
             Number of the first realisation in `rows`.
         *rest : slice
-            The entries along further axes that `rows` has.
+            The entries along further axes that the rows have.
         """
-        first, last = np.searchsorted(self.numbers, (start, start + len(rows))).tolist()
+
+        def put(file: StoredFile) -> None:
+            for name, array in rows.items():
+                first, last = np.searchsorted(self.numbers, (start, start + len(array))).tolist()
+                if first < last:
+                    stored = file.array(name, (slice(first, last), *rest))
+                    # not all profiles are kept
+                    array[self.numbers[first : first + len(stored)] - start] = stored
+
+        most = max(map(len, rows.values()), default=0)
+        first, last = np.searchsorted(self.numbers, (start, start + most)).tolist()
         if first < last:
-            chosen = (slice(first, last), *rest)
-            stored = read_file(self.path, lambda file: file.array(name, chosen))
-            # not all profiles are kept
-            rows[self.numbers[first : first + len(stored)] - start] = stored
+            read_file(self.path, put)
 
 
 def part_numbers(path: Path) -> list[int]:
@@ -381,11 +386,11 @@ def _merged(path: Path, file: StoredFile) -> tuple[EnsembleData, StoredRows]:
 
 
 def _read_unchanged(
-    path: Path, identity: os.stat_result, take: Callable[[StoredFile], Array]
-) -> Array:
+    path: Path, identity: os.stat_result, take: Callable[[StoredFile], Arrays]
+) -> Arrays:
     """Apply `take` to a file after checking that it has not been replaced."""
 
-    def checked(file: StoredFile) -> Array:
+    def checked(file: StoredFile) -> Arrays:
         if not os.path.samestat(os.fstat(file.handle), identity):
             raise ResultsFileError(f"{path}: was replaced by another; open it again")
         return take(file)

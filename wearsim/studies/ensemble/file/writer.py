@@ -52,6 +52,7 @@ if TYPE_CHECKING:
 
 #: Size of a part file, beyond which rows go to the next one.
 PART_BYTES = 1 << 21
+_BLOCK_BYTES = 1 << 26  # size of the variables for which each part is opened once
 
 Completion: TypeAlias = Callable[[EnsembleData], tuple[Mapping[str, Any], Arrays]]
 
@@ -321,9 +322,12 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
 
         if (self._status[start:stop] == PENDING).all():
             return
-        for name, variable in self.data.schema.variables.items():
-            if is_row(variable):
-                rows = self._stored.rows(name, start, stop)
+        variables, reserved = self.data.schema.variables, self.data.reserved
+        names = [name for name, variable in variables.items() if is_row(variable)]
+        blocks = np.cumsum([reserved[name][start:stop].nbytes for name in names]) // _BLOCK_BYTES
+        for number in np.unique(blocks):
+            block = [name for name, of in zip(names, blocks, strict=True) if of == number]
+            for name, rows in self._stored.block(block, start, stop).items():
                 if len(rows) and (name != "error" or np.any(rows != b"")):
                     hdf5_write.put_rows(file[name], start, rows)
 
