@@ -110,7 +110,8 @@ def test_spring_may_lift_the_roller_next_to_a_pause(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["implicit", "stabilised", "compiled passes"])
 def test_run_stopped_before_or_in_a_pause_equals_an_unbroken_one(name: str, path: Path) -> None:
-    overrides = {**STEPPERS[name], "outputs.records": 12, "evolution.strip_error": False}
+    short = {"evolution.tolerance": 1e-3} if name == "stabilised" else {}
+    overrides = {**STEPPERS[name], **short, "outputs.records": 12, "evolution.strip_error": False}
     unbroken = studies.run(paused(**overrides))
     in_parts, parts = run_in_parts(paused(**overrides), path, *[1] * 12)
     assert parts > 5
