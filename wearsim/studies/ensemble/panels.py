@@ -241,14 +241,14 @@ def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
 
 def _damage(result: EnsembleResult) -> Panel:
     """Return the damage at the end: of a cam along its angle, of a cylinder across the track."""
-    of_cylinder = "cylinder", "cylinder_damage_profile"
-    body, name = ("cam", "damage_curve") if result.raw.cam else of_cylinder
+    of_cylinder = "cylinder", "cylinder_damage_profile", None
+    body, name, axis = ("cam", "damage_curve", ANGLE) if result.raw.cam else of_cylinder
     band, curves = result.band(name), result.kept_values(name)
     mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
     limits = worn_limits(band.y, curves.max(axis=0))
     return Panel(
         f"Damage of the {body} at the end",
-        ANGLE if body == "cam" else Axis(Y, "mm", limits=limits),
+        axis or Axis(Y, "mm", limits=limits),
         DAMAGE,
         _curves(band.y, curves, band.mean),
         f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests.",
