@@ -363,7 +363,13 @@ def with_error(values: FloatArray, error: float | None, unit: str) -> str:
         return by_roller(values, unit)
     # the last digit is that below the first digit of the error
     digits = 2 + math.floor(math.log10(size / error)) if size > 0.0 else 1
-    texts = [in_unit(float(value), unit, min(max(digits, 1), 4)) for value in np.ravel(values)]
+    digits = min(max(digits, 1), 4)
+    last = 10.0 ** (math.floor(math.log10(error)) - 1)  # a value below its error has no digit after
+    known = [
+        value if abs(value) > error else last * round(value / last)
+        for value in np.ravel(values).tolist()
+    ]
+    texts = [in_unit(value, unit, digits) for value in known]
     text = texts[0] if len(set(texts)) == 1 else " / ".join(texts)
     return f"{text} ± {shown(error, unit, 2)}"
 
