@@ -14,7 +14,14 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.relocation import located, relocated
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
-from wearsim.evolution.strips import free_strips, grown, identical_strips, next_grids, on_grid
+from wearsim.evolution.strips import (
+    fill_strips,
+    free_strips,
+    grown,
+    identical_strips,
+    next_grids,
+    on_grid,
+)
 from wearsim.types import FloatArray, IntArray
 
 T = TypeVar("T")
@@ -304,6 +311,9 @@ class Evolution:
             number = int(self.numbers[place])
             passes = float(self.state.passes[place])
             edge = getattr(error, "cause", "") == "edge" and free_strips(self.problem)[place]
+            # a step that is too long may find a contact anywhere
+            if edge and self.stepper.forced_step is None:
+                edge = fill_strips(self.state, place)
             before, times = self._widened.get(number, (passes, 0))
             times = times if before == passes else 0
             if edge and times < MOST_WIDENED:  # the step is tried again on wider strips

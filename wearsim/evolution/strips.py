@@ -28,6 +28,7 @@ WIDER = 1.5  # width after growing over that before
 JOINED = 3  # strips joined to one; an odd number keeps symmetric strips symmetric
 LEAST_LOADED = 24  # least number of strips of each contact after joining, as of a fresh contact
 MOST_OF_ALL = 1601  # number of strips above which they are joined even if a contact has fewer
+LEAST_FILLED = 0.25  # part of all strips that contacts take up where a step may need wider strips
 _ALIGNED = 1e-9  # part of a strip by which edges that coincide may differ
 
 
@@ -119,6 +120,13 @@ def next_grids(
         if grid is not None:
             grids[v] = grid
     return grids
+
+
+def fill_strips(state: WearState, place: int) -> bool:
+    """Return whether the contacts of a realisation take up more than a small part of the strips."""
+    loaded = (state.contacts.line_load > 0.0).reshape(-1, state.passes.size, state.contacts.y.size)
+    places = np.flatnonzero(loaded[:, place].any(axis=0))
+    return bool(places.size and np.ptp(places) >= LEAST_FILLED * state.contacts.y.size)
 
 
 def _next(grid: Grid, growth: Growth, loaded: int) -> Grid | None:
