@@ -44,7 +44,8 @@ OF_FORCE = {"power": 1.0, "peak_pressure": 0.5, "elastic_approach": 0.75}
 # relative peak at an edge without a layer; measured on grooves of crowns of 30 to 250 mm, on strips
 # of a sixth of the half-length
 ABRUPT_EDGE = 0.3
-_OF_EDGES = ("peak_pressure", "normal_force", "elastic_approach", "descent")
+#: observables from which peaks at edges are estimated, with the width
+OF_EDGES = ("peak_pressure", "normal_force", "elastic_approach", "descent")
 
 
 def relative_crown_radius(problem: WearProblem) -> FloatArray | None:
@@ -153,12 +154,9 @@ def observed_errors(
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors = {}
-    edge_peaks: FloatArray | float = 0.0
-    # a life observes the quantities of its limits only
-    if crown_radius is not None and observed.keys() >= set(_OF_EDGES):
-        edge_peaks = _edge_peaks(observed, crown_radius, spacing)
-    if math.isfinite(roller_width) and observed.keys() >= {"width", *_OF_EDGES}:
-        edge_peaks = np.maximum(edge_peaks, _end_peaks(observed, roller_width - 2.0 * spacing))
+    peaks: FloatArray | float = 0.0
+    if observed.keys() >= {"width", *OF_EDGES}:
+        peaks = edge_peaks(observed, crown_radius, spacing, roller_width)
     for name, values in observed.items():
         scale = 1.0 if name.endswith("angle") else np.abs(values)
         lowest = [
@@ -174,7 +172,7 @@ def observed_errors(
             relative = relative + exponents[name] * of_force
         errors[name] = relative.reshape(values.shape) * scale
         if name == "peak_pressure":
-            errors[name] = errors[name] + scale * edge_peaks
+            errors[name] = errors[name] + scale * peaks
     return errors
 
 
@@ -187,7 +185,30 @@ def _over_force(name: str, observed: Mapping[str, Any], points: int, exponent: f
     return values / np.where(force > 0.0, force, 1.0) ** exponent
 
 
-def _edge_peaks(
+def edge_peaks(
+    observed: Mapping[str, FloatArray],
+    crown_radius: FloatArray | None,
+    spacing: float,
+    roller_width: float,
+) -> FloatArray:
+    """Return relative peaks of the pressure that strips do not resolve, (points, rollers, ...).
+
+    Parameters
+    ----------
+    observed : mapping of str to ndarray, shape (points, ...)
+        `OF_EDGES` and "width".
+    crown_radius, spacing, roller_width
+        As of `observed_errors`.
+    """
+    peaks = np.zeros(observed["peak_pressure"].shape)
+    if crown_radius is not None:
+        peaks = _peaks_at_edges(observed, crown_radius, spacing)
+    if math.isfinite(roller_width):
+        peaks = np.maximum(peaks, _peaks_at_ends(observed, roller_width - 2.0 * spacing))
+    return peaks
+
+
+def _peaks_at_edges(
     observed: Mapping[str, FloatArray], crown_radius: FloatArray, spacing: float
 ) -> FloatArray:
     """Return relative peaks at the edges of grooves that strips do not resolve, (points, rollers).
@@ -197,7 +218,7 @@ def _edge_peaks(
     """
     shape = observed["peak_pressure"].shape
     pressure, force, elastic, worn = (
-        np.maximum(observed[name].reshape(len(observed[name]), -1), 0.0) for name in _OF_EDGES
+        np.maximum(observed[name].reshape(len(observed[name]), -1), 0.0) for name in OF_EDGES
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         layer = np.pi * crown_radius * elastic * pressure / force  # over the half-length
@@ -207,7 +228,7 @@ def _edge_peaks(
     return np.asarray(np.nan_to_num(peak).reshape(shape))
 
 
-def _end_peaks(observed: Mapping[str, FloatArray], width: float) -> FloatArray:
+def _peaks_at_ends(observed: Mapping[str, FloatArray], width: float) -> FloatArray:
     """Return relative peaks at ends of rollers that the groove has reached, as pressures."""
     worn, elastic = (np.maximum(observed[name], 0.0) for name in ("descent", "elastic_approach"))
     reached = observed["width"].reshape(len(worn), -1).max(axis=1) >= width

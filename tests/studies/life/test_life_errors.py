@@ -48,3 +48,14 @@ def test_bounds_of_a_life_include_that_on_fine_strips(limit: dict[str, str], fac
     assert ((high - low) / true < 0.2).all()
     # finer strips and steps have narrower bounds
     assert (fine.values("life_high") - fine.values("life_low") < high - low).all()
+
+
+def test_bounds_include_peaks_at_the_ends_of_rollers() -> None:
+    limit, width = {"peak_pressure": "600 MPa"}, {"roller__width": "8 mm"}
+    found = lives(limit, "1e-11 1/Pa", **width)
+    fine = lives(limit, "1e-11 1/Pa", **width, contact__strips=161)
+    assert (found.at_end("width") > 7.9e-3).all()  # the groove is as wide as the roller
+    true = fine.values("life")
+    assert (np.abs(found.values("life") / true - 1.0) > 0.05).all()
+    assert (found.values("life_low") <= true).all()
+    assert (true <= found.values("life_high")).all()

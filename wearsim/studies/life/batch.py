@@ -28,6 +28,7 @@ from wearsim.evolution.observables import (
     peak_pressures,
     volume_error_by_stations,
 )
+from wearsim.evolution.observed_errors import OF_EDGES, edge_peaks, relative_crown_radius
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.strip_errors import Course, add_observed, add_step
@@ -45,6 +46,8 @@ from wearsim.studies.ensemble.batch import (
 )
 from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.fatigue.lives import course_of
+from wearsim.studies.roller_ends import width_between_edges
+from wearsim.studies.run.recorder import history_row
 from wearsim.types import FloatArray, IntArray
 
 TOLERANCE = 1e-6  # relative error of a quantity at its limit
@@ -74,8 +77,8 @@ class _Test:
     """A test in progress.
 
     It has its quantities over their limits after each step, its result, the number of its limit,
-    the level of that quantity, over the limit, up to which it is followed, and the log-slope of
-    the limited quantity.
+    the level of that quantity, over the limit, up to which it is followed, the log-slope of the
+    limited quantity, and the relative peak of the pressure that the strips do not resolve.
     """
 
     history: list[tuple[float, FloatArray]] = field(default_factory=list)
@@ -83,6 +86,7 @@ class _Test:
     limit: int = -1
     level: float = 1.0
     slope: float = 1.0
+    edge_peak: float = 0.0
     damage: list[tuple[float, float]] = field(default_factory=list)
 
 
@@ -221,10 +225,13 @@ class _Group:
         error_of_depth = state.depth_error + by_stations["depth"]
         error_of_volume = state.volume_error + volume_error_by_stations(problem, state)
         depth_error = error_of_depth / np.maximum(depth(problem, state), 1e-300)
+        limits = [self.limits[number] for number in crossing.limit.tolist()]
+        if any(limit.quantity == "peak pressure" for limit in limits):
+            self._store_edge_peaks(advance.numbers[crossing.places].tolist(), problem, state)
         for place, number in enumerate(advance.numbers[crossing.places].tolist()):
             test, chosen = self.tests[number], np.array([place])
             test.limit = int(crossing.limit[place])
-            limit, passes = self.limits[test.limit], float(state.passes[place])
+            limit, passes = limits[place], float(state.passes[place])
             if limit.unit == "m" and limit.quantity != "width":
                 error = float(error_of_depth[place]) / limit.value
             elif limit.quantity == "volume":
@@ -256,13 +263,24 @@ class _Group:
         }
         return {name: np.nan_to_num(values) for name, values in errors.items()}
 
+    def _store_edge_peaks(self, numbers: list[int], problem: WearProblem, state: WearState) -> None:
+        """Store the peaks of the pressure of each test that its strips do not resolve."""
+        row = history_row(self.stepper, problem, state, self.threshold)
+        crown, width = relative_crown_radius(problem), width_between_edges(self.runs[0].scenario)
+        for place, number in enumerate(numbers):
+            observed = {name: row[name][None, ..., place] for name in ("width", *OF_EDGES)}
+            radius = None if crown is None else crown[:, place]
+            peaks = edge_peaks(observed, radius, problem.grid.spacing, width)
+            self.tests[number].edge_peak = float(peaks.max())
+
     def _widen(self, number: int, errors: Mapping[str, FloatArray]) -> None:
         """Add errors of quantities over their limits, by quantity, to the bounds of a life."""
         test = self.tests[number]
         if test.outcome is None or test.limit < 0:
             return
         scalars = test.outcome.scalars
-        error = float(errors[self.limits[test.limit].quantity])
+        quantity = self.limits[test.limit].quantity
+        error = float(errors[quantity]) + (test.edge_peak if quantity == "peak pressure" else 0.0)
         added = scalars["life"] * error / max(test.slope, FLAT)
         scalars["life_low"] = max(scalars["life_low"] - added, 0.0)
         scalars["life_high"] += added
