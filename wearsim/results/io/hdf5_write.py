@@ -255,7 +255,7 @@ def put_array(group: h5py.Group, name: str, array: Array) -> h5d.DatasetID:
 def _put_dataset(group: h5py.Group, name: str, like: Array) -> h5d.DatasetID:
     """Create a dataset with the shape and type of an array, of which nothing is written.
 
-    With h5py.Group.create_dataset, which serves more kinds of datasets, a file takes a fifth longer.
+    With h5py.Group.create_dataset, for all kinds of datasets, a file takes a fifth longer to write.
     """
     creation = h5p.create(h5p.DATASET_CREATE)
     creation.set_obj_track_times(False)
