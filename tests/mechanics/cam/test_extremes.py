@@ -68,6 +68,7 @@ def test_dwell_has_no_error_and_a_rise_with_one_station_is_unknown():
     panels = Panel(0, 0.0, 3.0, dwell=True), Panel(1, 3.0, 2.0 * math.pi, dwell=False)
     flat = greatest(Stations(panels, (1, 5)), np.ones(6))
     assert (flat.value, flat.error) == (1.0, 0.0)
+    assert flat.angle_error == math.pi  # no angle has a greater value than another
     unknown = greatest(Stations(panels, (1, 1)), np.array([-1.0, 3.0]))
     assert unknown.error == 3.0
     assert unknown.angle_error == pytest.approx(0.5 * (2.0 * math.pi - 3.0))

@@ -35,6 +35,8 @@ def test_concentric_cam_equals_the_cylinder_bit_for_bit():
         assert np.array_equal(getattr(rig, name), getattr(worn, name)), name
     assert worn.values("turns")[-1] == 450_000
     assert worn.values("lift_error")[-1] == 0.0
+    angles = [row.text for row in worn.view.rows() if row.label.startswith("angle")]
+    assert angles == ["not determined"] * 4
 
 
 def test_run_of_a_cam_stops_and_is_extended_by_turns(tmp_path):

@@ -35,7 +35,8 @@ class Extreme(NamedTuple):
     value, angle : ndarray
         The value and its angle [rad], the first one of equal values.
     error, angle_error : ndarray
-        Estimated errors of both by interpolation between the stations.
+        Estimated errors of both by interpolation between the stations; pi if the angle is not
+        determined, as where all values are equal.
     """
 
     value: FloatArray
@@ -81,6 +82,7 @@ def greatest(stations: Stations, values: FloatArray) -> Extreme:
     apart = np.abs(angle - at)
     apart = np.minimum(apart, math.tau - apart) + angle_error
     away = np.where(rival, apart, 0.0).max(axis=0)
+    away = np.where(np.ptp(values, axis=0) <= _EQUAL * np.abs(largest), math.pi, away)
     bound = np.where(twin | rival, peak + error, -np.inf).max(axis=0) - largest
     return Extreme(largest, at, bound, np.clip(away, angle_error_there, math.pi))
 

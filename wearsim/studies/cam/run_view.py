@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -42,8 +43,10 @@ class CamRunView(RunView):
         final = self.result.final
 
         def stated(name: str, unit: str, key: str) -> str:
-            error = final[f"{name}_error_{key}"]
-            return with_error(np.asarray(final[f"{name}_{key}"]), float(np.max(error)), unit)
+            error = float(np.max(final[f"{name}_error_{key}"]))
+            if unit == "deg" and error >= math.pi:
+                return "not determined"
+            return with_error(np.asarray(final[f"{name}_{key}"]), error, unit)
 
         arm, greatest = self._arm_length(), float(np.max(final["lift_error_m"]))
         of_arm = f", {shown(greatest / arm, 'deg', 3)} of the arm" if arm else ""
@@ -56,8 +59,11 @@ class CamRunView(RunView):
                 stated("lift_error", "um", "m") + of_arm,
                 answers={"lift_error": (greatest, "um")},
             ),
-            Row("least wear of the lift", f"at {stated('least_wear_angle', 'deg', 'rad')}"),
-            Row("greatest wear of the lift", f"at {stated('greatest_wear_angle', 'deg', 'rad')}"),
+            Row("angle of the least wear of the lift", stated("least_wear_angle", "deg", "rad")),
+            Row(
+                "angle of the greatest wear of the lift",
+                stated("greatest_wear_angle", "deg", "rad"),
+            ),
         ]
 
     def data(self) -> dict[str, Any]:
