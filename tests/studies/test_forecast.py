@@ -121,6 +121,18 @@ def test_rollers_of_different_yaw_on_a_cam_take_longer_than_equal_ones() -> None
     assert seconds[1] > 4.0 * seconds[0]  # 10 to 17 times when measured
 
 
+def test_inputs_drawn_at_every_pass_have_a_forecast_of_their_time_and_memory() -> None:
+    drawn = {"distribution": "lognormal", "median": 0.1, "factor": 1.2, "persistence": "per-pass"}
+    rig = wearsim.load_scenario(SCENARIOS / "rig-450min.toml")
+    one, many = (
+        dry_run(scenario)["forecast"]
+        for scenario in (rig, rig.changed({"friction.coefficient": drawn}))
+    )
+    steps = [item["wall_time_s"] - 1.0 for item in (one, many)]  # without the start
+    assert 5.0 < steps[1] / steps[0] < 100.0  # 64 contacts: 20 to 30 times when measured
+    assert many["memory_bytes"] < 2.0 * one["memory_bytes"]
+
+
 def test_spring_that_unloads_has_a_forecast_up_to_its_travel() -> None:
     stiff = {"load.kind": "spring", "load.stiffness": "20000 N/mm"}
     scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", stiff)

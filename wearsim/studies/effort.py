@@ -37,7 +37,9 @@ _STEPS_OF_SPRING = 1.5  # over the number at a constant load
 _STAGES, _SOLVES_OF_SPRING = 9.0, 4.0  # of a stabilised step, and solves of each with a spring
 _STAGE = 0.35  # time of such a solve, over a solve of a groove
 _STEP = 1.3  # time of an implicit step
-_COUPLED = 5e-11  # of the strips of all contacts of a station, cubed, where several are coupled [s]
+# time of a step with several contacts at a station: of each contact, over the square of its strips;
+# of a station of a cam with rollers that wear, over the cube of the strips of all rollers [s]
+_OF_CONTACT, _OF_ROLLERS = 6e-9, 3e-11
 _EXPLICIT = 0.7  # time of an explicit step
 _WHOLE = 0.95  # of the width of a roller
 _CERTAIN = 0.8  # of the passes: a later failure may be an error of the forecast
@@ -295,7 +297,7 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     groove, solve = forecast.seconds_of_groove, forecast.seconds
     stages = _STAGES if stepper == "stabilised" else 1.0
     stations, contacts, _ = problem.shape
-    strips = problem.grid.strips
+    strips, rollers = problem.grid.strips, problem.rollers
     if stepper == "stabilised":
         stages *= _SOLVES_OF_SPRING if problem.has_spring else 1.0
         per_step = stages * max(_STAGE * groove, solve)
@@ -308,11 +310,13 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
         per_step = _STEP * groove
         per_step += (_OF_REFERENCE if scenario.contact.spec.reference else 2.0) * solve
         if contacts > 1:
-            per_step += _COUPLED * stations * float(contacts * strips) ** 3
+            per_step += _OF_CONTACT * stations * contacts * strips**2
+        if stations > 1 and rollers > 1 and wear["roller_depth"] > 0.0:
+            per_step += _OF_ROLLERS * stations * float(rollers * strips) ** 3
     row = _ROW + 25.0 * stations * contacts * (stations > 1)
     rows = row * (records if stepper == "per-pass" else steps)
     size = _FILE + records * record + 8.0 * (_CHECKPOINT * stations * contacts * strips + rows)
-    system = (contacts * strips) ** 2 if stepper == "implicit" else 0.0
+    system = contacts * rollers * strips**2 if stepper == "implicit" else 0.0
     return Effort(
         steps=math.ceil(steps),
         solves=math.ceil(steps * stages) * problem.contacts_each,
