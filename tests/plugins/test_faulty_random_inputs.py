@@ -122,6 +122,11 @@ QUANTILES: dict[str, Fault] = {
         SolverError,
         "values of quantile that are not finite",
     ),
+    "falling": (
+        {"quantile": lambda s, p: 320.0 - 40.0 * np.asarray(p)},
+        PluginError,
+        r"an array .* as quantiles \[320. 280.\], expected values that do not fall",
+    ),
     "no mean": ({"mean": None}, PluginError, "None as mean, expected a number"),
     "negative std": ({"std": -1.0}, SolverError, "negative values of std, down to -1"),
     "one end": ({"support": 280.0}, PluginError, "280.0 as support, expected a tuple of two"),

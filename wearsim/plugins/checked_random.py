@@ -57,7 +57,11 @@ class CheckedDistribution(_CheckedRandomInput, Distribution):
     def support(self) -> tuple[float, float]:
         """Minimum and maximum; may be infinite."""
         if not self._implements("support"):
-            return super().support
+            low, high = super().support
+            if low > high:
+                values = np.array([low, high])
+                raise self._kind_error(f"quantiles {values}", values, "values that do not fall")
+            return low, high
         support: Any = self._plugin.support
         pair = isinstance(support, tuple | list) and len(support) == 2
         if not (pair and all(map(is_numeric, support)) and support[0] <= support[1]):

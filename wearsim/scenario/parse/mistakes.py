@@ -170,6 +170,12 @@ def validate_options(
         Returns the distribution of a table within the options of another distribution, in their
         order, or None after adding its mistakes.
     """
+    shared = set(model.model_fields).intersection(other_keys.model_fields if other_keys else ())
+    for key in sorted(shared):
+        what = "is a key of wearsim and an option of the plugin, which never gets a value"
+        mistakes.add(table, key, what, None, "another name of the option, in the plugin")
+    if shared:
+        return None
     # as JSON: its strict mode rejects "3" for 3 but accepts a list for a tuple
     context = {
         "read": mistakes.read,

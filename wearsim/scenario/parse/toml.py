@@ -23,6 +23,7 @@ from wearsim.plugins import (
     Options,
     RandomInputSpec,
     TableSpec,
+    registry,
 )
 from wearsim.profiles import ROW_CHOICES, split_name
 from wearsim.quantities import DECIMAL_COMMA
@@ -401,7 +402,17 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
 def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
     """Return the keys above the tables; add a mistake for each unknown key and table."""
     keys = {key: data[key] for key in TopTable.model_fields if key in data}
-    known = {*TABLES, *keys, *(spec.name for spec in installed(TableSpec))}
+    owned = [spec.name for spec in installed(TableSpec)]
+    for name in {*TABLES, *TopTable.model_fields}.intersection(owned):
+        item = registry().registered(TableSpec, name)
+        mistakes.add(
+            name,
+            "",
+            f"is a table of wearsim, and one of the plugin {item.distribution} {item.version}",
+            None,
+            "another name of the plugin's table; until then, uninstall the plugin",
+        )
+    known = {*TABLES, *keys, *owned}
     for key in [key for key in data if key not in known]:
         if key in FIRST_PARTY and isinstance(data[key], dict):
             mistakes.notes.append(
