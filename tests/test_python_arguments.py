@@ -156,3 +156,44 @@ def test_last_progress_has_the_final_estimate(
     tests = wearsim.ensemble(random, 4, "b.h5", scheduler="serial", on_progress=seen.append)
     assert seen[-1].done == 4
     assert seen[-1].estimate == tests.estimate("depth").mean
+
+
+def test_argument_that_is_no_path_or_list_is_named(scenario: Scenario) -> None:
+    identify: Any = wearsim.identify
+    report: Any = wearsim.save_report
+    load: Any = wearsim.load_scenario
+    with pytest.raises(TypeError, match="a results file must be named by its path, got a int"):
+        wearsim.run(scenario, output=3)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="a results file must be named by its path, got a int"):
+        identify(scenario, "groove.csv", 3)
+    with pytest.raises(TypeError, match=r"tests must be files of profiles, .* got a int"):
+        identify(scenario, 3)
+    with pytest.raises(
+        TypeError, match=r"must be a list of results, such as \[result\], got a Res"
+    ):
+        report(wearsim.run(scenario), "page.html")
+    with pytest.raises(TypeError, match="a dotted key of overrides must be a text, got None"):
+        load("rig.toml", {None: 1})
+
+
+@pytest.mark.parametrize("parts", [False, True])
+def test_ensemble_is_read_after_a_change_of_the_folder(
+    scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: bool
+) -> None:
+    random = scenario.changed(
+        {"friction.coefficient": {"distribution": "uniform", "low": 0.08, "high": 0.12}}
+    )
+    stops = iter([False, True]) if parts else iter([])
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
+    try:
+        wearsim.ensemble(
+            random, 3, "b.h5", scheduler="serial", stop_requested=lambda: next(stops, parts)
+        )
+    except wearsim.Interrupted:
+        assert parts
+    tests = wearsim.open_results("b.h5")
+    assert tests.finished is not parts
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "other")
+    assert np.isfinite(tests.values("depth")[: tests.count]).all()
+    assert tests.count > 0

@@ -158,6 +158,9 @@ def save_report(
     """
     from wearsim.report.page.page import save_page  # noqa: PLC0415  (only of pages)
 
+    if not isinstance(results, Sequence) or isinstance(results, str):
+        kind = type(results).__name__
+        raise TypeError(f"results must be a list of results, such as [result], got a {kind}")
     save_page(views_of(results), Path(path), measured)
 
 

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from wearsim.errors import Mistake, PluginError, ScenarioError
-from wearsim.plugins import Spec, registry
+from wearsim.plugins import Spec, TableSpec, registry
 from wearsim.quantities import DECIMAL_COMMA, NUMBER, Quantity
 from wearsim.scenario.parse.fields import RandomInput, choices, field_at, form, model_at
 from wearsim.units import QuantityError, as_written
@@ -128,6 +128,19 @@ class Mistakes:
 def installed(kind: type[S]) -> list[S]:
     """Return the plugins of a kind, in the order of their names."""
     return [registry().get(kind, name) for name in registry().names(kind)]
+
+
+def refuse_tables(mistakes: Mistakes, names: Collection[str]) -> None:
+    """Add a mistake for each table that a plugin owns and that has the name of one of wearsim."""
+    for name in sorted(names):
+        item = registry().registered(TableSpec, name)
+        mistakes.add(
+            name,
+            "",
+            f"is a table of wearsim, and one of the plugin {item.distribution} {item.version}",
+            None,
+            "another name of the plugin's table; until then, uninstall the plugin",
+        )
 
 
 def nearest(name: str, known: Collection[str]) -> str:
