@@ -306,3 +306,36 @@ def test_internal_error_in_a_plugin_names_it_with_file_and_line(install, tmp_pat
     place = f"depth_per_pass, line {line} of {tmp_path / 'wearsim_broken.py'}"
     assert "internal error: KeyError: 'k'" in shown.stderr
     assert f"a defect of plugin 'wearsim_broken' of broken-dist 9, {place}; " in shown.stderr
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"result": "made_up.Result"}, "result 'made_up.Result', expected a reference 'package.mo"),
+        ({"view": ""}, "view '', expected a reference"),
+        ({"format": "made-up"}, "data '', expected a reference"),
+    ],
+)
+def test_study_kind_without_a_reference_is_an_error(fields, text):
+    given = {"result": "made_up:Result", "view": "made_up:View", **fields}
+    made = [StudyKind("new", summary="new", protocol=2, **given)]
+    with pytest.raises(PluginError, match=f"the StudyKind of 'new' has the {text}"):
+        Registry([Point(module(wearsim_study_kinds=lambda: made))])
+
+
+def test_study_kind_with_the_format_of_another_is_an_error(install):
+    given = {"result": "made_up:Result", "view": "made_up:View", "data": "made_up:Data"}
+    made = [StudyKind("new", summary="new", protocol=2, format="wearsim-run", **given)]
+    install(Point(module(wearsim_study_kinds=lambda: made)))
+    with pytest.raises(
+        PluginError, match=r"have the format 'wearsim-run': '(run|new)' of .*made-up"
+    ):
+        registry()
+
+
+@pytest.mark.parametrize("reference", ["made_up_module:View", "wearsim.report.view:Vue"])
+def test_reference_that_names_nothing_is_an_error(reference):
+    kind = StudyKind("new", summary="new", protocol=2, result="wearsim:Result", view=reference)
+    text = f"study kind 'new': its view, '{reference}', cannot be imported"
+    with pytest.raises(PluginError, match=text):
+        kind.load("view")

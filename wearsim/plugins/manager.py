@@ -153,6 +153,7 @@ class Registry:
                 f"{item.distribution} {item.version}: the {kind.__name__} of {item.spec.name!r}"
                 f" has the {fault}"
             )
+        self._refuse_format(item)
         other = self._specs[kind].setdefault(item.spec.name, item)
         if other is not item:
             raise PluginError(
@@ -160,6 +161,19 @@ class Registry:
                 f" {other.distribution} {other.version} and {item.distribution} {item.version};"
                 " uninstall one of them"
             )
+
+    def _refuse_format(self, item: Registered) -> None:
+        """Raise a PluginError if another kind of study has the same files, and nothing marks it."""
+        format_, marked_by = getattr(item.spec, "format", ""), getattr(item.spec, "marked_by", "")
+        for other in self._specs[StudyKind].values() if format_ else ():
+            kind = other.spec
+            same = isinstance(kind, StudyKind) and (kind.format, kind.marked_by)
+            if same == (format_, marked_by) and kind.name != item.spec.name:
+                raise PluginError(
+                    f"two study kinds have the format '{format_}': '{kind.name}' of"
+                    f" {other.distribution} {other.version} and '{item.spec.name}' of"
+                    f" {item.distribution} {item.version}; change it in the plugin"
+                )
 
     def all(self) -> list[Registered]:
         """Return all registered specs, sorted by kind and then by name."""
@@ -220,6 +234,13 @@ def _fault(kind: type[Spec], spec: Any) -> str | None:
         return f"protocol {spec.protocol!r}, expected the number {PROTOCOL}"
     if not callable(getattr(spec, "factory", print)):
         return f"factory {spec.factory!r}, expected a class or a function"
+    if isinstance(spec, StudyKind):
+        needed = ("result", "view", *(("read" if spec.read else "data",) if spec.format else ()))
+        for name in needed:
+            reference = getattr(spec, name)
+            module, colon, item = str(reference).partition(":")
+            if not (module and colon and item):
+                return f"{name} {reference!r}, expected a reference 'package.module:name'"
     field, words = _WORDS.get(kind, ("", ()))
     if field and getattr(spec, field) not in words:
         return f"{field} {getattr(spec, field)!r}, expected one of {', '.join(words)}"
