@@ -38,6 +38,8 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
         not writable.
     """
     path = as_path(path)
+    if force not in {True, False}:  # "no" would replace a file
+        raise TypeError(f"force must be True or False, got {force!r}")
     refuse_inputs(path, inputs)
     target, suffix = path.resolve(), path.suffix
     folder = target.parent
