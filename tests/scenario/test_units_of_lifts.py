@@ -161,3 +161,13 @@ def test_headers_without_units_are_expected_in_usual_ones(tmp_path):
         measured(tmp_path, "angle, lift", lifts())
     for column in ("angle [deg]", "lift [mm]"):
         assert f"has no unit, got {column.split()[0]}, expected {column}" in str(caught.value)
+
+
+def test_rise_in_another_unit_is_named():
+    text = CYCLOIDAL.replace('rise = "8 mm"', 'rise = "8 m"').replace('"-8 mm"', '"-8 m"')
+    with pytest.raises(ScenarioError) as caught:
+        read(text)
+    assert "[cam] motion: lifts the follower far beyond the base circle: the unit of a rise" in str(
+        caught.value
+    )
+    assert f"up to 8000 mm with base_radius = {1e3 * BASE:g} mm" in str(caught.value)

@@ -29,7 +29,7 @@ _FEWEST = 48  # points in whose differences noise can be seen
 _NO_NOISE = 1e-12  # of the range of a table: rounding of doubles
 #: lifts over the radius of the base circle beyond which their unit is probably wrong: those of cams
 #: are 0.02 to 5, and a unit is wrong by a factor of 1000
-_LARGE, _SMALL = 20.0, 2e-3
+LARGE, _SMALL = 20.0, 2e-3
 CHOICE = 'choose other names with columns = ["ANGLE", "{}"] in [cam]'
 
 
@@ -159,10 +159,10 @@ def refuse_unit(
         Least of it over the radius of the base circle; 0 for lifts, which may be small.
     """
     ratio = greatest / base_radius
-    if not least <= ratio <= _LARGE:
-        size = "large" if ratio > _LARGE else "small"
+    if not least <= ratio <= LARGE:
+        size = "large" if ratio > LARGE else "small"
         what = f"column '{column}' is too {size} for the base circle: its unit is probably wrong"
-        remedy = f"{other_unit(unit, smaller=ratio > _LARGE)} as unit, not {unit}"
+        remedy = f"{other_unit(unit, smaller=ratio > LARGE)} as unit, not {unit}"
         raise mistake_in(file, what, beside(greatest, base_radius), remedy)
 
 
