@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from wearsim.csv_cells import decode
-from wearsim.csv_tables import read_columns
+from wearsim.csv_tables import MAX_ALIKE, MAX_MISTAKES, read_columns
 from wearsim.errors import ScenarioError
 from wearsim.types import FloatArray
 
@@ -158,10 +158,18 @@ def test_every_mistake_is_reported_with_its_line(text: str, mistakes: list[str])
     assert _mistakes(text) == mistakes
 
 
-def test_number_of_mistakes_is_limited() -> None:
-    mistakes = _mistakes("time [s],load [N]\n" + "".join(f"{k},x\n" for k in range(50)))
-    assert len(mistakes) == 21
-    assert mistakes[-1] == "and 30 more"
+@pytest.mark.parametrize(("cells", "shown"), [("x", MAX_ALIKE), ("{}", MAX_MISTAKES)])
+def test_number_of_mistakes_is_limited(cells: str, shown: int) -> None:
+    rows = [f"{k},{cells.format('x' if k % 2 else '')}\n" for k in range(50)]
+    mistakes = _mistakes("time [s],load [N]\n" + "".join(rows))
+    assert len(mistakes) == shown + 1
+    assert mistakes[-1] == f"and {50 - shown} more"
+
+
+@pytest.mark.parametrize("blank", ["", "  ", ",", " , ", ";;"])
+def test_rows_of_separators_only_are_blank(blank: str) -> None:
+    text = f"time [s],load [N]\n0,1\n{blank}\n1,2\n{blank}\n"
+    assert _read(text)["load"].tolist() == [1.0, 2.0]
 
 
 @given(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from rig_text import short_rig
 
 import wearsim
 from tests.fixed_batches import batches_of
-from wearsim import Profile, Scenario, ScenarioError
+from wearsim import Profile, Scenario, ScenarioError, UnknownNameError
 from wearsim.studies.ensemble import driver
 
 Y = np.linspace(-8e-3, 8e-3, 161)
@@ -156,3 +157,68 @@ def test_last_progress_has_the_final_estimate(
     tests = wearsim.ensemble(random, 4, "b.h5", scheduler="serial", on_progress=seen.append)
     assert seen[-1].done == 4
     assert seen[-1].estimate == tests.estimate("depth").mean
+
+
+def test_argument_that_is_no_path_or_list_is_named(scenario: Scenario) -> None:
+    identify: Any = wearsim.identify
+    report: Any = wearsim.save_report
+    load: Any = wearsim.load_scenario
+    friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
+    random = scenario.changed({"friction.coefficient": friction})
+    with pytest.raises(TypeError, match="a results file must be named by its path, got a int"):
+        wearsim.run(scenario, output=3)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="a results file must be named by its path, got a int"):
+        identify(scenario, "groove.csv", 3)
+    with pytest.raises(TypeError, match=r"tests must be files of profiles, .* got a int"):
+        identify(scenario, 3)
+    with pytest.raises(
+        TypeError, match=r"must be a list of results, such as \[result\], got a Res"
+    ):
+        report(wearsim.run(scenario), "page.html")
+    with pytest.raises(TypeError, match="only results can be on a page, got 3"):
+        report([3], "page.html")
+    with pytest.raises(ValueError, match="no result is given for the page"):
+        report([], "page.html")
+    with pytest.raises(UnknownNameError, match="'3' is not a variable of a run; known: y, "):
+        wearsim.run(scenario).values(3)  # type: ignore[arg-type]
+    Path("kept.h5").write_text("kept")
+    with pytest.raises(TypeError, match="force must be True or False, got 'no'"):
+        wearsim.run(scenario, "kept.h5", force="no")  # type: ignore[arg-type]
+    assert Path("kept.h5").read_text() == "kept"
+    with pytest.raises(TypeError, match=r'must be a text such as "depth.mean 1%", got 0\.01'):
+        wearsim.ensemble(random, 2, "e.h5", precision=0.01)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="a dotted key of overrides must be a text, got None"):
+        load("rig.toml", {None: 1})
+
+
+@pytest.mark.parametrize("parts", [False, True])
+def test_ensemble_is_read_after_a_change_of_the_folder(
+    scenario: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: bool
+) -> None:
+    random = scenario.changed(
+        {"friction.coefficient": {"distribution": "uniform", "low": 0.08, "high": 0.12}}
+    )
+    stops = iter([False, True]) if parts else iter([])
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
+    try:
+        wearsim.ensemble(
+            random, 3, "b.h5", scheduler="serial", stop_requested=lambda: next(stops, parts)
+        )
+    except wearsim.Interrupted:
+        assert parts
+    tests = wearsim.open_results("b.h5")
+    assert tests.finished is not parts
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "other")
+    assert np.isfinite(tests.values("depth")[: tests.count]).all()
+    assert tests.count > 0
+
+
+def test_help_of_every_function_names_its_parameters_and_what_it_returns() -> None:
+    for name in wearsim.__all__:
+        function = getattr(wearsim, name)
+        if not inspect.isfunction(function):
+            continue
+        text, signature = inspect.getdoc(function) or "", inspect.signature(function)
+        assert [key for key in signature.parameters if key not in text] == [], name
+        assert signature.return_annotation in {None, "None"} or "Returns\n" in text, name

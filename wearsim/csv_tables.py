@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 
 MAX_MISTAKES = 20  # reported of one file
+MAX_ALIKE = 3  # of them, if the same mistake is in more than MAX_MISTAKES lines
+_USUAL_UNITS = {"m": "mm", "rad": "deg"}  # of the columns that users write, by the SI unit
 HEAD_LINES = 100  # the header is one of these
 _HEADER = re.compile(
     r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)"
@@ -60,7 +62,9 @@ class _Column(NamedTuple):
 
 
 def refuse_mistakes(file: str, mistakes: Sequence[Mistake]) -> None:
-    """Raise the mistakes of a table, if there are any, and of many the first `MAX_MISTAKES`.
+    """Raise the mistakes of a table, if there are any; of many the first ones and their number.
+
+    These are `MAX_MISTAKES`, but `MAX_ALIKE` if all are the same mistake in different lines.
 
     Raises
     ------
@@ -69,9 +73,11 @@ def refuse_mistakes(file: str, mistakes: Sequence[Mistake]) -> None:
     """
     if not mistakes:
         return
-    more = len(mistakes) - MAX_MISTAKES
+    alike = len({mistake.what for mistake in mistakes}) == 1
+    most = MAX_ALIKE if alike and len(mistakes) > MAX_MISTAKES else MAX_MISTAKES
+    more = len(mistakes) - most
     rest = [Mistake("", "", f"and {more} more")] if more > 0 else []
-    raise ScenarioError(file, [*mistakes[:MAX_MISTAKES], *rest])
+    raise ScenarioError(file, [*mistakes[:most], *rest])
 
 
 def read_columns(
@@ -254,12 +260,12 @@ def _mistake(line: int, what: str, got: str | None = None, expected: str | None 
 
 
 def _head(name: str, unit: str) -> str:
-    return name if unit == "1" else f"{name} [{unit}]"
+    return name if unit == "1" else f"{name} [{_USUAL_UNITS.get(unit, unit)}]"
 
 
 def _has_cells(line: str) -> bool:
-    """Return whether a line is neither blank nor a comment."""
-    return bool(line.strip()) and not line.lstrip().startswith("#")
+    """Return whether a line is no comment, and neither blank nor separators only."""
+    return bool(line.strip(" \t,;")) and not line.lstrip().startswith("#")
 
 
 def _cells(line: str, place: int, separator: str) -> _Row:

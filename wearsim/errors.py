@@ -240,7 +240,7 @@ def unknown_name(name: str, kind: str, known: Iterable[str]) -> UnknownNameError
         All names of that kind.
     """
     names = list(known)
-    similar = difflib.get_close_matches(name, names, n=1)
+    similar = difflib.get_close_matches(str(name), names, n=1)
     hint = f" (did you mean '{similar[0]}'?)" if similar else ""
     return UnknownNameError(f"'{name}' is not {kind}{hint}; known: {', '.join(names)}")
 

@@ -37,6 +37,14 @@ def test_check_prints_all_mistakes(command: Command, tmp_path: Path) -> None:
     assert any("normal_forse: unknown key (did you mean 'normal_force'?)" in line for line in lines)
 
 
+@pytest.mark.parametrize("verb", ["check", "contact", "run", "show", "cam"])
+def test_json_of_an_error_is_no_output(command: Command, tmp_path: Path, verb: str) -> None:
+    result = command(verb, tmp_path / "missing.toml", "--json")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert "missing.toml" in result.stderr
+
+
 def test_check_prints_the_notes(command: Command, scenario: Path) -> None:
     stiff = 'roller.material={youngs_modulus = "800 GPa", poisson_ratio = 0.2}'
     result = command("check", scenario, "--set", stiff)

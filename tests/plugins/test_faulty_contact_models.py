@@ -201,3 +201,19 @@ def test_models_of_wearsim_are_not_wrapped():
         grid = Grid.spanning(-4e-3, 4e-3, 81)
         built = scenario.contact.build(grid, scenario.materials)
         assert type(built).__module__.startswith("wearsim.models."), name
+
+
+def test_solve_contact_with_other_arguments_is_named(install):
+    class Short(SingleContactModel):
+        def __init__(self, *arguments: Any) -> None:
+            pass
+
+        def solve_contact(self, gap: Any, point: Any) -> Any:  # type: ignore[override]
+            raise NotImplementedError
+
+    spec = ContactModelSpec("faulty", Options, "a model", factory=Short, protocol=2)
+    install(Point(module(wearsim_contact_models=lambda: [spec])))
+    wanted = r"gap, longitudinal_curvature, point, wear_compliance, warm\)"
+    text = rf"solve_contact of contact model 'faulty' takes \(gap, point\), expected \({wanted}"
+    with pytest.raises(PluginError, match=text):
+        wearsim.run(rig(contact='model = "faulty"'))

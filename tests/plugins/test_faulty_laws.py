@@ -20,6 +20,8 @@ from wearsim.plugins import (
     MotionLaw,
     MotionLawSpec,
     Options,
+    WearLaw,
+    WearLawSpec,
 )
 from wearsim.scenario.examples import shipped_scenario
 
@@ -144,3 +146,32 @@ def test_fault_of_an_axial_profile_is_named(install, faults, kind, text):
     install(Point(module(wearsim_axial_profiles=lambda: [spec])))
     with pytest.raises(kind, match=message("axial profile", text)):
         wearsim.run(rig({"roller.axial_profile": {"form": "faulty"}}))
+
+
+class Abstract(WearLaw):
+    """A law that lacks its method."""
+
+    def __init__(self, options: Options) -> None:
+        pass
+
+
+def one_argument(self: Any, solution: Any) -> Any:
+    return solution.dissipation
+
+
+SIGNATURES = {
+    "method": (
+        type("Law", (Abstract,), {"depth_per_pass": one_argument}),
+        r"faulty' takes \(solution\), expected \(body, solution, rolling_speed\)",
+    ),
+    "abstract": (Abstract, r"factory of wear law 'faulty' cannot be called: .*depth_per_pass"),
+    "factory": (lambda: None, r"factory of wear law 'faulty' cannot be called: .*1 was given"),
+}
+
+
+@pytest.mark.parametrize(("factory", "text"), SIGNATURES.values(), ids=SIGNATURES)
+def test_method_or_factory_with_other_arguments_is_named(install, factory, text):
+    spec = WearLawSpec("faulty", Options, "a law", factory=factory, protocol=2)
+    install(Point(module(wearsim_wear_laws=lambda: [spec])))
+    with pytest.raises(PluginError, match=text):
+        wearsim.run(rig(wear='law = "faulty"'))

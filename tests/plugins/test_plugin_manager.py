@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
+from importlib import import_module
+from types import ModuleType
+from typing import Any, get_args
 
 import pytest
-from plugin_examples import HOOKS, TABLES, Point, load_named, module, rig
+from plugin_examples import HOOKS, RIG, TABLES, Point, load_named, module, rig
+from pydantic import create_model
 from typer.testing import CliRunner
 
 from wearsim.cli.app import app
@@ -19,12 +24,30 @@ from wearsim.plugins import (
     MotionLawSpec,
     Options,
     RandomInputSpec,
+    Spec,
     StudyKind,
     TableSpec,
     WearLawSpec,
     registry,
 )
 from wearsim.plugins.manager import Registry
+
+BROKEN = """
+from wearsim.plugins import Options, WearLaw, WearLawSpec, hookimpl
+
+
+class Broken(WearLaw):
+    def __init__(self, options):
+        pass
+
+    def depth_per_pass(self, body, solution, rolling_speed):
+        raise KeyError("k")
+
+
+@hookimpl
+def wearsim_wear_laws():
+    yield WearLawSpec("broken", Options, "a law", factory=Broken, protocol=2)
+"""
 
 
 def failing():
@@ -196,3 +219,123 @@ def test_refused_plugins_are_listed_by_the_command(install):
     refused = [entry["name"] for entry in entries if entry["refused"]]
     assert refused == ["old"]
     assert {entry["protocol"] for entry in entries if not entry["refused"]} == {2}
+
+
+FAULTS: dict[str, tuple[str, type[Spec], dict[str, Any], str]] = {
+    "role": ("wearsim_random_inputs", RandomInputSpec, {"role": "scalr"}, "role 'scalr', expected"),
+    "term": ("wearsim_loads", LoadSpec, {"role": "scalar"}, "role 'scalar', expected one of base"),
+    "rise": ("wearsim_motion_laws", MotionLawSpec, {"rise": True}, "rise True, expected one of re"),
+    "options": ("wearsim_loads", LoadSpec, {"options": dict}, "options <class 'dict'>, expected a"),
+    "name": ("wearsim_loads", LoadSpec, {"name": None}, "name None, expected a text"),
+    "protocol": ("wearsim_loads", LoadSpec, {"protocol": "2"}, "protocol '2', expected the number"),
+    "factory": ("wearsim_loads", LoadSpec, {"factory": 3}, "factory 3, expected a class or a func"),
+}
+
+
+@pytest.mark.parametrize(("hook", "kind", "field", "text"), FAULTS.values(), ids=FAULTS)
+def test_spec_with_a_field_that_cannot_be_used_is_an_error(hook, kind, field, text):
+    fields = {"name": "ramp", "options": Options, "summary": "a ramp", "factory": list}
+    made = [kind(**{**fields, "protocol": 2, **field})]
+    with pytest.raises(PluginError, match=rf"wearsim-made-up 0\.1: the {kind.__name__} .*{text}"):
+        Registry([Point(module(**{hook: lambda: made}))])
+
+
+@pytest.mark.parametrize("kind", [LoadSpec, MotionLawSpec, RandomInputSpec])
+def test_every_word_of_a_spec_is_accepted(kind):
+    hook = {LoadSpec: "wearsim_loads", MotionLawSpec: "wearsim_motion_laws"}.get(
+        kind, "wearsim_random_inputs"
+    )
+    field = "rise" if kind is MotionLawSpec else "role"
+    words = get_args(inspect.get_annotations(kind, eval_str=True)[field])
+    made = [
+        kind(word, Options, "a summary", factory=list, protocol=2, **{field: word})
+        for word in words
+    ]
+    assert Registry([Point(module(**{hook: lambda: made}))]).names(kind) == sorted(words)
+
+
+def test_function_without_the_marker_of_hooks_is_an_error():
+    made = ModuleType("made_up")
+    made.wearsim_loads = load_named("ramp")
+    with pytest.raises(PluginError, match="wearsim_loads is no hook; write @hookimpl above it"):
+        Registry([Point(lambda: made)])
+
+
+@pytest.mark.parametrize("name", ["load", "title"])
+def test_table_of_a_plugin_with_the_name_of_one_of_wearsim_is_an_error(install, name):
+    made = [TableSpec(name, Options, "a table", protocol=2)]
+    install(Point(module(wearsim_tables=lambda: made)))
+    with pytest.raises(ScenarioError) as caught:
+        rig(**TABLES)
+    text = f"[{name}]: is a table of wearsim, and one of the plugin wearsim-made-up 0.1, expected"
+    assert text in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("hook", "kind", "key", "tables"),
+    [
+        ("wearsim_loads", LoadSpec, "kind", {"load": 'kind = "new"'}),
+        ("wearsim_wear_laws", WearLawSpec, "law", {"wear": 'law = "new"'}),
+        (
+            "wearsim_random_inputs",
+            RandomInputSpec,
+            "persistence",
+            {"load": 'kind = "constant"\nnormal_force = {distribution = "new"}'},
+        ),
+    ],
+)
+def test_option_with_the_name_of_a_key_of_wearsim_is_an_error(install, hook, kind, key, tables):
+    options = create_model("Clash", __base__=Options, **{key: (str, "x")})
+    made = [kind("new", options, "new", factory=list, protocol=2)]
+    install(Point(module(**{hook: lambda: made})))
+    with pytest.raises(ScenarioError, match=rf"{key}: is a key of wearsim and an option of the pl"):
+        rig(**tables)
+
+
+def test_internal_error_in_a_plugin_names_it_with_file_and_line(install, tmp_path, monkeypatch):
+    monkeypatch.setenv("WEARSIM_TRACEBACK", "")
+    (tmp_path / "wearsim_broken.py").write_text(BROKEN)
+    monkeypatch.syspath_prepend(tmp_path)
+    install(Point(lambda: import_module("wearsim_broken"), "wearsim_broken", "broken-dist", "9"))
+    text = RIG + "".join(f"\n[{name}]\n{body}\n" for name, body in TABLES.items())
+    scenario = tmp_path / "rig.toml"
+    scenario.write_text(text.replace(TABLES["wear"], 'law = "broken"'))
+    shown = CliRunner().invoke(app, ["run", str(scenario)])
+    assert shown.exit_code == 1
+    line = 1 + BROKEN.splitlines().index('        raise KeyError("k")')
+    place = f"depth_per_pass, line {line} of {tmp_path / 'wearsim_broken.py'}"
+    assert "internal error: KeyError: 'k'" in shown.stderr
+    assert f"a defect of plugin 'wearsim_broken' of broken-dist 9, {place}; " in shown.stderr
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"result": "made_up.Result"}, "result 'made_up.Result', expected a reference 'package.mo"),
+        ({"view": ""}, "view '', expected a reference"),
+        ({"format": "made-up"}, "data '', expected a reference"),
+    ],
+)
+def test_study_kind_without_a_reference_is_an_error(fields, text):
+    given = {"result": "made_up:Result", "view": "made_up:View", **fields}
+    made = [StudyKind("new", summary="new", protocol=2, **given)]
+    with pytest.raises(PluginError, match=f"the StudyKind of 'new' has the {text}"):
+        Registry([Point(module(wearsim_study_kinds=lambda: made))])
+
+
+def test_study_kind_with_the_format_of_another_is_an_error(install):
+    given = {"result": "made_up:Result", "view": "made_up:View", "data": "made_up:Data"}
+    made = [StudyKind("new", summary="new", protocol=2, format="wearsim-run", **given)]
+    install(Point(module(wearsim_study_kinds=lambda: made)))
+    with pytest.raises(
+        PluginError, match=r"have the format 'wearsim-run': '(run|new)' of .*made-up"
+    ):
+        registry()
+
+
+@pytest.mark.parametrize("reference", ["made_up_module:View", "wearsim.report.view:Vue"])
+def test_reference_that_names_nothing_is_an_error(reference):
+    kind = StudyKind("new", summary="new", protocol=2, result="wearsim:Result", view=reference)
+    text = f"study kind 'new': its view, '{reference}', cannot be imported"
+    with pytest.raises(PluginError, match=text):
+        kind.load("view")

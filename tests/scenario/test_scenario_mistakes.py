@@ -174,8 +174,8 @@ rig.toml: [load] file: log.csv line 3: column 'load': is not a number, got 'x', 
         'radius = "25 mm"',
         'radius = "25 mm"\nprofile = "log.csv"',
         """\
-rig.toml: [cylinder] profile: log.csv line 1: column 'y' is missing, got time [min], load [m], expected y [m]
-rig.toml: [cylinder] profile: log.csv line 1: column 'height' is missing, got time [min], load [m], expected height [m] or z [m] or depth [m]; choose other names with --columns Y,Z or, in a scenario, profile_columns = ["Y", "Z"] or, in a tests file, columns; a minus sign before Z makes it a depth""",
+rig.toml: [cylinder] profile: log.csv line 1: column 'y' is missing, got time [min], load [m], expected y [mm]
+rig.toml: [cylinder] profile: log.csv line 1: column 'height' is missing, got time [min], load [m], expected height [mm] or z [mm] or depth [mm]; choose other names with --columns Y,Z or, in a scenario, profile_columns = ["Y", "Z"] or, in a tests file, columns; a minus sign before Z makes it a depth""",
     ),
     "creepage and bearing torque mixed up": (
         SLIP,

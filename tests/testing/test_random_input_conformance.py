@@ -189,6 +189,7 @@ MUTANTS = {
         "quantile-rises-within-support": [
             flat(support=(2.1, 4.0)),
             flat(quantile=lambda self, p: 4.0 - 2.0 * p, support=(4.0, 2.0)),
+            flat(quantile=lambda self, p: None, support=(2.0, 4.0)),
             flat(quantile=lambda self, p: 2.0 + 2.0 * p + 0.5 * np.sin(6 * np.pi * p)),
             flat(quantile=lambda self, p: np.where(p == 0.5, np.nan, 2.0 + 2.0 * p)),
         ],

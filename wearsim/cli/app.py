@@ -268,9 +268,12 @@ def _message(error: BaseException) -> str:
             f"error: not enough memory ({described(error)}); fewer strips, records, realisations or"
             " workers take less"
         )
+    from wearsim.plugins.manager import registry
+
+    plugin = registry().raised_in(error)
     return (
         f"internal error: {type(error).__name__}: {described(error)}\n"
-        "this is a defect of wearsim or of a plugin; --traceback shows where"
+        f"this is a defect of {plugin or 'wearsim or of a plugin'}; --traceback shows where"
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from numbers import Real
 from typing import Any, ClassVar, TypeVar
@@ -115,15 +116,47 @@ def built_plugin(
     PluginError
         If the factory returns an object of another class.
     """
-    built = spec.factory(*arguments)
+    try:
+        built = spec.factory(*arguments)
+    except TypeError as error:
+        if error.__traceback__ is not None and error.__traceback__.tb_next is not None:
+            raise  # of a line in the factory
+        raise PluginError(
+            f"the factory of {spec.kind} '{spec.name}' cannot be called: {error}"
+        ) from error
     if not isinstance(built, expected):
         raise PluginError(
             f"the factory of {spec.kind} '{spec.name}' returned {described_value(built)}, expected"
             f" a {expected.__name__}"
         )
     own: Built = built
-    is_own = type(built).__module__.partition(".")[0] == "wearsim"
-    return own if is_own else checked(built, spec.name)
+    if type(built).__module__.partition(".")[0] == "wearsim":
+        return own
+    for base in type(built).__mro__:
+        if base.__module__.partition(".")[0] == "wearsim":
+            _refuse_other_arguments(spec, built, base)
+    return checked(built, spec.name)
+
+
+def _refuse_other_arguments(spec: Any, built: object, base: type[Any]) -> None:
+    """Raise a PluginError if a required method does not take the arguments of its base class."""
+    for name in sorted(getattr(base, "__abstractmethods__", ())):
+        required = getattr(base, name)
+        if not callable(required):
+            continue  # a property
+        wanted = inspect.signature(required)
+        given = [item for item in wanted.parameters.values() if item.name != "self"]
+        own = getattr(built, name)
+        try:
+            inspect.signature(own).bind(*given)
+        except TypeError as error:
+            taken = ", ".join(map(str, inspect.signature(own).parameters))
+            raise PluginError(
+                f"{name} of {spec.kind} '{spec.name}' takes ({taken}), expected"
+                f" ({', '.join(item.name for item in given)})"
+            ) from error
+        except ValueError:  # a compiled function without a signature
+            continue
 
 
 def is_numeric(value: object) -> bool:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import difflib
+import traceback
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, distribution, entry_points
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pluggy
 
@@ -20,6 +21,7 @@ from wearsim.plugins.specs import (
     FatigueLawSpec,
     LoadSpec,
     MotionLawSpec,
+    Options,
     RandomInputSpec,
     Spec,
     StudyKind,
@@ -39,6 +41,12 @@ _HOOKS: dict[type[Spec], str] = {
     FatigueLawSpec: "wearsim_fatigue_laws",
     StudyKind: "wearsim_study_kinds",
     TableSpec: "wearsim_tables",
+}
+#: words that a field of a spec may hold
+_WORDS: dict[type[Spec], tuple[str, tuple[str, ...]]] = {
+    LoadSpec: ("role", ("base", "term")),
+    MotionLawSpec: ("rise", ("required", "none", "own")),
+    RandomInputSpec: ("role", ("scalar", "joint", "field", "process")),
 }
 #: modules of wearsim that implement hooks; they need no entry point
 _BUILT_IN = {"builtin": "wearsim.models", "studies": "wearsim.studies.kinds"}
@@ -93,16 +101,21 @@ class Registry:
     def __init__(self, points: Iterable[EntryPoint]) -> None:
         self.broken: list[Broken] = []
         self._specs: dict[type[Spec], dict[str, Registered]] = {kind: {} for kind in _HOOKS}
+        self._packages: dict[str, str] = {}
         for point in sorted(points, key=lambda p: (p.name, p.value)):
             self._load(point)
 
     def _load(self, point: EntryPoint) -> None:
         dist = point.dist or (distribution(PROJECT) if point.value in _BUILT_IN.values() else None)
         name, version = (dist.name, dist.version) if dist else ("unknown distribution", "?")
+        if name != PROJECT:
+            package = point.value.partition(":")[0].partition(".")[0]
+            self._packages[package] = f"plugin '{point.name}' of {name} {version}"
         manager = pluggy.PluginManager(PROJECT)
         manager.add_hookspecs(HookSpecs)
         try:
-            manager.register(point.load(), name=point.name)
+            module = point.load()
+            manager.register(module, name=point.name)
             manager.check_pending()
             specs = {
                 kind: [spec for batch in getattr(manager.hook, hook)() for spec in batch]
@@ -118,6 +131,13 @@ class Registry:
                 Broken(point.name, name, version, f"{type(error).__name__}: {described(error)}")
             )
             return
+        for hook in _HOOKS.values():
+            function = vars(module).get(hook) if hasattr(module, "__dict__") else None
+            if callable(function) and not hasattr(function, f"{PROJECT}_impl"):
+                raise PluginError(
+                    f"plugin '{point.name}' of {name} {version}: the function {hook} is no hook;"
+                    " write @hookimpl above it, from wearsim.plugins"
+                )
         for kind, yielded in specs.items():
             for spec in yielded:
                 self._add(kind, Registered(spec, name, version))
@@ -128,6 +148,12 @@ class Registry:
                 f"{item.distribution} {item.version}: hook {_HOOKS[kind]} yielded"
                 f" {item.spec!r}, expected a {kind.__name__}"
             )
+        if fault := _fault(kind, item.spec):
+            raise PluginError(
+                f"{item.distribution} {item.version}: the {kind.__name__} of {item.spec.name!r}"
+                f" has the {fault}"
+            )
+        self._refuse_format(item)
         other = self._specs[kind].setdefault(item.spec.name, item)
         if other is not item:
             raise PluginError(
@@ -135,6 +161,19 @@ class Registry:
                 f" {other.distribution} {other.version} and {item.distribution} {item.version};"
                 " uninstall one of them"
             )
+
+    def _refuse_format(self, item: Registered) -> None:
+        """Raise a PluginError if another kind of study has the same files, and nothing marks it."""
+        format_, marked_by = getattr(item.spec, "format", ""), getattr(item.spec, "marked_by", "")
+        for other in self._specs[StudyKind].values() if format_ else ():
+            kind = other.spec
+            same = isinstance(kind, StudyKind) and (kind.format, kind.marked_by)
+            if same == (format_, marked_by) and kind.name != item.spec.name:
+                raise PluginError(
+                    f"two study kinds have the format '{format_}': '{kind.name}' of"
+                    f" {other.distribution} {other.version} and '{item.spec.name}' of"
+                    f" {item.distribution} {item.version}; change it in the plugin"
+                )
 
     def all(self) -> list[Registered]:
         """Return all registered specs, sorted by kind and then by name."""
@@ -173,6 +212,39 @@ class Registry:
     def registered(self, kind: type[Spec], name: str) -> Registered:
         """Return the spec called `name` with its distribution; errors as in `get`."""
         return self._specs[kind][self.get(kind, name).name]
+
+    def raised_in(self, error: BaseException) -> str | None:
+        """Return the plugin that raised an error, with file and line, or None if none did."""
+        for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
+            package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+            if package in self._packages:
+                code = frame.f_code
+                place = f"{code.co_name}, line {line} of {code.co_filename}"
+                return f"{self._packages[package]}, {place}"
+        return None
+
+
+def _fault(kind: type[Spec], spec: Any) -> str | None:
+    """Return the first field of a spec with a value that cannot be used, or None."""
+    if not (isinstance(spec.name, str) and spec.name):
+        return f"name {spec.name!r}, expected a text"
+    if not (isinstance(spec.options, type) and issubclass(spec.options, Options)):
+        return f"options {spec.options!r}, expected a class derived from Options"
+    if not isinstance(spec.protocol, int):
+        return f"protocol {spec.protocol!r}, expected the number {PROTOCOL}"
+    if not callable(getattr(spec, "factory", print)):
+        return f"factory {spec.factory!r}, expected a class or a function"
+    if isinstance(spec, StudyKind):
+        needed = ("result", "view", *(("read" if spec.read else "data",) if spec.format else ()))
+        for name in needed:
+            reference = getattr(spec, name)
+            module, colon, item = str(reference).partition(":")
+            if not (module and colon and item):
+                return f"{name} {reference!r}, expected a reference 'package.module:name'"
+    field, words = _WORDS.get(kind, ("", ()))
+    if field and getattr(spec, field) not in words:
+        return f"{field} {getattr(spec, field)!r}, expected one of {', '.join(words)}"
+    return None
 
 
 @cache

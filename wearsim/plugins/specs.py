@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Literal, TypeAlias
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from wearsim.errors import PluginError
 from wearsim.plugins.contact_model import Capabilities, ContactModel
 from wearsim.plugins.laws import FatigueLaw, MotionLaw, WearLaw
 from wearsim.types import FloatArray, Grid, Material
@@ -465,6 +466,19 @@ class StudyKind(Spec):
     compare: str = field(kw_only=True, default="")
 
     def load(self, name: str) -> Any:
-        """Return what the reference in a field names, such as "result"."""
-        module, _, item = getattr(self, name).partition(":")
-        return getattr(import_module(module), item)
+        """Return what the reference in a field names, such as "result".
+
+        Raises
+        ------
+        PluginError
+            If there is no such module, or nothing of this name in it.
+        """
+        reference = getattr(self, name)
+        module, _, item = reference.partition(":")
+        try:
+            return getattr(import_module(module), item)
+        except (ImportError, AttributeError, ValueError) as error:
+            raise PluginError(
+                f"study kind '{self.name}': its {name}, {reference!r}, cannot be imported"
+                f" ({error}); correct the reference in the plugin"
+            ) from error

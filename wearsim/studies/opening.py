@@ -47,7 +47,16 @@ def open_results(path: str | Path) -> Any:
 
 
 def open_dissipation(path: str | Path) -> DissipationResult:
-    """Open the file of a dissipation study; see `open_results`.
+    """Open the file of a dissipation study; errors as of `open_results`.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    DissipationResult
 
     Examples
     --------
@@ -66,7 +75,17 @@ def open_dissipation(path: str | Path) -> DissipationResult:
 
 
 def open_ensemble(path: str | Path) -> EnsembleResult:
-    """Open the file of an ensemble or of lives; see `open_results`.
+    """Open the file of an ensemble or of lives; errors as of `open_results`.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    EnsembleResult
+        Of lives, a `LifeResult`.
 
     Examples
     --------
@@ -158,6 +177,13 @@ def save_report(
     """
     from wearsim.report.page.page import save_page  # noqa: PLC0415  (only of pages)
 
+    if not isinstance(results, Sequence) or isinstance(results, str):
+        kind = type(results).__name__
+        raise TypeError(f"results must be a list of results, such as [result], got a {kind}")
+    if not results:
+        raise ValueError("no result is given for the page")
+    if others := [item for item in results if not isinstance(item, Viewed)]:
+        raise TypeError(f"only results can be on a page, got {others[0]!r}")
     save_page(views_of(results), Path(path), measured)
 
 

@@ -16,6 +16,7 @@ from wearsim.plugins import (
     RandomInputSpec,
     Uniforms,
 )
+from wearsim.plugins.checked import described_value
 from wearsim.testing.checks import (
     Checks,
     ConfiguredSpec,
@@ -102,7 +103,8 @@ def _require_support(distribution: Distribution, values: FloatArray, name: str) 
 def quantile_rises_within_support(fixture: RandomInputFixture) -> None:
     """The quantile function rises from one end of the support to the other."""
     probability = _probabilities()
-    values = np.asarray(fixture.instance.quantile(probability))
+    values = fixture.instance.quantile(probability)
+    require(isinstance(values, np.ndarray), f"quantile returns {described_value(values)}")
     low, high = fixture.instance.support
     require(values.shape == probability.shape, f"quantile returns the shape {values.shape}")
     require(not np.isnan(values).any(), "quantile returns NaN")

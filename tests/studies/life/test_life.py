@@ -148,6 +148,8 @@ def test_counted_and_exact_lives_agree(exact: LifeResult, tmp_path: Path) -> Non
     assert not counted.is_exact
     assert "independently" in counted.settings.reason
     assert np.allclose(counted.lives, exact.lives, rtol=5e-3)
+    with pytest.raises(AttributeError, match="no wear factor is integrated exactly"):
+        counted.factor_law  # noqa: B018
 
 
 @pytest.mark.parametrize(
@@ -215,6 +217,7 @@ def test_lives_beyond_the_maximum_are_censored(tmp_path: Path) -> None:
     never = lives(tmp_path / "never.h5", design(limit__depth="5 mm"), 3, most=5000)
     assert never.censored == 3
     assert math.isnan(never.b(50).value)
+    assert repr(never).endswith("3 lives, B10 unknown>")
 
 
 def test_quantity_that_hardly_grows_gives_an_interval_of_life(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from wearsim.atomic_write import refuse_if_locked, refuse_inputs, write_lock
 from wearsim.errors import ResultsFileError, WearsimError
+from wearsim.results.io.files import as_path
 
 if TYPE_CHECKING:
     from wearsim.results.io.stored_file import StoredFile
@@ -36,8 +37,11 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
         scenario or a table, is being written by another process, or if its folder is missing or
         not writable.
     """
+    path = as_path(path)
+    if force not in {True, False}:  # "no" would replace a file
+        raise TypeError(f"force must be True or False, got {force!r}")
     refuse_inputs(path, inputs)
-    target, suffix = Path(path).resolve(), Path(path).suffix
+    target, suffix = path.resolve(), path.suffix
     folder = target.parent
     if suffix.lower() in _OTHER_KINDS:
         name = Path(path).with_suffix(".h5").name

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from wearsim.errors import Mistake, PluginError, ScenarioError
-from wearsim.plugins import Spec, registry
+from wearsim.plugins import Spec, TableSpec, registry
 from wearsim.quantities import DECIMAL_COMMA, NUMBER, Quantity
 from wearsim.scenario.parse.fields import RandomInput, choices, field_at, form, model_at
 from wearsim.units import QuantityError, as_written
@@ -130,6 +130,19 @@ def installed(kind: type[S]) -> list[S]:
     return [registry().get(kind, name) for name in registry().names(kind)]
 
 
+def refuse_tables(mistakes: Mistakes, names: Collection[str]) -> None:
+    """Add a mistake for each table that a plugin owns and that has the name of one of wearsim."""
+    for name in sorted(names):
+        item = registry().registered(TableSpec, name)
+        mistakes.add(
+            name,
+            "",
+            f"is a table of wearsim, and one of the plugin {item.distribution} {item.version}",
+            None,
+            "another name of the plugin's table; until then, uninstall the plugin",
+        )
+
+
 def nearest(name: str, known: Collection[str]) -> str:
     """Return the most similar of the `known` names as a hint in parentheses, or nothing."""
     longer = [other for other in known if name in other.split("_")]  # "force" of "normal_force"
@@ -170,6 +183,12 @@ def validate_options(
         Returns the distribution of a table within the options of another distribution, in their
         order, or None after adding its mistakes.
     """
+    shared = set(model.model_fields).intersection(other_keys.model_fields if other_keys else ())
+    for key in sorted(shared):
+        what = "is a key of wearsim and an option of the plugin, which never gets a value"
+        mistakes.add(table, key, what, None, "another name of the option, in the plugin")
+    if shared:
+        return None
     # as JSON: its strict mode rejects "3" for 3 but accepts a list for a tuple
     context = {
         "read": mistakes.read,

@@ -13,6 +13,7 @@ from pydantic.fields import FieldInfo
 
 from wearsim.errors import ScenarioError, described
 from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec
+from wearsim.plugins.checked_random import built_random_input
 from wearsim.quantities import Quantity
 from wearsim.scenario.parse.fields import (
     CONTACT_FIELDS,
@@ -332,7 +333,7 @@ def _build(
     if within or options is None or (spec.role in WITH_MARGINAL and marginal is None):
         return None
     try:
-        return spec.factory(options) if marginal is None else spec.factory(options, marginal)
+        return built_random_input(spec, options, marginal)
     except ScenarioError as error:
         mistakes.add_file(error, place, key_of_file(raw, error.file))
     except QuantityError as error:

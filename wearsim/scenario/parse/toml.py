@@ -27,7 +27,7 @@ from wearsim.plugins import (
 from wearsim.profiles import ROW_CHOICES, split_name
 from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
-from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
+from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest, refuse_tables
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.scenario.tables.axial import AxialTable, combine_bodies
 from wearsim.scenario.tables.bodies import (
@@ -312,6 +312,8 @@ def parse_fields(
     if not isinstance(overrides, Mapping | None):
         kind = type(overrides).__name__
         raise TypeError(f"overrides must be a mapping of values by dotted key, got a {kind}")
+    if others := [key for key in overrides or () if not isinstance(key, str)]:
+        raise TypeError(f"a dotted key of overrides must be a text, got {others[0]!r}")
     data = parse_toml(text, name)
     if overrides:
         text = apply_overrides(text, name, overrides)
@@ -401,7 +403,9 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
 def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
     """Return the keys above the tables; add a mistake for each unknown key and table."""
     keys = {key: data[key] for key in TopTable.model_fields if key in data}
-    known = {*TABLES, *keys, *(spec.name for spec in installed(TableSpec))}
+    owned = [spec.name for spec in installed(TableSpec)]
+    refuse_tables(mistakes, {*TABLES, *TopTable.model_fields}.intersection(owned))
+    known = {*TABLES, *keys, *owned}
     for key in [key for key in data if key not in known]:
         if key in FIRST_PARTY and isinstance(data[key], dict):
             mistakes.notes.append(

@@ -28,6 +28,8 @@ from wearsim.scenario.tables.cam_points import (
     motion_of,
     peak,
     refuse_few,
+    refuse_unit,
+    small_lift,
     smoothed_points,
 )
 from wearsim.types import FloatArray
@@ -37,6 +39,9 @@ if TYPE_CHECKING:
     from wearsim.scenario.tables.cam import CamTable
 
 _CLOSED = 6.0  # standard deviations by which both ends of a turn may differ
+_ROUNDED = 0.25  # of a step, by which the last angle may differ from a turn after the first
+_NEAR = 0.05  # of a turn: angles in the wrong unit, the last row of which may be missing
+_WIDEST = 2.0  # swing of an arm [rad]
 
 
 def motion_of_lift(
@@ -59,7 +64,7 @@ def motion_of_lift(
     """
     assert table.lift is not None
     tolerance, path = _tolerance(table.lift_tolerance, follower), table.lift.path
-    read = read_lift_table(table.lift.text, path, table.columns, table.units, follower)
+    read = read_lift_table(table.lift.text, path, table.columns, table.units, follower, notes)
     unit = "rad" if follower.swings else "m"
     angle, lift = one_turn(path, *read, unit)
     return motion_of_table(notes, path, angle, lift, unit, tolerance)
@@ -85,6 +90,7 @@ def read_lift_table(
     names: tuple[str, str] | None,
     units: tuple[str, str] | None,
     follower: Follower,
+    notes: list[str] | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return angles [rad] and lifts of a file, in metres or, of an arm, in radians.
 
@@ -97,6 +103,8 @@ def read_lift_table(
     names, units : tuple of str, optional
         Names of the columns, and their units where the file has none.
     follower : Follower
+    notes : list of str, optional
+        Gets a note of lifts whose unit is probably wrong.
 
     Raises
     ------
@@ -118,9 +126,44 @@ def read_lift_table(
         either_way=True,
         choice=CHOICE.format("LIFT"),
     )
-    lifts = columns[lift] / follower.arm_length if follower.swings and length else columns[lift]
+    lifts, unit = columns[lift], given.get(lift) or heads.get(lift)
+    found = (
+        _doubts(path, lift, unit, lifts, follower) if length else _refuse_wide(path, lift, lifts)
+    )
+    if notes is not None:
+        notes += found
+    if follower.swings and length:
+        lifts = lifts / follower.arm_length
     refuse_few(path, len(lifts), FEWEST_ROWS, "rows for a quintic spline")
     return columns[angle], lifts
+
+
+def _doubts(
+    path: str, column: str, unit: str | None, lifts: FloatArray, follower: Follower
+) -> list[str]:
+    """Return notes of lifts [m] that do not suit the base circle; refuse those of a wrong unit."""
+    least, base_radius = float(lifts.min()), follower.base_radius
+    greatest = float(np.ptp(lifts))
+    refuse_unit(path, column, unit, greatest, base_radius, 0.0)
+    note = small_lift(path, column, unit, greatest, base_radius)
+    notes = [note] if note else []
+    if least > 0.5 * base_radius:
+        got = in_engineers_unit(least, "m", 3)
+        notes.append(
+            f"{path}: column '{column}' is nowhere below {got}: lifts are counted from the base"
+            " circle, and radii from the axis belong in a table of the surface, profile"
+        )
+    return notes
+
+
+def _refuse_wide(path: str, column: str, lifts: FloatArray) -> list[str]:
+    """Raise a ScenarioError if an arm swings by more than is possible; return no notes."""
+    swing = float(np.ptp(lifts))
+    if swing > _WIDEST:
+        got = f"a swing of {math.degrees(swing):.3g} deg"
+        what = f"column '{column}' is too large for an arm: its unit is probably wrong"
+        raise mistake_in(path, what, got, "deg as unit, not rad")
+    return []
 
 
 def one_turn(
@@ -128,16 +171,24 @@ def one_turn(
 ) -> tuple[FloatArray, FloatArray]:
     """Return a table of lifts in `unit` from its first angle to the same one after a turn [rad]."""
     turn = float(angle[-1] - angle[0])
-    if abs(turn - math.tau) > 1e-9:
-        step = float(np.diff(angle).max())
-        if not 0.0 < math.tau - turn < 1.5 * step + 1e-6:
-            got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
-            what = "the angles do not span a turn"
-            raise mistake_in(path, what, got, "0 to 360 deg")
-        return np.append(angle, angle[0] + math.tau), np.append(values, values[0])
     noise = estimated_noise(angle[:-1], values[:-1])
     allowed = max(1e-9 * float(np.ptp(values)), _CLOSED * math.sqrt(2.0) * noise)
-    if abs(values[-1] - values[0]) > allowed:
+    closes = abs(values[-1] - values[0]) <= allowed
+    off, steps = abs(turn - math.tau), np.diff(angle)
+    # a last row at 6.28 or 6.2832 rad repeats the first one, at a rounded angle
+    if 1e-9 < off < _ROUNDED * float(steps.min()) and (closes or turn > math.tau):
+        angle = np.append(angle[:-1], angle[0] + math.tau)
+    elif off > 1e-9:
+        if not 0.0 < math.tau - turn < 1.5 * float(steps.max()) + 1e-6:
+            got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
+            what = "the angles do not span a turn"
+            if abs(math.degrees(turn) / math.tau - 1.0) < _NEAR:
+                what += "; their unit is probably rad, not deg"
+            elif abs(math.radians(turn) / math.tau - 1.0) < _NEAR:
+                what += "; their unit is probably deg, not rad"
+            raise mistake_in(path, what, got, "0 to 360 deg")
+        return np.append(angle, angle[0] + math.tau), np.append(values, values[0])
+    if not closes:
         got = " and ".join(in_engineers_unit(values[k], unit) for k in (0, -1))
         what = "the lift does not close: its first and last value differ"
         raise mistake_in(path, what, got, "equal values at 0 and 360 deg")

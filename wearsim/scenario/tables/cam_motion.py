@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
 from wearsim.errors import ScenarioError
@@ -25,7 +26,7 @@ from wearsim.quantities import Quantity
 from wearsim.scenario.parse.mistakes import Mistakes, split_keys, validate_options
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.scenario.tables.cam_lift import motion_of_lift
-from wearsim.scenario.tables.cam_points import MeasuredPoints
+from wearsim.scenario.tables.cam_points import LARGE, POINTS, MeasuredPoints, beside
 from wearsim.scenario.tables.cam_surface import motion_of_profile
 from wearsim.units import ANGLE, LENGTH, QuantityError, as_written
 
@@ -63,7 +64,10 @@ def read_motion(
     unit = "rad" if follower.swings else "m"
     try:
         if table.motion is not None:
-            return _from_laws(mistakes, table.motion, unit), None
+            motion = _from_laws(mistakes, table.motion, unit)
+            if motion is not None and unit == "m":
+                _check_rises(mistakes, motion, table.base_radius)
+            return motion, None
         if table.shape is not None:
             return _from_shape(table, follower), None
         read = motion_of_lift if way == "lift" else motion_of_profile
@@ -90,6 +94,14 @@ def _from_shape(table: CamTable, follower: Follower) -> Motion | None:
         return None  # a mistake has been added
     build: Any = profile
     return shape_motion(build(table.base_radius, *sizes), follower)
+
+
+def _check_rises(mistakes: Mistakes, motion: Motion, base_radius: float) -> None:
+    """Add a mistake if the lift is so large for the base circle that a unit must be wrong."""
+    greatest = float(np.ptp(motion.lift(np.linspace(0.0, math.tau, POINTS))[0]))
+    if greatest > LARGE * base_radius:
+        what = "lifts the follower far beyond the base circle: the unit of a rise is probably wrong"
+        mistakes.add("cam", "motion", what, beside(greatest, base_radius), "mm as unit, not m")
 
 
 def _rise(value: str | None, unit: str) -> float:

@@ -21,12 +21,15 @@ from wearsim.mechanics.cam.smoothing import (
     smoothed,
 )
 from wearsim.types import FloatArray
-from wearsim.units import measure
+from wearsim.units import in_engineers_unit, measure
 
 POINTS = 1440  # of a turn, on which a motion is evaluated or fitted
 _VISIBLE = 0.005  # change of the acceleration by noise, of its peak, that is smoothed
 _FEWEST = 48  # points in whose differences noise can be seen
 _NO_NOISE = 1e-12  # of the range of a table: rounding of doubles
+#: lifts over the radius of the base circle beyond which their unit is probably wrong: those of cams
+#: are 0.02 to 5, and a unit is wrong by a factor of 1000
+LARGE, _SMALL = 20.0, 2e-3
 CHOICE = 'choose other names with columns = ["ANGLE", "{}"] in [cam]'
 
 
@@ -137,6 +140,58 @@ def has_dimension(unit: str | None, target: str) -> bool:
         return unit is not None and measure(unit)[1] == measure(target)[1]
     except ValueError:
         return False
+
+
+def refuse_unit(
+    file: str, column: str, unit: str | None, greatest: float, base_radius: float, least: float
+) -> None:
+    """Raise a ScenarioError if lifts or radii do not suit the base circle at all.
+
+    Parameters
+    ----------
+    file, column, unit : str
+        File, and name and unit of the column.
+    greatest : float
+        Greatest lift, less the least, or greatest radius [m].
+    base_radius : float
+        [m].
+    least : float
+        Least of it over the radius of the base circle; 0 for lifts, which may be small.
+    """
+    ratio = greatest / base_radius
+    if not least <= ratio <= LARGE:
+        size = "large" if ratio > LARGE else "small"
+        what = f"column '{column}' is too {size} for the base circle: its unit is probably wrong"
+        remedy = f"{other_unit(unit, smaller=ratio > LARGE)} as unit, not {unit}"
+        raise mistake_in(file, what, beside(greatest, base_radius), remedy)
+
+
+def small_lift(
+    file: str, column: str, unit: str | None, greatest: float, base_radius: float
+) -> str | None:
+    """Return a note if the greatest lift is so small that its unit is probably wrong, or None."""
+    if greatest >= _SMALL * base_radius:
+        return None
+    if greatest == 0.0:
+        return f"{file}: column '{column}' is the same at all angles: the follower does not move"
+    other = other_unit(unit, smaller=False)
+    return (
+        f"{file}: column '{column}' is small for the base circle, {beside(greatest, base_radius)}:"
+        f" unless the cam is almost round, its unit is {other}, not {unit}"
+    )
+
+
+def beside(greatest: float, base_radius: float) -> str:
+    """Return a length and the radius of the base circle [m], for messages."""
+    first, second = (in_engineers_unit(value, "m", 4) for value in (greatest, base_radius))
+    return f"up to {first} with base_radius = {second}"
+
+
+def other_unit(unit: str | None, *, smaller: bool) -> str:
+    """Return the unit that a column in the wrong `unit` probably has."""
+    units = ("um", "mm", "m")
+    place = units.index(unit) + (-1 if smaller else 1) if unit in units else -1
+    return units[place] if 0 <= place < 3 else f"a {'smaller' if smaller else 'greater'} unit"
 
 
 def refuse_few(path: str, count: int, fewest: int, what: str) -> None:

@@ -22,6 +22,7 @@ from wearsim.scenario.tables.cam_points import (
     has_dimension,
     motion_of,
     refuse_few,
+    refuse_unit,
     smoothed_points,
 )
 from wearsim.types import FloatArray
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from wearsim.scenario.tables.cam import CamTable
 
 _FEWEST = 16  # points
+_LEAST = 0.05  # greatest radius over that of the base circle, below which its unit must be wrong
 _DRAWS = 4  # for the error of the acceleration
 RADIUS_NAMES = ("r", "rho", "halbmesser")
 
@@ -111,6 +113,7 @@ def _surface_table(
     else:
         names = given or ("x", "y")
         units = dict(zip(names, table.units or (), strict=False))
+        heads = units_of_columns(file.text, dict.fromkeys(names, ()))
         columns = read_columns(
             file.text, path, dict.fromkeys(names, "m"), units=units, choice=choice
         )
@@ -121,6 +124,9 @@ def _surface_table(
             x, y = x[:-1], y[:-1]
         angle, radius = np.unwrap(np.arctan2(y, x)), np.hypot(x, y)
     refuse_few(path, len(x), _FEWEST, "points of the surface")
+    name = names[1] if polar else names[0]
+    unit = units.get(name) or heads.get(name)
+    refuse_unit(path, name, unit, float(radius.max()), table.base_radius, _LEAST)
     return angle, radius, x, y
 
 

@@ -134,6 +134,10 @@ def study_cam(
     angles : ndarray, shape (points,), optional
         Angles of the cam, instead of the stations of a run [rad].
 
+    Returns
+    -------
+    CamStudy
+
     Raises
     ------
     ScenarioError

@@ -301,7 +301,18 @@ def _grid_dependence(
 def solve_contact(
     scenario: Scenario | str | Path, profile: Profile | str | Path | None = None
 ) -> ContactSolution:
-    """Solve the contact of the scenario's first roller; see `study_contact`.
+    """Solve the contact of the scenario's first roller; errors as of `study_contact`.
+
+    Parameters
+    ----------
+    scenario : Scenario or path
+        A scenario of a run or of a single contact, or its file.
+    profile : Profile or path, optional
+        The cylinder's profile, or its file, instead of the scenario's.
+
+    Returns
+    -------
+    ContactSolution
 
     Examples
     --------

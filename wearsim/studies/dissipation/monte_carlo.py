@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.errors import Interrupted, ScenarioError, SolverError
-from wearsim.results.io.files import write_results
+from wearsim.results.io.files import as_path, write_results
 from wearsim.results.io.outputs import output_lock
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.automatic import with_chosen_model
@@ -98,7 +98,7 @@ def dissipation(
     """
     scenario = with_chosen_model(as_scenario(scenario), test=False)
     realisations = checked_count(scenario, realisations)
-    path = Path(output) if output is not None else None
+    path = as_path(output) if output is not None else None
     with (
         output_lock(path, force, scenario.paths),
         shown_progress(progress, "Counter", on_progress, scenario) as watch,

@@ -16,6 +16,7 @@ import numpy as np
 from wearsim.arguments import ArgumentError, checking_argument
 from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import CapabilityError, ResultsFileError, ScenarioError
+from wearsim.results.io.files import as_path
 from wearsim.results.io.outputs import check_output
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
@@ -136,7 +137,7 @@ def ensemble(
     scenario = with_chosen_model(as_scenario(scenario), test=True)
     precision = named_precision(precision, until)
     request = checked_request(scenario, realisations, plan, precision)
-    path = Path(output)
+    path = as_path(output)
     check_output(path, force, scenario.paths)
     hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
     with hands.open(scenario, request.realisations) as (watch, pool):

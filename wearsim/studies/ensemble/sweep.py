@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.quantities import NUMBER, quantity
 from wearsim.report.frames import concatenated
+from wearsim.results.io.files import as_path
 from wearsim.results.io.outputs import check_output
 from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario, as_scenario
@@ -237,7 +238,7 @@ def _requested(path: Path) -> tuple[object, ...] | None:
 
 def path_of(output: str | Path, value: str) -> Path:
     """Return the file of one value: 'out/test.h5' and '250 N' give 'out/test-250N.h5'."""
-    path = Path(output)
+    path = as_path(output)
     joined = re.sub(r"\s+(?=[A-Za-z])", "", value.strip())  # a number and its unit
     plain = re.sub(r"\s+", "_", joined.replace("/", "_per_").replace("%", "percent"))
     plain = re.sub(r"[^\w.+-]+", "", plain)

@@ -168,6 +168,11 @@ def _measurements(
                 replace(item, curvature=item.curvature or curvature) for item in read_tests(tests)
             ]
         tests = [tests]
+    if not isinstance(tests, Sequence):
+        kind = type(tests).__name__
+        raise TypeError(
+            f"tests must be files of profiles, a tests file or Measurements, got a {kind}"
+        )
     given = [item for item in tests if isinstance(item, Measurement)]
     if given and (before or len(given) < len(tests)):
         raise TypeError("tests are either files or Measurement objects, not both")

@@ -13,6 +13,7 @@ import numpy as np
 
 from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import Interrupted
+from wearsim.results.io.files import as_path
 from wearsim.results.io.outputs import check_output
 from wearsim.scenario import Scenario, as_scenario, realise
 from wearsim.studies.automatic import with_chosen_model
@@ -145,7 +146,7 @@ def life(
 def _results_path(output: str | Path | None) -> Iterator[Path]:
     """Give the results file of a study, one in a temporary folder without `output`."""
     if output is not None:
-        yield Path(output)
+        yield as_path(output)
         return
     with TemporaryDirectory(prefix="wearsim-") as folder:
         try:

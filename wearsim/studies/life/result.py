@@ -60,7 +60,8 @@ class LifeResult(LifeValues):
 
     def __repr__(self) -> str:
         b10 = self.b(10).value
-        return f"<LifeResult '{self.title}': {self.count} lives, B10 {b10:.4g} {self.unit}>"
+        known = f"B10 {b10:.4g} {self.unit}" if math.isfinite(b10) else "B10 unknown"
+        return f"<LifeResult '{self.title}': {self.count} lives, {known}>"
 
     def with_settings(self, **changed: Any) -> LifeResult:
         """Return the result with other settings: `target` [passes] or `shares` [per cent].

@@ -172,6 +172,8 @@ class LifeValues(EnsembleResult):
     @property
     def _drawn_law(self) -> Distribution:
         """Distribution of the wear factor in the scenario."""
+        if not self.settings.factor:
+            raise AttributeError("no wear factor is integrated exactly in these lives")
         inputs = {item.name: item for item in self.scenario.random}
         return inputs[self.settings.factor].scalar
 

@@ -13,6 +13,7 @@ from wearsim.atomic_write import DISK, Storage, write_lock
 from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.state import WearState
+from wearsim.results.io.files import as_path
 from wearsim.results.io.outputs import output_lock
 from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario, as_scenario
@@ -93,7 +94,7 @@ def run(
     >>> kept = wearsim.run("rig.toml", "rig.h5")  # writes the file as well
     """
     scenario = with_chosen_model(as_scenario(scenario), test=True)
-    path = Path(output) if output is not None else None
+    path = as_path(output) if output is not None else None
     limit, warnings = None, []
     if until is not None:
         with checking_argument("until"):

@@ -314,9 +314,13 @@ class Target:
 
         Raises
         ------
+        TypeError
+            If it is no text.
         ValueError
             If the text is not a target.
         """
+        if not isinstance(text, str):
+            raise TypeError(f'a target must be a text such as "depth.mean 1%", got {text!r}')
         if of_life := _FORM_OF_LIFE.fullmatch(text.strip()):
             share, width = (float(of_life[name]) / 100.0 for name in ("percent", "width"))
             if 0.0 < share < 1.0 and width > 0.0:

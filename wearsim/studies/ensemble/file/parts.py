@@ -174,7 +174,7 @@ def _read_part(part: Path, path: Path, data: EnsembleData) -> Part:
         state = json.loads(file.text(STATE))
         EnsembleData.check_types(state)
         errors = {int(numbers[row]): text for row, text in _errors_of(file, status).items()}
-        return Part(part, numbers, status, errors, state)
+        return Part(part.absolute(), numbers, status, errors, state)
 
     try:
         return read_file(part, take)
@@ -233,7 +233,7 @@ def write_part(
     numbers, status = rows[NUMBER], rows["status"]
     failed = np.flatnonzero(status == FAILED).tolist()
     errors = {int(numbers[place]): text_of(rows["error"][place]) for place in failed}
-    return Part(part, numbers, status, errors, dict(state))
+    return Part(part.absolute(), numbers, status, errors, dict(state))
 
 
 def text_of(error: np.bytes_) -> str:
@@ -379,7 +379,8 @@ def _merged(path: Path, file: StoredFile) -> tuple[EnsembleData, StoredRows]:
     if (status > FAILED).any():
         raise ValueError(f"a realisation has the status {status.max()}")
     errors = _errors_of(file, status)
-    identity = os.fstat(file.handle)
+    # rows are read on access, perhaps after a change of the working directory
+    identity, path = os.fstat(file.handle), path.absolute()
     read = partial(_read_unchanged, path, identity)
     stored = StoredRows(read, schema, [], partial(_is_unchanged, path, identity))
     return EnsembleData(**attributes, variables=stored, status=status, errors=errors), stored
