@@ -388,3 +388,14 @@ def test_depth_that_a_mounting_spring_does_not_permit_is_refused():
     )  # unloaded after 15 um
     with pytest.raises(ScenarioError, match="no draw of the inputs describes this groove"):
         wearsim.identify(scenario, [depth(48.0)])
+
+
+def test_tests_that_rigid_bodies_do_not_wear_are_identified_and_not_planned():
+    rolling = {"creepage.longitudinal": 0.0, "creepage.differential_slip": True}
+    scenario = rig().changed({**rolling, "operation.duration": "100 min"})
+    worn = float(wearsim.run(scenario).depth[-1])
+    begin = scenario.changed({"wear.cylinder.k_over_h": "1.1e-12 1/Pa"})
+    (found,) = wearsim.identify(begin, [Measurement("a", depth=worn, depth_std=0.02 * worn)]).tests
+    assert found["k_over_h_per_Pa"]["low"] < K < found["k_over_h_per_Pa"]["high"]
+    with pytest.raises(CapabilityError, match="in full slip, which is zero"):
+        plan_tests(scenario, [3])

@@ -133,6 +133,11 @@ def _kernel(
     cylinder, roller = factors(scenario)
     known = {CYLINDER: np.array([cylinder]), ROLLER: np.array([roller])}
     depth = float(closed_form_depths(scenario, known, 1)[0])
+    if not depth > 0.0:
+        raise CapabilityError(
+            f"{scenario.file}: tests are planned for the depth that rigid bodies wear in full slip,"
+            " which is zero; give creepage.longitudinal or creepage.yaw"
+        )
     passes = float(scenario.total_passes)
     std = DEPTH_ERROR * depth
     grower = Grower(scenario, draws, on_progress=on_progress)

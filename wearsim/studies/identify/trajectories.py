@@ -245,6 +245,7 @@ class Grower:
         ]
         start = np.max([high for _, high in ends], axis=0)
         span = float((start / np.min([low for low, _ in ends], axis=0)).max())
+        span = max(span, (ABOVE / BELOW) ** 1.5)  # also where rigid bodies do not wear
         return self._covered(times, start, span, wanted)
 
     def grow_on_cam(self, wanted: Sequence[Wanted]) -> Trajectories:
