@@ -24,6 +24,7 @@ MEASURED = 0.1  # standard deviation of ln K/H if the inputs are measured
 FEW_DRAWS = 25.0
 _CURVE = 601  # values of ln K/H of a stored density
 _GRID = 2001  # values of ln K/H at which the likelihoods of several tests are multiplied
+_ROUNDS = 8  # of narrowing that grid
 _DROPPED = 40.0  # of a log likelihood below the greatest
 _AGREEMENT = 1e-3  # probability below which grooves of a specimen contradict each other
 _FIVE = (0.025, 0.05, 0.5, 0.95, 0.975)
@@ -110,13 +111,13 @@ def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> tuple[Likelihoo
     # the product of mixtures, on a grid that is narrowed to where it is
     low = min(k.mean - 5.0 * k.variance**0.5 for k in kernels)
     high = max(k.mean + 5.0 * k.variance**0.5 for k in kernels)
-    narrow = False
-    while not narrow:
+    for _ in range(_ROUNDS):
         grid = np.linspace(low, high, _GRID)
         scores = np.array([log_density(k, grid) for k in kernels])
         score = scores.sum(axis=0)
         inside = np.flatnonzero(score > score.max() - _DROPPED)
-        narrow = len(inside) > _GRID // 4
+        if len(inside) > _GRID // 4:
+            break
         low, high = (grid[np.clip(end, 0, _GRID - 1)] for end in (inside[0] - 1, inside[-1] + 1))
     best = [float(log_density(k, k.centre).max()) for k in kernels]
     apart = max(2.0 * (sum(best) - float(score.max())), 0.0)
