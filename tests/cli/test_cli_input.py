@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 from cli_examples import SCENARIOS, SHORT, Command
 
+import wearsim
 import wearsim.plugins
+from wearsim.mechanics.hertz.ellipse import HertzContact
 from wearsim.plugins.manager import Broken, Registry
+from wearsim.studies.run.setup import Setup
+
+# of strip theory, relative, and round-off
+_OF_THEORY = {"mean-contact": 1e-12, "rig-450min": 1e-4}
 
 
 def test_check_prints_what_will_run(command: Command, scenario: Path) -> None:
@@ -255,17 +261,40 @@ def test_options_of_a_profile_need_one(command: Command, scenario: Path) -> None
     assert "Invalid value for --filter: needs a unit" in result.stderr
 
 
+def hertz_patch(file: Path) -> HertzContact:
+    """Return the exact ellipse of a scenario of 300 N."""
+    return Setup(wearsim.load_scenario(file)).widest_patch(300.0)
+
+
 def test_contact_prints_engineering_units(command: Command) -> None:
     result = command("contact", SCENARIOS / "mean-contact.toml")
     assert result.exit_code == 0
     rows = {line[:24].strip(): line[24:].strip() for line in result.stdout.splitlines()}
-    assert rows["patch length 2a"] == "0.2726 mm"
+    length, _, length_error, _ = rows["patch length 2a"].split()
+    patch = hertz_patch(SCENARIOS / "mean-contact.toml")
+    assert float(length) == pytest.approx(2e3 * patch.a, abs=float(length_error))
     assert rows["peak pressure"] == "680.2 MPa"
     data = json.loads(command("contact", SCENARIOS / "mean-contact.toml", "--json").stdout)
     assert rows["dissipated power"] == f"0.07387 ± {data['power_error_W']:.1e} W"
     assert rows["spin moment"] == "0 N mm"
-    width, unit = rows["patch width"].split()
-    assert (float(width), unit) == (pytest.approx(3.0898, rel=3e-3), "mm")
+    width, _, width_error, unit = rows["patch width"].split()
+    assert (float(width), unit) == (pytest.approx(2e3 * patch.b, abs=float(width_error)), "mm")
+    assert float(width_error) < 0.02 * float(width)
+
+
+@pytest.mark.parametrize("strips", [15, 31, 50, 121])
+@pytest.mark.parametrize("name", ["mean-contact", "rig-450min"])
+def test_stated_errors_of_the_patch_hold_the_patch_of_hertz(
+    name: str, strips: int, command: Command
+) -> None:
+    file = SCENARIOS / f"{name}.toml"
+    key = "contact.my" if name == "mean-contact" else "contact.strips"
+    data = json.loads(command("contact", file, "--set", f"{key}={strips}", "--json").stdout)
+    patch = hertz_patch(file)
+    for side, exact in (("length", 2.0 * patch.a), ("width", 2.0 * patch.b)):
+        error = data[f"patch_{side}_error_m"]
+        assert abs(data[f"patch_{side}_m"] - exact) <= error + _OF_THEORY[name] * exact
+        assert error < 0.1 * exact
 
 
 def test_contact_json_is_si_and_all_of_stdout(command: Command) -> None:

@@ -290,3 +290,28 @@ def test_implicit_steps_agree_with_20_000_single_turns_at_every_station():
     stated = fast.depth_error[-1] / fast.depth[-1]
     assert np.abs(depth / truth - 1.0).max() < stated
     assert fast.normal_force[-1] == pytest.approx(slow.normal_force[-1], rel=1e-4)
+
+
+@pytest.mark.parametrize("rate", ["1.1e-11 1/Pa", "0 1/Pa"])
+def test_error_of_the_energy_is_that_of_the_volume_where_bodies_wear_in_proportion(rate):
+    def run(**changes):
+        scenario = wearsim.load_scenario(SCENARIOS / "cam-eccentric.toml").changed(
+            {
+                "operation.turns": 2911,
+                "creepage.longitudinal": 4.326e-4,
+                "load.feedback": "static",
+                "wear.cylinder.k_over_h": rate,
+                **changes,
+            }
+        )
+        return wearsim.run(scenario)
+
+    coarse, fine = run(**{"evolution.tolerance": 1e-2}), run(**{"contact.strips": 161})
+    both = coarse.errors["dissipated_energy"][-1] + fine.errors["dissipated_energy"][-1]
+    assert abs(coarse.dissipated_energy[-1] - fine.dissipated_energy[-1]) <= both
+    if coarse.worn_volume[-1] > 0.0:
+        relative = coarse.volume_error[1:] / coarse.worn_volume[1:]
+        error = coarse.errors["dissipated_energy"][1:] / coarse.dissipated_energy[1:]
+        assert error == pytest.approx(relative, rel=1e-12, abs=0.0)
+    else:
+        assert coarse.errors["dissipated_energy"][-1] > 0.0

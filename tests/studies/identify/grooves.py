@@ -9,6 +9,7 @@ import numpy as np
 
 from tests.rig_text import BODIES, RUBBING
 from wearsim.scenario import Scenario
+from wearsim.studies.cam.cam_wear import Wanted
 from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.trajectories import Grower, Grown
 from wearsim.uq.hierarchy.noise import Noise
@@ -54,7 +55,7 @@ def rig(random: bool = False) -> Scenario:
 @cache
 def grown() -> Grown:
     """Return the worn profiles of the rig for all wear factors."""
-    return Grower(rig()).grow((28e-6, 62e-6), [PASSES]).by_passes[PASSES]
+    return Grower(rig()).grow([Wanted("cylinder", PASSES, 28e-6, 62e-6)]).by_passes[PASSES]
 
 
 def groove(

@@ -7,6 +7,7 @@ import pytest
 
 from tests.studies.identify.grooves import NOISE, PASSES, K, groove, grown, rig
 from wearsim.errors import ScenarioError
+from wearsim.studies.cam.cam_wear import Wanted
 from wearsim.studies.identify.analysis import Identified, identified, kernel_of
 from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.measurements import Measurement
@@ -99,10 +100,11 @@ def test_bow_of_a_trace_is_fitted_or_warned_of():
 @pytest.mark.coverage
 def test_intervals_hold_the_truth_with_scattered_inputs():
     scenario = rig().changed(SCATTERED)
-    profiles = Grower(scenario, 48).grow((28e-6, 62e-6), [PASSES]).by_passes[PASSES]
+    wanted = [Wanted("cylinder", PASSES, 28e-6, 62e-6)]
+    profiles = Grower(scenario, 48).grow(wanted).by_passes[PASSES]
     # the truths are other draws of the same inputs
     other = rig().changed({**SCATTERED, "seed": 5})
-    truths = Grower(other, 256).grow((28e-6, 62e-6), [PASSES]).by_passes[PASSES]
+    truths = Grower(other, 256).grow(wanted).by_passes[PASSES]
     rng, held = np.random.default_rng(12), 0
     y = np.arange(-12e-3, 12e-3, 60e-6)
     source = TraceLikelihood(y, np.zeros_like(y), NOISE, truths)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -89,7 +90,7 @@ def test_wear_of_the_roller_needs_a_shared_factor():
     assert Grower(scenario, 2, shared=True).reasons == ()
     with pytest.raises(ScenarioError, match="wear of the roller is measured"):
         wearsim.identify(scenario, [depth(5.0, body="roller")])
-    both = [depth(48.0), depth(1.6, body="roller")]
+    both = [depth(48.0), Measurement("b", depth=1.6e-6, depth_std=0.2e-6, body="roller")]
     found = wearsim.identify(scenario, both, share=("roller", "cylinder"))
     assert [test["body"] for test in found.tests] == ["cylinder", "roller"]
 
@@ -312,3 +313,89 @@ def test_result_is_a_dataset_of_xarray():
     total = (np.gradient(dataset["ln_k"]) * dataset["test_density"][0]).sum()
     assert float(total) == pytest.approx(1.0, abs=1e-3)
     assert found.plot(ax=None) is not None
+
+
+def test_tests_of_one_specimen_with_unlike_errors_are_taken_together():
+    tests = [Measurement("a", depth=48e-6, depth_std=std, group="one") for std in (0.01e-6, 10e-6)]
+    found = wearsim.identify(rig(), tests)
+    alone = wearsim.identify(rig(), tests[:1])
+    ends = [item.summary["k_over_h_median_per_Pa"] for item in (found, alone)]
+    assert list(ends[0].values()) == pytest.approx(list(ends[1].values()), rel=2e-3)
+    assert not any("contradict" in text for text in found.warnings)
+
+
+@pytest.mark.parametrize("at", [None, "200 min"])
+def test_grooves_of_one_specimen_that_contradict_each_other_are_warned_of(at: str | None):
+    first = "450 min" if at is None else "100 min"
+    tests = [depth(20.0, group="one", at=first), depth(60.0, group="one", at=at)]
+    found = wearsim.identify(rig(), tests)
+    assert any("one: its grooves contradict each other" in text for text in found.warnings)
+
+
+def test_interval_of_an_inaccurate_depth_holds_95_percent_of_its_likelihood():
+    error = 0.2
+    std = error * 48e-6
+    found = wearsim.identify(rig(), [Measurement("a", depth=48e-6, depth_std=std)]).tests[0]
+    logs = np.linspace(math.log(1.0 - 4.0 * error), math.log(1.0 + 4.0 * error), 20_001)
+    weight = np.exp(-0.5 * ((np.exp(logs) - 1.0) / error) ** 2)
+    factors = 1.5 * logs + math.log(K * (48.0 / 48.11) ** 1.5)  # rigid bodies in full slip
+    low, high = (math.log(found["k_over_h_per_Pa"][end]) for end in ("low", "high"))
+    inside = (factors > low) & (factors < high)
+    assert weight[inside].sum() / weight.sum() == pytest.approx(0.95, abs=0.015)
+
+
+@pytest.mark.parametrize(
+    ("size", "std", "message"),
+    [
+        (0.5, 1.0, "depth_std: is more than a quarter of the depth of 0.5 um"),
+        (3000.0, 1.0, "depth: the worn depth of 3 mm exceeds a tenth of roller.radius"),
+    ],
+)
+def test_depth_that_bounds_no_wear_factor_is_refused(size: float, std: float, message: str):
+    with pytest.raises(ScenarioError, match=message):
+        wearsim.identify(rig(), [Measurement("a", depth=size * 1e-6, depth_std=std * 1e-6)])
+
+
+@pytest.mark.parametrize(
+    ("changes", "share"),
+    [
+        ({}, ()),
+        ({"creepage.longitudinal": 2e-4}, ()),
+        ({"load.kind": "spring", "load.stiffness": "690 N/mm"}, ()),
+        ({"wear.roller.k_over_h": "2e-12 1/Pa"}, ("cylinder", "roller")),
+    ],
+)
+@pytest.mark.parametrize("minutes", [20.0, 100.0])
+def test_depth_measured_before_the_end_of_the_test_gives_the_wear_factor(changes, share, minutes):
+    worn = wearsim.run(rig().changed({**changes, "operation.duration": f"{minutes:g} min"}))
+    body = "roller" if share else "cylinder"
+    size = float(np.max(worn.roller_depth[-1] if share else worn.depth[-1]))
+    test = Measurement("a", depth=size, depth_std=0.02 * size, at=f"{minutes:g} min", body=body)
+    # the search begins at a wear factor that is far too small
+    begin = {"wear.cylinder.k_over_h": "1.1e-13 1/Pa"}
+    if share:
+        begin["wear.roller.k_over_h"] = "2e-14 1/Pa"
+    (found,) = wearsim.identify(rig().changed({**changes, **begin}), [test], share=share).tests
+    assert found["k_over_h_per_Pa"]["value"] == pytest.approx(K, rel=5e-3)
+    energy, error = worn.dissipated_energy[-1], worn.errors["dissipated_energy"][-1]
+    assert found["energy_J"]["value"] == pytest.approx(energy, rel=5e-3 + error / energy)
+    assert found["model_depth_m"] == pytest.approx(size, rel=2e-3)
+
+
+def test_depth_that_a_mounting_spring_does_not_permit_is_refused():
+    scenario = rig().changed(
+        {"load.kind": "spring", "load.stiffness": "20 N/um"}
+    )  # unloaded after 15 um
+    with pytest.raises(ScenarioError, match="no draw of the inputs describes this groove"):
+        wearsim.identify(scenario, [depth(48.0)])
+
+
+def test_tests_that_rigid_bodies_do_not_wear_are_identified_and_not_planned():
+    rolling = {"creepage.longitudinal": 0.0, "creepage.differential_slip": True}
+    scenario = rig().changed({**rolling, "operation.duration": "100 min"})
+    worn = float(wearsim.run(scenario).depth[-1])
+    begin = scenario.changed({"wear.cylinder.k_over_h": "1.1e-12 1/Pa"})
+    (found,) = wearsim.identify(begin, [Measurement("a", depth=worn, depth_std=0.02 * worn)]).tests
+    assert found["k_over_h_per_Pa"]["low"] < K < found["k_over_h_per_Pa"]["high"]
+    with pytest.raises(CapabilityError, match="in full slip, which is zero"):
+        plan_tests(scenario, [3])

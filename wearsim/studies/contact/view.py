@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.evolution.observables import greatest_between
 from wearsim.levelling import Measured
 from wearsim.report.panels import (
     BLACK,
@@ -28,6 +29,7 @@ from wearsim.studies.contact.outline import patch_edges, patch_outlines
 from wearsim.studies.contact.single import ContactStudy
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray
 
+_OF_EDGE = 0.25  # error of an edge of the patch, in strips
 _DIGITS = 10  # after the point, of a fraction; beyond them is rounding
 _DIFFERENCES = {
     "dissipation": "P_l(y), L2 over the strips",
@@ -58,13 +60,28 @@ class ContactView(View):
         """Width of the patch across the track [m]."""
         return float(self.edges[1] - self.edges[0]) if self.edges else 0.0
 
+    @property
+    def _width_error(self) -> float:
+        """Estimated error of the width [m]: each edge is known to a part of a strip."""
+        return 2.0 * _OF_EDGE * self.result.grid.spacing if self.edges else 0.0
+
+    @property
+    def _length(self) -> tuple[float, float | None]:
+        """Greatest length of the patch along rolling, and its estimated error if known [m]."""
+        study, half_length = self.result, self.result.solution.half_length
+        greatest = float(half_length.max())
+        if study.grid_error is None:
+            return 2.0 * greatest, None
+        # the relative error is that of the pressure; between the strips lies a parabola
+        between = float(greatest_between(half_length)) - greatest
+        return 2.0 * greatest, 2.0 * (between + (study.pressure_error or 0.0) * greatest)
+
     def rows(self) -> Rows:
         """Return the numbers of the contact."""
         study, point, solution = self.result, self.result.point, self.result.solution
         rounding = 1e-12 * point.normal_force * study.grid.spacing * study.grid.strips
         moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
-        width = shown(self._width, "mm") if self.edges else NOTHING
-        length = 2.0 * float(solution.half_length.max())
+        length, length_error = self._length
         pressure, power = solution.peak_pressure, solution.power
         pressure_error = _times(study.pressure_error, pressure)
         power_error = _times(study.grid_error, power)
@@ -78,8 +95,10 @@ class ContactView(View):
             Row("longitudinal creepage", solution.longitudinal_creepage),
             Row("lateral creepage", point.creepage.lateral),
             Row("spin", f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"),
-            Row.answer("patch length 2a", "patch_length", length, "mm"),
-            Row("patch width", width, answers={"patch_width": (self._width, "mm")}),
+            Row.answer("patch length 2a", "patch_length", length, "mm", length_error),
+            Row.answer("patch width", "patch_width", self._width, "mm", self._width_error)
+            if self.edges
+            else Row("patch width", NOTHING, answers={"patch_width": (0.0, "mm")}),
             Row.answer("peak pressure", "peak_pressure", pressure, "MPa", pressure_error),
             Row.answer("approach", "approach", solution.approach, "um"),
             Row.answer("longitudinal force", "force_x", solution.force_x, "N"),
@@ -116,8 +135,10 @@ class ContactView(View):
             "longitudinal_creepage": solution.longitudinal_creepage,
             "lateral_creepage": point.creepage.lateral,
             "spin_per_m": point.creepage.spin,
-            "patch_length_m": 2.0 * float(solution.half_length.max()),
+            "patch_length_m": self._length[0],
+            "patch_length_error_m": self._length[1],
             "patch_width_m": self._width,
+            "patch_width_error_m": self._width_error,
             "peak_pressure_Pa": solution.peak_pressure,
             "approach_m": solution.approach,
             "force_x_N": solution.force_x,

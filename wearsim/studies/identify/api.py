@@ -19,9 +19,11 @@ from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.cam_wear import Wanted, size_of
 from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.failures import too_deep
 from wearsim.studies.identify.analysis import Identified, identified
 from wearsim.studies.identify.inputs import contained_inputs, with_known
 from wearsim.studies.identify.lifts import read_change
+from wearsim.studies.identify.likelihood import depth_range
 from wearsim.studies.identify.measurements import (
     Measurement,
     key_of,
@@ -39,6 +41,7 @@ from wearsim.uq.hierarchy.verdict import NEGLIGIBLE
 
 MOST_DRAWS = 768  # where a trace leaves few of the first ones
 _LEAST_SIGNAL = 3.0  # depth over the noise
+_MOST_STD = 0.25  # of a measured depth, over the depth
 _SHARE = ("cylinder", "roller")
 
 
@@ -249,8 +252,7 @@ class _Study:
             size = float(size_of(item.surface, smoothed(trace.height)))
             return _Ready(item, scenario, trace, passes, (0.5 * size, 1.2 * size))
         if item.profile is None:
-            assert item.depth is not None
-            return _Ready(item, scenario, None, passes, (item.depth, item.depth))
+            return _Ready(item, scenario, None, passes, _possible_depths(scenario, item))
         trace = read_trace(item, crown)
         self.notes += [f"{item.name}: {text}" for text in trace.notes]
         if trace.depth is None or trace.noise is None:
@@ -299,13 +301,9 @@ class _Study:
             ready.item.surface: ready.item.angle for ready in group if ready.item.angle is not None
         }
         grower = Grower(group[0].scenario, draws, self.shared, report, angles)
-        if self.scenario.cam is None:
-            low = min(ready.depths[0] for ready in group)
-            high = max(ready.depths[1] for ready in group)
-            trajectories = grower.grow((low, high), [ready.passes for ready in group])
-        else:
-            wanted = [Wanted(test.item.surface, test.passes, *test.depths) for test in group]
-            trajectories = grower.grow_on_cam(wanted)
+        wanted = [Wanted(test.item.surface, test.passes, *test.depths) for test in group]
+        on_cam = self.scenario.cam is not None
+        trajectories = grower.grow_on_cam(wanted) if on_cam else grower.grow(wanted)
         return [self._identified(ready, trajectories) for ready in group], trajectories
 
     def _identified(self, ready: _Ready, trajectories: Trajectories) -> Identified:
@@ -357,6 +355,27 @@ def _passes(scenario: Scenario, item: Measurement) -> float:
         what, expected = "is not within the test", f"up to {scenario.total_time / 60.0:.6g} min"
         raise item.refused(Mistake("", "at", what, item.at, expected))
     return passes
+
+
+def _possible_depths(scenario: Scenario, item: Measurement) -> tuple[float, float]:
+    """Return the least and the greatest depth that a measured depth leaves possible [m]."""
+    depth, std = item.depth, item.depth_std
+    assert depth is not None
+    assert std is not None
+    if std > _MOST_STD * depth:
+        raise item.refused(
+            Mistake(
+                "",
+                "depth_std",
+                f"is more than a quarter of the depth of {1e6 * depth:.4g} um: a depth of zero is"
+                " almost possible, and K/H has no lower bound",
+                f"{1e6 * std:.4g} um",
+                f"at most {1e6 * _MOST_STD * depth:.4g} um, or the test left out",
+            )
+        )
+    if text := too_deep(scenario, depth):
+        raise item.refused(Mistake("", "depth", text, None, "a depth in its unit, '48 um'"))
+    return depth_range(depth, std)
 
 
 def _check_place(scenario: Scenario, item: Measurement) -> None:

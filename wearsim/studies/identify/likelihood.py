@@ -29,6 +29,8 @@ _COARSE = 0.05  # part of its variance by which a lattice is wider than the mome
 _UNFIT, _OFF = 0.35, 0.3  # of ln variance and of the mean, in standard deviations
 _VALUES = 3_000_000  # of an array
 _DROPPED = 80.0  # of chi2 above the best draw
+_REACH = 4.0  # standard deviations of a measured depth that are integrated to either side
+_DEPTHS = 161
 _LONGEST = np.array([0.4, 1e-3])  # greatest change of ln K and shift in one iteration
 
 
@@ -294,8 +296,16 @@ class DrawLikelihood:
         )
 
 
+def depth_range(depth: float, std: float) -> tuple[float, float]:
+    """Return the least and the greatest depth that a measured depth leaves possible [m]."""
+    return max(depth - _REACH * std, 0.1 * depth), depth + _REACH * std
+
+
 def depth_likelihood(depth: float, std: float, grown: Grown, body: str) -> DrawLikelihood:
     """Return the likelihood of a measured depth for each draw.
+
+    The error of the depth is normal, which ln K is not where the error is a large part of the
+    depth: its mean and standard deviation are those of the likelihood.
 
     Parameters
     ----------
@@ -306,15 +316,22 @@ def depth_likelihood(depth: float, std: float, grown: Grown, body: str) -> DrawL
         "cylinder" or "roller".
     """
     greatest = np.log(np.maximum(grown.depth[body].max(axis=2), 1e-12))
-    mean, slope = np.empty((2, len(greatest)))
+    away = np.linspace(-_REACH, _REACH, _DEPTHS)
+    tried = np.log(np.maximum(depth + std * away, 1e-12))
+    evidence, mean, spread = np.empty((3, len(greatest)))
     for draw, (ln_depth, ln_k) in enumerate(zip(greatest, grown.ln_k, strict=True)):
-        mean[draw] = np.interp(np.log(depth), ln_depth, ln_k)
-        place = int(np.clip(np.searchsorted(ln_depth, np.log(depth)), 1, len(ln_k) - 1))
-        rise = ln_depth[place] - ln_depth[place - 1]
-        slope[draw] = (ln_k[place] - ln_k[place - 1]) / max(rise, 1e-12)
+        values = np.interp(tried, ln_depth, ln_k)
+        # equal steps of depth, and a flat prior of ln K
+        weight = np.exp(-0.5 * away**2) * np.gradient(values, away)
+        evidence[draw] = weight.sum()
+        if not evidence[draw] > 0.0:  # no K/H wears to this depth
+            evidence[draw], mean[draw], spread[draw] = 0.0, ln_k[-1], 1.0
+            continue
+        mean[draw] = np.average(values, weights=weight)
+        spread[draw] = np.sqrt(np.average((values - mean[draw]) ** 2, weights=weight))
     zero = np.zeros_like(mean)
-    # the same density of depth at every draw: a steeper curve has a narrower density of ln K
-    return DrawLikelihood(np.log(slope), mean, slope * std / depth, zero, zero)
+    with np.errstate(divide="ignore"):
+        return DrawLikelihood(np.log(evidence), mean, spread, zero, zero)
 
 
 def _interpolated(position: FloatArray, y: FloatArray, rows: FloatArray) -> FloatArray:

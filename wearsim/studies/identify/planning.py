@@ -13,10 +13,11 @@ from wearsim.errors import CapabilityError
 from wearsim.report.view import Table
 from wearsim.scenario import Scenario, as_scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
+from wearsim.studies.cam.cam_wear import Wanted
 from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.identify.analysis import kernel_of
 from wearsim.studies.identify.inputs import with_measured
-from wearsim.studies.identify.likelihood import depth_likelihood
+from wearsim.studies.identify.likelihood import depth_likelihood, depth_range
 from wearsim.studies.identify.measurements import key_of
 from wearsim.studies.identify.trajectories import CYLINDER, ROLLER, Grower, check_law, factors
 from wearsim.uq.hierarchy.kernels import LikelihoodMixture
@@ -132,9 +133,17 @@ def _kernel(
     cylinder, roller = factors(scenario)
     known = {CYLINDER: np.array([cylinder]), ROLLER: np.array([roller])}
     depth = float(closed_form_depths(scenario, known, 1)[0])
+    if not depth > 0.0:
+        raise CapabilityError(
+            f"{scenario.file}: tests are planned for the depth that rigid bodies wear in full slip,"
+            " which is zero; give creepage.longitudinal or creepage.yaw"
+        )
     passes = float(scenario.total_passes)
-    grown = Grower(scenario, draws, on_progress=on_progress).grow((depth, depth), [passes])
-    likelihood = depth_likelihood(depth, DEPTH_ERROR * depth, grown.by_passes[passes], "cylinder")
+    std = DEPTH_ERROR * depth
+    grower = Grower(scenario, draws, on_progress=on_progress)
+    wanted = Wanted("cylinder", passes, *depth_range(depth, std))
+    grown = grower.grow([wanted]).by_passes[passes]
+    likelihood = depth_likelihood(depth, std, grown, "cylinder")
     return kernel_of(likelihood, scenario.file)
 
 

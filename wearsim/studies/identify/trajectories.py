@@ -14,22 +14,18 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import CapabilityError, SolverError, mistake_in
-from wearsim.evolution.integrate import Evolution, bisect_failures
-from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, fresh_state
-from wearsim.evolution.strips import averaged, same_strips
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
-from wearsim.studies.cam.cam_wear import CylinderView, Wanted, falls_of_lift, size_of, view_of
-from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, joined_problem
+from wearsim.studies.cam.cam_wear import Wanted, size_of, view_of
+from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
 from wearsim.studies.ensemble.realisation import closed_form_depths
+from wearsim.studies.identify.wear_tests import ListedPasses, worn_at_records
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import lattice, strips_of_run
 from wearsim.studies.run.setup import Setup
-from wearsim.studies.schedule import RecordSchedule, due_records, states_at
 from wearsim.studies.start.heights import start_height
-from wearsim.types import FloatArray, Grid, IntArray
+from wearsim.types import FloatArray, Grid
 
 CYLINDER, ROLLER = "wear.cylinder.k_over_h", "wear.roller.k_over_h"
 RATIO = 1.3  # of tau between records
@@ -41,24 +37,10 @@ _FEW = 8  # draws
 _MOST_LOST = 0.05  # fraction of the draws whose tests may fail
 _PILOTS = 6  # tests that search for the wear factor of a cam
 _NEAR = 1.3  # ratio of sizes at which the search ends
+_EXTENSIONS = 4  # times that tests are run again, to cover what was measured
+_GAIN = 1.05  # least ratio of depths by which a greater K/H is not in vain
+_MOST_EXTENDED = 100.0  # greatest ratio of K/H by which a test is extended at once
 _ROOM = 1.5  # by which the depth on a cam may differ between draws from that expected
-
-
-@dataclass(frozen=True)
-class ListedPasses(RecordSchedule):
-    """Schedule of records at given passes.
-
-    Parameters
-    ----------
-    passes : tuple of float
-        Rising.
-    """
-
-    passes: tuple[float, ...] = ()
-
-    def next_record(self, passes: float) -> float:
-        """Return the passes of the first record after `passes`, infinity after the last."""
-        return next((number for number in self.passes if number > passes), np.inf)
 
 
 @dataclass(frozen=True)
@@ -234,15 +216,13 @@ class Grower:
                 values.setdefault(key, []).append(float(np.mean(value)))
         return {key: np.array(value) for key, value in values.items()}
 
-    def grow(self, depths: tuple[float, float], passes: Sequence[float]) -> Trajectories:
-        """Run the wear tests.
+    def grow(self, wanted: Sequence[Wanted]) -> Trajectories:
+        """Run the wear tests of a cylinder.
 
         Parameters
         ----------
-        depths : tuple of float
-            Least and greatest depth of the measured grooves [m].
-        passes : sequence of float
-            Numbers of passes of the measurements.
+        wanted : sequence of Wanted
+            Sizes of the measured grooves.
 
         Returns
         -------
@@ -253,10 +233,20 @@ class Grower:
         SolverError
             If the tests of more than a twentieth of the draws fail; others are left out.
         """
-        times = sorted(set(passes))
-        low, high = BELOW * depths[0], ABOVE * depths[1]
-        span = (high / low) ** 1.5 * (times[-1] / times[0] if self.reasons else 1.0)
-        return self._grown_at(times, self._factor_for(high), span)
+        times = sorted({item.passes for item in wanted})
+        # with one test for all K/H, a groove that was measured earlier needs a smaller one
+        ends = [
+            [
+                self._factor_for(margin * size, item.passes)
+                * (1.0 if self.reasons else item.passes / times[-1])
+                for margin, size in ((BELOW, item.low), (ABOVE, item.high))
+            ]
+            for item in wanted
+        ]
+        start = np.max([high for _, high in ends], axis=0)
+        span = float((start / np.min([low for low, _ in ends], axis=0)).max())
+        span = max(span, (ABOVE / BELOW) ** 1.5)  # also where rigid bodies do not wear
+        return self._covered(times, start, span, wanted)
 
     def grow_on_cam(self, wanted: Sequence[Wanted]) -> Trajectories:
         """Run the wear tests of a cam; see `grow`.
@@ -282,7 +272,33 @@ class Grower:
         usual = expected / expected[0] if expected[0] > 0.0 else np.full(self.count, np.nan)
         usual = np.where(np.isfinite(usual) & (usual > 0.0), usual, 1.0)
         start = high.max() * np.clip(usual, 0.1, 10.0) ** -1.5
-        return self._grown_at(times, start, float(high.max() / low.min()))
+        return self._covered(times, start, float(high.max() / low.min()), wanted)
+
+    def _covered(
+        self, times: Sequence[float], start: FloatArray, span: float, wanted: Sequence[Wanted]
+    ) -> Trajectories:
+        """Return the wear from the least to the greatest size of all that was measured.
+
+        Where a draw wears less or more than was expected, all tests are run again.
+        """
+        before = np.inf
+        for last in (False,) * _EXTENSIONS + (True,):
+            grown, kept = self._grown_at(times, start, span)
+            more, less = np.ones((2, len(kept)))
+            for item in wanted:
+                sizes = size_of(item.surface, grown.by_passes[item.passes].depth[item.surface])
+                short = item.high / np.maximum(sizes[:, -1], 1e-3 * item.high)
+                more = np.maximum(more, np.where(short > 1.0, (ABOVE * short) ** 1.5, 1.0))
+                beyond = sizes[:, 0] / item.low
+                less = np.maximum(less, np.where(beyond > 1.0, (beyond / BELOW) ** 1.5, 1.0))
+            missing = float(max(more.max(), less.max()))
+            if last or missing == 1.0 or missing > before / _GAIN:
+                break
+            before = missing
+            start = start.copy()
+            start[kept] *= np.minimum(more, _MOST_EXTENDED)
+            span *= float(np.minimum(more, _MOST_EXTENDED).max() * less.max())
+        return grown
 
     def _pilot(self, wanted: Sequence[Wanted], passes: float) -> tuple[float, FloatArray]:
         """Return a wear factor near the first draw, and the sizes that it wears [m]."""
@@ -303,8 +319,13 @@ class Grower:
             k *= float(np.clip(ratio, 0.01, 100.0)) ** 1.5
         return k, sizes
 
-    def _grown_at(self, times: Sequence[float], start: FloatArray, span: float) -> Trajectories:
-        """Return the wear up to a factor for each draw, and down to the part 1/span of it."""
+    def _grown_at(
+        self, times: Sequence[float], start: FloatArray, span: float
+    ) -> tuple[Trajectories, list[int]]:
+        """Return the wear up to a factor for each draw, and down to the part 1/span of it.
+
+        The numbers of the draws without a failed test are returned too.
+        """
         count = int(np.ceil(np.log(span) / np.log(RATIO))) + 1
         if self.reasons:
             # interpolation between many tests is hidden by their scatter
@@ -335,19 +356,31 @@ class Grower:
                 for item in times
             }
         values = {key: column[kept] for key, column in self.values().items()}
-        return Trajectories(values, self.reasons, by_passes, self.count - len(kept))
+        return Trajectories(values, self.reasons, by_passes, self.count - len(kept)), kept
 
-    def _factor_for(self, depth: float) -> FloatArray:
-        """Return the wear factor with which each draw wears to a depth, for rigid bodies."""
+    def _factor_for(self, depth: float, passes: float) -> FloatArray:
+        """Return the wear factor with which each draw wears to a depth, for rigid bodies.
+
+        That of the scenario for a draw of which rigid bodies do not wear.
+        """
         cylinder, roller = factors(self.scenario)
+        scenario = replace(self.scenario, operation=self._operation(passes))
         columns = self.drawer.columns(0, self.count)
-        factor = np.full(self.count, cylinder)
-        for _ in range(8):  # a mounting spring slows the wear as the groove deepens
+        factor, before = np.full(self.count, cylinder), np.full(self.count, np.inf)
+        for _ in range(8):  # a mounting spring slows the wear as the groove deepens, or ends it
             share = {ROLLER: factor * (roller / cylinder)} if self.shared else {}
             known = {**columns, CYLINDER: factor, **share}
-            reached = closed_form_depths(self.scenario, known, self.count)
-            factor = factor * np.clip(depth / np.maximum(reached, 1e-3 * depth), 0.1, 10.0) ** 1.5
+            reached = closed_form_depths(scenario, known, self.count)
+            ended = (before < depth) & (reached < np.minimum(_GAIN * before, depth))
+            worn, before = (reached > 0.0) & ~ended, reached
+            ratio = np.where(worn, depth / np.where(worn, reached, 1.0), 1.0)
+            factor = factor * np.clip(ratio, 0.1, 10.0) ** 1.5
         return factor
+
+    def _operation(self, passes: float) -> Any:
+        """Return the operation of the scenario up to some passes."""
+        update = {"passes": max(1, round(passes)), "duration": None, "turns": None}
+        return self.scenario.operation.model_copy(update=update)
 
     def _grown(
         self, ln_k: FloatArray, states: Sequence[tuple[Any, ...]], shape: tuple[int, ...]
@@ -370,9 +403,7 @@ class Grower:
         their tests.
         """
         cylinder, roller = factors(self.scenario)
-        table = self.scenario.operation.model_copy(
-            update={"passes": max(1, round(passes[-1])), "duration": None}
-        )
+        table = self._operation(passes[-1])
         ready: list[Setup] = []
         evolution = self.scenario.evolution
         if self.count > _FEW and evolution.tolerance < TOLERANCE:
@@ -401,7 +432,7 @@ class Grower:
         failures: dict[int, Exception] = {}
         done = 0
         for group in batch_groups(runs):
-            grown, failed = _step(group, schedule, grid, views)
+            grown, failed = worn_at_records(group, schedule, grid, views)
             results.update(grown)
             failures.update(failed)
             done += len(group)
@@ -425,59 +456,3 @@ def _covering(grids: Sequence[Grid], setups: Sequence[Setup]) -> Grid:
     half = max(abs(setup.centre - middle) + setup.final for setup in setups)
     extent = Grid.spanning(middle - 0.5 * spacing, middle + 0.5 * spacing, 1)
     return lattice(extent, max(half, 0.5 * (high - low)))
-
-
-def _step(
-    group: Sequence[RealisationRun],
-    schedule: ListedPasses,
-    grid: Grid,
-    views: Mapping[int, CylinderView],
-) -> tuple[dict[int, list[Any]], dict[int, Exception]]:
-    """Step through a group of tests; return their profiles and energies at the records, and errors.
-
-    The profiles are on the strips of `grid`.
-    """
-    results: dict[int, list[Any]] = {run.number: [] for run in group}
-    failures: dict[int, Exception] = {}
-
-    def work(places: IntArray) -> None:
-        runs = [group[place] for place in places]
-        stepper, stop = runs[0].stepper, schedule.passes[-1]
-        problem = joined_problem([run.problem for run in runs])
-        steps = runs[0].scenario.evolution.max_steps
-        for run in runs:
-            results[run.number].clear()
-        tests = Evolution(problem, fresh_state(problem), stepper, stop, steps, schedule.next_record)
-        for advance in tests:
-            due = due_records(advance, schedule, stop, stepper.pass_by_pass)
-            # tests that are not stepped together have individual steppers, and one record each
-            for part in [due] if len(runs) > 1 else [[record] for record in due]:
-                if not part:
-                    continue
-                present, states = states_at(stepper, advance, part)
-                numbers = [runs[int(advance.numbers[place])].number for _, place, _ in part]
-                profiles = _profiles(present, states, grid, [views[record] for record in numbers])
-                for row, number in enumerate(numbers):
-                    results[number].append((profiles[row], float(states.energy[row])))
-        failures.update({runs[place].number: error for place, error in tests.failures.items()})
-
-    _, failed = bisect_failures(work, np.arange(len(group)))
-    return results, failures | {group[place].number: error for place, error in failed.items()}
-
-
-def _profiles(
-    problem: WearProblem, state: WearState, grid: Grid, views: Sequence[CylinderView]
-) -> list[dict[str, FloatArray]]:
-    """Return the worn profiles of each test of a state by the name of their surface."""
-    same = same_strips(problem.grid, grid)
-    cylinder, roller = (
-        depths if same else averaged(depths, problem.grid, grid) for depths in state.depths
-    )
-    depth, falls = problem.kinematics.track.at_unworn(cylinder[:, 0]), falls_of_lift(problem, state)
-    return [
-        {
-            **view.profiles(depth[:, row], falls[:, row]),
-            "roller": roller[0, :, row].mean(axis=0),
-        }
-        for row, view in enumerate(views)
-    ]

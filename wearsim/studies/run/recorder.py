@@ -287,6 +287,7 @@ class Recorder:
         self.schedule = schedule
         self.threshold = threshold
         self._multiplicity = problem.kinematics.multiplicity
+        self._by_energy = problem.linear_wear and bool(problem.wear_coefficients.any())
         sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
         sums |= {f"{name}_error" for name in ESTIMATED}
         steps = {name: column for name, column in (history or {}).items() if name not in sums}
@@ -421,7 +422,9 @@ class Recorder:
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
             columns[name] = by_steps + np.nan_to_num(part)[:, None]
             columns[name] = columns[name] + columns.get(f"{name}_by_stations", 0.0)
-        of_turn = self._error_of_turn(columns)
+        of_turn = np.zeros(len(self._history))
+        if "volume_error_by_stations" in columns:
+            of_turn = self._of_volume(columns, "volume_error_by_stations")
         for name in self.observed:
             unknown = np.full_like(columns[name], np.nan)
             by_stations = np.nan_to_num(columns.get(f"{name}_error_by_stations", 0.0))
@@ -432,16 +435,16 @@ class Recorder:
             error = self.observed_errors.get(name, unknown) + by_stations
             error = error + columns.get(f"{name}_error_by_steps", 0.0)
             columns[f"{name}_error"] = np.minimum(error, np.pi) if name.endswith("angle") else error
+        if self._by_energy and self.observed_errors:  # the volume is proportional to the energy
+            relative = self._of_volume(columns, "volume_error")[:, None]
+            columns["dissipated_energy_error"] = columns["dissipated_energy"] * relative
         return columns
 
-    def _error_of_turn(self, columns: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the relative error of sums over the stations of a cam, taken from its volume."""
-        error = columns.get("volume_error_by_stations")
-        if error is None:
-            return np.zeros(len(self._history))
+    def _of_volume(self, columns: Mapping[str, FloatArray], name: str) -> FloatArray:
+        """Return an error of the volume worn off both bodies over that volume, (steps,)."""
         rollers = columns["roller_worn_volume"][..., 0] @ self._multiplicity
         total = columns["worn_volume"][:, 0] + rollers
-        return np.asarray(error[:, 0] / np.where(total > 0.0, total, np.inf))
+        return np.asarray(columns[name][:, 0] / np.where(total > 0.0, total, np.inf))
 
     @property
     def observed(self) -> dict[str, FloatArray]:
