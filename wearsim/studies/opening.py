@@ -85,7 +85,7 @@ def open_ensemble(path: str | Path) -> EnsembleResult:
     Returns
     -------
     EnsembleResult
-        Of lives, a `LifeResult`.
+        Of lives, that of `life`.
 
     Examples
     --------
