@@ -115,7 +115,7 @@ class IdentificationResult(StudyResult[IdentificationData]):
     >>> depths = [Measurement(f"test {d}", depth=d * 1e-6, depth_std=1e-6) for d in (45, 48, 51)]
     >>> found = wearsim.identify("rig.toml", depths)
     >>> [f"{test['k_over_h_per_Pa']['value']:.2e}" for test in found.tests]
-    ['9.95e-12', '1.10e-11', '1.20e-11']
+    ['9.94e-12', '1.10e-11', '1.20e-11']
     """
 
     scatter = Stored("scatter", "Grid of the scatter t of ln K/H.")
