@@ -77,7 +77,7 @@ class Steps(Process):
 
 
 def scenario(install: Callable[..., None], base: type[Any], faults: dict[str, Any]) -> Scenario:
-    """Return a test with a random input, some of whose methods and attributes are replaced."""
+    """Return a test with a random input that has some faulty methods or attributes."""
     roles = {Flat: "scalar", Angles: "joint", Strips: "field", Steps: "process"}
     role: Any = roles[base]
     faulty = type("Faulty", (base,), faults)

@@ -1,4 +1,4 @@
-"""Files of cams whose values are in another unit than their headers say, or are rounded."""
+"""Files of cams with a wrong unit in their header, and with rounded angles."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from wearsim.types import ContactSolution, FloatArray
 
 
 class CheckedWearLaw(Checked, WearLaw):
-    """Wear law of a plugin whose depths are checked; raises the errors of `Checked`."""
+    """Wear law of a plugin, with checks of its depths; errors as of `Checked`."""
 
     spec = WearLawSpec
 
@@ -48,7 +48,7 @@ class CheckedWearLaw(Checked, WearLaw):
 
 
 class CheckedFatigueLaw(Checked, FatigueLaw):
-    """Fatigue law of a plugin whose damages are checked; raises the errors of `Checked`."""
+    """Fatigue law of a plugin, with checks of its damages; errors as of `Checked`."""
 
     spec = FatigueLawSpec
 
@@ -59,7 +59,7 @@ class CheckedFatigueLaw(Checked, FatigueLaw):
 
 
 class CheckedMotionLaw(Checked, MotionLaw):
-    """Motion law of a plugin whose lifts are checked; raises the errors of `Checked`.
+    """Motion law of a plugin, with checks of its lifts; errors as of `Checked`.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class CheckedMotionLaw(Checked, MotionLaw):
 
 
 class CheckedAxialProfile(Checked, AxialProfile):
-    """Form along the axis of a plugin whose drops are checked; raises the errors of `Checked`."""
+    """Form along the axis of a plugin, with checks of its drops; errors as of `Checked`."""
 
     spec = AxialProfileSpec
 

@@ -25,7 +25,7 @@ class _CheckedPairs(Checked):
 
 
 class CheckedLoad(_CheckedPairs, Load):
-    """Load of a plugin whose forces are checked; raises the errors of `Checked`.
+    """Load of a plugin, with checks of its forces; errors as of `Checked`.
 
     Whether they are above zero is for the study to check, as it depends on the scenario.
     """
@@ -77,7 +77,7 @@ class CheckedLoad(_CheckedPairs, Load):
 
 
 class CheckedLoadTerm(_CheckedPairs, LoadTerm):
-    """Term of a plugin whose forces are checked; raises the errors of `Checked`."""
+    """Term of a plugin, with checks of its forces; errors as of `Checked`."""
 
     def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the state after `duration` [s] at constant `power` [W]."""

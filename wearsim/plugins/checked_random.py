@@ -40,7 +40,7 @@ class _CheckedRandomInput(Checked):
 
 
 class CheckedDistribution(_CheckedRandomInput, Distribution):
-    """Distribution of a plugin whose quantiles are checked; raises the errors of `Checked`."""
+    """Distribution of a plugin, with checks of its quantiles; errors as of `Checked`."""
 
     def quantile(self, probability: FloatArray) -> FloatArray:
         """Return the quantiles, shape as `probability`; infinite only at 0 and 1."""
@@ -98,7 +98,7 @@ class CheckedDistribution(_CheckedRandomInput, Distribution):
 
 
 class CheckedJointDistribution(Checked, JointDistribution):
-    """Joint distribution of a plugin whose draws are checked; raises the errors of `Checked`."""
+    """Joint distribution of a plugin, with checks of its draws; errors as of `Checked`."""
 
     spec = RandomInputSpec
 
@@ -140,7 +140,7 @@ class CheckedJointDistribution(Checked, JointDistribution):
 
 
 class CheckedFrictionField(_CheckedRandomInput, FrictionField):
-    """Friction field of a plugin whose values are checked; raises the errors of `Checked`."""
+    """Friction field of a plugin, with checks of its values; errors as of `Checked`."""
 
     def __init__(self, plugin: FrictionField, name: str) -> None:
         super().__init__(plugin, name)
@@ -163,7 +163,7 @@ class CheckedFrictionField(_CheckedRandomInput, FrictionField):
 
 
 class CheckedProcess(_CheckedRandomInput, Process):
-    """Process of a plugin whose paths are checked; raises the errors of `Checked`."""
+    """Process of a plugin, with checks of its paths; errors as of `Checked`."""
 
     def __init__(self, plugin: Process, name: str) -> None:
         super().__init__(plugin, name)

@@ -364,7 +364,8 @@ def with_error(values: FloatArray, error: float | None, unit: str) -> str:
     # the last digit is that below the first digit of the error
     digits = 2 + math.floor(math.log10(size / error)) if size > 0.0 else 1
     digits = min(max(digits, 1), 4)
-    last = 10.0 ** (math.floor(math.log10(error)) - 1)  # a value below its error has no digit after
+    last = 10.0 ** (math.floor(math.log10(error)) - 1)  # second digit of the error
+    # smaller values than the error are rounded to that digit
     known = [
         value if abs(value) > error else last * round(value / last)
         for value in np.ravel(values).tolist()

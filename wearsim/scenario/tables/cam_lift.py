@@ -127,18 +127,19 @@ def read_lift_table(
         choice=CHOICE.format("LIFT"),
     )
     lifts, unit = columns[lift], given.get(lift) or heads.get(lift)
-    found = (
-        _doubts(path, lift, unit, lifts, follower) if length else _refuse_wide(path, lift, lifts)
-    )
-    if notes is not None:
-        notes += found
+    if not length:
+        _refuse_wide(path, lift, lifts)
+    else:
+        found = _checked_lifts(path, lift, unit, lifts, follower)
+        if notes is not None:
+            notes += found
     if follower.swings and length:
         lifts = lifts / follower.arm_length
     refuse_few(path, len(lifts), FEWEST_ROWS, "rows for a quintic spline")
     return columns[angle], lifts
 
 
-def _doubts(
+def _checked_lifts(
     path: str, column: str, unit: str | None, lifts: FloatArray, follower: Follower
 ) -> list[str]:
     """Return notes of lifts [m] that do not suit the base circle; refuse those of a wrong unit."""
@@ -156,14 +157,13 @@ def _doubts(
     return notes
 
 
-def _refuse_wide(path: str, column: str, lifts: FloatArray) -> list[str]:
-    """Raise a ScenarioError if an arm swings by more than is possible; return no notes."""
+def _refuse_wide(path: str, column: str, lifts: FloatArray) -> None:
+    """Raise a ScenarioError if an arm swings by more than is possible."""
     swing = float(np.ptp(lifts))
     if swing > _WIDEST:
         got = f"a swing of {math.degrees(swing):.3g} deg"
         what = f"column '{column}' is too large for an arm: its unit is probably wrong"
         raise mistake_in(path, what, got, "deg as unit, not rad")
-    return []
 
 
 def one_turn(

@@ -13,7 +13,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.observables import depth_error_by_stations, volume_error_by_stations
-from wearsim.evolution.observed_errors import observed_errors, relative_crown_radius
+from wearsim.evolution.observed_errors import observed_errors
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
@@ -32,7 +32,6 @@ from wearsim.scenario import Scenario
 from wearsim.studies.cam.observables import observables_of_track
 from wearsim.studies.failures import too_deep_failure
 from wearsim.studies.fatigue.observables import fatigue_curves
-from wearsim.studies.roller_ends import width_between_edges
 from wearsim.studies.run.assemble import coarse_stepper
 from wearsim.studies.run.recorder import history_row
 from wearsim.studies.run.setup import Setup
@@ -360,17 +359,13 @@ def add_strip_errors(
         errors = by_strips[:, -1]
         if isinstance(result, RunObservations) and np.isfinite(errors).all():
             observed = {name: np.array(values) for name, values in course.observed.items()}
-            fresh, crown = np.zeros((3, 1)), relative_crown_radius(problem)
-            assert course.grid is not None
+            fresh = np.zeros((3, 1))
             stated = observed_errors(
                 other,
                 np.append(0.0, passes),
                 observed,
                 np.concatenate([fresh, sizes], axis=1),
                 np.concatenate([fresh, by_strips], axis=1),
-                None if crown is None else crown[:, number],
-                course.grid.spacing,
-                width_between_edges(runs[0].scenario),
             )
             added[number] = errors, {name: values[-1] for name, values in stated.items()}
             result.scalars["depth_error"] += float(errors[0])
