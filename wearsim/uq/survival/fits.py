@@ -129,14 +129,13 @@ class LifeFit(FittedLives):
         """
         w = standard_score(self.family, probability)
         best = self.mu + self.sigma * w
-        _, gradient, curvature = self.sample.derivatives(best, math.log(self.sigma), w)
-        del gradient
-        information = -curvature
+        information = -self.sample.derivatives(best, math.log(self.sigma), w)[2]
         error = math.sqrt(abs(information[1, 1] / np.linalg.det(information)))
-        start = math.log(self.sigma)
+        at = math.log(self.sigma)
 
         def excess(distance: float) -> float:
-            top = self.sample.profile(best + distance * error, start, w)
+            nonlocal at  # near the maximum at the next distance too
+            at, top = self.sample.profile(best + distance * error, at, w)
             return 2.0 * (self.log_likelihood - top) - _DEVIANCE
 
         ends = []
@@ -144,15 +143,11 @@ class LifeFit(FittedLives):
             far = side
             while excess(far) < 0.0 and abs(far) < _WIDEST:
                 far *= 2.0
-            inside = abs(far) < _WIDEST
-            at = (
-                scipy.optimize.brentq(excess, 0.5 * far if abs(far) > 1.0 else 0.0, far)
-                if inside
-                else math.nan
-            )
-            ends.append(
-                math.exp(best + at * error) if inside else (0.0 if side < 0.0 else math.inf)
-            )
+            if abs(far) < _WIDEST:
+                near = 0.5 * far if abs(far) > 1.0 else 0.0
+                ends.append(math.exp(best + error * scipy.optimize.brentq(excess, near, far)))
+            else:
+                ends.append(0.0 if side < 0.0 else math.inf)
         return Interval(math.exp(best), *ends)
 
 
@@ -183,9 +178,10 @@ class _Sample:
         curvature = np.array([[second.sum() * inverse**2, across], [across, (mixed * v).sum()]])
         return total, gradient, curvature
 
-    def profile(self, q: float, start: float, w: float) -> float:
-        """Return the greatest log-likelihood with the quantile q."""
-        return self._maximised(np.array([q, start]), w, [1])[1]
+    def profile(self, q: float, start: float, w: float) -> tuple[float, float]:
+        """Return ln sigma of the greatest log-likelihood with the quantile q, and its value."""
+        at, value = self._maximised(np.array([q, start]), w, [1])
+        return float(at[1]), value
 
     def maximum(self, w: float = 0.0) -> tuple[FloatArray, float]:
         """Return location and ln sigma of the greatest log-likelihood, and its value."""
