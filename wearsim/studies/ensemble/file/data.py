@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from wearsim.results.io.stored_file import StoredFile
     from wearsim.studies.ensemble.file.parts import Part
 
-_SMALL = 1 << 13  # largest column that is kept once it has been read [bytes]
+_SMALL = 1 << 13  # largest variable or column that is kept once it has been read [bytes]
 
 
 class StoredRows(Mapping[str, "Array"]):
@@ -44,8 +44,9 @@ class StoredRows(Mapping[str, "Array"]):
     parts : list of Part
         Its parts, oldest first. A row in a later one counts.
     is_unchanged : callable, optional
-        Returns whether the file is as it was when it was opened. Small columns are then not read
-        again, as estimates take the same ones many times; without it all are.
+        Returns whether the file is as it was when it was opened. Small variables are then read
+        together, and they and small columns are not read again, as estimates take the same ones
+        many times; without it all are.
     """
 
     def __init__(
@@ -57,7 +58,8 @@ class StoredRows(Mapping[str, "Array"]):
     ) -> None:
         self._read, self._schema, self.parts = read, schema, parts
         self._is_unchanged = is_unchanged
-        self._kept: dict[tuple[object, ...], Array] = {}
+        self._small: Arrays | None = None  # variables, once they have been read
+        self._kept: dict[tuple[object, ...], Array] = {}  # columns of others
 
     def __len__(self) -> int:
         return len(self._schema.variables)
@@ -92,17 +94,30 @@ class StoredRows(Mapping[str, "Array"]):
         ResultsFileError
             If the file or a part is damaged, or was changed since it was opened.
         """
-        places = (slice(start, stop), *rest)
-        key = (name, *((place.start, place.stop, place.step) for place in places))
-        if key in self._kept and self._is_unchanged():
-            rows = {name: self._kept[key].copy()}
-        else:
-            rows = self._of_file([name], places)
-            if (start, stop) == (0, None) and rows[name].nbytes <= _SMALL:
-                self._kept[key] = rows[name].copy()
+        rows = {name: self._stored(name, (slice(start, stop), *rest))}
         if is_row(self._schema.variables[name]):
             self._put_parts(rows, start, *rest)
         return rows[name]
+
+    def _stored(self, name: str, places: tuple[slice, ...]) -> Array:
+        """Return rows of the file without its parts."""
+        if not self._is_unchanged():
+            return self._of_file([name], places)[name]
+        if self._small is None:
+            self._small = self._read(self._small_variables)
+        if name in self._small:
+            return self._small[name][places].copy()
+        key = (name, *((place.start, place.stop, place.step) for place in places))
+        if key in self._kept:
+            return self._kept[key].copy()
+        values = self._of_file([name], places)[name]
+        if places[0] == slice(0, None) and values.nbytes <= _SMALL:
+            self._kept[key] = values.copy()
+        return values
+
+    def _small_variables(self, file: StoredFile) -> Arrays:
+        names = self._schema.variables
+        return {name: file.array(name) for name in names if file.dataset(name).nbytes <= _SMALL}
 
     def block(self, names: Iterable[str], start: int, stop: int | None) -> Arrays:
         """Return the same rows of several variables, for which each file is opened once.
