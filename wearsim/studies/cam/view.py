@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.mechanics.cam import extreme, surface_points
-from wearsim.report.text import NOTHING, PER_SI, count, in_unit, shown
+from wearsim.report.text import NOTHING, PER_SI, count, count_of, in_unit, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import harmonic_depth
@@ -22,6 +22,7 @@ from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
     from wearsim.report.surfaces import Sampling, Surface
+    from wearsim.scenario.tables.cam_points import MeasuredPoints
 
 
 #: effects that wear tests of cams neglect, besides those neglected on cylinders
@@ -80,8 +81,11 @@ class CamView(View):
         study, turn = self.result, self.result.turn
 
         def place(name: str, label: str, unit: str, value: float, theta: float) -> Row:
-            text = f"{shown(value, unit)} at {turn.place(theta)}"
-            return Row(label, text, answers={name: (value, unit)})
+            return Row(
+                label,
+                f"{shown(value, unit)} at {turn.place(theta)}",
+                answers={name: (value, unit)},
+            )
 
         def stated(name: str, label: str, value: float | None, unit: str, digits: int = 4) -> Row:
             return Row(label, shown(value, unit, digits), answers={name: (value, unit)})
@@ -90,11 +94,17 @@ class CamView(View):
         depth = shown(harmonic_depth(turn), "um", 2)
         p, q = study.winding_ratio
         sweeps = "" if study.sweeps is None else f", {study.sweeps:.4g} sweeps around the roller"
-        forces = {"least_normal_force": (least, "N"), "greatest_normal_force": (greatest, "N")}
         rows = [
             stated("perimeter", "perimeter", study.perimeter, "mm", 6),
             stated("load_integral", "integral of N ds", study.load_integral, "N m", 6),
-            Row("normal force", f"{shown(least, 'N')} to {shown(greatest, 'N')}", answers=forces),
+            Row(
+                "normal force",
+                f"{shown(least, 'N')} to {shown(greatest, 'N')}",
+                answers={
+                    "least_normal_force": (least, "N"),
+                    "greatest_normal_force": (greatest, "N"),
+                },
+            ),
             place("peak_pressure", "greatest pressure", "MPa", *study.max_peak_pressure),
             place("pressure_angle", "greatest pressure angle", "deg", *study.max_pressure_angle),
             place("outer_radius", "outer radius", "mm", *study.max_radius),
@@ -122,9 +132,12 @@ class CamView(View):
             *self._film_rows(),
         ]
         if turn.free:
-            arcs = f"{len(study.skids)} arc{'s' * (len(study.skids) > 1)}"
             energy = sum(skid.energy for skid in study.skids)
-            text = f"{arcs}, {shown(energy, 'J', 3)} per turn" if energy else NOTHING
+            text = (
+                f"{count_of(len(study.skids), 'arc')}, {shown(energy, 'J', 3)} per turn"
+                if energy
+                else NOTHING
+            )
             rows.append(Row("skids of the roller", text, answers={"skid_energy": (energy, "J")}))
         lives = lives_at(turn.scenario, np.array(study.max_peak_pressure[:1]))
         if lives is not None:
@@ -136,11 +149,17 @@ class CamView(View):
             rows.append(Row("stations", f"{len(study.weight)} of a run"))
         if measured := turn.cam.measured:
             away, unit = np.abs(measured.residual), "um" if measured.unit == "m" else "mrad"
-            rms = shown(float(np.sqrt((away**2).mean())), unit, 3)
-            most, noise = shown(float(away.max()), unit, 3), shown(measured.noise, unit, 3)
+            rms, most, noise = (
+                shown(float(size), unit, 3)
+                for size in (np.sqrt((away**2).mean()), away.max(), measured.noise)
+            )
             where = shown(float(measured.angle[away.argmax()]), "deg")
-            words = f"rms {rms}, at most {most} at {where}; noise {noise}"
-            rows.append(Row(f"residuals of the {measured.quantity}", words))
+            rows.append(
+                Row(
+                    f"residuals of the {measured.quantity}",
+                    f"rms {rms}, at most {most} at {where}; noise {noise}",
+                )
+            )
         return rows
 
     def _film_rows(self) -> Rows:
@@ -164,9 +183,13 @@ class CamView(View):
             [in_unit(value, unit) for value in _without_rounding(key, values[key][1])]
             for _, key, unit in shown_columns
         ]
-        rows = zip(*cells, self._segment_names(), strict=True)
-        heads = [*(head for head, *_ in shown_columns), "segment"]
-        return [Table("", [list(row) for row in rows], heads)]
+        return [
+            Table(
+                "",
+                [list(row) for row in zip(*cells, self._segment_names(), strict=True)],
+                [*(head for head, *_ in shown_columns), "segment"],
+            )
+        ]
 
     def _segment_names(self) -> list[str]:
         """Return the name of the segment of each station."""
@@ -230,18 +253,7 @@ class CamView(View):
     def data(self) -> dict[str, Any]:
         """Return the study in SI units."""
         study, motion = self.result, self.result.turn.cam.motion
-        measured, smoothing = self.result.turn.cam.measured, {}
-        if measured is not None:
-            unit = measured.unit
-            smoothing["smoothing"] = {
-                "file": measured.file,
-                "quantity": measured.quantity,
-                f"noise_{unit}": measured.noise,
-                "scatter_of_acceleration_per_rad2": measured.scatter,
-                "error_of_acceleration_per_rad2": measured.error,
-                "angle_rad": measured.angle,
-                f"residual_{unit}": measured.residual,
-            }
+        measured = study.turn.cam.measured
         return {
             "title": self.title,
             "perimeter_m": study.perimeter,
@@ -267,7 +279,7 @@ class CamView(View):
                 {"start_rad": skid.start, "stop_rad": skid.stop, "energy_J": skid.energy}
                 for skid in study.skids
             ],
-            **smoothing,
+            **({} if measured is None else {"smoothing": _smoothing(measured)}),
             "stations": {name: values for name, (_, values) in self._columns().items()},
             "warnings": study.warnings,
             "notes": study.notes,
@@ -299,6 +311,19 @@ class CamView(View):
             "station",
             range(len(self.result.point.angle)),
         )
+
+
+def _smoothing(measured: MeasuredPoints) -> dict[str, Any]:
+    """Return how measured points of a motion are smoothed, for JSON."""
+    return {
+        "file": measured.file,
+        "quantity": measured.quantity,
+        f"noise_{measured.unit}": measured.noise,
+        "scatter_of_acceleration_per_rad2": measured.scatter,
+        "error_of_acceleration_per_rad2": measured.error,
+        "angle_rad": measured.angle,
+        f"residual_{measured.unit}": measured.residual,
+    }
 
 
 def _without_rounding(key: str, values: FloatArray) -> list[float]:
