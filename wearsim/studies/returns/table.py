@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,6 +55,11 @@ class Returns:
     running: BoolArray
     others: dict[str, int]
 
+    @property
+    def failed(self) -> int:
+        """Number of units that failed."""
+        return int(self.fleet.failed.sum())
+
 
 class _Reader:
     """Reader of the rows of a file, which collects the mistakes."""
@@ -70,8 +76,7 @@ class _Reader:
         """Check names and units of the columns."""
         for name in self.units:
             if name not in COLUMNS:
-                near = difflib.get_close_matches(name, COLUMNS, n=1)
-                hint = f" (is it '{near[0]}'?)" if near else ""
+                hint = _hint(name, COLUMNS)
                 self.add(line, f"unknown column '{name}'{hint}", None, ", ".join(COLUMNS))
         if "state" not in self.units:
             self.add(line, "column 'state' is missing", None, " or ".join(_STATES))
@@ -98,8 +103,7 @@ class _Reader:
         if text in self.labels:
             return self.labels.index(text)
         if text:
-            near = difflib.get_close_matches(text, self.labels, n=1)
-            hint = f" (is it '{near[0]}'?)" if near else ""
+            hint = _hint(text, self.labels)
             self.add(row.line, f"column 'design': unknown design{hint}", f"'{text}'", known)
         elif len(self.labels) > 1:
             self.add(row.line, "column 'design' is missing", None, known)
@@ -145,6 +149,12 @@ class _Reader:
         return 1.0, math.inf
 
 
+def _hint(text: str, known: Sequence[str]) -> str:
+    """Return a question whether the nearest known text is meant, if one is near."""
+    near = difflib.get_close_matches(text, known, n=1)
+    return f" (is it '{near[0]}'?)" if near else ""
+
+
 def read_returns(file: str | Path, designs: Sequence[UnitsOf]) -> Returns:
     """Return the units in service that a CSV file holds.
 
@@ -173,28 +183,23 @@ def read_returns(file: str | Path, designs: Sequence[UnitsOf]) -> Returns:
     else:
         reader.header(rows[0].line - 1)
     limits = {name.replace("_", " ") for item in designs for name in item.limits}
-    names, spans, numbers, running = list[str](), [], list[int](), list[bool]()
-    others: dict[str, int] = {}
+    units_read, others = [], Counter[str]()
     for row in rows if not reader.mistakes else ():
         state = row.cells["state"].lower()
         if state not in _STATES:
-            near = difflib.get_close_matches(state, _STATES, n=1)
-            hint = f" (is it '{near[0]}'?)" if near else ""
+            what = f"column 'state'{_hint(state, _STATES)}"
             got = f"'{row.cells['state']}'" if state else None
-            reader.add(row.line, f"column 'state'{hint}", got, " or ".join(_STATES))
+            reader.add(row.line, what, got, " or ".join(_STATES))
         number = reader.design(row)
         first, last = reader.span(row, state, number)
         cause = row.cells.get("limit", "").replace("_", " ").lower()
         if cause and cause not in limits:
-            others[cause] = others.get(cause, 0) + 1
+            others[cause] += 1
             # withdrawn at this failure, or at the last inspection before it
             first, last = first or _AT_ONCE, math.inf
-        names.append(row.cells.get("unit") or f"line {row.line}")
-        spans.append((first, last))
-        numbers.append(number)
-        running.append(state == "suspended" and not cause)
+        name = row.cells.get("unit") or f"line {row.line}"
+        units_read.append((name, first, last, number, state == "suspended" and not cause))
     refuse_mistakes(str(file), reader.mistakes)
-    low, high = np.array(spans).T
-    return Returns(
-        str(file), names, Fleet(low, high, np.array(numbers)), np.array(running, dtype=bool), others
-    )
+    names, low, high, numbers, running = zip(*units_read, strict=True)
+    fleet = Fleet(np.array(low), np.array(high), np.array(numbers))
+    return Returns(str(file), list(names), fleet, np.array(running, dtype=bool), dict(others))
