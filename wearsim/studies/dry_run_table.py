@@ -31,9 +31,13 @@ def _track(data: Data) -> _Track:
     """Return the texts on a cylinder or a cam, from `dry_run`."""
     cylinder, cam = data["cylinder"], data["cam"]
     if cam is None:
-        body = [*_fields(cylinder, "radius_m", digits=6), *_form(cylinder)]
-        speed = f"{data['rolling_speed_m_per_s']:.4g} m/s"
-        return _Track("cylinder", "passes", 1.0, body, speed)
+        return _Track(
+            "cylinder",
+            "passes",
+            1.0,
+            [*_fields(cylinder, "radius_m", digits=6), *_form(cylinder)],
+            f"{data['rolling_speed_m_per_s']:.4g} m/s",
+        )
     speeds = cam["stations"]["rolling_speed_m_per_s"]
     return _Track(
         "cam",
@@ -278,5 +282,4 @@ def _limit_row(item: Data, test: Data, track: _Track) -> tuple[str, str]:
         seconds = passes / test["passes"] * test["duration_s"]
         when = f"{_rounded(passes / track.per_unit)} {track.unit}, {_rounded(seconds / 60.0)} min"
         text = f"reached after about {when}"
-    name = f"limit of {item['quantity'].replace('_', ' ')}"
-    return name, f"{text}: about {ratio} at the end"
+    return f"limit of {item['quantity'].replace('_', ' ')}", f"{text}: about {ratio} at the end"

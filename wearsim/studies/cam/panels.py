@@ -27,7 +27,6 @@ from wearsim.report.panels import (
     Text,
     dots,
     measured_marks,
-    worn_limits,
 )
 from wearsim.report.text import OBSERVABLES, PER_SI, shown, with_error
 from wearsim.scenario.tables.cam_points import MeasuredPoints
@@ -46,11 +45,11 @@ from wearsim.studies.fatigue.panels import pitting_panel
 from wearsim.studies.fatigue.view import with_source_lines
 from wearsim.studies.run.panels import (
     HEIGHT,
-    Y,
     caption,
     depth_panel,
     pressure_panel,
     record_texts,
+    track_axis,
 )
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.setup import Setup
@@ -362,11 +361,7 @@ def _groove(result: Result, measured: Sequence[Measured]) -> Panel:
     worn, angle = grooves_at(result, given)
     return Panel(
         f"{'Deepest groove, at' if given is None else 'Groove at'} {angle * DEG:.4g} deg",
-        Axis(
-            Y,
-            "mm",
-            limits=worn_limits(result.y, worn.max(axis=0), *(profile.y for profile in measured)),
-        ),
+        track_axis(result.y, worn.max(axis=0), *(profile.y for profile in measured)),
         HEIGHT,
         [
             Records(result.y, result.start_height - worn, result.record_passes),
@@ -401,7 +396,7 @@ def _roller(result: Result) -> Panel:
         text = "The roller does not wear."
     return Panel(
         "Worn profile of the roller",
-        Axis(Y, "mm", limits=worn_limits(result.y, profiles.max(axis=0))),
+        track_axis(result.y, profiles.max(axis=0)),
         HEIGHT,
         marks,
         text,

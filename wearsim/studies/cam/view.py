@@ -22,7 +22,6 @@ from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
     from wearsim.report.surfaces import Sampling, Surface
-    from wearsim.scenario.tables.cam_points import MeasuredPoints
 
 
 #: effects that wear tests of cams neglect, besides those neglected on cylinders
@@ -91,7 +90,6 @@ class CamView(View):
             return Row(label, shown(value, unit, digits), answers={name: (value, unit)})
 
         least, greatest = turn.normal_range
-        depth = shown(harmonic_depth(turn), "um", 2)
         p, q = study.winding_ratio
         sweeps = "" if study.sweeps is None else f", {study.sweeps:.4g} sweeps around the roller"
         rows = [
@@ -123,7 +121,10 @@ class CamView(View):
                     )
                 },
             ),
-            Row(f"harmonic limit at {depth} of wear", shown(study.harmonic_limit, "1", 3)),
+            Row(
+                f"harmonic limit at {shown(harmonic_depth(turn), 'um', 2)} of wear",
+                shown(study.harmonic_limit, "1", 3),
+            ),
             Row(
                 "winding number",
                 f"{study.winding_number:.6g}, nearest ratio {p}/{q}{sweeps}",
@@ -253,7 +254,17 @@ class CamView(View):
     def data(self) -> dict[str, Any]:
         """Return the study in SI units."""
         study, motion = self.result, self.result.turn.cam.motion
-        measured = study.turn.cam.measured
+        smoothing: dict[str, Any] = {}
+        if measured := study.turn.cam.measured:
+            smoothing["smoothing"] = {
+                "file": measured.file,
+                "quantity": measured.quantity,
+                f"noise_{measured.unit}": measured.noise,
+                "scatter_of_acceleration_per_rad2": measured.scatter,
+                "error_of_acceleration_per_rad2": measured.error,
+                "angle_rad": measured.angle,
+                f"residual_{measured.unit}": measured.residual,
+            }
         return {
             "title": self.title,
             "perimeter_m": study.perimeter,
@@ -279,7 +290,7 @@ class CamView(View):
                 {"start_rad": skid.start, "stop_rad": skid.stop, "energy_J": skid.energy}
                 for skid in study.skids
             ],
-            **({} if measured is None else {"smoothing": _smoothing(measured)}),
+            **smoothing,
             "stations": {name: values for name, (_, values) in self._columns().items()},
             "warnings": study.warnings,
             "notes": study.notes,
@@ -311,19 +322,6 @@ class CamView(View):
             "station",
             range(len(self.result.point.angle)),
         )
-
-
-def _smoothing(measured: MeasuredPoints) -> dict[str, Any]:
-    """Return how measured points of a motion are smoothed, for JSON."""
-    return {
-        "file": measured.file,
-        "quantity": measured.quantity,
-        f"noise_{measured.unit}": measured.noise,
-        "scatter_of_acceleration_per_rad2": measured.scatter,
-        "error_of_acceleration_per_rad2": measured.error,
-        "angle_rad": measured.angle,
-        f"residual_{measured.unit}": measured.residual,
-    }
 
 
 def _without_rounding(key: str, values: FloatArray) -> list[float]:

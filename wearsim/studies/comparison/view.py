@@ -27,7 +27,6 @@ from wearsim.report.panels import (
     evenly_spaced,
     pass_axis,
     several_colours,
-    worn_limits,
 )
 from wearsim.report.text import (
     NOTHING,
@@ -46,7 +45,7 @@ from wearsim.report.text import (
 from wearsim.report.view import STUDY, Frame, Overview, Row, Rows, Table, View
 from wearsim.studies.comparison.compare import Comparable, Compared, Comparison, compare
 from wearsim.studies.ensemble.view import INTERVAL
-from wearsim.studies.run.panels import HEIGHT, Y
+from wearsim.studies.run.panels import HEIGHT, track_axis
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.mann_whitney import FEWEST, Paired
 
@@ -451,10 +450,11 @@ def _interval(
 
 def _labels(comparison: Comparison, row: Compared, place: int, colour: str) -> list[Mark]:
     """Return the name of a row, and under it its comparison with the first row."""
-    lines = [text for _, text in against(comparison, row)][:1] if place else []
-    if lines and lines[0].startswith("in "):
-        more = "deeper" if comparison.observable == "depth" else "more"
-        lines = [f"{more} than {comparison.rows[0].label} {lines[0]}"]
+    pairs = against(comparison, row)[:1] if place else []
+    lines = [
+        f"{name.removeprefix(f'{row.label} ')} {text}" if text.startswith("in ") else text
+        for name, text in pairs
+    ]
     under = [part for line in lines for part in fill(line, _LINE_LENGTH).splitlines()]
     size = "run" if row.kind == "run" else f"ensemble of {realisations(row)}"
     head = fill(f"{row.label} ({size})", _LINE_LENGTH).splitlines()
@@ -490,7 +490,7 @@ def _profiles(profiles: dict[str, ComputedProfile]) -> Panel:
     banded = ", of ensembles the mean with a band" * any(item.label for item in profiles.values())
     return Panel(
         "Worn profiles",
-        Axis(Y, "mm", limits=worn_limits(y, np.max(worn, axis=0))),
+        track_axis(y, np.max(worn, axis=0)),
         HEIGHT,
         marks,
         f"Profiles at the end{banded}.",

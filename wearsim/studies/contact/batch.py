@@ -250,8 +250,10 @@ class Realisations:
 
     def _drawn(self, part: slice) -> dict[str, FloatArray]:
         """Return the drawn inputs of some realisations by the names of `contact_values`."""
-        values = {key: column[part] for key, column in self.values.items() if not is_axial(key)}
-        return contact_values(self._once.random, values)
+        return contact_values(
+            self._once.random,
+            {key: column[part] for key, column in self.values.items() if not is_axial(key)},
+        )
 
     def _contacts(self, part: slice) -> ContactBatch:
         """Return the contacts of some realisations."""

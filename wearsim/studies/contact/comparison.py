@@ -86,10 +86,9 @@ class ContactReference:
 
     def errors_of(self, solution: ContactSolution) -> ContactErrors:
         """Return the differences of a solution on strips of the same width from the reference."""
-        beyond = (len(self.y) - len(solution.y)) // 2
         scalars = self.power, self.peak_pressure, self.half_length, self.adhesion_fraction
         reference = np.concatenate([scalars, self.line_load, self.dissipation])
-        return _differences(_values(solution, beyond), reference)
+        return _differences(_values(solution, (len(self.y) - len(solution.y)) // 2), reference)
 
 
 def reference_spec(name: str) -> ContactModelSpec:
@@ -190,18 +189,22 @@ def solve_reference(
         values = solve(spec.options(), grid)
         half = Grid.spanning(*grid.edges, (grid.strips + 1) // 2)
         coarse, scalars = solve(spec.options(), half), len(_SCALARS)
-        fields = coarse[scalars:].reshape(2, -1)
-        there = [np.interp(grid.y, half.y, field) for field in fields]
-        coarse = np.concatenate([coarse[:scalars], *there])
+        coarse = np.concatenate(
+            [
+                coarse[:scalars],
+                *[np.interp(grid.y, half.y, field) for field in coarse[scalars:].reshape(2, -1)],
+            ]
+        )
     line_load, dissipation = values[len(_SCALARS) :].reshape(2, -1)
-    errors = vars(_differences(coarse, values))
     return ContactReference(
         name,
         grid.y,
         dissipation,
         line_load,
         **dict(zip(_SCALARS, values[: len(_SCALARS)].tolist(), strict=True)),
-        own=ContactErrors(**{name: abs(error) for name, error in errors.items()}),
+        own=ContactErrors(
+            **{name: abs(error) for name, error in vars(_differences(coarse, values)).items()}
+        ),
         seconds=perf_counter() - start,
     )
 

@@ -192,15 +192,11 @@ class ContactView(View):
 
     def line(self) -> str:
         """Return the footer of the contact, with the error estimated from a grid half as fine."""
-        study, error = self.result, ""
-        if study.grid_error is not None:
-            error = (
-                f"dissipated power within {percent(study.grid_error)}"
-                " (estimated numerical error of the grid)"
-            )
+        study, source = self.result, "(estimated numerical error of the grid)"
+        error = study.grid_error
         return footer(
             [study.described_model, f"{study.grid.strips} strips"],
-            error,
+            "" if error is None else f"dissipated power within {percent(error)} {source}",
             NOTHING if study.seconds is None else brief(study.seconds),
         )
 

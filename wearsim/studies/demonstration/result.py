@@ -157,8 +157,10 @@ class Demonstration(Viewed):
 
     def __repr__(self) -> str:
         need = self.requirement
-        text = f"R = {need.survival:g}, C = {need.confidence:g} at {need.life:g} {need.unit}"
-        return f"<Demonstration '{self.title}': {text}, {self.by_binomial[0]} specimens>"
+        return (
+            f"<Demonstration '{self.title}': R = {need.survival:g}, C = {need.confidence:g} at"
+            f" {need.life:g} {need.unit}, {self.by_binomial[0]} specimens>"
+        )
 
     @property
     def title(self) -> str:

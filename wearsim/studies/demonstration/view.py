@@ -118,15 +118,17 @@ class DemonstrationView(DesignsView):
     def tables(self) -> list[Table]:
         """Return the requirement, and the tests of all conditions."""
         design = self.result.designs[0]
-        given = f"{count(design.count)} realisations"
-        if design.levels is not None:
-            given += f", posterior of K/H given {design.levels.specimens or 'the'} specimens"
+        posterior = (
+            f", posterior of K/H given {design.levels.specimens or 'the'} specimens"
+            if design.levels is not None
+            else ""
+        )
         return [
             Table(
                 STUDY,
                 [
                     Row("to show", self._need()),
-                    Row("lives", given),
+                    Row("lives", f"{count(design.count)} realisations{posterior}"),
                     Row("limits", ", ".join(limit_texts(design.scenario.limit.given))),
                 ],
             ),

@@ -243,10 +243,9 @@ class DissipationResult(StudyResult[DissipationData]):
         course = converge(self.power, np.unique(counts.astype(np.int64)))
         if self.raw.plan != "sobol":
             return course
-        errors = [
-            _replicated_errors(self.power[:count], self.raw.replicates) for count in course.count
-        ]
-        mean_error, std_error = np.array(errors).T
+        mean_error, std_error = np.array(
+            [_replicated_errors(self.power[:count], self.raw.replicates) for count in course.count]
+        ).T
         return replace(course, mean_error=mean_error, std_error=std_error)
 
 

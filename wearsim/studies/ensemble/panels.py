@@ -30,7 +30,6 @@ from wearsim.report.panels import (
     histogram,
     measured_marks,
     message,
-    worn_limits,
 )
 from wearsim.report.text import (
     NINETY_PERCENT,
@@ -50,7 +49,7 @@ from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.ensemble.view import known_effects, no_effects
 from wearsim.studies.fatigue.panels import DAMAGE
 from wearsim.studies.fatigue.view import with_source_lines
-from wearsim.studies.run.panels import HEIGHT, Y
+from wearsim.studies.run.panels import HEIGHT, track_axis
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.estimation.estimates import Target
@@ -229,11 +228,7 @@ def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
     deepest = shown(float((profile.start - profile.height).max()), "um")
     return Panel(
         title,
-        Axis(
-            Y,
-            "mm",
-            limits=worn_limits(y, profile.start - profile.low, *(item.y for item in measured)),
-        ),
+        track_axis(y, profile.start - profile.low, *(item.y for item in measured)),
         HEIGHT,
         [
             *([band] if profile.label else []),
@@ -257,7 +252,7 @@ def _damage(result: EnsembleResult) -> Panel:
     mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
     return Panel(
         f"Damage of the {body} at the end",
-        axis or Axis(Y, "mm", limits=worn_limits(band.y, curves.max(axis=0))),
+        axis or track_axis(band.y, curves.max(axis=0)),
         DAMAGE,
         _curves(band.y, curves, band.mean),
         f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests.",

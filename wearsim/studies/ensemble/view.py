@@ -230,11 +230,8 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
     def _precision(self) -> Rows:
         """Return rows on the target and on the variance removed by a control variate."""
-        result, rows = self.result, list[Row]()
-        if result.until:
-            rows.append(
-                Row(f"precision {result.until}", _target_met(result, Target.parse(result.until)))
-            )
+        result, until = self.result, self.result.until
+        rows = [Row(f"precision {until}", _target_met(result))] if until else []
         saved = result.estimate("depth", -1, ()).variance_saved
         if saved is None:
             return rows
@@ -335,9 +332,8 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
 def observed(result: EnsembleResult) -> list[str]:
     """Return the names of the observables that are not zero in all realisations."""
-    if not result.count:
-        return []
-    return [name for name in result.observables if result.at_end(name).any()]
+    names = result.observables if result.count else ()
+    return [name for name in names if result.at_end(name).any()]
 
 
 def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
@@ -381,8 +377,9 @@ def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
     ]
 
 
-def _target_met(result: EnsembleResult, target: Target) -> str:
-    """Return whether a target is reached, and the half-width of the interval."""
+def _target_met(result: EnsembleResult) -> str:
+    """Return whether the target is reached, and the half-width of the interval."""
+    target = Target.parse(result.until)
     estimate = result.estimate_for(target)
     interval, achieved = target.interval(estimate), target.achieved(estimate)
     is_reached, realisations = target.reached(estimate), f"{count(result.count)} realisations"

@@ -30,9 +30,8 @@ def fatigue_rows(result: Result, body: str) -> Rows:
     if not result.raw.fatigue:
         return []
     final = result.final
-    place = ""
-    if "damage_angle_rad" in final:
-        place = f" at {shown(_most(final['damage_angle_rad']), 'deg')}"
+    angle = final.get("damage_angle_rad")
+    place = "" if angle is None else f" at {shown(_most(angle), 'deg')}"
     damage, pitting = (
         with_error(np.asarray(final[name], dtype=float), _most(final[f"{name}_error"]), unit)
         for name, unit in (("damage", "1"), ("pitting", "%"))

@@ -185,7 +185,13 @@ class IdentificationView(StudyView[IdentificationResult]):
                         for name in ("file", "specimen")
                     ),
                     *(
-                        Column(title, [_number(test[key], size) for test in tests])
+                        Column(
+                            title,
+                            [
+                                "" if test[key] is None else f"{size * test[key]:.12g}"
+                                for test in tests
+                            ],
+                        )
                         for title, key, size, _ in _NUMBERS
                     ),
                 ]
@@ -289,10 +295,6 @@ class IdentificationView(StudyView[IdentificationResult]):
 
 def _name(file: str) -> str:
     return file.rpartition("/")[2]
-
-
-def _number(value: float | None, scale: float) -> str:
-    return "" if value is None else f"{scale * value:.12g}"
 
 
 def _wear_factor(factor: Mapping[str, float], names: Sequence[str]) -> str:

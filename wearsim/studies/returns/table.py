@@ -76,8 +76,8 @@ class _Reader:
         """Check names and units of the columns."""
         for name in self.units:
             if name not in COLUMNS:
-                hint = _hint(name, COLUMNS)
-                self.add(line, f"unknown column '{name}'{hint}", None, ", ".join(COLUMNS))
+                what = f"unknown column '{name}'{_hint(name, COLUMNS)}"
+                self.add(line, what, None, ", ".join(COLUMNS))
         if "state" not in self.units:
             self.add(line, "column 'state' is missing", None, " or ".join(_STATES))
         if not {"life", "low"} & set(self.units):
@@ -86,8 +86,12 @@ class _Reader:
         for name in _LIVES:
             written = self.units.get(name)
             if written not in {None, "", unit} and self._seconds(written) is None:
-                expected = f"{name} [{unit}], or a time such as {name} [h]"
-                self.add(line, f"column '{name}' has an unknown unit", f"[{written}]", expected)
+                self.add(
+                    line,
+                    f"column '{name}' has an unknown unit",
+                    f"[{written}]",
+                    f"{name} [{unit}], or a time such as {name} [h]",
+                )
 
     @staticmethod
     def _seconds(unit: str | None) -> float | None:
@@ -103,8 +107,8 @@ class _Reader:
         if text in self.labels:
             return self.labels.index(text)
         if text:
-            hint = _hint(text, self.labels)
-            self.add(row.line, f"column 'design': unknown design{hint}", f"'{text}'", known)
+            what = f"column 'design': unknown design{_hint(text, self.labels)}"
+            self.add(row.line, what, f"'{text}'", known)
         elif len(self.labels) > 1:
             self.add(row.line, "column 'design' is missing", None, known)
         return 0
@@ -140,8 +144,12 @@ class _Reader:
         elif life is not None:
             return life, life
         elif high is None:
-            what = "failed without a life"
-            self.add(row.line, what, None, "a life, or low and high of the inspections")
+            self.add(
+                row.line,
+                "failed without a life",
+                None,
+                "a life, or low and high of the inspections",
+            )
         elif low is not None and low >= high:
             self.add(row.line, "'low' must be below 'high'", f"{low:g} and {high:g}")
         else:
@@ -187,9 +195,12 @@ def read_returns(file: str | Path, designs: Sequence[UnitsOf]) -> Returns:
     for row in rows if not reader.mistakes else ():
         state = row.cells["state"].lower()
         if state not in _STATES:
-            what = f"column 'state'{_hint(state, _STATES)}"
-            got = f"'{row.cells['state']}'" if state else None
-            reader.add(row.line, what, got, " or ".join(_STATES))
+            reader.add(
+                row.line,
+                f"column 'state'{_hint(state, _STATES)}",
+                f"'{row.cells['state']}'" if state else None,
+                " or ".join(_STATES),
+            )
         number = reader.design(row)
         first, last = reader.span(row, state, number)
         cause = row.cells.get("limit", "").replace("_", " ").lower()
@@ -201,5 +212,10 @@ def read_returns(file: str | Path, designs: Sequence[UnitsOf]) -> Returns:
         units_read.append((name, first, last, number, state == "suspended" and not cause))
     refuse_mistakes(str(file), reader.mistakes)
     names, low, high, numbers, running = zip(*units_read, strict=True)
-    fleet = Fleet(np.array(low), np.array(high), np.array(numbers))
-    return Returns(str(file), list(names), fleet, np.array(running, dtype=bool), dict(others))
+    return Returns(
+        str(file),
+        list(names),
+        Fleet(np.array(low), np.array(high), np.array(numbers)),
+        np.array(running, dtype=bool),
+        dict(others),
+    )

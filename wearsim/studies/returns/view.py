@@ -85,10 +85,12 @@ class FieldReturnsView(DesignsView):
                 rows.append(
                     Row(f"P(life < {count(target)} {result.unit}){of}", f"{after}, before {before}")
                 )
-        predicted = f"{_numbers(check.before, -1)} predicted before"
         return [
             *rows,
-            Row("failures", f"{result.returns.failed} observed, {predicted}"),
+            Row(
+                "failures",
+                f"{result.returns.failed} observed, {_numbers(check.before, -1)} predicted before",
+            ),
             Row(
                 "agreement before",
                 _judged(
@@ -136,14 +138,17 @@ class FieldReturnsView(DesignsView):
 
     def _lives(self) -> Table:
         """Return lives of shares before and after the returns."""
-        result, lines = self.result, list[list[str]]()
-        for number, label in enumerate(result.labels):
-            of = f"{label} " if len(result.labels) > 1 else ""
-            for share in result.designs[number].settings.shares:
-                lives = (result.before(share, number), result.after(share, number))
-                lines.append(
-                    [f"{of}B{share:g}", *(cell for life in lives for cell in _cells(life))]
-                )
+        result = self.result
+        labels = [f"{label} " if len(result.labels) > 1 else "" for label in result.labels]
+        lines = [
+            [
+                f"{label}B{share:g}",
+                *_cells(result.before(share, number)),
+                *_cells(result.after(share, number)),
+            ]
+            for number, label in enumerate(labels)
+            for share in result.designs[number].settings.shares
+        ]
         columns = ["95 % credible", "sd of ln life"]
         return Table("", lines, [f"life [{result.unit}]", "before", *columns, "after", *columns])
 
@@ -388,7 +393,6 @@ def _survival(result: FieldReturns) -> Panel:
         curve = survival_curve(ends, fleet.failed[chosen])
         if len(curve.life):
             # up to the oldest unit
-            text = f"{name}units (Kaplan-Meier)"
             marks.append(
                 Line(
                     np.concatenate([[0.0], curve.life, [ends.max()]]),
@@ -396,14 +400,19 @@ def _survival(result: FieldReturns) -> Panel:
                     "--",
                     steps=True,
                     colour=_DARK,
-                    label=text,
+                    label=f"{name}units (Kaplan-Meier)",
                 )
             )
     target = result.designs[0].target
     if target is not None:
         marks.append(Span(target, dash=":", colour="0.4", label=f"target {count(target)}"))
-    text = "Share of the machines that outlast a life, before and after the returns."
-    return Panel("Survival, with 95 % bands", axis, share_axis("survival"), marks, text)
+    return Panel(
+        "Survival, with 95 % bands",
+        axis,
+        share_axis("survival"),
+        marks,
+        "Share of the machines that outlast a life, before and after the returns.",
+    )
 
 
 def _failures(result: FieldReturns) -> Panel:

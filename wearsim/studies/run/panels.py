@@ -39,11 +39,11 @@ HEIGHT = Axis("height above nominal", "um")
 def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of a run; measured profiles are drawn over the computed ones."""
     power = np.asarray(result.dissipation).reshape(-1, len(result.y)).max(axis=0)
-    limits = worn_limits(result.y, power, *(profile.y for profile in measured))
+    across = track_axis(result.y, power, *(profile.y for profile in measured))
     panels = {
-        "profiles": _profiles(result, limits, measured),
+        "profiles": _profiles(result, across, measured),
         "depth": depth_panel(result),
-        "dissipation": _dissipation(result, limits),
+        "dissipation": _dissipation(result, across),
         "load": _normal_force(result),
         "pressure": pressure_panel(result),
     }
@@ -62,6 +62,11 @@ def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     )
 
 
+def track_axis(y: FloatArray, worn: FloatArray, *others: FloatArray) -> Axis:
+    """Return the axis across the track, over what is worn; parameters as of `worn_limits`."""
+    return Axis(Y, "mm", limits=worn_limits(y, worn, *others))
+
+
 def record_texts(result: Result) -> list[str]:
     """Return passes and time of each record, for the slider of a page."""
     return [
@@ -74,8 +79,10 @@ def caption(result: Result) -> str:
     """Return passes, time, model, depth and width of a run in words."""
     depth = f"depth {shown(float(np.max(result.depth[-1])), 'um')}"
     if result.start_height.any():
-        below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
-        depth = f"{depth} worn since the start, depth below nominal {below}"
+        depth += (
+            " worn since the start, depth below nominal"
+            f" {shown(float(np.max(result.depth_below_nominal[-1])), 'um')}"
+        )
     unfinished = "" if result.finished else ", failed" if result.failure else ", unfinished"
     if result.until:
         unfinished = f", stopped at {result.until}"
@@ -87,12 +94,12 @@ def caption(result: Result) -> str:
     )
 
 
-def _profiles(result: Result, limits: tuple[float, float], measured: Sequence[Measured]) -> Panel:
+def _profiles(result: Result, across: Axis, measured: Sequence[Measured]) -> Panel:
     worn, passes = np.asarray(result.profiles), result.record_passes
     rollers = np.asarray(result.roller_profiles).reshape(len(passes), -1, len(result.y))
     return Panel(
         "Worn profile of the cylinder (black: start of the run)",
-        Axis(Y, "mm", limits=limits),
+        across,
         HEIGHT,
         [
             Records(result.y, result.start_height - worn, passes),
@@ -143,12 +150,12 @@ def depth_panel(result: Result) -> Panel:
     )
 
 
-def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
+def _dissipation(result: Result, across: Axis) -> Panel:
     power = np.asarray(result.dissipation).reshape(len(result.record_passes), -1, len(result.y))
     rollers = power.shape[1]
     return Panel(
         "Dissipated power per length (black: start of the run)",
-        Axis(Y, "mm", limits=limits),
+        across,
         Axis("$P_l$", "W/mm", limits=(0.0, None)),
         [
             Records(

@@ -168,8 +168,7 @@ def _profile_text(profile: Profile) -> str:
 def _surface_text(scenario: Scenario, data: RunData) -> str:
     """Return the worn surface of a cam as CSV, with all digits."""
     grid, angle = _grid(data), np.ravel(data.static["station_angle"])
-    worn = data.records["cylinder_depth_profile"][-1, :, 0]
-    height = start_height(scenario, grid, angle) - worn
+    height = start_height(scenario, grid, angle) - data.records["cylinder_depth_profile"][-1, :, 0]
     y = (1e3 * grid.y).tolist()
     rows = (
         f"{math.degrees(place)!r},{at!r},{z + 0.0!r}\n"

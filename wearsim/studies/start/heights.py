@@ -69,8 +69,9 @@ def start_height(scenario: Scenario, grid: Grid, angles: FloatArray | None = Non
     profile, surface = scenario.cylinder.profile, scenario.cylinder.start_surface
     if surface is not None and angles is not None:
         return surface.at(angles, grid.y)
-    none = np.zeros_like(grid.y)
-    height = none if profile is None else np.interp(grid.y, profile.y, profile.height)
+    height = (
+        np.zeros_like(grid.y) if profile is None else np.interp(grid.y, profile.y, profile.height)
+    )
     return height if angles is None else np.broadcast_to(height, (len(angles), len(height)))
 
 
