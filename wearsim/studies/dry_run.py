@@ -62,9 +62,10 @@ def dry_run(scenario: Scenario) -> Data:
     crowned = roller.axial_profile.form == "crown"
     patch, patch_load = means.hardest_patch(high)
     random = {key for item in scenario.random for key in item.keys}
-    fixed_load = {} if "load.normal_force" in random else {"least_N": low, "greatest_N": high}
-    coefficient = scenario.friction.coefficient
-    friction = {} if "friction.coefficient" in random else {"friction": coefficient}
+    force, friction = (
+        {"least_N": low, "greatest_N": high},
+        {"friction": scenario.friction.coefficient},
+    )
     data: Data = {
         "title": scenario.title,
         "file": scenario.file,
@@ -90,13 +91,13 @@ def dry_run(scenario: Scenario) -> Data:
         "rolling_speed_m_per_s": scenario.rolling_speed,
         "load": {
             "kind": scenario.load.kind.removesuffix("-arm"),  # as the scenario names it
-            **fixed_load,
+            **({} if "load.normal_force" in random else force),
             "stiffness_N_per_m": load.stiffness,
             "feedback": getattr(load, "feedback", None),
             "terms": [term.name for term in scenario.load.terms],
         },
         "log": _log(scenario, load),
-        **friction,
+        **({} if "friction.coefficient" in random else friction),
         "creep_factor": scenario.friction.creep_factor,
         "creepage": _creepage(scenario, random),
         "random": [_random(item, units_of(scenario)) for item in scenario.random],
@@ -129,14 +130,15 @@ def _cam(scenario: Scenario) -> Data | None:
     if (cam := scenario.cam) is None:
         return None
     turn = turn_of(scenario)
-    stations, motion = turn.stations, cam.motion
-    point = turn.at_stations(stations)
+    stations, point = turn.stations, turn.at_stations(turn.stations)
     return {
         "base_radius_m": cam.base_radius,
         "follower": cam.follower.kind,
         "groove": cam.groove,
         "stations": {
-            "segment": [motion.segments[stations.panels[k].segment].name for k in stations.panel],
+            "segment": [
+                cam.motion.segments[stations.panels[k].segment].name for k in stations.panel
+            ],
             "angle_rad": point.angle,
             "weight_rad": stations.weight,
             "rolling_speed_m_per_s": turn.speed * point.kinematics.travel,
@@ -193,19 +195,22 @@ def _creepage(scenario: Scenario, random: set[str]) -> Data:
         if creepage.drive == "free"
         else ("longitudinal", "", creepage.longitudinal)
     )
-    both = ("yaw", creepage.yaw), ("tilt", creepage.tilt)
-    angles = [(name, "_rad", scenario.per_roller(angle)) for name, angle in both]
-    known = [item for item in (driven, *angles) if f"creepage.{item[0]}" not in random]
+    angles = (
+        (name, "_rad", scenario.per_roller(getattr(creepage, name))) for name in ("yaw", "tilt")
+    )
     return {
         "drive": creepage.drive,
-        **{name + unit: value for name, unit, value in known},
+        **{
+            name + unit: value
+            for name, unit, value in (driven, *angles)
+            if f"creepage.{name}" not in random
+        },
         "bearing_friction": creepage.bearing_friction,
         "differential_slip": creepage.differential_slip,
     }
 
 
 def _random(item: RandomInput, units: dict[str, str]) -> Data:
-    ranges = range_90(item)
     return {
         "name": item.name,
         "distribution": item.kind,
@@ -213,7 +218,7 @@ def _random(item: RandomInput, units: dict[str, str]) -> Data:
         "description": item.describe(),
         "values": [
             {"key": key, "unit": units[key], "mean": mean, "range_90": bounds}
-            for key, mean, bounds in zip(item.keys, item.mean, ranges, strict=True)
+            for key, mean, bounds in zip(item.keys, item.mean, range_90(item), strict=True)
         ],
     }
 

@@ -27,7 +27,6 @@ from wearsim.report.panels import (
     Text,
     dots,
     measured_marks,
-    worn_limits,
 )
 from wearsim.report.text import OBSERVABLES, PER_SI, shown, with_error
 from wearsim.scenario.tables.cam_points import MeasuredPoints
@@ -46,11 +45,11 @@ from wearsim.studies.fatigue.panels import pitting_panel
 from wearsim.studies.fatigue.view import with_source_lines
 from wearsim.studies.run.panels import (
     HEIGHT,
-    Y,
     caption,
     depth_panel,
     pressure_panel,
     record_texts,
+    track_axis,
 )
 from wearsim.studies.run.result import Result
 from wearsim.studies.run.setup import Setup
@@ -158,8 +157,8 @@ def cam_sheet(study: CamStudy, measured: Sequence[Measured] = ()) -> Sheet:
 
 def _fine(turn: CamTurn) -> Point:
     """Return the state at many angles of every smooth part of the turn."""
-    samples = tuple(61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
-    return turn.at_stations(Stations(turn.panels, samples))
+    samples = (61 + round(2.0 * DEG * (part.stop - part.start)) for part in turn.panels)
+    return turn.at_stations(Stations(turn.panels, tuple(samples)))
 
 
 def _right(
@@ -184,8 +183,14 @@ def segment_marks(motion: Motion, *, names: bool = True) -> list[Mark]:
     for part, start, stop in zip(motion.segments, motion.starts, motion.starts[1:], strict=False):
         marks.append(Span(stop, dash=":", width=0.6, colour=GREY))
         if names and stop - start > 0.15:
-            place = 0.5 * (start + stop), 0.02
-            marks.append(Text(*place, part.name, "y", anchor="center", size=7.0, colour=GREY))
+            marks.append(
+                Text(
+                    *(0.5 * (start + stop), 0.02, part.name, "y"),
+                    anchor="center",
+                    size=7.0,
+                    colour=GREY,
+                )
+            )
     return marks
 
 
@@ -227,20 +232,10 @@ def shape_panel(turn: CamTurn) -> Panel:
 def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of the run of a cam; measured profiles lie over the deepest groove."""
     turn = unchecked_turn_of(result.scenario)
-    stations = turn.stations
-    worn = np.asarray(result.raw.records["cylinder_depth_profile"])[:, :, 0]
     panels = {
-        "map": _map(
-            turn,
-            stations,
-            result,
-            "depth",
-            result.depth,
-            "Worn depth of the cam",
-            "the cam is deepest",
-        ),
-        "shape": _worn_shape(turn, stations, worn[-1]),
-        "lift": _lift_error(turn, stations, result),
+        "map": _map(turn, result, "depth", "Worn depth of the cam", "the cam is deepest"),
+        "shape": _worn_shape(turn, result),
+        "lift": _lift_error(turn, result),
         "groove": _groove(result, measured),
         "depth": depth_panel(result),
         "roller": _roller(result),
@@ -249,10 +244,11 @@ def cam_run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     rows = [["map", "map", "shape"], ["lift", "lift", "shape"], ["depth", "groove", "roller"]]
     heights = [1.2, 0.9, 1.1]
     if result.raw.fatigue:
-        title, where = "Damage of the cam by fatigue", "the damage of the cam is greatest"
-        damage = result.values("cylinder_damage")
-        panels["damage"] = _map(turn, stations, result, "damage", damage, title, where)
-        panels["pitting"] = pitting_panel(result)
+        where = "the damage of the cam is greatest"
+        panels |= {
+            "damage": _map(turn, result, "damage", "Damage of the cam by fatigue", where),
+            "pitting": pitting_panel(result),
+        }
         rows.insert(2, ["damage", "damage", "pitting"])
         heights.insert(2, 1.2)
     return Sheet(
@@ -277,58 +273,49 @@ def _caption(result: Result) -> str:
     )
 
 
-def _map(
-    turn: CamTurn,
-    stations: Stations,
-    result: Result,
-    quantity: str,
-    course: FloatArray,
-    title: str,
-    where: str,
-) -> Panel:
+def _map(turn: CamTurn, result: Result, quantity: str, title: str, where: str) -> Panel:
     """Return depth or damage of a cam at the end as a map over angle and width.
 
     Parameters
     ----------
     turn : CamTurn
-    stations : Stations
     result : Result
     quantity : {"depth", "damage"}
-    course : ndarray
-        Its greatest value on the cam at every step.
     title, where : str
         Title of the panel, and what is at the angle of the greatest value.
     """
     axis = Axis(quantity, OBSERVABLES[quantity].unit)
-    profiles = np.asarray(result.raw.records[f"cylinder_{quantity}_profile"])[-1, :, 0]
-    angle, values = stations.values_at(profiles, _SAMPLES)
+    angle, values = turn.stations.values_at(
+        np.asarray(result.raw.records[f"cylinder_{quantity}_profile"])[-1, :, 0], _SAMPLES
+    )
     greatest = values.max(axis=0)
     extent = result.y[greatest > 1e-3 * greatest.max()] if greatest.max() > 0.0 else result.y
-    # interpolation overshoots next to an edge
-    image = Image(angle, result.y, np.maximum(values, 0.0).T, axis, "magma_r")
-    limits = (1.25 * extent[0], 1.05 * extent[-1])  # the names of the segments lie below
+    course = result.depth if quantity == "depth" else result.values("cylinder_damage")
     place = float(np.max(result.final[f"{quantity}_angle_rad"])) * DEG
-    text = f"At the end {where} at {place:.4g} deg: "
-    text += f"{shown(float(np.max(course[-1])), axis.unit)}."
     return Panel(
         title,
         ANGLE,
-        Axis("y across the track", "mm", limits=limits),
-        [image, *segment_marks(turn.cam.motion)],
-        text,
+        # the names of the segments lie below
+        Axis("y across the track", "mm", limits=(1.25 * extent[0], 1.05 * extent[-1])),
+        [
+            # interpolation overshoots next to an edge
+            Image(angle, result.y, np.maximum(values, 0.0).T, axis, "magma_r"),
+            *segment_marks(turn.cam.motion),
+        ],
+        f"At the end {where} at {place:.4g} deg: {shown(float(np.max(course[-1])), axis.unit)}.",
     )
 
 
-def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
-    fine = Stations(stations.panels, (_SAMPLES,) * len(stations.panels))
+def _worn_shape(turn: CamTurn, result: Result) -> Panel:
+    stations, follower = turn.stations, turn.cam.follower
+    point = turn.at_stations(Stations(stations.panels, (_SAMPLES,) * len(stations.panels)))
     places = 0.5 - 0.5 * np.cos(np.pi * np.arange(_SAMPLES) / (_SAMPLES - 1))
-    deepest = depth.max(axis=1)
-    worn = stations.values_between(deepest, places)
-    point = turn.at_stations(fine)
+    deepest = np.asarray(result.raw.records["cylinder_depth_profile"])[-1, :, 0].max(axis=1)
     factor = factor_for(turn, float(deepest.max()))
-    follower, kinematics = turn.cam.follower, point.kinematics
-    fresh = surface_points(follower, kinematics, point.angle)[1]
-    cut = surface_points(follower, kinematics, point.angle, factor * worn)[1]
+    fresh, cut = (
+        surface_points(follower, point.kinematics, point.angle, depth)[1]
+        for depth in (0.0, factor * stations.values_between(deepest, places))
+    )
     starts = np.asarray(turn.cam.motion.starts[:-1])
     edges = fresh[:, np.abs(point.angle - starts[:, None]).argmin(axis=1)]
     marks: list[Mark] = [
@@ -349,18 +336,19 @@ def _worn_shape(turn: CamTurn, stations: Stations, depth: FloatArray) -> Panel:
     )
 
 
-def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
+def _lift_error(turn: CamTurn, result: Result) -> Panel:
     curves = np.asarray(result.raw.records["lift_error_curve"])[:, :, 0, 0]
-    between = [stations.values_at(curve, _SAMPLES) for curve in curves]
-    angle, values = between[0][0], np.array([value for _, value in between])
+    angles, values = zip(
+        *(turn.stations.values_at(curve, _SAMPLES) for curve in curves), strict=True
+    )
     error = shown(float(np.max(result.final["lift_error_m"])), "um")
     return Panel(
         "Lift error against the unworn cam",
         ANGLE,
         Axis("lift error", "um"),
         [
-            Records(angle, values, result.record_passes, most=8),
-            dots(stations.angle, curves[-1], ".", size=3.5, colour=BLACK, label="stations"),
+            Records(angles[0], np.array(values), result.record_passes, most=8),
+            dots(turn.stations.angle, curves[-1], ".", size=3.5, colour=BLACK, label="stations"),
             *segment_marks(turn.cam.motion, names=False),
         ],
         f"At the end it varies by {error} over a turn.",
@@ -371,32 +359,30 @@ def _lift_error(turn: CamTurn, stations: Stations, result: Result) -> Panel:
 def _groove(result: Result, measured: Sequence[Measured]) -> Panel:
     given = measured[0].angle if measured else None
     worn, angle = grooves_at(result, given)
-    limits = worn_limits(result.y, worn.max(axis=0), *(profile.y for profile in measured))
-    which = "Deepest groove, at" if given is None else "Groove at"
-    profiles = Records(result.y, result.start_height - worn, result.record_passes)
     return Panel(
-        f"{which} {angle * DEG:.4g} deg",
-        Axis(Y, "mm", limits=limits),
+        f"{'Deepest groove, at' if given is None else 'Groove at'} {angle * DEG:.4g} deg",
+        track_axis(result.y, worn.max(axis=0), *(profile.y for profile in measured)),
         HEIGHT,
-        [profiles, *measured_marks(measured)],
+        [
+            Records(result.y, result.start_height - worn, result.record_passes),
+            *measured_marks(measured),
+        ],
         f"Height across the track; it is {shown(float(worn[-1].max()), 'um')} deep.",
     )
 
 
 def _residuals(motion: Motion, measured: MeasuredPoints) -> Panel:
     """Return the residuals of a table about its smoothing spline, along the angle."""
-    unit = "um" if measured.unit == "m" else "mrad"
     noise = 2.0 * measured.noise
-    marks: list[Mark] = [
-        Span(-noise, noise, across="y", colour=GREY, alpha=0.15),
-        dots(measured.angle, measured.residual, ".", size=3.0),
-        *segment_marks(motion, names=False),
-    ]
     return Panel(
         f"Residuals of the {measured.quantity}, and twice its noise (shaded)",
         ANGLE,
-        Axis("measured less spline", unit),
-        marks,
+        Axis("measured less spline", "um" if measured.unit == "m" else "mrad"),
+        [
+            Span(-noise, noise, across="y", colour=GREY, alpha=0.15),
+            dots(measured.angle, measured.residual, ".", size=3.0),
+            *segment_marks(motion, names=False),
+        ],
         "What was measured, less the spline that smooths it.",
     )
 
@@ -410,7 +396,7 @@ def _roller(result: Result) -> Panel:
         text = "The roller does not wear."
     return Panel(
         "Worn profile of the roller",
-        Axis(Y, "mm", limits=worn_limits(result.y, profiles.max(axis=0))),
+        track_axis(result.y, profiles.max(axis=0)),
         HEIGHT,
         marks,
         text,

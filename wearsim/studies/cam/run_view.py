@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -70,8 +70,10 @@ class CamRunView(RunView):
         """Return the end state in SI units, with the lift error of an arm as an angle [rad]."""
         final, arm = self.result.final, self._arm_length()
         names = ("lift_error", "station_lift_error", "station_lift_error_from_dwell")
-        angles = {f"{n}_rad": (np.asarray(final[f"{n}_m"]) / arm).tolist() for n in names if arm}
-        return {**super().data(), **angles}
+        return {
+            **super().data(),
+            **{f"{n}_rad": (np.asarray(final[f"{n}_m"]) / arm).tolist() for n in names if arm},
+        }
 
     def loads(self) -> Rows:
         """Return the loads of the cam."""
@@ -82,7 +84,7 @@ class CamRunView(RunView):
         return {
             **super().columns(),
             "worn_cam.csv": [self.surface(Sampling()).columns],
-            "along_angle.csv": [list(self._along_angle())],
+            "along_angle.csv": [self._along_angle()],
         }
 
     def angles(self) -> Sequence[str]:
@@ -91,25 +93,28 @@ class CamRunView(RunView):
         Where a part of the turn ends, another begins at the same angle.
         """
         degrees = [f"{angle:.6g} deg" for angle in np.degrees(self.result.values("station_angle"))]
-        following = [*degrees[1:], ""]
         return [
             f"before {this_angle}" if this_angle == next_angle else f"at {this_angle}"
-            for this_angle, next_angle in zip(degrees, following, strict=True)
+            for this_angle, next_angle in zip(degrees, [*degrees[1:], ""], strict=True)
         ]
 
-    def _along_angle(self) -> Iterator[Column]:
-        """Yield angle, depth and lift error at every record, of an arm also its angle."""
+    def _along_angle(self) -> list[Column]:
+        """Return angle, depth and lift error at every record, of an arm also its angle."""
         depth, lift_error = along_angle(self.result)
-        yield computed("angle", CURVE_ANGLES, "rad")
         lever = self._arm_length()
         quantities = {
             "depth": (depth, "m"),
             "lift error": (lift_error, "m"),
             **({"lift error of the arm": (lift_error / lever, "rad")} if lever else {}),
         }
-        for name, (values, unit) in quantities.items():
-            for passes, column in zip(self.result.record_passes, values.T, strict=True):
-                yield computed(f"{name} at {passes:.12g} passes", column, unit)
+        return [
+            computed("angle", CURVE_ANGLES, "rad"),
+            *(
+                computed(f"{name} at {passes:.12g} passes", column, unit)
+                for name, (values, unit) in quantities.items()
+                for passes, column in zip(self.result.record_passes, values.T, strict=True)
+            ),
+        ]
 
     def _arm_length(self) -> float | None:
         """Return the length of the arm [m]; None of another follower."""

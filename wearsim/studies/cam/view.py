@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.mechanics.cam import extreme, surface_points
-from wearsim.report.text import NOTHING, PER_SI, count, in_unit, shown
+from wearsim.report.text import NOTHING, PER_SI, count, count_of, in_unit, shown
 from wearsim.report.view import Column, Columns, Frame, Row, Rows, Table, View
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import harmonic_depth
@@ -80,21 +80,29 @@ class CamView(View):
         study, turn = self.result, self.result.turn
 
         def place(name: str, label: str, unit: str, value: float, theta: float) -> Row:
-            text = f"{shown(value, unit)} at {turn.place(theta)}"
-            return Row(label, text, answers={name: (value, unit)})
+            return Row(
+                label,
+                f"{shown(value, unit)} at {turn.place(theta)}",
+                answers={name: (value, unit)},
+            )
 
         def stated(name: str, label: str, value: float | None, unit: str, digits: int = 4) -> Row:
             return Row(label, shown(value, unit, digits), answers={name: (value, unit)})
 
         least, greatest = turn.normal_range
-        depth = shown(harmonic_depth(turn), "um", 2)
         p, q = study.winding_ratio
         sweeps = "" if study.sweeps is None else f", {study.sweeps:.4g} sweeps around the roller"
-        forces = {"least_normal_force": (least, "N"), "greatest_normal_force": (greatest, "N")}
         rows = [
             stated("perimeter", "perimeter", study.perimeter, "mm", 6),
             stated("load_integral", "integral of N ds", study.load_integral, "N m", 6),
-            Row("normal force", f"{shown(least, 'N')} to {shown(greatest, 'N')}", answers=forces),
+            Row(
+                "normal force",
+                f"{shown(least, 'N')} to {shown(greatest, 'N')}",
+                answers={
+                    "least_normal_force": (least, "N"),
+                    "greatest_normal_force": (greatest, "N"),
+                },
+            ),
             place("peak_pressure", "greatest pressure", "MPa", *study.max_peak_pressure),
             place("pressure_angle", "greatest pressure angle", "deg", *study.max_pressure_angle),
             place("outer_radius", "outer radius", "mm", *study.max_radius),
@@ -113,7 +121,10 @@ class CamView(View):
                     )
                 },
             ),
-            Row(f"harmonic limit at {depth} of wear", shown(study.harmonic_limit, "1", 3)),
+            Row(
+                f"harmonic limit at {shown(harmonic_depth(turn), 'um', 2)} of wear",
+                shown(study.harmonic_limit, "1", 3),
+            ),
             Row(
                 "winding number",
                 f"{study.winding_number:.6g}, nearest ratio {p}/{q}{sweeps}",
@@ -122,9 +133,12 @@ class CamView(View):
             *self._film_rows(),
         ]
         if turn.free:
-            arcs = f"{len(study.skids)} arc{'s' * (len(study.skids) > 1)}"
             energy = sum(skid.energy for skid in study.skids)
-            text = f"{arcs}, {shown(energy, 'J', 3)} per turn" if energy else NOTHING
+            text = (
+                f"{count_of(len(study.skids), 'arc')}, {shown(energy, 'J', 3)} per turn"
+                if energy
+                else NOTHING
+            )
             rows.append(Row("skids of the roller", text, answers={"skid_energy": (energy, "J")}))
         lives = lives_at(turn.scenario, np.array(study.max_peak_pressure[:1]))
         if lives is not None:
@@ -136,11 +150,17 @@ class CamView(View):
             rows.append(Row("stations", f"{len(study.weight)} of a run"))
         if measured := turn.cam.measured:
             away, unit = np.abs(measured.residual), "um" if measured.unit == "m" else "mrad"
-            rms = shown(float(np.sqrt((away**2).mean())), unit, 3)
-            most, noise = shown(float(away.max()), unit, 3), shown(measured.noise, unit, 3)
+            rms, most, noise = (
+                shown(float(size), unit, 3)
+                for size in (np.sqrt((away**2).mean()), away.max(), measured.noise)
+            )
             where = shown(float(measured.angle[away.argmax()]), "deg")
-            words = f"rms {rms}, at most {most} at {where}; noise {noise}"
-            rows.append(Row(f"residuals of the {measured.quantity}", words))
+            rows.append(
+                Row(
+                    f"residuals of the {measured.quantity}",
+                    f"rms {rms}, at most {most} at {where}; noise {noise}",
+                )
+            )
         return rows
 
     def _film_rows(self) -> Rows:
@@ -164,9 +184,13 @@ class CamView(View):
             [in_unit(value, unit) for value in _without_rounding(key, values[key][1])]
             for _, key, unit in shown_columns
         ]
-        rows = zip(*cells, self._segment_names(), strict=True)
-        heads = [*(head for head, *_ in shown_columns), "segment"]
-        return [Table("", [list(row) for row in rows], heads)]
+        return [
+            Table(
+                "",
+                [list(row) for row in zip(*cells, self._segment_names(), strict=True)],
+                [*(head for head, *_ in shown_columns), "segment"],
+            )
+        ]
 
     def _segment_names(self) -> list[str]:
         """Return the name of the segment of each station."""
@@ -230,17 +254,16 @@ class CamView(View):
     def data(self) -> dict[str, Any]:
         """Return the study in SI units."""
         study, motion = self.result, self.result.turn.cam.motion
-        measured, smoothing = self.result.turn.cam.measured, {}
-        if measured is not None:
-            unit = measured.unit
+        smoothing: dict[str, Any] = {}
+        if measured := study.turn.cam.measured:
             smoothing["smoothing"] = {
                 "file": measured.file,
                 "quantity": measured.quantity,
-                f"noise_{unit}": measured.noise,
+                f"noise_{measured.unit}": measured.noise,
                 "scatter_of_acceleration_per_rad2": measured.scatter,
                 "error_of_acceleration_per_rad2": measured.error,
                 "angle_rad": measured.angle,
-                f"residual_{unit}": measured.residual,
+                f"residual_{measured.unit}": measured.residual,
             }
         return {
             "title": self.title,

@@ -16,7 +16,6 @@ from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.opening import open_results
 from wearsim.studies.run.result import Result
 from wearsim.types import FloatArray, IntArray
-from wearsim.uq.estimation.estimates import Design
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.mann_whitney import Paired, paired, superiority
 from wearsim.uq.sampling.sampler import REPLICATES
@@ -169,10 +168,9 @@ def compare(
 
 def _comparable(item: Comparable | str | Path) -> Comparable:
     result = open_results(item) if isinstance(item, str | Path) else item
-    if not (is_ensemble(result) or isinstance(result, Result)):
-        raise TypeError(f"only results of wear tests can be compared, got {result!r}")
-    tests: Comparable = result
-    return tests
+    if isinstance(result, Result | EnsembleResult):
+        return result
+    raise TypeError(f"only results of wear tests can be compared, got {result!r}")
 
 
 def is_ensemble(result: object) -> TypeGuard[EnsembleResult]:
@@ -198,15 +196,11 @@ def _values(result: Comparable, observable: str) -> tuple[IntArray, FloatArray]:
     return np.zeros(1, np.int64), np.array([float(np.max(result.values(observable)[-1]))])
 
 
-def _course(result: Result, observable: str) -> FloatArray:
-    values = np.asarray(result.values(observable))
-    return np.stack([result.passes, values if values.ndim == 1 else values.max(axis=1)])
-
-
 def _row(label: str, result: Comparable, observable: str, first: Comparable | None) -> Compared:
     _, values = _values(result, observable)
     deeper = None if first is None else _deeper(result, first, observable)
     if isinstance(result, Result):
+        steps = np.asarray(result.values(observable))
         return Compared(
             label=label,
             kind="run",
@@ -226,7 +220,7 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
             if isinstance(first, Result)
             else None,
             values=values,
-            course=_course(result, observable),
+            course=np.stack([result.passes, steps.reshape(len(steps), -1).max(axis=1)]),
         )
     estimate = result.estimate(observable, probabilities=QUANTILES)
     return Compared(
@@ -284,8 +278,12 @@ def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -
     )
     if len(both) == 0:
         return None
-    plan: Design = "sobol" if result.plan == "sobol" else "monte-carlo"
-    return paired(values[places], firsts[places_of_first], plan, both % REPLICATES)
+    return paired(
+        values[places],
+        firsts[places_of_first],
+        "sobol" if result.plan == "sobol" else "monte-carlo",
+        both % REPLICATES,
+    )
 
 
 def _of_run(result: Result, observable: str) -> Interval:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from textwrap import fill
 from typing import Any
@@ -27,7 +27,6 @@ from wearsim.report.panels import (
     evenly_spaced,
     pass_axis,
     several_colours,
-    worn_limits,
 )
 from wearsim.report.text import (
     NOTHING,
@@ -46,11 +45,10 @@ from wearsim.report.text import (
 from wearsim.report.view import STUDY, Frame, Overview, Row, Rows, Table, View
 from wearsim.studies.comparison.compare import Comparable, Compared, Comparison, compare
 from wearsim.studies.ensemble.view import INTERVAL
-from wearsim.studies.run.panels import HEIGHT, Y
+from wearsim.studies.run.panels import HEIGHT, track_axis
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.mann_whitney import FEWEST, Paired
 
-_ENDS = ("value", "low", "high")
 EQUAL = "equal in all tests"
 
 
@@ -73,13 +71,13 @@ class ComparisonView(View):
 
     def __init__(self, comparison: Comparison, key: str = "") -> None:
         self.comparison, self.results, self.key = comparison, comparison.results, key
-        labels = [row.label for row in comparison.rows]
+        *labels, last = (row.label for row in comparison.rows)
+        self.title = f"{', '.join(labels)} and {last}"
         words = OBSERVABLES[comparison.observable].words
-        self.title = f"{', '.join(labels[:-1])} and {labels[-1]}"
         self.question = f"How do the {words}s at the end of these tests differ?"
         self._views: list[View] = [result.view for result in self.results]
         self.files = [str(result.path) for result in self.results]
-        self.warnings = _warnings(comparison)
+        self.warnings = list(_warnings(comparison))
 
     def rows(self) -> Rows:
         """Return the comparisons with the first, and the value of each."""
@@ -91,25 +89,27 @@ class ComparisonView(View):
 
     def tables(self) -> list[Table]:
         """Return what is compared, and the estimates with their intervals."""
-        comparison, named = self.comparison, OBSERVABLES[self.comparison.observable]
-        what = f"{named.words} at the end" + (f", for values of {self.key}" if self.key else "")
-        estimated = next((row.quantiles for row in comparison.rows if row.quantiles), ())
+        rows, named = self.comparison.rows, OBSERVABLES[self.comparison.observable]
+        estimated = next((row.quantiles for row in rows if row.quantiles), ())
         quantiles = (f"{100 * probability:g} %" for probability, _ in estimated)
         heads = ["[" + named.unit + "]", "mean", "std", *quantiles]
-        lines = [line for row in comparison.rows for line in _lines(row, named.unit, len(heads))]
         study = [
-            Row("compared", what),
+            Row(
+                "compared",
+                f"{named.words} at the end" + (f", for values of {self.key}" if self.key else ""),
+            ),
             *(
                 Row(row.label, f"{kind(row)}; {length(row)}; {file}")
-                for row, file in zip(comparison.rows, self.files, strict=True)
+                for row, file in zip(rows, self.files, strict=True)
             ),
         ]
+        lines = [line for row in rows for line in _lines(row, named.unit, len(heads))]
         return [Table(STUDY, study), Table("", lines, heads), self._side_by_side()]
 
     def _side_by_side(self) -> Table:
         """Return all answers of the results, one column for each of them."""
         answers = [{row.label: row.text for row in view.rows()} for view in self._views]
-        labels = list(dict.fromkeys(label for texts in answers for label in texts))
+        labels = dict.fromkeys(label for texts in answers for label in texts)
         return Table(
             "",
             [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels],
@@ -118,13 +118,13 @@ class ComparisonView(View):
 
     def overview(self) -> Overview:
         """Return the comparison, and the limits of each of the results."""
-        compared = super().overview()
-        groups, excluded = dict(compared.groups), list[str]()
-        for row, view in zip(self.comparison.rows, self._views, strict=True):
-            overview = view.overview()
-            groups[f"Limits of {row.label}"] = overview.groups.get("Limits", [])
-            excluded += [text for text in overview.excluded if text not in excluded]
-        return Overview(compared.picture, groups, excluded, alone=True)
+        compared, overviews = super().overview(), [view.overview() for view in self._views]
+        limits = {
+            f"Limits of {row.label}": overview.groups.get("Limits", [])
+            for row, overview in zip(self.comparison.rows, overviews, strict=True)
+        }
+        excluded = dict.fromkeys(text for overview in overviews for text in overview.excluded)
+        return Overview(compared.picture, {**compared.groups, **limits}, list(excluded), alone=True)
 
     def data(self) -> dict[str, Any]:
         """Return the comparison in SI units; all results are compared with the first."""
@@ -144,7 +144,10 @@ class ComparisonView(View):
         rows, unit = self.comparison.rows, si_unit(self.comparison.observable)
         columns = [
             ("label", "", np.array([row.label for row in rows])),
-            *((end, unit, np.array([getattr(row.value, end) for row in rows])) for end in _ENDS),
+            *(
+                (end, unit, np.array([getattr(row.value, end) for row in rows]))
+                for end in ("value", "low", "high")
+            ),
         ]
         return Frame(columns, "result", range(1, len(rows) + 1))
 
@@ -153,12 +156,14 @@ class ComparisonView(View):
         titles = {result.title for result in self.results}
         shared = titles.pop() if len(titles) == 1 else ""
         suffix = f"for values of {self.key}" if self.key else ""
-        heading = ", ".join(text for text in (shared, suffix) if text)
-        profiles = {
-            row.label: result.worn_profile()
-            for row, result in zip(self.comparison.rows, self.results, strict=False)
-        }
-        return comparison_sheet(self.comparison, heading, profiles)
+        return comparison_sheet(
+            self.comparison,
+            ", ".join(filter(None, (shared, suffix))),
+            {
+                row.label: result.worn_profile()
+                for row, result in zip(self.comparison.rows, self.results, strict=False)
+            },
+        )
 
 
 def comparison_view(
@@ -178,33 +183,27 @@ def comparison_view(
     return ComparisonView(compared, key)
 
 
-def _warnings(comparison: Comparison) -> list[str]:
-    """Return warnings of unequal lengths of the tests and of failed realisations."""
-    texts = []
+def _warnings(comparison: Comparison) -> Iterator[str]:
+    """Yield warnings of unequal lengths of the tests and of failed realisations."""
     if not comparison.equally_long:
         ends = "; ".join(f"{row.label}: {length(row)}" for row in comparison.rows)
-        texts.append(f"the tests differ in length ({ends}), which contributes to the differences")
-    texts += [
+        yield f"the tests differ in length ({ends}), which contributes to the differences"
+    yield from (
         f"{count(row.failed)} of the {count(row.done + row.failed)} realisations of {row.label}"
         " failed; estimates from the others may be biased"
         for row in comparison.rows
         if row.failed
-    ]
-    return texts
+    )
 
 
 def _lines(row: Compared, unit: str, columns: int) -> list[list[str]]:
     """Return the estimates of a run or an ensemble, and below them their intervals."""
-    items = [row.value]
-    if row.count > 1:
-        items += [row.std] if row.std is not None else []
-        items += [interval for _, interval in row.quantiles]
+    further = (row.std, *(interval for _, interval in row.quantiles)) if row.count > 1 else ()
+    items = [row.value, *(item for item in further if item is not None)]
     values, intervals = zip(*(cells(item, unit) for item in items), strict=True)
-    lines = [[row.label, *values, *[NOTHING] * (columns - 1 - len(items))]]
-    if any(intervals):
-        name = "  error estimate" if row.kind == "run" else INTERVAL
-        lines.append([name, *intervals, *[""] * (columns - 1 - len(items))])
-    return lines
+    more, name = columns - 1 - len(items), "  error estimate" if row.kind == "run" else INTERVAL
+    below = [[name, *intervals, *[""] * more]] if any(intervals) else []
+    return [[row.label, *values, *[NOTHING] * more], *below]
 
 
 def _data(row: Compared, file: str) -> dict[str, Any]:
@@ -235,14 +234,13 @@ def _data(row: Compared, file: str) -> dict[str, Any]:
 
 def realisations(row: Compared) -> str:
     """Return the number of realisations of an ensemble: "7 of 10, 3 failed"."""
-    text = count(row.done)
-    if row.done < row.requested:
-        text += f" of {count(row.requested)}"
-        # an ensemble that reached its target, without failures
-        text += " at most" if row.finished and row.done + row.failed < row.requested else ""
-    text += f", {count(row.failed)} failed" if row.failed else ""
-    text += f", {count(row.count)} of them independent" if row.count < row.done else ""
-    return text if row.finished else f"{text}, unfinished"
+    # an ensemble that reached its target, without failures
+    at_most = " at most" if row.finished and row.done + row.failed < row.requested else ""
+    requested = f" of {count(row.requested)}{at_most}" if row.done < row.requested else ""
+    failed = f", {count(row.failed)} failed" if row.failed else ""
+    independent = f", {count(row.count)} of them independent" if row.count < row.done else ""
+    unfinished = "" if row.finished else ", unfinished"
+    return f"{count(row.done)}{requested}{failed}{independent}{unfinished}"
 
 
 def kind(row: Compared) -> str:
@@ -266,17 +264,23 @@ def against(comparison: Comparison, row: Compared) -> list[tuple[str, str]]:
     row : Compared
         One of its rows except the first.
     """
-    first = comparison.rows[0]
-    unit = OBSERVABLES[comparison.observable].unit
+    first, unit = comparison.rows[0], OBSERVABLES[comparison.observable].unit
     more, less = ("deeper", "shallower") if comparison.observable == "depth" else ("more", "less")
     if row.difference is not None:
         errors = (first.value.half_width, row.value.half_width)
-        text = _of_runs(row.difference, errors, unit, more, less)
-        return [(f"{row.label} against {first.label}", text)]
+        return [
+            (
+                f"{row.label} against {first.label}",
+                _of_runs(row.difference, errors, unit, more, less),
+            )
+        ]
     deeper, paired = row.deeper, row.paired
-    name = f"{row.label} {more} than {first.label}"
     return [
-        *([(name, _of_tests(first, row, deeper))] if deeper is not None else []),
+        *(
+            [(f"{row.label} {more} than {first.label}", _of_tests(first, row, deeper))]
+            if deeper is not None
+            else []
+        ),
         *([("  with the same draws", _of_pairs(paired, unit, more, less))] if paired else []),
     ]
 
@@ -285,9 +289,8 @@ def _of_runs(
     difference: Interval, errors: tuple[float, float], unit: str, more: str, less: str
 ) -> str:
     """Return the difference of two runs, with their estimated errors."""
-    texts = " and ".join(shown(error, unit, 2) for error in errors)
+    texts, by = " and ".join(shown(error, unit, 2) for error in errors), difference.value
     stated = f"estimated errors {texts}" if any(errors) else "no error estimate"
-    by = difference.value
     if by == 0.0:
         return f"equal ({stated})"
     if difference.low <= 0.0 <= difference.high:
@@ -344,25 +347,15 @@ def comparison_sheet(
         courses of runs alone; the mean and the 90 % range of each, in rows with their labels.
     """
     named, rows = OBSERVABLES[comparison.observable], comparison.rows
-    colours = several_colours(len(rows))
-    pairs = list(zip(rows, colours, strict=True))
+    pairs = list(zip(rows, several_colours(len(rows)), strict=True))
     at_end = Axis(f"{named.words} at the end", named.unit)
-    if all(row.course is not None for row in rows):
-        left = _courses(pairs, named)
-    else:
-        left = Panel(
-            "Cumulative distribution",
-            at_end,
-            Axis("cumulative probability", "%", limits=(0.0, 1.0)),
-            [mark for row, colour in pairs for mark in _distribution(row, colour)],
-            "Share of the tests that are below a value.",
-            legend="",
-        )
     return Sheet(
         fill(title, _LINE_LENGTH),
         {
-            "ranges": _ranges(comparison, colours, at_end),
-            "values": left,
+            "ranges": _ranges(comparison, pairs, at_end),
+            "values": _courses(pairs, named)
+            if all(row.course is not None for row in rows)
+            else _distributions(pairs, at_end),
             **({"profiles": _profiles(profiles)} if profiles else {}),
         },
         [["values", "ranges"]],
@@ -373,26 +366,29 @@ def comparison_sheet(
 def _courses(pairs: list[tuple[Compared, str]], named: Named) -> Panel:
     """Return the observable of each run against roller passes."""
     # the dot at the end shows a run that another one covers
-    marks = [
-        Line(
-            row.course[0],
-            row.course[1],
-            marker="o",
-            size=4.5,
-            at_end=True,
-            colour=colour,
-            label=row.label,
-        )
-        for row, colour in pairs
-        if row.course is not None
-    ]
-    words = named.words[:1].upper() + named.words[1:]
+    style: dict[str, Any] = {"marker": "o", "size": 4.5, "at_end": True}
     return Panel(
-        f"{words} against roller passes",
+        f"{named.words.capitalize()} against roller passes",
         pass_axis(max(row.passes for row, _ in pairs)),
         Axis(named.words, named.unit),
-        marks,
+        [
+            Line(*row.course, colour=colour, label=row.label, **style)
+            for row, colour in pairs
+            if row.course is not None
+        ],
         "The course of each run.",
+        legend="",
+    )
+
+
+def _distributions(pairs: list[tuple[Compared, str]], axis: Axis) -> Panel:
+    """Return the distribution function of each ensemble, and the value of each run."""
+    return Panel(
+        "Cumulative distribution",
+        axis,
+        Axis("cumulative probability", "%", limits=(0.0, 1.0)),
+        [mark for row, colour in pairs for mark in _distribution(row, colour)],
+        "Share of the tests that are below a value.",
         legend="",
     )
 
@@ -400,30 +396,34 @@ def _courses(pairs: list[tuple[Compared, str]], named: Named) -> Panel:
 def _distribution(row: Compared, colour: str) -> list[Mark]:
     """Return the distribution function of an ensemble, or the value of a run with its error."""
     if row.kind == "run":
-        error = Span(row.value.low, row.value.high, colour=colour, alpha=0.3)
-        return [error, Span(row.value.value, colour=colour, label=row.label, width=1.3)]
+        return [
+            Span(row.value.low, row.value.high, colour=colour, alpha=0.3),
+            Span(row.value.value, colour=colour, label=row.label, width=1.3),
+        ]
     picks = evenly_spaced(len(row.values), MOST_POINTS)
-    parts = (picks + 1.0) / len(row.values)
     # from zero, since the function rises at the first value too
     across = np.concatenate([row.values[:1], row.values[picks]])
-    rising = np.concatenate([[0.0], parts])
+    rising = np.concatenate([[0.0], (picks + 1.0) / len(row.values)])
     return [Line(across, rising, steps=True, colour=colour, label=row.label)]
 
 
-def _ranges(comparison: Comparison, colours: list[str], axis: Axis) -> Panel:
+def _ranges(comparison: Comparison, pairs: list[tuple[Compared, str]], axis: Axis) -> Panel:
     """Return mean with interval, median and 90 % range, in rows under their labels."""
     rows, marks = comparison.rows, list[Mark]()
-    for place, (row, colour) in enumerate(zip(rows, colours, strict=True)):
-        quantiles = dict(row.quantiles)
-        ends = [quantile.value for quantile in quantiles.values()]
-        if _has_range(row):
-            marks.append(_interval(place, ends[0], ends[-1], colour, _THIN))
-        if quantiles:
-            marks.append(dots([quantiles[0.5].value], [place], "|", size=13.0, colour=colour))
-        if np.isfinite([row.value.low, row.value.high]).all():
-            marks.append(_interval(place, row.value.low, row.value.high, colour, _THICK, 0.45))
-        marks.append(dots([row.value.value], [place], size=4.5, colour=colour))
-        marks += _labels(comparison, row, place, colour)
+    for place, (row, colour) in enumerate(pairs):
+        quantiles, mean = {p: quantile.value for p, quantile in row.quantiles}, row.value
+        ends = list(quantiles.values())
+        marks += [
+            *([_interval(place, ends[0], ends[-1], colour, _THIN)] if _has_range(row) else []),
+            *([dots([quantiles[0.5]], [place], "|", size=13.0, colour=colour)] if ends else []),
+            *(
+                [_interval(place, mean.low, mean.high, colour, _THICK, 0.45)]
+                if np.isfinite([mean.low, mean.high]).all()
+                else []
+            ),
+            dots([mean.value], [place], size=4.5, colour=colour),
+            *_labels(comparison, row, place, colour),
+        ]
     title, legend = "Value and estimated error", ""
     if any(row.quantiles for row in rows):
         title = "Mean, median and range"
@@ -450,10 +450,11 @@ def _interval(
 
 def _labels(comparison: Comparison, row: Compared, place: int, colour: str) -> list[Mark]:
     """Return the name of a row, and under it its comparison with the first row."""
-    lines = [text for _, text in against(comparison, row)][:1] if place else []
-    if lines and lines[0].startswith("in "):
-        more = "deeper" if comparison.observable == "depth" else "more"
-        lines = [f"{more} than {comparison.rows[0].label} {lines[0]}"]
+    pairs = against(comparison, row)[:1] if place else []
+    lines = [
+        f"{name.removeprefix(f'{row.label} ')} {text}" if text.startswith("in ") else text
+        for name, text in pairs
+    ]
     under = [part for line in lines for part in fill(line, _LINE_LENGTH).splitlines()]
     size = "run" if row.kind == "run" else f"ensemble of {realisations(row)}"
     head = fill(f"{row.label} ({size})", _LINE_LENGTH).splitlines()
@@ -486,11 +487,11 @@ def _profiles(profiles: dict[str, ComputedProfile]) -> Panel:
         if profile.label:
             marks.append(Band(profile.y, profile.low, profile.high, colour=colour))
         marks.append(Line(profile.y, profile.height, colour=colour, label=label))
-    banded = any(profile.label for profile in profiles.values())
+    banded = ", of ensembles the mean with a band" * any(item.label for item in profiles.values())
     return Panel(
         "Worn profiles",
-        Axis(Y, "mm", limits=worn_limits(y, np.max(worn, axis=0))),
+        track_axis(y, np.max(worn, axis=0)),
         HEIGHT,
         marks,
-        "Profiles at the end" + (", of ensembles the mean with a band." if banded else "."),
+        f"Profiles at the end{banded}.",
     )

@@ -62,12 +62,12 @@ class LocalFriction:
         self._scenario, self._item, self._field = scenario, item, item.distribution
         self._stream = Stream(scenario.seed, item.name, "field")
         if not model.capabilities.friction_field:
-            specs = [
+            specs = (
                 registry().get(ContactModelSpec, name)
                 for name in registry().names(ContactModelSpec)
-            ]
-            specs.sort(key=lambda spec: spec.reference)
-            names = [f"'{spec.name}'" for spec in specs if spec.capabilities.friction_field]
+            )
+            able = [spec for spec in specs if spec.capabilities.friction_field]
+            names = [f"'{spec.name}'" for spec in sorted(able, key=lambda spec: spec.reference)]
             models = f"contact.model = {' or '.join(names)}" if names else "another distribution"
             raise CapabilityError(
                 f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
@@ -120,8 +120,9 @@ class LocalFriction:
         """
         friction = np.empty_like(x)
         for row in range(len(x)):
-            uniforms = partial(self._stream.uniforms, realisation=first + row)
-            friction[row] = self._field.values(x[row], y, uniforms)
+            friction[row] = self._field.values(
+                x[row], y, partial(self._stream.uniforms, realisation=first + row)
+            )
         return replace(batch, friction=friction, friction_carried=self._field.frame != "contact")
 
 
@@ -144,12 +145,11 @@ def finer_grid(
     str
         "contact.my = 124": key and least value for either direction that is too coarse.
     """
-    choice = scenario.contact
-    settings = []
+    choice, settings = scenario.contact, []
     if friction.unresolved(along, 0.0) is not None:
         needed = _least(points, lambda count: friction.unresolved(along * points / count, 0.0))
-        has_key = hasattr(choice.options, "mx")
-        settings.append(f"contact.mx = {needed}" if has_key else f"{needed} points along rolling")
+        by_key, in_words = f"contact.mx = {needed}", f"{needed} points along rolling"
+        settings.append(by_key if hasattr(choice.options, "mx") else in_words)
     if friction.unresolved(0.0, across) is not None:
         strips = choice.strips or getattr(choice.options, "my", None)
         if strips is None:
@@ -197,9 +197,12 @@ class Realisations:
     def __init__(self, scenario: Scenario, count: int) -> None:
         self.scenario, self.count = scenario, count
         if scenario.cam is not None:
-            what = "has many contacts, and this study solves one"
-            remedy = "wearsim cam for its contacts, or wearsim ensemble"
-            raise mistake_in(scenario.file, what, None, remedy, table="cam")
+            raise mistake_in(
+                scenario.file,
+                "has many contacts, and this study solves one",
+                expected="wearsim cam for its contacts, or wearsim ensemble",
+                table="cam",
+            )
         self._setup = setup = Setup(scenario)
         mean_load = setup.load_range(0.0)[0]
         self._once, field, self.notes = acting_inputs(scenario)
@@ -247,18 +250,18 @@ class Realisations:
 
     def _drawn(self, part: slice) -> dict[str, FloatArray]:
         """Return the drawn inputs of some realisations by the names of `contact_values`."""
-        values = {key: column[part] for key, column in self.values.items() if not is_axial(key)}
-        return contact_values(self._once.random, values)
+        return contact_values(
+            self._once.random,
+            {key: column[part] for key, column in self.values.items() if not is_axial(key)},
+        )
 
     def _contacts(self, part: slice) -> ContactBatch:
         """Return the contacts of some realisations."""
-        drawn = {name: values[None] for name, values in self._drawn(part).items()}
-        count = part.stop - part.start
+        drawn, count = self._drawn(part), part.stop - part.start
+        drawn = {name: values[None] for name, values in drawn.items()}
         problem = build_problem(self._setup, self.model, self.grid, drawn, realisations=count)
         forms = {key: column[part] for key, column in self.values.items() if is_axial(key)}
-        if forms:
-            problem = self._with_forms(problem, drawn, forms)
-        return unworn_contacts(problem)
+        return unworn_contacts(self._with_forms(problem, drawn, forms) if forms else problem)
 
     def _with_forms(
         self, problem: WearProblem, drawn: dict[str, FloatArray], forms: dict[str, FloatArray]
@@ -266,21 +269,24 @@ class Realisations:
         """Return the problem with the drawn forms of the bodies along the axis."""
         count = problem.shape[2]
         offsets = np.broadcast_to(self._setup.inputs_of([0], drawn)["offset"], (1, count))
-        parts = []
-        for number in range(count):
-            values = {key: float(column[number]) for key, column in forms.items()}
-            realised = realise(self._once, values)
-            parts.append(surfaces(realised, [0], offsets[:, number : number + 1], self.grid))
-        rolling, slip = parts[0].roller_drop, parts[0].slip_profile
-        if rolling is not None:
-            rolling = np.concatenate([np.asarray(part.roller_drop) for part in parts], axis=1)
-        if slip is not None:
-            slip = np.concatenate([np.asarray(part.slip_profile) for part in parts], axis=2)
+        drawn_forms = (
+            {key: float(column[number]) for key, column in forms.items()} for number in range(count)
+        )
+        parts = [
+            surfaces(realise(self._once, values), [0], offsets[:, number : number + 1], self.grid)
+            for number, values in enumerate(drawn_forms)
+        ]
+
+        def joined(name: str, axis: int) -> FloatArray | None:
+            """Return an array of all realisations, None if there is none."""
+            arrays = [getattr(part, name) for part in parts]
+            return None if arrays[0] is None else np.concatenate(arrays, axis=axis)
+
         return replace(
             problem,
             flat_gap=np.concatenate([part.gap for part in parts], axis=2),
-            roller_drop=rolling,
-            slip_profile=slip,
+            roller_drop=joined("roller_drop", 1),
+            slip_profile=joined("slip_profile", 2),
         )
 
     def _solve(self, part: slice) -> ContactBatchSolution:
@@ -335,8 +341,7 @@ def acting_inputs(
     """
     acting = [item for item in scenario.random if _acts(scenario, item)]
     idle = [item.name for item in scenario.random if item not in acting]
-    verb = "have" if len(idle) > 1 else "has"
-    note = f"{', '.join(idle)} {verb} no effect on the dissipation of a contact: not drawn"
+    have = f"{', '.join(idle)} {'have' if len(idle) > 1 else 'has'}"
     drawn = tuple(
         replace(item, persistence="per-test", distribution=item.scalar)
         if item.role == "process"
@@ -344,8 +349,11 @@ def acting_inputs(
         for item in acting
         if item.role != "field"
     )
-    field = next((item for item in acting if item.role == "field"), None)
-    return replace(scenario, random=drawn), field, (note,) if idle else ()
+    return (
+        replace(scenario, random=drawn),
+        next((item for item in acting if item.role == "field"), None),
+        (f"{have} no effect on the dissipation of a contact: not drawn",) if idle else (),
+    )
 
 
 def _acts(scenario: Scenario, item: RandomInput) -> bool:
@@ -355,15 +363,17 @@ def _acts(scenario: Scenario, item: RandomInput) -> bool:
     if not item.name.startswith("load."):
         return False
     values = {*item.extremes, *item.scalar.quantile(_BETWEEN).tolist()}
-    start = np.zeros(1)
-    forces = {
-        float(realise(scenario, {item.name: value}).load.built.force(start)[0]) for value in values
-    }
+    loads = (realise(scenario, {item.name: value}).load.built for value in values)
+    forces = {float(load.force(np.zeros(1))[0]) for load in loads}
     if len(forces) == 1:
         return False
     table, key = item.name.split(".", 1)
     mean = item.mean[0]
-    written = str(item.quantity.write(mean)) if item.quantity else f"{mean:g}"
-    what = "changes the load of the contact, and only load.normal_force can be random here"
-    expected = f"one value, such as {written}"
-    raise mistake_in(scenario.file, what, item.kind, expected, table=table, key=key)
+    raise mistake_in(
+        scenario.file,
+        "changes the load of the contact, and only load.normal_force can be random here",
+        item.kind,
+        f"one value, such as {item.quantity.write(mean) if item.quantity else f'{mean:g}'}",
+        table=table,
+        key=key,
+    )

@@ -86,10 +86,9 @@ class ContactReference:
 
     def errors_of(self, solution: ContactSolution) -> ContactErrors:
         """Return the differences of a solution on strips of the same width from the reference."""
-        beyond = (len(self.y) - len(solution.y)) // 2
         scalars = self.power, self.peak_pressure, self.half_length, self.adhesion_fraction
         reference = np.concatenate([scalars, self.line_load, self.dissipation])
-        return _differences(_values(solution, beyond), reference)
+        return _differences(_values(solution, (len(self.y) - len(solution.y)) // 2), reference)
 
 
 def reference_spec(name: str) -> ContactModelSpec:
@@ -107,8 +106,11 @@ def reference_spec(name: str) -> ContactModelSpec:
     """
     names = registry().names(ContactModelSpec)
     if name not in names:
-        known = f"there are {', '.join(names)}"
-        remedy = f"install it with: {INSTALL[name]}" if name in INSTALL else known
+        remedy = (
+            f"install it with: {INSTALL[name]}"
+            if name in INSTALL
+            else f"there are {', '.join(names)}"
+        )
         raise PluginError(f"no contact model '{name}' is installed; {remedy}")
     return registry().get(ContactModelSpec, name)
 
@@ -183,31 +185,38 @@ def solve_reference(
         else:
             raise failure
         values, coarse = solutions
-        errors = _differences(coarse, values)
     else:
         values = solve(spec.options(), grid)
         half = Grid.spanning(*grid.edges, (grid.strips + 1) // 2)
         coarse, scalars = solve(spec.options(), half), len(_SCALARS)
-        fields = coarse[scalars:].reshape(2, -1)
-        there = [np.interp(grid.y, half.y, field) for field in fields]
-        errors = _differences(np.concatenate([coarse[:scalars], *there]), values)
+        coarse = np.concatenate(
+            [
+                coarse[:scalars],
+                *[np.interp(grid.y, half.y, field) for field in coarse[scalars:].reshape(2, -1)],
+            ]
+        )
     line_load, dissipation = values[len(_SCALARS) :].reshape(2, -1)
-    errors = replace(errors, **{name: abs(error) for name, error in vars(errors).items()})
     return ContactReference(
         name,
         grid.y,
         dissipation,
         line_load,
         **dict(zip(_SCALARS, values[: len(_SCALARS)].tolist(), strict=True)),
-        own=errors,
+        own=ContactErrors(
+            **{name: abs(error) for name, error in vars(_differences(coarse, values)).items()}
+        ),
         seconds=perf_counter() - start,
     )
 
 
 def at_creepage(point: OperatingPoint, solution: ContactSolution) -> OperatingPoint:
     """Return the operating point with the longitudinal creepage of a solution prescribed."""
-    creepage = replace(point.creepage, longitudinal=solution.longitudinal_creepage)
-    return replace(point, creepage=creepage, bearing_torque=None, rolling_radius=None)
+    return replace(
+        point,
+        creepage=replace(point.creepage, longitudinal=solution.longitudinal_creepage),
+        bearing_torque=None,
+        rolling_radius=None,
+    )
 
 
 def error_above_tolerance(
@@ -262,8 +271,12 @@ def error_above_tolerance(
 def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:
     """Return scalars, q(y) and P_l(y) of a solution in one array, with zeros for strips beyond."""
     scalars = solution.power, solution.peak_pressure, float(solution.half_length.max())
-    fields = (np.pad(field, beyond) for field in (solution.line_load, solution.dissipation))
-    return np.concatenate([[*scalars, solution.adhesion_fraction], *fields])
+    return np.concatenate(
+        [
+            [*scalars, solution.adhesion_fraction],
+            *(np.pad(field, beyond) for field in (solution.line_load, solution.dissipation)),
+        ]
+    )
 
 
 def _differences(values: FloatArray, reference: FloatArray) -> ContactErrors:

@@ -127,8 +127,9 @@ def calibration() -> Calibration:
 def terms_of(scaled: FloatArray) -> FloatArray:
     """Return the terms of a quadratic polynomial, shape (contacts, 36), of scaled indicators."""
     first, second = np.triu_indices(scaled.shape[1])
-    ones = np.ones((len(scaled), 1))
-    return np.concatenate([ones, scaled, scaled[:, first] * scaled[:, second]], axis=1)
+    return np.concatenate(
+        [np.ones((len(scaled), 1)), scaled, scaled[:, first] * scaled[:, second]], axis=1
+    )
 
 
 def indicators_of(

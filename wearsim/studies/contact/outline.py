@@ -64,8 +64,9 @@ def patch_outlines(y: FloatArray, half_length: FloatArray) -> list[tuple[FloatAr
         across, ends = np.concatenate([left, inside, right]), np.sqrt(part)
         # the square of the half-length is linear there
         height = np.concatenate([a[0] * ends, a, a[-1] * ends[::-1]])
-        there_and_back = np.concatenate([across, across[::-1]])
-        outlines.append((there_and_back, np.concatenate([height, -height[::-1]])))
+        outlines.append(
+            (np.concatenate([across, across[::-1]]), np.concatenate([height, -height[::-1]]))
+        )
     return outlines
 
 

@@ -159,8 +159,9 @@ def study_contact(
         profile = load_profile(profile)
     if profile is not None:
         if not isinstance(profile, Profile):
-            kind = type(profile).__name__
-            raise TypeError(f"profile must be a Profile or the path of a file, got a {kind}")
+            raise TypeError(
+                f"profile must be a Profile or the path of a file, got a {type(profile).__name__}"
+            )
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
     scenario = with_chosen_model(scenario, test=False)
     setup = Setup(scenario)
@@ -176,18 +177,23 @@ def study_contact(
         model, gap, curvature, point = _contact(scenario, wider)
         solution, grid = model.solve_one(gap, curvature, point), wider
         span = f"{1e3 * grid.edges[0]:.4g} to {1e3 * grid.edges[1]:.4g} mm"
-        text = f"the contact is wider than the profile: the strips span {span}, and it is"
-        notes = (*notes, f"{text} level beyond the profile")
+        notes = (
+            *notes,
+            (
+                f"the contact is wider than the profile: the strips span {span}, and it is level"
+                " beyond the profile"
+            ),
+        )
     if scenario.cam is not None:
         theta = math.degrees(float(turn_of(scenario).stations.angle[0]))
         notes = (*notes, f"contact of the cam at {theta:.4g} deg; wearsim cam solves all stations")
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
-    errors: tuple[float | None, float | None] = (None, None)
-    seconds, warnings = None, plausibility_warnings(setup)
+    power_error = pressure_error = seconds = None
+    warnings = plausibility_warnings(setup)
     if with_error:
-        errors = _grid_errors(scenario, grid, solution)
-        if errors[1] is not None and errors[1] > GRID_DEPENDENT:
-            warnings.append(_grid_dependence(scenario, grid, solution, errors[1]))
+        power_error, pressure_error = _grid_errors(scenario, grid, solution)
+        if pressure_error is not None and pressure_error > GRID_DEPENDENT:
+            warnings.append(_grid_dependence(scenario, grid, solution, pressure_error))
         start = perf_counter()
         model.solve_one(gap, curvature, point)
         seconds = perf_counter() - start
@@ -204,7 +210,8 @@ def study_contact(
         point,
         scenario.contact.model,
         described_model(scenario.contact.model, scenario.text),
-        *errors,
+        power_error,
+        pressure_error,
         seconds,
         notes,
         tuple(warnings),
@@ -234,7 +241,6 @@ def _reference(
         edges = grid.edges[0] - margin, grid.edges[1] + margin
         wider = Grid.spanning(*edges, grid.strips + 2 * beyond) if beyond else grid
         _, gap, curvature, point = _contact(scenario, wider)
-        prescribed = at_creepage(point, solution)
         try:
             return solve_reference(
                 against,
@@ -242,7 +248,7 @@ def _reference(
                 materials,
                 gap,
                 curvature,
-                prescribed,
+                at_creepage(point, solution),
                 creep_factor=scenario.friction.creep_factor,
             )
         except ContactError as error:

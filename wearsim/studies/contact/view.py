@@ -81,10 +81,8 @@ class ContactView(View):
         study, point, solution = self.result, self.result.point, self.result.solution
         rounding = 1e-12 * point.normal_force * study.grid.spacing * study.grid.strips
         moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
-        length, length_error = self._length
         pressure, power = solution.peak_pressure, solution.power
-        pressure_error = _times(study.pressure_error, pressure)
-        power_error = _times(study.grid_error, power)
+        length, length_error = self._length
         return [
             *(Row(*pair) for pair in self.start.items()),
             Row("contact model", study.described_model),
@@ -99,12 +97,18 @@ class ContactView(View):
             Row.answer("patch width", "patch_width", self._width, "mm", self._width_error)
             if self.edges
             else Row("patch width", NOTHING, answers={"patch_width": (0.0, "mm")}),
-            Row.answer("peak pressure", "peak_pressure", pressure, "MPa", pressure_error),
+            Row.answer(
+                "peak pressure",
+                "peak_pressure",
+                pressure,
+                "MPa",
+                _times(study.pressure_error, pressure),
+            ),
             Row.answer("approach", "approach", solution.approach, "um"),
             Row.answer("longitudinal force", "force_x", solution.force_x, "N"),
             Row.answer("lateral force", "force_y", solution.force_y, "N"),
             Row.answer("spin moment", "spin_moment", moment, "N mm"),
-            Row.answer("dissipated power", "power", power, "W", power_error),
+            Row.answer("dissipated power", "power", power, "W", _times(study.grid_error, power)),
             Row("adhesion fraction", round(solution.adhesion_fraction, _DIGITS), "%"),
         ]
 
@@ -119,8 +123,12 @@ class ContactView(View):
             text = f"{sign}{shown(abs(round(error, _DIGITS)), '%', 2)}"
             theirs = shown(round(getattr(reference.own, name), _DIGITS), "%", 2)
             rows.append(Row(_DIFFERENCES[name], f"{text}, its own error {theirs}"))
-        rows.append(Row("time of the reference", lapse(reference.seconds)))
-        return [Table(f"difference from '{reference.model}'", rows)]
+        return [
+            Table(
+                f"difference from '{reference.model}'",
+                [*rows, Row("time of the reference", lapse(reference.seconds))],
+            )
+        ]
 
     def data(self) -> dict[str, Any]:
         """Return the contact and its strips in SI units."""
@@ -184,12 +192,13 @@ class ContactView(View):
 
     def line(self) -> str:
         """Return the footer of the contact, with the error estimated from a grid half as fine."""
-        study, error = self.result, ""
-        if study.grid_error is not None:
-            within = percent(study.grid_error)
-            error = f"dissipated power within {within} (estimated numerical error of the grid)"
-        time = NOTHING if study.seconds is None else brief(study.seconds)
-        return footer([study.described_model, f"{study.grid.strips} strips"], error, time)
+        study, source = self.result, "(estimated numerical error of the grid)"
+        error = study.grid_error
+        return footer(
+            [study.described_model, f"{study.grid.strips} strips"],
+            "" if error is None else f"dissipated power within {percent(error)} {source}",
+            NOTHING if study.seconds is None else brief(study.seconds),
+        )
 
     def frame(self) -> Frame:
         """Return the strips, one row each."""
@@ -204,18 +213,16 @@ class ContactView(View):
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the fields, if there are any, line load and dissipated power per length."""
         study = self.result
-        panels = {} if study.fields is None else _fields(study.fields, study.solution)
-        rows = [["pressure", "traction"], ["areas", "power"]] if panels else []
-        panels |= _strips(study)
-        rows.append(["line load", "dissipation"])
+        fields = {} if study.fields is None else _fields(study.fields, study.solution)
+        rows = [["pressure", "traction"], ["areas", "power"]] if fields else []
         return Sheet(
             f"{study.title}\n{study.described_model}\n"
             f"normal force {shown(study.point.normal_force, 'N')},"
             f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
             f" dissipated power {shown(study.solution.power, 'W')}",
-            panels,
-            rows,
-            (10.0, 8.2 if study.fields is not None else 3.4),
+            fields | _strips(study),
+            [*rows, ["line load", "dissipation"]],
+            (10.0, 8.2 if fields else 3.4),
         )
 
 
@@ -229,8 +236,7 @@ Y = Axis("y", "mm")
 
 
 def _fields(fields: ContactFields, solution: ContactSolution) -> dict[str, Panel]:
-    touching = np.flatnonzero(solution.half_length > 0.0)
-    inside = slice(int(touching[0]), int(touching[-1]) + 1)
+    inside = _touching(solution.half_length)
     x = fields.x[:, inside]
     y = np.broadcast_to(fields.y[inside], x.shape)
     traction_x, traction_y = fields.traction_x[:, inside], fields.traction_y[:, inside]
@@ -308,7 +314,7 @@ def _spread_out(length: int, wanted: int) -> IntArray:
 def _strips(study: ContactStudy) -> dict[str, Panel]:
     """Return line load and dissipated power per length, also of a reference."""
     solution, reference, errors = study.solution, study.reference, study.errors
-    inside = _touching(solution.line_load)
+    inside = _touching(solution.line_load, 1)
     panels = {}
     for name, key, unit, colour, title, label in (
         ("line load", "line_load", "N/mm", BLUE, "Line load", "q"),
@@ -320,19 +326,24 @@ def _strips(study: ContactStudy) -> dict[str, Panel]:
         values: FloatArray = getattr(solution, key)
         marks, top = [Line(solution.y[inside], values[inside], colour=colour)], None
         if reference is not None and errors is not None:
-            theirs: FloatArray = getattr(reference, key)
-            near = _touching(reference.line_load)
-            difference = f"; difference {shown(errors.dissipation, '%', 2)} (L2)"
-            text = reference.model + (difference if key == "dissipation" else "")
-            curve = reference.y[near], theirs[near]
-            marks.append(Line(*curve, dash="--", width=1.0, colour=BLACK, label=text))
+            theirs, near = getattr(reference, key), _touching(reference.line_load, 1)
+            curve, text = (reference.y[near], theirs[near]), reference.model
+            if key == "dissipation":
+                text += f"; difference {shown(errors.dissipation, '%', 2)} (L2)"
+            marks.append(Line(*curve, "--", width=1.0, colour=BLACK, label=text))
             top = 1.25 * 1.05 * max(float(values.max()), float(theirs.max()))
-        y, caption = Axis(label, unit, limits=(0.0, top)), f"{title} across the track."
-        panels[name] = Panel(title, Y, y, marks, caption, legend="upper center")
+        panels[name] = Panel(
+            title,
+            Y,
+            Axis(label, unit, limits=(0.0, top)),
+            marks,
+            f"{title} across the track.",
+            legend="upper center",
+        )
     return panels
 
 
-def _touching(line_load: FloatArray) -> slice:
-    """Return the range of strips in contact, with one more at both ends."""
-    first, last = np.flatnonzero(line_load > 0.0)[[0, -1]].tolist()
-    return slice(max(first - 1, 0), last + 2)
+def _touching(values: FloatArray, beyond: int = 0) -> slice:
+    """Return the range of strips in contact, where values are positive, and some at both ends."""
+    first, last = np.flatnonzero(values > 0.0)[[0, -1]].tolist()
+    return slice(max(first - beyond, 0), last + 1 + beyond)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -92,14 +92,14 @@ class Requirement(NamedTuple):
             raise ValueError(f"'{text}': at most {_MOST_FAILURES} failures, got {failures}")
         life = match["life"]
         parse_life(life, unit, 1.0, "life")  # checks form and sign
+        seconds = 0.0
         try:
             value = float(life.removesuffix(unit))
         except ValueError:
-            written = re.sub(r"^[-+\d.eE\s]+", "", life)
-            seconds = quantity(f"1 {written}", "s")
-            value, unit = quantity(life, "s") / seconds, written
-            return cls(numbers[0], numbers[1], value, unit, seconds, failures)
-        return cls(numbers[0], numbers[1], value, unit, 0.0, failures)
+            unit = re.sub(r"^[-+\d.eE\s]+", "", life)
+            seconds = quantity(f"1 {unit}", "s")
+            value = quantity(life, "s") / seconds
+        return cls(numbers[0], numbers[1], value, unit, seconds, failures)
 
 
 class Plan(NamedTuple):
@@ -157,8 +157,10 @@ class Demonstration(Viewed):
 
     def __repr__(self) -> str:
         need = self.requirement
-        text = f"R = {need.survival:g}, C = {need.confidence:g} at {need.life:g} {need.unit}"
-        return f"<Demonstration '{self.title}': {text}, {self.by_binomial[0]} specimens>"
+        return (
+            f"<Demonstration '{self.title}': R = {need.survival:g}, C = {need.confidence:g} at"
+            f" {need.life:g} {need.unit}, {self.by_binomial[0]} specimens>"
+        )
 
     @property
     def title(self) -> str:
@@ -169,8 +171,8 @@ class Demonstration(Viewed):
     def by_binomial(self) -> list[int]:
         """Specimens for the life itself, for each number of failures, without a distribution."""
         need = self.requirement
-        known = np.array([need.survival])
-        numbers = [specimens(need.confidence, known, k) for k in range(need.failures + 1)]
+        known, failures = np.array([need.survival]), range(need.failures + 1)
+        numbers = (specimens(need.confidence, known, k) for k in failures)
         return [int(number) for number in numbers if number is not None]
 
     @cached_property
@@ -208,8 +210,9 @@ class Demonstration(Viewed):
     @property
     def life(self) -> Interval:
         """Life of the simulated design at the survival to show, in the requirement's unit."""
-        scale = self._interval(self._scale)
-        return Interval(*(self.requirement.life * math.exp(end) for end in _ends_of(scale)))
+        return Interval(
+            *(self.requirement.life * math.exp(end) for end in astuple(self._interval(self._scale)))
+        )
 
     @property
     def survival(self) -> Interval:
@@ -248,7 +251,7 @@ class Demonstration(Viewed):
         first, other = (self._drawn[k].log_quantile(share) for k in (0, design))
         # in units of time, where speeds may differ
         ratio = first - other + math.log(self._units(design) / self._units(0))
-        return Interval(*(math.exp(end) for end in _ends_of(self._interval(ratio))))
+        return Interval(*(math.exp(end) for end in astuple(self._interval(ratio))))
 
     def plan(self, duration: float, failures: int = 0, design: int = 0) -> Plan:
         """Return a test of a duration.
@@ -288,17 +291,16 @@ class Demonstration(Viewed):
     @cached_property
     def plans(self) -> list[list[Plan]]:
         """Tests of all conditions, for each duration and number of failures."""
-        need, plans = self.requirement, []
-        for design in range(len(self.designs)):
-            factor = self.acceleration(design).value if design else 1.0
-            durations = [need.life * ratio / factor for ratio in DURATIONS]
-            failures = range(need.failures + 1)
-            plans.append([self.plan(time, k, design) for time in durations for k in failures])
-        return plans
-
-
-def _ends_of(interval: Interval) -> tuple[float, float, float]:
-    return interval.value, interval.low, interval.high
+        need = self.requirement
+        factors = [1.0, *(self.acceleration(k).value for k in range(1, len(self.designs)))]
+        return [
+            [
+                self.plan(need.life * ratio / factor, failures, design)
+                for ratio in DURATIONS
+                for failures in range(need.failures + 1)
+            ]
+            for design, factor in enumerate(factors)
+        ]
 
 
 def demonstration(

@@ -29,16 +29,6 @@ from wearsim.studies.life.view import limit_texts
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.intervals import arrays_of
 
-_BASIS = (
-    "The simulation gives the shape of the distribution of lives and the acceleration; the scale is"
-    " what is demonstrated. Intervals of 95 % contain the sampling of the realisations, and what is"
-    " not known of K/H where it has a posterior, but not the error of the model."
-)
-_NO_SHAPE = (
-    "tests that are longer or shorter than the life to show, and accelerated ones, assume the"
-    " simulated shape of the distribution; by the binomial alone, the life itself is tested"
-)
-
 
 class DemonstrationView(DesignsView):
     """Specimens against duration, and the probability that the design passes.
@@ -47,17 +37,28 @@ class DemonstrationView(DesignsView):
     """
 
     file, group = "tests.csv", "Demonstration"
-    basis = _BASIS
+    basis = (
+        "The simulation gives the shape of the distribution of lives and the acceleration; the"
+        " scale is what is demonstrated. Intervals of 95 % contain the sampling of the"
+        " realisations, and what is not known of K/H where it has a posterior, but not the error of"
+        " the model."
+    )
+    notes = (
+        (
+            "tests that are longer or shorter than the life to show, and accelerated ones, assume"
+            " the simulated shape of the distribution; by the binomial alone, the life itself is"
+            " tested"
+        ),
+    )
 
     def __init__(self, result: Demonstration) -> None:
         self.result, self.title = result, result.title
         self.question = f"How many specimens for how long show {self._need()}?"
-        self.notes = (_NO_SHAPE,)
         share = 1.0 - result.requirement.survival
-        obstacles = [
+        obstacles = (
             (label, design.probability_obstacle(design.distribution.quantile_of_mean(share)))
             for label, design in zip(result.labels, result.designs, strict=True)
-        ]
+        )
         self.warnings = tuple(
             f"the life at this survival of {label} is uncertain: {why}"
             for label, why in obstacles
@@ -66,8 +67,10 @@ class DemonstrationView(DesignsView):
 
     def _need(self) -> str:
         need = self.result.requirement
-        survival = f"that {100.0 * need.survival:g} % survive {self._amount(need.life)}"
-        return f"{survival} with {100.0 * need.confidence:g} % confidence"
+        return (
+            f"that {100.0 * need.survival:g} % survive {self._amount(need.life)}"
+            f" with {100.0 * need.confidence:g} % confidence"
+        )
 
     def _amount(self, duration: float) -> str:
         return f"{self._number(duration)} {self.result.requirement.unit}"
@@ -78,13 +81,16 @@ class DemonstrationView(DesignsView):
 
     def rows(self) -> Rows:
         """Return specimens by the binomial, the simulated design, and the acceleration."""
-        result, need = self.result, self.result.requirement
-        numbers = result.by_binomial
+        result, need, numbers = self.result, self.result.requirement, self.result.by_binomial
         allowed = ", ".join(
             f"{number} with {count_of(k, 'failure', 'no failure')}"
             for k, number in enumerate(numbers)
         )
-        rows = [
+        factors = (
+            (label, result.acceleration(number))
+            for number, label in enumerate(result.labels[1:], 1)
+        )
+        return [
             Row("specimens", f"{allowed}, for {self._amount(need.life)}"),
             Row("probability of passing", self._passing(result.plan(need.life))),
             Row(
@@ -99,43 +105,49 @@ class DemonstrationView(DesignsView):
                 "probability that the design meets it",
                 NOTHING if math.isnan(result.meets) else shown(result.meets, "%", 3),
             ),
+            *(
+                Row(
+                    f"acceleration by {label}",
+                    f"{with_ends(factor, '{:.3g}'.format)} times shorter lives; {numbers[0]}"
+                    f" specimens without failure take {self._amount(need.life / factor.value)}",
+                )
+                for label, factor in factors
+            ),
         ]
-        for number in range(1, len(result.designs)):
-            factor = with_ends(result.acceleration(number), "{:.3g}".format)
-            duration = need.life / result.acceleration(number).value
-            text = f"{factor} times shorter lives; {numbers[0]} specimens without failure take"
-            rows.append(
-                Row(f"acceleration by {result.labels[number]}", f"{text} {self._amount(duration)}")
-            )
-        return rows
 
     def tables(self) -> list[Table]:
         """Return the requirement, and the tests of all conditions."""
-        result, design = self.result, self.result.designs[0]
-        given = f"{count(design.count)} realisations"
-        if design.levels is not None:
-            given += f", posterior of K/H given {design.levels.specimens or 'the'} specimens"
-        study = [
-            Row("to show", self._need()),
-            Row("lives", given),
-            Row("limits", ", ".join(limit_texts(design.scenario.limit.given))),
+        design = self.result.designs[0]
+        posterior = (
+            f", posterior of K/H given {design.levels.specimens or 'the'} specimens"
+            if design.levels is not None
+            else ""
+        )
+        return [
+            Table(
+                STUDY,
+                [
+                    Row("to show", self._need()),
+                    Row("lives", f"{count(design.count)} realisations{posterior}"),
+                    Row("limits", ", ".join(limit_texts(design.scenario.limit.given))),
+                ],
+            ),
+            *map(self._tests, range(len(self.result.designs))),
         ]
-        return [Table(STUDY, study), *map(self._tests, range(len(result.designs)))]
 
     def _tests(self, design: int) -> Table:
         """Return specimens against duration for the conditions of a test."""
-        result, need = self.result, self.result.requirement
-        plans, lines = result.plans[design], []
-        for place in range(0, len(plans), need.failures + 1):
-            some = plans[place : place + need.failures + 1]
-            lines.append(
-                [self._number(some[0].duration), *map(_cell, some), self._passing(some[0])]
-            )
-        what = "test" if design == 0 else f"test at {result.labels[design]}"
-        allowed = (count_of(k, "failure", "no failure") for k in range(need.failures + 1))
+        need, plans = self.result.requirement, self.result.plans[design]
+        size = need.failures + 1
+        what = f"test at {self.result.labels[design]}" if design else "test"
+        allowed = (count_of(k, "failure", "no failure") for k in range(size))
+        by_duration = (plans[place : place + size] for place in range(0, len(plans), size))
         return Table(
             "",
-            lines,
+            [
+                [self._number(some[0].duration), *map(_cell, some), self._passing(some[0])]
+                for some in by_duration
+            ],
             [
                 f"duration of the {what} [{need.unit}]",
                 *(f"specimens, {text}" for text in allowed),
@@ -174,19 +186,15 @@ class DemonstrationView(DesignsView):
 
     def table(self) -> list[Column]:
         """Return the tests as columns."""
-        result = self.result
-        labels = [
-            label for label, plans in zip(result.labels, result.plans, strict=True) for _ in plans
-        ]
-        plans = [plan for some in result.plans for plan in some]
-        names = ("duration", "failures", "specimens", "low", "high")
-        given = [[getattr(plan, name) for plan in plans] for name in names]
+        pairs = list(zip(self.result.labels, self.result.plans, strict=True))
+        plans = [plan for _, some in pairs for plan in some]
         duration, failures, *specimens = (
-            np.array([math.nan if item is None else item for item in numbers]) for numbers in given
+            np.array([math.nan if item is None else item for item in numbers])
+            for numbers in zip(*(plan[:-1] for plan in plans), strict=True)
         )
         return [
-            Column("conditions", labels),
-            Column("duration", duration, result.requirement.unit),
+            Column("conditions", [label for label, some in pairs for _ in some]),
+            Column("duration", duration, self.result.requirement.unit),
             Column("failures", failures),
             *columns_of("specimens", specimens),
             *columns_of("passes", arrays_of(plan.passing for plan in plans)),
@@ -194,8 +202,7 @@ class DemonstrationView(DesignsView):
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return specimens and the probability of passing against the duration."""
-        result = self.result
-        need = result.requirement
+        result, need = self.result, self.result.requirement
         tests = [
             *((count_of(k, "failure", "no failure"), k, 0, 1.0) for k in range(need.failures + 1)),
             *(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from wearsim.errors import unknown_name
+from wearsim.report.text import plain
 from wearsim.results.content import (
     Arrays,
     Axis,
@@ -174,8 +175,7 @@ class DissipationResult(StudyResult[DissipationData]):
 
     def __repr__(self) -> str:
         done = f"{self.count}" if self.finished else f"{self.count} of {self.raw.requested}"
-        noun = "realisation" if done == "1" else "realisations"
-        power = self.summaries["power"]
+        noun, power = f"realisation{'s' * (done != '1')}", self.summaries["power"]
         std = f", std {power.std:.4g} W" if power.count > 1 else ""
         return f"<DissipationResult '{self.title}': {done} {noun}, power {power.mean:.4g} W{std}>"
 
@@ -243,10 +243,9 @@ class DissipationResult(StudyResult[DissipationData]):
         course = converge(self.power, np.unique(counts.astype(np.int64)))
         if self.raw.plan != "sobol":
             return course
-        errors = [
-            _replicated_errors(self.power[:count], self.raw.replicates) for count in course.count
-        ]
-        mean_error, std_error = np.array(errors).T
+        mean_error, std_error = np.array(
+            [_replicated_errors(self.power[:count], self.raw.replicates) for count in course.count]
+        ).T
         return replace(course, mean_error=mean_error, std_error=std_error)
 
 
@@ -285,14 +284,15 @@ def _summary(
     if design == "monte-carlo" or summary.is_constant:
         return summary
     mean_error, std_error = _replicated_errors(values, replicates)
-    quantiles = [Quantile(item.value, item.low, item.high, p) for p, item in known.quantiles]
     return replace(
         summary,
         mean=known.mean.value,
         std=known.std.value if math.isfinite(known.std.value) else summary.std,
         mean_error=mean_error,
         std_error=std_error,
-        quantiles=tuple(quantiles),
+        quantiles=tuple(
+            Quantile(item.value, item.low, item.high, p) for p, item in known.quantiles
+        ),
     )
 
 
@@ -310,12 +310,4 @@ def _replicated_errors(values: FloatArray, replicates: int) -> tuple[float, floa
 
 def as_numbers(estimates: dict[str, Summary]) -> dict[str, Any]:
     """Return estimates ready for JSON, with None where they are not finite."""
-    return {name: _finite(asdict(summary)) for name, summary in estimates.items()}
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _finite(item) for name, item in value.items()}
-    if isinstance(value, tuple | list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return {name: plain(asdict(summary)) for name, summary in estimates.items()}

@@ -76,8 +76,8 @@ class DissipationView(StudyView[DissipationResult]):
 
     def __init__(self, result: DissipationResult) -> None:
         super().__init__(result)
-        number = number_of_realisations(result.count)
-        self.question = f"How much power does one contact dissipate, in {number}?"
+        realisations = number_of_realisations(result.count)
+        self.question = f"How much power does one contact dissipate, in {realisations}?"
 
     def rows(self) -> Rows:
         """Return mean, ranges and standard deviation of the power, the mean first."""
@@ -90,7 +90,7 @@ class DissipationView(StudyView[DissipationResult]):
             Row("inputs at their means", self.result.mean_problem_power, "W"),
         ]
         if power.count == 1 or power.is_constant:
-            equal = "" if power.count == 1 else ", equal in all realisations"
+            equal = ", equal in all realisations" * (power.count > 1)
             return [*rows, Row("dissipated power", shown(power.mean, "W") + equal)]
         for low, high in ((0.025, 0.975), (0.05, 0.95)):
             ends = [power.quantile(low), power.quantile(high)]
@@ -100,28 +100,35 @@ class DissipationView(StudyView[DissipationResult]):
             intervals = (
                 TOO_FEW_REALISATIONS if NOTHING in pair else "..".join(pair) for pair in pairs
             )
-            confidence = " and ".join(dict.fromkeys(intervals))
-            name = f"dissipated power, {100.0 * (high - low):g} %"
-            rows.append(Row(name, f"{values} W (95 % confidence: {confidence})"))
-        extremes = f"{in_unit(power.least, 'W')} to {shown(power.greatest, 'W')}"
-        rows.append(Row("dissipated power, all", extremes))
-        return [*rows, Row.answer("standard deviation", "std_power", power.std, "W")]
+            text = f"{values} W (95 % confidence: {' and '.join(dict.fromkeys(intervals))})"
+            rows.append(Row(f"dissipated power, {100.0 * (high - low):g} %", text))
+        return [
+            *rows,
+            Row(
+                "dissipated power, all",
+                f"{in_unit(power.least, 'W')} to {shown(power.greatest, 'W')}",
+            ),
+            Row.answer("standard deviation", "std_power", power.std, "W"),
+        ]
 
     def study(self) -> Rows:
         """Return rows on realisations, method and effort."""
         result, raw = self.result, self.result.raw
-        done = count(result.count)
-        design = [raw.plan, f"seed {raw.seed}"]
-        if not result.finished:
-            done, design = f"{done} of {count(raw.requested)}", [*design, "unfinished"]
-        grid = [Row("friction sampled on", raw.friction_grid)] if raw.friction_grid else []
-        effort = f"{lapse(raw.solve_seconds)} for the contacts, {lapse(raw.wall_seconds)} in total"
+        requested, unfinished = f" of {count(raw.requested)}", ", unfinished"
+        if result.finished:
+            requested = unfinished = ""
         return [
-            Row("realisations", ", ".join([done, *design])),
+            Row(
+                "realisations",
+                f"{count(result.count)}{requested}, {raw.plan}, seed {raw.seed}{unfinished}",
+            ),
             Row("contact model", result.described_model),
             Row("strips", f"{len(result.y)} of {shown(raw.strip_width, 'um')}"),
-            *grid,
-            Row("wall time", effort),
+            *([Row("friction sampled on", raw.friction_grid)] if raw.friction_grid else []),
+            Row(
+                "wall time",
+                f"{lapse(raw.solve_seconds)} for the contacts, {lapse(raw.wall_seconds)} in total",
+            ),
         ]
 
     def details(self) -> list[Table]:
@@ -131,10 +138,9 @@ class DissipationView(StudyView[DissipationResult]):
     def _cells(self, name: str) -> tuple[str, ...]:
         """Return mean, standard deviation, their intervals and skewness of a quantity."""
         result, (words, unit) = self.result, QUANTITIES[name]
-        summary = result.summaries[name]
+        summary, width = result.summaries[name], result.raw.strip_width * len(result.y)
         force = float(abs(result.values("normal_force")).max())
-        length = result.raw.strip_width * len(result.y)
-        scale = {"force_x": force, "force_y": force, "spin_moment": force * length}
+        scale = {"force_x": force, "force_y": force, "spin_moment": force * width}
         rounding = _ROUNDING * scale.get(name, 0.0)
         mean = 0.0 if abs(summary.mean) <= rounding else summary.mean
         if is_constant(mean, summary.std, rounding):
@@ -199,11 +205,17 @@ class DissipationView(StudyView[DissipationResult]):
 
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, drawn values first, and strips."""
-        numbers = Column("realisation", np.arange(self.result.count, dtype=np.float64))
         by_name = self._along("realisation")
-        first = {key: by_name[key] for key in self.result.inputs}
-        realisations = [numbers, *(first | by_name).values()]
-        return {"realisations.csv": [realisations], "strips.csv": [[*self._along("y").values()]]}
+        drawn_first = {key: by_name[key] for key in self.result.inputs} | by_name
+        return {
+            "realisations.csv": [
+                [
+                    Column("realisation", np.arange(self.result.count, dtype=np.float64)),
+                    *drawn_first.values(),
+                ]
+            ],
+            "strips.csv": [[*self._along("y").values()]],
+        }
 
     def _along(self, axis: str) -> dict[str, Column]:
         """Return the columns of the variables along one axis."""
@@ -240,7 +252,10 @@ class DissipationView(StudyView[DissipationResult]):
             "band": _band(result),
             "realisations": _realisations(result),
         }
-        for name, title in _LABELS:
+        for name, title in (
+            ("mean", "Mean dissipated power, with standard error"),
+            ("std", "Standard deviation, with standard error"),
+        ):
             value, error = getattr(course, name), getattr(course, f"{name}_error")
             if constant:  # a constant power has rounding errors only
                 error = np.zeros_like(error)
@@ -259,22 +274,13 @@ class DissipationView(StudyView[DissipationResult]):
 
 def _ends(interval: Interval, unit: str) -> str:
     """Return the ends of an interval, if the sample suffices for them."""
-    ends = [in_unit(end, unit) for end in (interval.low, interval.high)]
     enough = math.isfinite(interval.half_width) and interval.low < interval.high
-    return " to ".join(ends) if enough else NOTHING
+    return f"{in_unit(interval.low, unit)} to {in_unit(interval.high, unit)}" if enough else NOTHING
 
 
 MOST_LINES = 200
 CLASSES = 30
 _EQUAL = 1e-9  # relative difference of curves that are drawn as one
-_POWER, _PER_LENGTH = Axis("$P_d$", "W"), Axis("$P_l$", "W/mm", limits=(0.0, None))
-_LABELS = (
-    ("mean", "Mean dissipated power, with standard error"),
-    (
-        "std",
-        "Standard deviation, with standard error",
-    ),
-)
 
 
 def _caption(result: DissipationResult) -> str:
@@ -296,14 +302,13 @@ def _density(result: DissipationResult) -> Panel:
     power, summary, title = result.power, result.summaries["power"], "Density of dissipated power"
     at_means = f"inputs at their means: {shown(result.mean_problem_power, 'W')}"
     if result.count == 1 or summary.is_constant:
-        value, number = shown(summary.mean, "W"), number_of_realisations(result.count)
-        return message(title, f"{value} in {number}: no density to draw", at_means)
+        where = f"{shown(summary.mean, 'W')} in {number_of_realisations(result.count)}"
+        return message(title, f"{where}: no density to draw", at_means)
     bars, edges = histogram(power, CLASSES)
     margin = 0.05 * (edges[-1] - edges[0])
     low, high = max(edges[0] - margin, 0.0), edges[-1] + margin  # the power is not negative
     across = np.linspace(low, high, 400)
     score = (across - summary.mean) / summary.std
-    normal = np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau))
     lines = (
         (summary.mean, BLACK, "-", f"mean: {shown(summary.mean, 'W')}"),
         (result.mean_problem_power, GREEN, "--", at_means),
@@ -317,7 +322,12 @@ def _density(result: DissipationResult) -> Panel:
         Axis("probability density", "1/W", 1.0, limits=(0.0, None), margin=(0.0, HEADROOM)),
         [
             bars,
-            Line(across, normal, colour=ORANGE, label="normal distribution, same mean and std"),
+            Line(
+                across,
+                np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau)),
+                colour=ORANGE,
+                label="normal distribution, same mean and std",
+            ),
             *(
                 Span(place, colour=colour, dash=dash, label=label, reach=1.0 / (1.0 + HEADROOM))
                 for place, colour, dash, label in lines
@@ -337,7 +347,7 @@ def _realisations(result: DissipationResult) -> Panel:
     return Panel(
         f"Dissipated power per length, {title}",
         _across(result),
-        _PER_LENGTH,
+        Axis("$P_l$", "W/mm", limits=(0.0, None)),
         [Line(result.y, rows, width=0.6, alpha=float(np.clip(15.0 / len(rows), 0.12, 1.0)))],
         "Dissipated power across the track in single realisations.",
     )
@@ -348,16 +358,19 @@ def _across(result: DissipationResult) -> Axis:
 
 
 def _band(result: DissipationResult) -> Panel:
-    names = ("dissipation_low", "dissipation_high", "dissipation_mean", "mean_problem_dissipation")
-    low, high, mean, at_means = (result.values(name) for name in names)
+    y, values = result.y, result.values
     return Panel(
         "Mean and 95 % range",
         _across(result),
         Axis("$P_l$", "W/mm", limits=(0.0, None), margin=(0.0, HEADROOM)),
         [
-            Band(result.y, low, high, label="2.5 to 97.5 %"),
-            Line(result.y, mean, colour=BLACK, label="mean"),
-            Line(result.y, at_means, colour=GREEN, dash="--", label="inputs at their means"),
+            Band(y, values("dissipation_low"), values("dissipation_high"), label="2.5 to 97.5 %"),
+            Line(y, values("dissipation_mean"), colour=BLACK, label="mean"),
+            Line(
+                *(y, values("mean_problem_dissipation"), "--"),
+                colour=GREEN,
+                label="inputs at their means",
+            ),
         ],
         "Dissipated power per length: mean over the realisations and their 95 % band.",
         legend="upper center",

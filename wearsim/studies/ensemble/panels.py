@@ -30,7 +30,6 @@ from wearsim.report.panels import (
     histogram,
     measured_marks,
     message,
-    worn_limits,
 )
 from wearsim.report.text import (
     NINETY_PERCENT,
@@ -50,7 +49,7 @@ from wearsim.studies.ensemble.result import EnsembleResult
 from wearsim.studies.ensemble.view import known_effects, no_effects
 from wearsim.studies.fatigue.panels import DAMAGE
 from wearsim.studies.fatigue.view import with_source_lines
-from wearsim.studies.run.panels import HEIGHT, Y
+from wearsim.studies.run.panels import HEIGHT, track_axis
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.estimation.estimates import Target
@@ -59,7 +58,7 @@ from wearsim.uq.estimation.intervals import UNKNOWN, Interval, arrays_of
 LINES = 12  # realisations drawn as lines
 MOST_POINTS = 2000
 _MOST_EFFECTS = 14
-_DEFAULT = "depth.mean 1%"
+_BELOW_LEGEND = 1.0 / (1.0 + HEADROOM)  # part of a histogram
 
 
 def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) -> Sheet:
@@ -71,24 +70,24 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
     if result.count == 0:
         nothing = message("", "no realisation is completed: nothing to draw")
         return Sheet(title, {"nothing": nothing}, [["nothing"]], (13.0, 7.5))
-    panels = {
-        "density": _density(result),
-        "course": _course(result),
-        "convergence": _convergence(result),
-        "profile": _profile(result, measured),
-    }
     curves = {
         "lift": ("lift_error_curve", _lift_error),
         "damage": ("cylinder_damage_profile", _damage),
     }
     known = result.raw.schema.variables if len(result.profiles) else ()
     drawn = {name: panel(result) for name, (curve, panel) in curves.items() if curve in known}
-    panels |= {**drawn, "effects": _effects(result)}
-    panels |= draws_panels(result, "depth", result.at_end("depth"), Axis("depth at the end", "um"))
     lower = ["profile", *drawn, "effects"]
     return Sheet(
         title,
-        panels,
+        {
+            "density": _density(result),
+            "course": _course(result),
+            "convergence": _convergence(result),
+            "profile": _profile(result, measured),
+            **drawn,
+            "effects": _effects(result),
+            **draws_panels(result, "depth", result.at_end("depth"), Axis("depth at the end", "um")),
+        },
         [["course", "density", "convergence"], lower],
         (13.0 if len(lower) < 4 else 17.0, 7.5),
         main="course",
@@ -112,8 +111,10 @@ def _caption(result: EnsembleResult) -> str:
         return f"{text}\ndepth {shown(depth.mean.value, 'um')}"
     text += f"\nmean depth {shown(depth.mean.value, 'um')}"
     if profile.start.any():
-        lowest = shown(-float(profile.height.min()), "um")
-        text += f" worn since the start, mean profile {lowest} below nominal"
+        text += (
+            " worn since the start, mean profile"
+            f" {shown(-float(profile.height.min()), 'um')} below nominal"
+        )
     if result.is_constant("depth"):
         return f"{text}, equal in all realisations"
     text += f", std {shown(depth.std.value, 'um', 3)}"
@@ -130,38 +131,43 @@ def _course(result: EnsembleResult) -> Panel:
     passes, numbers = course.passes[drawn], result.numbers[:LINES]
     first = int(numbers[0])
     rows = result.raw.rows("depth", first, int(numbers[-1]) + 1)[numbers - first][:, drawn]
-    marks: list[Mark] = [_some(passes, rows)]
     low, median, high = (course.quantiles[p][drawn] for p in (0.05, 0.5, 0.95))
-    if result.count > 1:
-        if sufficient_for(result.count, NINETY_PERCENT[0]):
-            marks.append(Band(passes, low, high, label="5 % to 95 %"))
-        marks.append(Line(passes, median, label="median"))
-        mean = course.mean[drawn]
-        marks.append(Line(passes, mean, dash="--", width=1.0, colour=BLACK, label="mean"))
+    lines = [
+        Line(passes, median, label="median"),
+        Line(passes, course.mean[drawn], "--", width=1.0, colour=BLACK, label="mean"),
+    ]
     return Panel(
         "Depth against roller passes",
         x,
         y,
-        marks,
+        _spread(passes, rows, low, high, lines, result.count),
         f"The median of the depth is {shown(float(median[-1]), 'um')} at the end.",
         legend="upper left",
     )
 
 
-def _some(x: FloatArray, rows: FloatArray) -> Line:
-    """Return some realisations as thin lines."""
-    return Line(x, rows, width=0.6, alpha=0.6, colour=GREY, label=number_of_realisations(len(rows)))
+def _spread(
+    x: FloatArray,
+    some: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    lines: list[Line],
+    number: int,
+) -> list[Mark]:
+    """Return curves of some realisations, and of all their 90 % range and further lines."""
+    thin = Line(x, some, width=0.6, alpha=0.6, colour=GREY, label=number_of_realisations(len(some)))
+    if number == 1:
+        return [thin]
+    is_sufficient = sufficient_for(number, NINETY_PERCENT[0])
+    band = [Band(x, low, high, label="5 % to 95 %")] if is_sufficient else []
+    return [thin, *band, *lines]
 
 
 def _curves(x: FloatArray, curves: FloatArray, mean: FloatArray) -> list[Mark]:
     """Return the curves of some realisations, and of all their 90 % range and mean."""
-    marks: list[Mark] = [_some(x, curves[:LINES])]
-    if len(curves) > 1:
-        if sufficient_for(len(curves), NINETY_PERCENT[0]):
-            low, high = np.quantile(curves, NINETY_PERCENT, axis=0)
-            marks.append(Band(x, low, high, label="5 % to 95 %"))
-        marks.append(Line(x, mean, colour=BLACK, label="mean"))
-    return marks
+    low, high = np.quantile(curves, NINETY_PERCENT, axis=0)
+    line = Line(x, mean, colour=BLACK, label="mean")
+    return _spread(x, curves[:LINES], low, high, [line], len(curves))
 
 
 def _density(result: EnsembleResult) -> Panel:
@@ -177,16 +183,18 @@ def _density(result: EnsembleResult) -> Panel:
         (median, BLUE, "-", f"median {shown(median, 'um')}"),
         *(ends if sufficient_for(result.count, NINETY_PERCENT[0]) else []),
     ]
-    marks = [
-        Span(place, colour=colour, dash=dash, label=label, width=1.1, reach=1.0 / (1.0 + HEADROOM))
-        for place, colour, dash, label in lines
-    ]
     extremes = f"from {shown(float(depth.min()), 'um')} to {shown(float(depth.max()), 'um')}"
     return Panel(
         title,
         Axis("depth", "um"),
         Axis("probability density", "1/um", 1e-6, margin=(0.0, HEADROOM), limits=(0.0, None)),
-        [histogram(depth)[0], *marks],
+        [
+            histogram(depth)[0],
+            *(
+                Span(place, colour=colour, dash=dash, label=label, width=1.1, reach=_BELOW_LEGEND)
+                for place, colour, dash, label in lines
+            ),
+        ],
         f"Depths of {count(len(depth))} tests, {extremes}.",
         legend="upper right",
         columns=2,
@@ -195,19 +203,14 @@ def _density(result: EnsembleResult) -> Panel:
 
 def _convergence(result: EnsembleResult) -> Panel:
     """Return the convergence of the estimate of the target, by default of the mean depth."""
-    target = Target.parse(result.until or _DEFAULT)
-    named = OBSERVABLES[target.observable]
+    target = Target.parse(result.until or "depth.mean 1%")
+    words, unit = OBSERVABLES[target.observable]
     counts, intervals = result.convergence(target)
     value, low, high = arrays_of(intervals)
     labels = {-target.width: "", target.width: f"target: ±{100 * target.width:g} %"}
     return convergence(
         f"{statistic_in_words(target).capitalize()}, with 95 % interval",
-        named.words,
-        named.unit,
-        counts,
-        value,
-        low,
-        high,
+        *(words, unit, counts, value, low, high),
         [
             Span(value[-1] * (1.0 + part), across="y", dash="--", colour=GREEN, label=label)
             for part, label in (labels.items() if result.until else ())
@@ -218,22 +221,21 @@ def _convergence(result: EnsembleResult) -> Panel:
 def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
     """Return the mean worn profile with its 95 % range, and measured profiles over it."""
     profile = result.worn_profile()
-    y, text = profile.y, "start of the tests"
-    start = Line(y, profile.start, dash="--", width=1.0, colour=GREY, label=text)
-    marks: list[Mark] = [
-        *([Band(y, profile.low, profile.high, label=profile.label)] if profile.label else []),
-        Line(y, profile.height, colour=BLACK, label="mean"),
-        *([start] if profile.start.any() else []),
-    ]
-    limits = worn_limits(profile.y, profile.start - profile.low, *(item.y for item in measured))
+    y, band = profile.y, Band(profile.y, profile.low, profile.high, label=profile.label)
+    start = Line(y, profile.start, "--", width=1.0, colour=GREY, label="start of the tests")
     title = "Deepest groove at the end" if result.raw.cam else "Worn profile at the end"
     title += "" if profile.kept == result.count else f", of the first {count(profile.kept)}"
     deepest = shown(float((profile.start - profile.height).max()), "um")
     return Panel(
         title,
-        Axis(Y, "mm", limits=limits),
+        track_axis(y, profile.start - profile.low, *(item.y for item in measured)),
         HEIGHT,
-        [*marks, *measured_marks(measured)],
+        [
+            *([band] if profile.label else []),
+            Line(y, profile.height, colour=BLACK, label="mean"),
+            *([start] if profile.start.any() else []),
+            *measured_marks(measured),
+        ],
         f"Mean of {count(profile.kept)} profiles, {deepest} deep, and the band of the tests.",
         legend="lower right",
     )
@@ -241,14 +243,16 @@ def _profile(result: EnsembleResult, measured: Sequence[Measured]) -> Panel:
 
 def _damage(result: EnsembleResult) -> Panel:
     """Return the damage at the end: of a cam along its angle, of a cylinder across the track."""
-    of_cylinder = "cylinder", "cylinder_damage_profile", None
-    body, name, axis = ("cam", "damage_curve", ANGLE) if result.raw.cam else of_cylinder
+    body, name, axis = (
+        ("cam", "damage_curve", ANGLE)
+        if result.raw.cam
+        else ("cylinder", "cylinder_damage_profile", None)
+    )
     band, curves = result.band(name), result.kept_values(name)
     mean = shown(result.estimate("cylinder_damage", -1, ()).mean.value, "1")
-    limits = worn_limits(band.y, curves.max(axis=0))
     return Panel(
         f"Damage of the {body} at the end",
-        axis or Axis(Y, "mm", limits=limits),
+        axis or track_axis(band.y, curves.max(axis=0)),
         DAMAGE,
         _curves(band.y, curves, band.mean),
         f"The greatest damage of the {body} is {mean} in the mean of {count(result.count)} tests.",
@@ -260,13 +264,15 @@ def _lift_error(result: EnsembleResult) -> Panel:
     curves = result.kept_values("lift_error_curve")
     # the last angle is the first one
     curves = curves - curves[:, :-1].mean(axis=1, keepdims=True)
-    marks = _curves(np.asarray(result.raw.variables["angle"]), curves, curves.mean(axis=0))
     mean = shown(result.estimate("lift_error", -1, ()).mean.value, "um")
     return Panel(
         "Lift error at the end",
         ANGLE,
         Axis("difference from its mean", "um"),
-        [*marks, *segment_marks(unchecked_turn_of(result.scenario).cam.motion, names=False)],
+        [
+            *_curves(np.asarray(result.raw.variables["angle"]), curves, curves.mean(axis=0)),
+            *segment_marks(unchecked_turn_of(result.scenario).cam.motion, names=False),
+        ],
         f"Change of the lift by wear. Peak to peak it is {mean} in the mean of"
         f" {count(result.count)} tests.",
     )
@@ -282,20 +288,26 @@ def _effects(result: EnsembleResult) -> Panel:
 
 def effects_panel(title: str, of: str, effects: list[Effect]) -> Panel:
     """Return Sobol indices as bars with their intervals."""
-    effects, largest = effects[:_MOST_EFFECTS], effects[0]
+    effects = effects[:_MOST_EFFECTS]
     places = np.arange(float(len(effects)))
     first, total = [item.first for item in effects], [item.total or UNKNOWN for item in effects]
-    colours = [GREY if item.without_effect else BLUE for item in effects]
-    widths = [np.nan_to_num(index.value) for index in first]
-    bars = Bars(places - 0.3, places + 0.3, widths, horizontal=True, colour=colours, alpha=0.55)
-    marks: list[Mark] = [bars, _intervals(places, first, BLACK)]
+    marks: list[Mark] = [
+        Bars(
+            *(places - 0.3, places + 0.3),
+            [np.nan_to_num(index.value) for index in first],
+            horizontal=True,
+            colour=[GREY if item.without_effect else BLUE for item in effects],
+            alpha=0.55,
+        ),
+        _intervals(places, first, BLACK),
+    ]
     if any(item.total for item in effects):
         below, values = places + 0.38, [index.value for index in total]
         marks += [
             _intervals(below, total, ORANGE),
             dots(values, below, "D", colour=ORANGE, label="total, with interactions"),
         ]
-    share = f"{100.0 * largest.first.value:.0f} % of the variance"
+    share = f"{100.0 * first[0].value:.0f} % of the variance"
     return Panel(
         title,
         Axis("first-order index: part of the variance", "%", limits=(0.0, 1.0)),
@@ -305,7 +317,7 @@ def effects_panel(title: str, of: str, effects: list[Effect]) -> Panel:
             limits=(len(effects) - 0.4, -0.6),
         ),
         marks,
-        f"{largest.name} explains {share} of {of}.",
+        f"{effects[0].name} explains {share} of {of}.",
         legend="lower right",
     )
 
@@ -344,7 +356,11 @@ def draws_panels(
     drawn = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1)
     finite = np.flatnonzero(np.isfinite(values))
     every = finite[evenly_spaced(len(finite), MOST_POINTS)]
-    points = dots(drawn[every], values[every], alpha=0.5, more={"realisation": (every, "1")})
-    title = f"{name.capitalize()} against {item['key']}"
-    text = f"One point for each of {count(len(every))} tests."
-    return {"draws": Panel(title, Axis(item["key"], unit, 1.0 / size), axis, [points], text)}
+    panel = Panel(
+        f"{name.capitalize()} against {item['key']}",
+        Axis(item["key"], unit, 1.0 / size),
+        axis,
+        [dots(drawn[every], values[every], alpha=0.5, more={"realisation": (every, "1")})],
+        f"One point for each of {count(len(every))} tests.",
+    )
+    return {"draws": panel}

@@ -81,15 +81,16 @@ class RealisationsView(StudyView[Shown]):
 
     def random_inputs(self) -> Rows:
         """Return the draws of the random inputs, and descriptions of those that vary in time."""
-        groups = {item["name"]: item["text"] for item in self.result.raw.groups}
-        varying = varying_inputs(self.result, self.result.inputs)
-        return [*drawn_rows(self.result), *varying_rows(groups | varying)]
+        varying = {item["name"]: item["text"] for item in self.result.raw.groups}
+        varying |= varying_inputs(self.result, self.result.inputs)
+        return [*drawn_rows(self.result), *varying_rows(varying)]
 
     def observables_table(self, title: str) -> Table:
         """Return the estimates of all observables at the end, with intervals."""
-        names = observed(self.result)
         return Table(
-            "", [line for name in names for line in _lines(self.result, name)], (title, *_HEADS[1:])
+            "",
+            [line for name in observed(self.result) for line in _lines(self.result, name)],
+            (title, *_HEADS[1:]),
         )
 
     def answers(self) -> dict[str, Answer]:
@@ -132,21 +133,26 @@ class RealisationsView(StudyView[Shown]):
 
     def columns(self) -> Mapping[str, Columns]:
         """Return realisations, courses, and profile and lift error at the end."""
-        result = self.result
-        scenario = fatigue_scenario(result)
-        blocks = _realisations(result.raw)
+        result, scenario = self.result, fatigue_scenario(self.result)
         tables: dict[str, Columns] = {
-            "realisations.csv": (with_sources(block, scenario) for block in blocks),
+            "realisations.csv": (
+                with_sources(block, scenario) for block in _realisations(result.raw)
+            ),
             **({"courses.csv": [with_sources(_courses(result), scenario)]} if result.count else {}),
         }
         for name in [name for name in KEPT if result.count and name in result.raw.schema.variables]:
             band, (file, what) = result.band(name), _CURVES.get(name, (name, "damage"))
             if what != "damage" or band.mean.any():  # of a body that may pit
-                columns = _band(result.raw, name, what, band)
-                tables[f"{file}.csv"] = [with_sources(columns, scenario)]
+                tables[f"{file}.csv"] = [
+                    with_sources(_band(result.raw, name, what, band), scenario)
+                ]
         if result.failed:
-            numbers = Column("realisation", list(map(str, result.errors)))
-            tables["failures.csv"] = [[numbers, Column("error", list(result.errors.values()))]]
+            tables["failures.csv"] = [
+                [
+                    Column("realisation", list(map(str, result.errors))),
+                    Column("error", list(result.errors.values())),
+                ]
+            ]
         return tables
 
 
@@ -162,10 +168,10 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
     def __init__(self, result: EnsembleResult) -> None:
         super().__init__(result)
-        time = simulated(result.raw.total_time)
         self.question = (
             f"How deep do {number_of_realisations(result.count)} of a test of"
-            f" {count(result.raw.total_passes)} roller passes ({time}) wear the cylinder?"
+            f" {count(result.raw.total_passes)} roller passes ({simulated(result.raw.total_time)})"
+            " wear the cylinder?"
         )
 
     def rows(self) -> Rows:
@@ -177,30 +183,34 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         rows = [Row("mean depth", depth.mean, "um")]
         if result.count > 1 and not result.is_constant("depth"):
             low, high = (depth.quantile(p) for p in NINETY_PERCENT)
-            tests = f"{in_unit(low.value, 'um', 3)} to {shown(high.value, 'um', 3)}"
             rows += [
-                Row("90 % of the tests", tests),
+                Row(
+                    "90 % of the tests",
+                    f"{in_unit(low.value, 'um', 3)} to {shown(high.value, 'um', 3)}",
+                ),
                 Row("median", depth.quantile(0.5), "um"),
                 Row("95 % of the tests are below", high, "um"),
                 Row("standard deviation", depth.std, "um"),
             ]
-        for name in ("width", "worn_volume", "roller_depth", "dissipated_energy", "peak_pressure"):
-            if result.at_end(name).any():
-                words, unit = OBSERVABLES[name]
-                rows.append(Row(f"mean {words}", result.estimate(name, -1, ()).mean, unit))
-        return rows
+        others = ("width", "worn_volume", "roller_depth", "dissipated_energy", "peak_pressure")
+        named = {name: OBSERVABLES[name] for name in others if result.at_end(name).any()}
+        return rows + [
+            Row(f"mean {words}", result.estimate(name, -1, ()).mean, unit)
+            for name, (words, unit) in named.items()
+        ]
 
     def study(self) -> Rows:
         """Return rows on realisations, design, method, precision and effort."""
         result, raw = self.result, self.result.raw
-        done = progress_text(result.count, result.failed, result.requested, result.finished)
         wall, ended = raw.wall_seconds, result.count + result.failed
         effort = lapse(wall)
         if wall and ended:
             effort += f", {shown(ended / wall, '1', 3)} realisations per second"
-        intervals = result.count and result.plan != "monte-carlo"
         return [
-            Row("realisations", done),
+            Row(
+                "realisations",
+                progress_text(result.count, result.failed, result.requested, result.finished),
+            ),
             Row("sampling design", f"{raw.plan}, seed {raw.seed}"),
             Row(
                 "length of a test",
@@ -211,30 +221,24 @@ class EnsembleView(RealisationsView[EnsembleResult]):
             Row("stepper", f"{raw.stepper}, tolerance {raw.tolerance:g}"),
             *(
                 [Row("95 % intervals", result.estimate("depth", -1, ()).method)]
-                if intervals
+                if result.count and result.plan != "monte-carlo"
                 else []
             ),
-            *self._precision(),
+            *(self._precision() if result.count else []),
             Row("wall time", effort),
         ]
 
     def _precision(self) -> Rows:
         """Return rows on the target and on the variance removed by a control variate."""
-        result, rows = self.result, list[Row]()
-        if not result.count:
-            return rows
-        if result.until:
-            met = _target_met(result, Target.parse(result.until))
-            rows.append(Row(f"precision {result.until}", met))
+        result, until = self.result, self.result.until
+        rows = [Row(f"precision {until}", _target_met(result))] if until else []
         saved = result.estimate("depth", -1, ()).variance_saved
-        if saved is not None:
-            text = f"removes {shown(saved, '%', 3)} of the variance of the mean depth"
-            if saved < 1.0:
-                text += (
-                    f", equivalent to {count(result.count / (1.0 - saved))} realisations without"
-                )
-            rows.append(Row("control variate", text))
-        return rows
+        if saved is None:
+            return rows
+        text = f"removes {shown(saved, '%', 3)} of the variance of the mean depth"
+        if saved < 1.0:
+            text += f", equivalent to {count(result.count / (1.0 - saved))} realisations without"
+        return [*rows, Row("control variate", text)]
 
     def details(self) -> list[Table]:
         """Return the estimates of all observables, and the Sobol indices of the depth."""
@@ -245,12 +249,11 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         result, head = self.result, "Sobol indices of the depth"
         if why := no_effects(result):
             return Table("", [[f"{head}: {why}"]], [""])
-        effects = result.sensitivity("depth")
+        effects = sorted(result.sensitivity("depth"), key=lambda item: item.without_effect)
         totals = any(item.total is not None for item in effects)
-        order = sorted(effects, key=lambda item: item.without_effect)
         return Table(
             "",
-            [_effect(result, item, totals) for item in order],
+            [_effect(result, item, totals) for item in effects],
             [head, "first order", *(["total"] if totals else [])],
         )
 
@@ -300,7 +303,7 @@ class EnsembleView(RealisationsView[EnsembleResult]):
         if result.count:
             depth = result.estimate("depth", -1, (0.95,))
             items = ("mean depth", depth.mean), ("its 95 % quantile", depth.quantiles[0][1])
-            errors = [within(name, item.half_width, item.value) for name, item in items]
+            errors = (within(name, item.half_width, item.value) for name, item in items)
             error = f"{', '.join(errors)} (95 % intervals)"
         return footer(
             [
@@ -329,24 +332,22 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
 def observed(result: EnsembleResult) -> list[str]:
     """Return the names of the observables that are not zero in all realisations."""
-    if not result.count:
-        return []
-    return [name for name in result.observables if result.at_end(name).any()]
+    names = result.observables if result.count else ()
+    return [name for name in names if result.at_end(name).any()]
 
 
 def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
     """Return the estimates of an observable, and below them their intervals."""
     named, estimate = OBSERVABLES[name], result.estimate(name, -1, QUANTILES)
-    if result.is_constant(name) and result.count > 1:
-        value, _ = cells(estimate.mean, named.unit)
-        return [(named.label, value, CONSTANT, *[NOTHING] * len(QUANTILES))]
     items = [estimate.mean, estimate.std, *(interval for _, interval in estimate.quantiles)]
-    texts = [cells(item, named.unit) for item in items]
+    texts, nothing = [cells(item, named.unit) for item in items], [NOTHING] * len(QUANTILES)
+    if result.is_constant(name) and result.count > 1:
+        return [(named.label, texts[0][0], CONSTANT, *nothing)]
     if named.unit == "deg":  # the mean of 359 and 1 deg is not 180 deg
         texts[:2] = [(NOTHING, "")] * 2
     values, intervals = zip(*texts, strict=True)
     if result.count == 1:
-        return [(named.label, values[0], *[NOTHING] * (len(items) - 1))]
+        return [(named.label, values[0], NOTHING, *nothing)]
     return [(named.label, *values), (INTERVAL, *intervals)]
 
 
@@ -366,20 +367,19 @@ def no_effects(result: EnsembleResult) -> str:
 def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
     """Return the Sobol indices of a random input as cells."""
     if not math.isfinite(item.first.value):
-        return [
-            item.name,
-            too_few(result.fewest_for_indices([item.name])),
-            *([""] if totals else []),
-        ]
+        return [item.name, too_few(result.fewest_for_indices([item.name])), *[""] * totals]
     indices = [index for index in (item.first, item.total) if index]
-    if item.without_effect:
-        bounds = (shown(index.high, "%", 2) for index in indices)
-        return [item.name, *(f"not significant, at most {bound}" for bound in bounds)]
-    return [item.name, *map(part_with_interval, indices)]
+    if not item.without_effect:
+        return [item.name, *map(part_with_interval, indices)]
+    return [
+        item.name,
+        *(f"not significant, at most {shown(index.high, '%', 2)}" for index in indices),
+    ]
 
 
-def _target_met(result: EnsembleResult, target: Target) -> str:
-    """Return whether a target is reached, and the half-width of the interval."""
+def _target_met(result: EnsembleResult) -> str:
+    """Return whether the target is reached, and the half-width of the interval."""
+    target = Target.parse(result.until)
     estimate = result.estimate_for(target)
     interval, achieved = target.interval(estimate), target.achieved(estimate)
     is_reached, realisations = target.reached(estimate), f"{count(result.count)} realisations"
@@ -398,11 +398,10 @@ def _target_met(result: EnsembleResult, target: Target) -> str:
 
 
 def _estimate(estimate: Estimate) -> dict[str, Any]:
-    data = asdict(estimate)
-    data["quantiles"] = [
-        {"probability": p, **asdict(interval)} for p, interval in estimate.quantiles
-    ]
-    return data
+    return {
+        **asdict(estimate),
+        "quantiles": [{"probability": p, **asdict(interval)} for p, interval in estimate.quantiles],
+    }
 
 
 def _realisations(raw: EnsembleData) -> Iterator[list[Column]]:
@@ -419,16 +418,17 @@ def _block(raw: EnsembleData, start: int, stop: int) -> Iterator[Column]:
     yield Column("failed", failed.astype(np.float64))
     for item in raw.inputs:
         key, values = item["key"], raw.rows(item["key"], start, stop)
-        if values.ndim == 1:
-            yield drawn(key, values, item["unit"])
-        else:
-            for number, column in enumerate(values.T, 1):
-                yield drawn(f"{key} roller {number}", column, item["unit"])
+        for number, column in enumerate(np.atleast_2d(values.T), 1):
+            title = key if values.ndim == 1 else f"{key} roller {number}"
+            yield drawn(title, column, item["unit"])
     for name in (*ALL_OBSERVABLES, *_SCALARS, *LIFE):
         if name in raw.schema.variables:
             values = raw.rows(name, start, stop)
-            final = np.where(failed, np.nan, values[:, -1] if values.ndim > 1 else values)
-            yield computed(name, final, raw.schema.variables[name].unit)
+            yield computed(
+                name,
+                np.where(failed, np.nan, values[:, -1] if values.ndim > 1 else values),
+                raw.schema.variables[name].unit,
+            )
 
 
 def _courses(result: EnsembleResult) -> Iterator[Column]:
@@ -444,8 +444,7 @@ def _courses(result: EnsembleResult) -> Iterator[Column]:
             "std": course.std,
             **{f"{100.0 * p:g} %": values for p, values in course.quantiles.items()},
         }
-        for ending, values in columns.items():
-            yield computed(f"{name} {ending}", values, unit, name)
+        yield from (computed(f"{name} {end}", part, unit, name) for end, part in columns.items())
 
 
 def _band(raw: EnsembleData, name: str, what: str, band: Band) -> list[Column]:

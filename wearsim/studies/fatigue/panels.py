@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,7 +35,7 @@ _ENDS = 1e-3, 0.999  # share of the lives at the ends of the axis
 DAMAGE = Axis("damage", "1", limits=(0.0, None))
 
 
-def rollers_at_end(y: FloatArray, values: FloatArray) -> list[Mark]:
+def rollers_at_end(y: FloatArray, values: FloatArray) -> list[Line]:
     """Return values of the rollers across the track at the end, of those that are not zero.
 
     Parameters
@@ -44,9 +44,8 @@ def rollers_at_end(y: FloatArray, values: FloatArray) -> list[Mark]:
     values : ndarray, shape (rollers, strips)
     """
     names = ["roller"] if len(values) == 1 else [f"roller {k}" for k in range(1, len(values) + 1)]
-    style: dict[str, Any] = {"dash": "--", "width": 1.0, "colour": BLACK}
     return [
-        Line(y, curve, label=f"{name}, at the end", **style)
+        Line(y, curve, "--", width=1.0, colour=BLACK, label=f"{name}, at the end")
         for name, curve in zip(names, values, strict=True)
         if curve.any()
     ]
@@ -56,15 +55,14 @@ def damage_panel(result: Result) -> Panel:
     """Return the damage of the cylinder across the track at every record, and of the rollers."""
     records = result.raw.records
     cylinder = np.asarray(records["cylinder_damage_profile"])[:, 0, 0]
-    marks: list[Mark] = [
-        Records(result.y, cylinder, result.record_passes),
-        *rollers_at_end(result.y, np.asarray(records["roller_damage_profile"])[-1, :, 0]),
-    ]
     return Panel(
         "Damage of the cylinder by fatigue",
         Axis("y", "mm", limits=worn_limits(result.y, cylinder.max(axis=0))),
         DAMAGE,
-        marks,
+        [
+            Records(result.y, cylinder, result.record_passes),
+            *rollers_at_end(result.y, np.asarray(records["roller_damage_profile"])[-1, :, 0]),
+        ],
         f"At the end the cylinder has a damage of {shown(float(cylinder[-1].max()), '1')}.",
         legend="upper right",
     )
@@ -76,15 +74,14 @@ def pitting_panel(result: Result) -> Panel:
         np.asarray(result.values(name)).reshape(len(result.passes), -1).max(axis=1)
         for name in ("damage", "pitting")
     )
-    marks: list[Mark] = [
-        Line(result.passes, damage, label="effective damage"),
-        Line(result.passes, chance, dash="--", label="probability of pitting"),
-    ]
     return Panel(
         "Effective damage, and pitting",
         pass_axis(float(result.passes[-1])),
         DAMAGE,
-        marks,
+        [
+            Line(result.passes, damage, label="effective damage"),
+            Line(result.passes, chance, dash="--", label="probability of pitting"),
+        ],
         f"At the end the effective damage is {shown(float(damage[-1]), '1')} and the probability of"
         f" pitting {shown(float(chance[-1]), '%', 3)}.",
         legend="lower right",
@@ -121,13 +118,16 @@ def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) 
             "pitting first": (levels[:, 1], "--", ORANGE),
             "both": (1.0 - levels[:, 0], ":", BLACK),
         }
-        for words, (share, dash, of_curve) in curves.items():
-            name, drawn = (f"{label}: {words}", colour) if label else (words, of_curve)
-            lives = passes / result.settings.per_unit
-            marks.append(Line(lives, share, dash, colour=drawn, label=name))
-        text += f" {label}:" if label else ""
-        text += f" At last {shown(level.wear, '%', 3)} end by {other} and"
-        text += f" {shown(level.pitting, '%', 3)} by pitting."
+        of_design = f"{label}: " if label else ""
+        lives = passes / result.settings.per_unit
+        marks += [
+            Line(lives, share, dash, colour=colour if label else own, label=f"{of_design}{words}")
+            for words, (share, dash, own) in curves.items()
+        ]
+        text += (
+            f" {of_design}At last {shown(level.wear, '%', 3)} end by {other} and"
+            f" {shown(level.pitting, '%', 3)} by pitting."
+        )
     if not marks:
         return message(title, "no life ended")
     return Panel(

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from wearsim.scenario import Scenario
     from wearsim.studies.run.result import Result
 
-EXCLUDED = "fatigue (pitting)"  # by a study without the table [fatigue]
-
 
 def fatigue_rows(result: Result, body: str) -> Rows:
     """Return rows on damage and pitting at the end of a run; none without fatigue.
@@ -32,19 +30,20 @@ def fatigue_rows(result: Result, body: str) -> Rows:
     if not result.raw.fatigue:
         return []
     final = result.final
-    names = "damage", "damage_error", "pitting", "pitting_error"
-    damage, error, pitting, of_pitting = (np.asarray(final[name], dtype=float) for name in names)
-    greatest = f"{body} {shown(_most(final['cylinder_damage']), '1', 3)}"
-    if "damage_angle_rad" in final:
-        greatest += f" at {shown(_most(final['damage_angle_rad']), 'deg')}"
-    greatest += f", roller {shown(_most(final['roller_damage']), '1', 3)}"
+    angle = final.get("damage_angle_rad")
+    place = "" if angle is None else f" at {shown(_most(angle), 'deg')}"
+    damage, pitting = (
+        with_error(np.asarray(final[name], dtype=float), _most(final[f"{name}_error"]), unit)
+        for name, unit in (("damage", "1"), ("pitting", "%"))
+    )
     return [
-        Row("effective damage", with_error(damage, float(np.max(error)), "1")),
-        Row("greatest damage", greatest),
+        Row("effective damage", damage),
         Row(
-            "probability of pitting",
-            with_error(pitting, float(np.max(of_pitting)), "%"),
+            "greatest damage",
+            f"{body} {shown(_most(final['cylinder_damage']), '1', 3)}{place},"
+            f" roller {shown(_most(final['roller_damage']), '1', 3)}",
         ),
+        Row("probability of pitting", pitting),
         *source_rows(fatigue_scenario(result)),
     ]
 

@@ -39,11 +39,6 @@ from wearsim.studies.identify.planning import SCATTERS, PlannedDesign
 from wearsim.studies.identify.result import IdentificationResult
 
 _SCALE = 1e12  # K/H is shown in 1e-12 1/Pa
-_EXPECTED = 2.0 / 3.0
-_ERROR = (
-    "Intervals hold 95 %. In full slip a groove shows the product of K/H and dissipated energy: a"
-    " K/H holds for the stated energy. The error of the contact model is not contained."
-)
 _HEADS = (
     "test",
     "levelled on",
@@ -63,7 +58,6 @@ _NUMBERS = (
     ("low [1/Pa]", "k_over_h_per_Pa_low", 1.0, "1/Pa"),
     ("high [1/Pa]", "k_over_h_per_Pa_high", 1.0, "1/Pa"),
 )
-_NEXT = ("median_per_Pa", "low_per_Pa", "high_per_Pa")
 
 
 class IdentificationView(StudyView[IdentificationResult]):
@@ -74,7 +68,10 @@ class IdentificationView(StudyView[IdentificationResult]):
     """
 
     verb = "identify"
-    basis = _ERROR
+    basis = (
+        "Intervals hold 95 %. In full slip a groove shows the product of K/H and dissipated energy:"
+        " a K/H holds for the stated energy. The error of the contact model is not contained."
+    )
 
     def __init__(self, result: IdentificationResult) -> None:
         super().__init__(result)
@@ -83,36 +80,36 @@ class IdentificationView(StudyView[IdentificationResult]):
     def rows(self) -> Rows:
         """Return the verdict, scatter, sensitivity to the prior and what would decide."""
         result, summary = self.result, self.result.summary
-        t, seen = summary["scatter_of_k"], summary["scatter_seen"]
+        t, seen, bayes = (
+            summary[name] for name in ("scatter_of_k", "scatter_seen", "bayes_factor")
+        )
         following, ratio = summary["next_specimen"], summary["likelihood_ratio"]
-        middle = summary["k_over_h_median_per_Pa"]
+        middle, decide = summary["k_over_h_median_per_Pa"], summary["to_decide"]
         sensitivity = "; ".join(
             f"{row['prior_scale']:g}: {row['bayes_factor']:.2f}, t {row['scatter_of_k']:.2f}"
             for row in summary["sensitivity"]
         )
-        scatter = (
-            f"{t['value']:.2f} (90 %: {t['low_90']:.2f} to {t['high_90']:.2f};"
-            f" 95 %: {t['low']:.2f} to {t['high']:.2f})"
-        )
-        factor = f"{summary['bayes_factor']:.2f} against t ~ half-normal(0.5)"
-        rows = [
+        likelihood = []
+        if ratio is not None:
+            limit = f"95 % of such tests stay below {summary['likelihood_ratio_95']:.2f}"
+            likelihood = [Row("likelihood ratio of t = 0", f"{ratio:.2f}; {limit}")]
+        return [
             Row("verdict", result.verdict_words),
             Row("scatter of ln K/H seen", NOTHING if seen is None else f"{seen:.3f}"),
             Row("scatter that inputs explain", f"{summary['scatter_from_inputs']:.3f}"),
-            Row("scatter t of ln K/H itself", scatter, answers={"scatter_of_k": (t["value"], "1")}),
+            Row(
+                "scatter t of ln K/H itself",
+                f"{t['value']:.2f} (90 %: {t['low_90']:.2f} to {t['high_90']:.2f};"
+                f" 95 %: {t['low']:.2f} to {t['high']:.2f})",
+                answers={"scatter_of_k": (t["value"], "1")},
+            ),
             Row(
                 "Bayes factor of t = 0",
-                factor,
-                answers={"bayes_factor": (summary["bayes_factor"], "1")},
+                f"{bayes:.2f} against t ~ half-normal(0.5)",
+                answers={"bayes_factor": (bayes, "1")},
             ),
             Row("by the scale of the prior", sensitivity),
-        ]
-        if ratio is not None:
-            limit = f"95 % of such tests stay below {summary['likelihood_ratio_95']:.2f}"
-            rows.append(Row("likelihood ratio of t = 0", f"{ratio:.2f}; {limit}"))
-        decide = summary["to_decide"]
-        return [
-            *rows,
+            *likelihood,
             Row(
                 "K/H, median of specimens",
                 _wear_factor(middle, ("value", "low", "high")),
@@ -120,7 +117,7 @@ class IdentificationView(StudyView[IdentificationResult]):
             ),
             Row(
                 "K/H, next specimen",
-                _wear_factor(following, _NEXT),
+                _wear_factor(following, ("median_per_Pa", "low_per_Pa", "high_per_Pa")),
                 answers={"k_over_h_next": (following["median_per_Pa"], "1/Pa")},
             ),
             Row(
@@ -132,20 +129,22 @@ class IdentificationView(StudyView[IdentificationResult]):
     def study(self) -> Rows:
         """Return energies, variance from inputs, growth with passes, and effort."""
         result = self.result
-        energies = [test["energy_J"]["value"] for test in result.tests]
         parts = [round(100.0 * test["share_of_inputs"]) for test in result.tests]
         low, high = min(parts), max(parts)
-        inputs = f"{high} %" if low == high else f"{low} to {high} %"
         return [
             Row(
-                "K/H holds for the energy", ", ".join(shown(energy, "J", 3) for energy in energies)
+                "K/H holds for the energy",
+                ", ".join(shown(test["energy_J"]["value"], "J", 3) for test in result.tests),
             ),
-            Row("variance of ln K/H from inputs", inputs),
+            Row(
+                "variance of ln K/H from inputs",
+                f"{high} %" if low == high else f"{low} to {high} %",
+            ),
             *(
                 Row(
                     f"depth of {name}",
                     f"~ passes^{exponent['value']:.3f} ({exponent['low']:.3f} to"
-                    f" {exponent['high']:.3f}); {_EXPECTED:.3f} for rigid bodies in full slip"
+                    f" {exponent['high']:.3f}); {2.0 / 3.0:.3f} for rigid bodies in full slip"
                     " under a constant load",
                 )
                 for name, exponent in result.summary["exponents"].items()
@@ -173,47 +172,51 @@ class IdentificationView(StudyView[IdentificationResult]):
 
     def columns(self) -> Mapping[str, Columns]:
         """Return the tests, and all traces below each other."""
-        tests, names = self._tests(), ("height", "fitted", "low", "high")
-        table = {
-            **{name: [test[name] for test in tests] for name in ("file", "specimen")},
-            **{
-                title: [_number(test[key], size) for test in tests]
-                for title, key, size, _ in _NUMBERS
-            },
-        }
-        traces = [self.result.values(f"trace_{name}") for name in ("y", *names)]
+        tests, names = self._tests(), ("y", "height", "fitted", "low", "high")
+        traces = [self.result.values(f"trace_{name}") for name in names]
         known = np.isfinite(traces[0])
         numbers = np.broadcast_to(np.arange(1.0, len(known) + 1.0)[:, None], known.shape)
-        y, *heights = (trace[known] for trace in traces)
-        curves = [
-            Column("test", numbers[known]),
-            Column("y", y, "mm", 1e-3),
-            *(
-                Column(name, height, "um", 1e-6)
-                for name, height in zip(names, heights, strict=True)
-            ),
-        ]
+        units = (("mm", 1e-3), *[("um", 1e-6)] * 4)
         return {
-            "tests.csv": [[Column(name, cells) for name, cells in table.items()]],
-            "traces.csv": [curves],
+            "tests.csv": [
+                [
+                    *(
+                        Column(name, [test[name] for test in tests])
+                        for name in ("file", "specimen")
+                    ),
+                    *(
+                        Column(
+                            title,
+                            [
+                                "" if test[key] is None else f"{size * test[key]:.12g}"
+                                for test in tests
+                            ],
+                        )
+                        for title, key, size, _ in _NUMBERS
+                    ),
+                ]
+            ],
+            "traces.csv": [
+                [
+                    Column("test", numbers[known]),
+                    *(
+                        Column(name, trace[known], *unit)
+                        for name, trace, unit in zip(names, traces, units, strict=True)
+                    ),
+                ]
+            ],
         }
 
     def frame(self) -> Frame:
         """Return the tests, one row for each groove."""
         tests = self._tests()
         units = {"file": "", "specimen": "", **{name: unit for _, name, _, unit in _NUMBERS}}
-        return Frame(
-            [
-                (
-                    name,
-                    unit,
-                    np.array([np.nan if test[name] is None else test[name] for test in tests]),
-                )
-                for name, unit in {**units, "energy_J": "J"}.items()
-            ],
-            "groove",
-            range(1, len(tests) + 1),
-        )
+        values = {
+            name: np.array([np.nan if test[name] is None else test[name] for test in tests])
+            for name in (*units, "energy_J")
+        }
+        columns = [(name, units.get(name, "J"), column) for name, column in values.items()]
+        return Frame(columns, "groove", range(1, len(tests) + 1))
 
     def _tests(self) -> list[dict[str, Any]]:
         """Return the tests with one entry for each end of an interval."""
@@ -231,22 +234,19 @@ class IdentificationView(StudyView[IdentificationResult]):
     def repetition(self) -> Repetition:
         """Return files, command and remark that repeat the study."""
         raw, (command, files, remark) = self.result.raw, super().repetition()
-        if raw.measured:
-            files = {**files, self._tests_file: tomlkit.dumps({"test": raw.measured})}
-        profiles = dict.fromkeys(
-            test[key]
-            for test in raw.measured
-            for key in ("profile", "lift", "before")
-            if key in test
-        )
         if not raw.measured:
-            remark = (
+            return Repetition(
+                command,
+                files,
                 "The results file holds neither the measured profiles nor the tests file and"
                 " options, such as --tests, --columns and --draws: put the profiles beside these"
                 " files, and add the options of the study. An identification that is repeated"
-                " stores them."
+                " stores them.",
             )
-        elif profiles:
+        files = {**files, self._tests_file: tomlkit.dumps({"test": raw.measured})}
+        names = ("profile", "lift", "before")
+        profiles = dict.fromkeys(test[key] for test in raw.measured for key in names if key in test)
+        if profiles:
             remark = (
                 "The measured profiles are not stored in the results file; these files are needed"
                 f" too, beside {self._tests_file}: {', '.join(profiles)}. {remark}"
@@ -262,45 +262,39 @@ class IdentificationView(StudyView[IdentificationResult]):
         raw = self.result.raw
         if not raw.measured:
             return [_name(test["file"]) for test in self.result.tests]
-        negligible = f"{self.result.summary['negligible']!r}"
         return [
-            *("--tests", self._tests_file, "--negligible", negligible),
+            *(
+                "--tests",
+                self._tests_file,
+                "--negligible",
+                f"{self.result.summary['negligible']!r}",
+            ),
             *(["--draws", str(raw.draws)] if raw.draws is not None else []),
             *(["--share", "k=cylinder,roller"] if raw.shared else []),
         ]
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return K/H of each specimen, density of m and t, and traces with their residuals."""
-        result = self.result
-        panels = {
-            "factors": _factors(result),
-            "scatter": _density_of_scatter(result),
-            "density": _density(result),
-        }
-        traced = [
-            k for k in range(len(result.tests)) if np.isfinite(result.values("trace_y")[k, 0])
-        ]
+        result, drawn = self.result, {"factors": _factors, "scatter": _scatter, "density": _density}
+        panels = {name: panel(result) for name, panel in drawn.items()}
+        traced = np.flatnonzero(np.isfinite(result.values("trace_y")[:, 0])).tolist()
         for place in traced[:MOST_TRACES]:
             panels[f"trace {place}"], panels[f"residual {place}"] = _trace(result, place)
-        drawn, rows, heights = traced[:_IN_FIGURE], [["factors", "density"]], [1.0]
+        columns, rows, heights = traced[:_IN_FIGURE], [["factors", "density"]], [1.0]
         if traced:
-            upper = ([f"{name} {place}" for place in drawn] for name in ("trace", "residual"))
+            upper = ([f"{name} {place}" for place in columns] for name in ("trace", "residual"))
             rows, heights = [*upper, *rows], [0.75, 0.35, 1.0]
         return Sheet(
             f"{result.title}\n{result.verdict_words}",
             panels,
             rows,
-            (max(4.2 * len(drawn), 9.6), 8.6 if traced else 4.2),
+            (max(4.2 * len(columns), 9.6), 8.6 if traced else 4.2),
             heights=heights,
         )
 
 
 def _name(file: str) -> str:
     return file.rpartition("/")[2]
-
-
-def _number(value: float | None, scale: float) -> str:
-    return "" if value is None else f"{scale * value:.12g}"
 
 
 def _wear_factor(factor: Mapping[str, float], names: Sequence[str]) -> str:
@@ -311,18 +305,20 @@ def _wear_factor(factor: Mapping[str, float], names: Sequence[str]) -> str:
 
 def _cells(test: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the cells of a measured groove."""
-    measured, depth = test["depth_interval_m"], test["model_depth_interval_m"]
-    area, k = test["area_interval_m2"], test["k_over_h_per_Pa"]
+    measured, area, k = (
+        test[name] for name in ("depth_interval_m", "area_interval_m2", "k_over_h_per_Pa")
+    )
     residuals = NOTHING
     if test["residual_ratio"] is not None:
-        tilt = f"tilt {1e3 * test['inclination_rad']:.2g} mrad, "
-        ratio = f"{test['residual_ratio']:.2f} (p {test['residual_probability']:.2f})"
-        residuals = f"{tilt}{ratio}, r1 {test['residual_autocorrelation']:.2f}"
+        residuals = (
+            f"tilt {1e3 * test['inclination_rad']:.2g} mrad, {test['residual_ratio']:.2f}"
+            f" (p {test['residual_probability']:.2f}), r1 {test['residual_autocorrelation']:.2f}"
+        )
     return (
         _name(test["file"]),
         test["levelled_on"],
         NOTHING if measured is None else with_range(test["depth_m"], measured, 1e6),
-        with_range(test["model_depth_m"], depth, 1e6),
+        with_range(test["model_depth_m"], test["model_depth_interval_m"], 1e6),
         NOTHING if area is None else with_range(test["area_m2"], area, 1e6),
         with_range(k["value"], (k["low"], k["high"]), _SCALE),
         residuals,
@@ -339,20 +335,19 @@ def deciding(decision: Mapping[str, Any], tests: int) -> str:
     tests : int
         Number of tests at hand.
     """
-    measure = ", ".join(decision["measure"]) or "all inputs"
     many = decision["tests"] or f"more than {decision['most_tests']}"
     now = f"{decision['power']:.2f} by these {tests} tests" if tests > 1 else "0 by one test"
     text = (
         f"a scatter of {decision['scatter']:g} is seen with probability {now}, and 0.8 by {many}"
         " such tests"
     )
-    if decision["tests_if_measured"] and decision["power_if_measured"] > decision["power"]:
-        text += (
-            f"\nwith {measure} measured, so that inputs leave 0.1:"
-            f" {decision['power_if_measured']:.2f}, and 0.8 by"
-            f" {decision['tests_if_measured']} tests"
-        )
-    return text
+    if not decision["tests_if_measured"] or decision["power_if_measured"] <= decision["power"]:
+        return text
+    return (
+        f"{text}\nwith {', '.join(decision['measure']) or 'all inputs'} measured, so that inputs"
+        f" leave 0.1: {decision['power_if_measured']:.2f}, and 0.8 by"
+        f" {decision['tests_if_measured']} tests"
+    )
 
 
 _IN_FIGURE, MOST_TRACES, MOST_POINTS = 6, 12, 1200
@@ -368,29 +363,32 @@ def depth_text(name: str, ends: Sequence[float]) -> str:
 
 def _trace(result: IdentificationResult, place: int) -> tuple[Panel, Panel]:
     """Return a trace against the band of the model, and its residuals."""
-    names = ("y", "height", "fitted", "low", "high", "unworn")
+    names, test = ("y", "height", "fitted", "low", "high", "unworn"), result.tests[place]
     rows = [result.values(f"trace_{name}")[place] for name in names]
     known = np.flatnonzero(np.isfinite(rows[0]))
     every = known[evenly_spaced(len(known), MOST_POINTS)]
     y, height, fitted, low, high, unworn = (row[every] for row in rows)
-    test, free = result.tests[place], unworn > 0.5
-    marks = [
-        dots(y, height, ".", size=2.0, colour=GREY, label="measured"),
-        dots(y[free], height[free], ".", size=2.0, colour=GREEN, label="shoulders"),
-        Band(y, low, high, colour=ORANGE, alpha=0.4, label="95 % band"),
-        Line(y, fitted, width=1.0, label="best profile"),
-    ]
-    k = test["k_over_h_per_Pa"]
-    title = f"{test['file'].rpartition('/')[2]}: K/H {1e12 * k['value']:.3g}e-12 1/Pa"
+    free, noise = unworn > 0.5, test["noise_m"] or 0.0
     text = depth_text("Model's depth", test["model_depth_interval_m"])
     if test["depth_interval_m"] is not None:
         text = f"{depth_text('Measured depth', test['depth_interval_m'])}. {text}"
-    lift = test.get("quantity") == "lift"
     ends = float(y.min()), float(y.max())
-    x = Axis("angle", "deg", limits=ends) if lift else Axis("y", "mm", limits=ends)
-    name = "change of the lift" if lift else "height"
-    upper = Panel(title, x, Axis(name, "um"), marks, f"{text}.", legend="lower right")
-    noise = test["noise_m"] or 0.0
+    x, name = Axis("y", "mm", limits=ends), "height"
+    if test.get("quantity") == "lift":
+        x, name = Axis("angle", "deg", limits=ends), "change of the lift"
+    upper = Panel(
+        f"{_name(test['file'])}: K/H {1e12 * test['k_over_h_per_Pa']['value']:.3g}e-12 1/Pa",
+        x,
+        Axis(name, "um"),
+        [
+            dots(y, height, ".", size=2.0, colour=GREY, label="measured"),
+            dots(y[free], height[free], ".", size=2.0, colour=GREEN, label="shoulders"),
+            Band(y, low, high, colour=ORANGE, alpha=0.4, label="95 % band"),
+            Line(y, fitted, width=1.0, label="best profile"),
+        ],
+        f"{text}.",
+        legend="lower right",
+    )
     residuals: list[Mark] = [
         Line(y, height - fitted, colour=GREY, width=0.6),
         Span(-2.0 * noise, 2.0 * noise, across="y", colour=GREEN, alpha=0.15),
@@ -402,17 +400,19 @@ def _factors(result: IdentificationResult) -> Panel:
     """Return K/H of each specimen with its density, and the distribution of the next one."""
     k, following = np.exp(result.ln_k), result.summary["next_specimen"]
     std, middle = np.log(following["factor"]), np.log(following["median_per_Pa"])
-    named: list[tuple[str, Any]] = [
-        *zip(result.raw.specimens, result.test_density, strict=True),
-        ("next specimen", np.exp(-0.5 * ((result.ln_k - middle) / std) ** 2)),
+    named: list[tuple[str, Any, str, float]] = [
+        *(
+            (name, density, BLUE, 0.35)
+            for name, density in zip(result.raw.specimens, result.test_density, strict=True)
+        ),
+        ("next specimen", np.exp(-0.5 * ((result.ln_k - middle) / std) ** 2), ORANGE, 0.5),
     ]
     marks: list[Mark] = []
-    for row, (name, density) in enumerate(named):
-        colour, alpha = (BLUE, 0.35) if row < len(named) - 1 else (ORANGE, 0.5)
+    for row, (name, density, colour, alpha) in enumerate(named):
         curve = row + 0.8 * density / density.max()
         marks += [
             Band(k, np.full_like(k, row), curve, colour=colour, alpha=alpha),
-            Text(0.01, row + 0.1, name.rpartition("/")[2], parts="x", colour=BLACK),
+            Text(0.01, row + 0.1, _name(name), parts="x", colour=BLACK),
         ]
     below = np.cumsum(result.test_density, axis=1)
     below /= below[:, -1:]
@@ -427,12 +427,11 @@ def _factors(result: IdentificationResult) -> Panel:
     )
 
 
-def _density_of_scatter(result: IdentificationResult) -> Panel:
+def _scatter(result: IdentificationResult) -> Panel:
     """Return the density of the scatter of ln K/H, for a page."""
-    t = result.scatter
+    t, ends = result.scatter, result.scatter_of_k
     density = (result.posterior * np.gradient(result.values("mean_ln_k"), axis=1)).sum(axis=1)
     density /= np.trapezoid(density, t)
-    ends = result.scatter_of_k
     return Panel(
         "Scatter of the wear factor itself",
         Axis("scatter t of ln K/H", limits=(0.0, max(1.3 * ends["high"], 0.3))),
@@ -456,14 +455,16 @@ def _density(result: IdentificationResult) -> Panel:
     levels = [float(density.ravel()[order][held.searchsorted(mass)]) for mass in _MASSES]
     rows, median = np.broadcast_to(t[:, None], m.shape), np.exp(m)
     top = max(1.3 * result.scatter_of_k["high"], 0.3)
-    inside = (density > levels[0]) & (rows < top)
-    limits = (0.9 * float(median[inside].min()), 1.1 * float(median[inside].max()))
-    areas = Contours(median, rows, density, [*levels, density.max()], _SHADES, outlined=True)
+    inside = median[(density > levels[0]) & (rows < top)]
+    limits = (0.9 * float(inside.min()), 1.1 * float(inside.max()))
     return Panel(
         "Median and scatter of K/H: 50, 90 and 95 %",
         Axis("median of K/H", log=True, limits=limits, **_UNIT),
         Axis("scatter t of ln K/H (dashed: negligible)", limits=(0.0, top)),
-        [areas, Span(result.summary["negligible"], across="y", dash="--", width=0.8, colour=GREY)],
+        [
+            Contours(median, rows, density, [*levels, density.max()], _SHADES, outlined=True),
+            Span(result.summary["negligible"], across="y", dash="--", width=0.8, colour=GREY),
+        ],
         figure_only=True,
     )
 

@@ -57,10 +57,9 @@ class LivesView(View):
         for label, comparison in zip(self.labels[1:], self.compared, strict=True):
             of = "" if len(self.compared) == 1 else f", {first} against {label}"
             ratio = f"{first} has {_factor(comparison.b10_ratio)} times the B10 of {label}"
-            ratio += _numerical(*comparison.b10_ratio_bounds)
             same = comparison.same_machine
             rows += [
-                Row(f"B10 ratio{of}", ratio),
+                Row(f"B10 ratio{of}", ratio + _numerical(*comparison.b10_ratio_bounds)),
                 Row(
                     f"same machine{of}",
                     "unknown: the studies have no common draws"
@@ -83,15 +82,18 @@ class LivesView(View):
     def data(self) -> dict[str, Any]:
         """Return all designs and their comparison with the first."""
         first, *others = self.results
-        designs = [result.view.data() for result in self.results]
-        data: dict[str, Any] = {"unit": first.unit, "designs": designs, "labels": self.labels}
-        if len(others) == 1:
-            data |= _comparison(self.compared[0])
-        else:
-            data["compared_with_first"] = [_comparison(other.compare(first)) for other in others]
-        if variable := swept_variable(self.results):
-            data["against"] = _against(variable, self.results)
-        return data
+        variable = swept_variable(self.results)
+        return {
+            "unit": first.unit,
+            "designs": [result.view.data() for result in self.results],
+            "labels": self.labels,
+            **(
+                _comparison(self.compared[0])
+                if len(others) == 1
+                else {"compared_with_first": [_comparison(item.compare(first)) for item in others]}
+            ),
+            **({"against": _against(variable, self.results)} if variable else {}),
+        }
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels of all designs."""

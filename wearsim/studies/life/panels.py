@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 
@@ -35,10 +36,11 @@ from wearsim.studies.cam.view import CAM_EXCLUDED, loads
 from wearsim.studies.ensemble.panels import draws_panels, effects_panel
 from wearsim.studies.ensemble.view import known_effects
 from wearsim.studies.fatigue.panels import incidence_panel
-from wearsim.studies.fatigue.view import EXCLUDED as NO_FATIGUE, source_text
+from wearsim.studies.fatigue.view import source_text
 from wearsim.studies.life.comparison import swept_variable
 from wearsim.studies.life.result import LifeResult
-from wearsim.studies.run.view import EXCLUDED
+from wearsim.studies.life.stored_settings import DesignVariable
+from wearsim.studies.run.view import excluded_effects
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 from wearsim.uq.estimation.intervals import arrays_of
@@ -94,10 +96,11 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
         cam by angle; for a sweep also the lives against the design variable, with fatigue the
         incidences of wear and of pitting. Sources of constants are in the title.
     """
-    pairs = zip(results, labels, several_colours(len(results)), strict=True)
-    designs = [_Design(*pair, len(results) > 1) for pair in pairs]
-    titles = {result.title for result in results}
-    axis = Axis("life", results[0].unit, 1.0)
+    several, axis = len(results) > 1, Axis("life", results[0].unit, 1.0)
+    designs = [
+        _Design(*triple, several)
+        for triple in zip(results, labels, several_colours(len(results)), strict=True)
+    ]
     panels: dict[str, Panel] = {
         "survival": _survival(designs, axis),
         **{family: _probabilities(designs, family, axis) for family in FAMILIES},
@@ -105,31 +108,33 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
         "incidence": _incidence(designs, axis),
         "limits": _limits(designs),
     }
-    rows: list[list[str]] = [["survival", *FAMILIES], ["tornado", "incidence", "limits"]]
-    if swept_variable(results) is not None:
-        panels["against"] = _against(designs)
-        rows = [[*row, "against"] for row in rows]
+    wide = {}
+    if (variable := swept_variable(results)) is not None:
+        wide["against"] = _against(results, variable)
     if any(result.raw.fatigue for result in results):
-        of_designs = [(design.result, design.named, design.colour) for design in designs]
-        panels["wear or pitting"] = incidence_panel(of_designs, axis)
-        rows = [[*row, "wear or pitting"] for row in rows]
-    (result, *others) = results
-    if not (others or result.are_equal or result.settings.alone):
+        wide["wear or pitting"] = incidence_panel(
+            [(design.result, design.named, design.colour) for design in designs], axis
+        )
+    panels |= wide
+    rows = [["survival", *FAMILIES, *wide], ["tornado", "incidence", "limits", *wide]]
+    result = results[0]
+    if not (several or result.are_equal or result.settings.alone):
         if effects := known_effects(result, "life"):
             title = "What the scatter of the life is due to (Sobol indices)"
             panels["indices"] = effects_panel(title, "ln life", effects)
         panels |= draws_panels(result, "life", result.lives, axis)
-    title = titles.pop() if len(titles) == 1 else "lives of designs"
+    title = result.title if len({result.title for result in results}) == 1 else "lives of designs"
     sources = dict.fromkeys(source_text(result.scenario) for result in results)
-    title = "\n".join([title, *(text for text in sources if text)])
-    return Sheet(title, panels, rows, (_WIDTH * (len(rows[0]) / 3.0), 8.4))
+    return Sheet(
+        "\n".join(filter(None, [title, *sources])),
+        panels,
+        rows,
+        (_WIDTH * (len(rows[0]) / 3.0), 8.4),
+    )
 
 
-def _against(designs: Sequence[_Design]) -> Panel:
+def _against(results: Sequence[LifeResult], variable: DesignVariable) -> Panel:
     """Return the lives of the shares with their intervals against the variable of a sweep."""
-    results = [design.result for design in designs]
-    variable = swept_variable(results)
-    assert variable is not None
     unit, size = engineers_unit(variable.unit)
     by_value = sorted(
         ((result.variable.value, result) for result in results if result.variable),
@@ -137,16 +142,15 @@ def _against(designs: Sequence[_Design]) -> Panel:
     )
     shares, marks = results[0].settings.shares, list[Mark]()
     for share, colour in zip(shares, several_colours(len(shares)), strict=True):
-        pairs = [(value, result.b(share)) for value, result in by_value]
-        known = [(value, life) for value, life in pairs if np.isfinite(life.value)]
+        lives = {value: result.b(share) for value, result in by_value}
+        known = {value: life for value, life in lives.items() if np.isfinite(life.value)}
         if not known:
             continue
-        values, lives = zip(*known, strict=True)
-        value, low, high = arrays_of(lives)
-        low, high = (np.where(np.isfinite(end), end, np.nan) for end in (low, high))
+        value, *ends = arrays_of(known.values())
+        low, high = (np.where(np.isfinite(end), end, np.nan) for end in ends)
         marks += [
-            Whiskers(values, low, high, colour=colour),
-            Line(values, value, marker="o", colour=colour, label=f"B{share:g}"),
+            Whiskers(tuple(known), low, high, colour=colour),
+            Line(tuple(known), value, marker="o", colour=colour, label=f"B{share:g}"),
         ]
     if not marks:
         return message("Life against the design", "all lives are censored")
@@ -174,10 +178,10 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
             Line(curve.life, curve.survival, steps=steps, colour=colour, label=design.named),
         ]
         if result.censored:
-            end, text = float(curve.survival[-1]), f"{result.censored} censored"
+            end, words = float(curve.survival[-1]), f"{result.censored} censored"
             marks += [
                 dots([result.most], [end], "|", size=12.0, colour=colour),
-                Text(result.most, end, text, "", (-4.0, 6.0), "right", colour=colour),
+                Text(result.most, end, words, "", (-4.0, 6.0), "right", colour=colour),
             ]
     text = "Share of the machines that outlast a life, with its 95 % band."
     for target in {design.result.target for design in designs}:
@@ -199,9 +203,7 @@ def _survival(designs: Sequence[_Design], axis: Axis) -> Panel:
 def _scale(family: Family) -> Callable[[FloatArray], FloatArray]:
     from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
 
-    if family == "log-normal":
-        return lambda p: np.asarray(ndtri(p))
-    return lambda p: np.log(-np.log1p(-p))
+    return ndtri if family == "log-normal" else lambda p: np.log(-np.log1p(-p))
 
 
 def _probabilities(designs: Sequence[_Design], family: Family, axis: Axis) -> Panel:
@@ -223,22 +225,26 @@ def _probabilities(designs: Sequence[_Design], family: Family, axis: Axis) -> Pa
             ends += [first, last]
         across = np.geomspace(first, last, _POINTS)
         fits: Sequence[FittedLives] = result.integrated_fits or result.fits
-        for fit in fits:
-            if fit.family == family:
-                marks += _fit_marks(fit, across, colour, is_best=fit is fits[0])
+        marks += [
+            mark
+            for fit in fits
+            if fit.family == family
+            for mark in _fit_marks(fit, across, colour, is_best=fit is fits[0])
+        ]
         if result.is_exact:
             mean = np.clip(result.distribution.failed(across).mean(axis=0), 1e-4, 1.0 - 1e-4)
-            curve = across, scale(mean)
-            marks.append(Line(*curve, dash=":", width=0.9, colour=_DARK, label="exact K/H"))
+            marks.append(Line(across, scale(mean), ":", width=0.9, colour=_DARK, label="exact K/H"))
     if not ends:
         return message(title, "no life above 0 ended")
     low, high = (float(value) for value in scale(np.array([5e-4, 0.9995])))
-    ticks = scale(np.array(_PERCENT) / 100.0).tolist()
     return Panel(
         title,
         Axis("life", axis.unit, 1.0, log=True, limits=(0.75 * min(ends), 1.3 * max(ends))),
         Axis(
-            "failed [%]", limits=(low, high), ticks=ticks, names=[f"{tick:g}" for tick in _PERCENT]
+            "failed [%]",
+            limits=(low, high),
+            ticks=scale(np.array(_PERCENT) / 100.0).tolist(),
+            names=[f"{tick:g}" for tick in _PERCENT],
         ),
         marks,
         f"Lives on a scale on which a {family} distribution is a straight line; of the fit with its"
@@ -254,8 +260,10 @@ def _fit_marks(fit: FittedLives, life: FloatArray, colour: str, *, is_best: bool
     life, score, reach = life[inside], score[inside], reach[inside]
     dash, label = ("-", "fit, lower AIC") if is_best else ("--", "fit")
     band = Band(life, score - reach, score + reach, colour=colour, alpha=0.15)
-    line = Line(life, score, dash=dash, width=1.4, colour=colour, label=label)
-    return [line, band] if reach.any() else [line]
+    return [
+        Line(life, score, dash=dash, width=1.4, colour=colour, label=label),
+        *([band] if reach.any() else []),
+    ]
 
 
 def _tornado(designs: Sequence[_Design]) -> Panel:
@@ -266,20 +274,17 @@ def _tornado(designs: Sequence[_Design]) -> Panel:
     if not names:
         alone = {result.settings.factor for result in results if result.settings.alone}
         text = f"only {', '.join(alone)}" if alone else "too few realisations, or equal lives"
-        obstacles = [result.effects_obstacle for result in results if result.effects_obstacle]
-        lines = [line for obstacle in obstacles for line in obstacle.split("; ")]
+        lines = [line for result in results for line in result.effects_obstacle.split("; ") if line]
         return message(title, *(lines or [text]))
     height, marks = 0.7 / len(designs), list[Mark]()
     for number, (by_input, design) in enumerate(zip(effects, designs, strict=True)):
         middle = (number - 0.5 * (len(designs) - 1)) * height
         places = np.array([names.index(name) for name in by_input], dtype=float) + middle
-        for end, alpha in enumerate((0.35, 0.8)):
-            ends = [effect.factors[end] for effect in by_input.values()]
-            value, low, high = arrays_of(ends)
-            label = design.named if end else ""
-            bars = (places - 0.5 * height, places + 0.5 * height, value, 1.0, True)
+        edges = places - 0.5 * height, places + 0.5 * height
+        for end, (alpha, label) in enumerate(((0.35, ""), (0.8, design.named))):
+            value, low, high = arrays_of(effect.factors[end] for effect in by_input.values())
             marks += [
-                Bars(*bars, label=label, colour=design.colour, alpha=alpha),
+                Bars(*edges, value, 1.0, True, label=label, colour=design.colour, alpha=alpha),
                 Whiskers(places, low, high, horizontal=True, colour="0.2"),
             ]
     name = "factor of the life, input at its 10 % (pale) and 90 % quantile"
@@ -298,13 +303,19 @@ def _incidence(designs: Sequence[_Design], axis: Axis) -> Panel:
     for design in designs:
         result = design.result
         cause = np.where(result.observed, result.values("first_limit"), -1).astype(np.int64)
-        lives = np.minimum(result.lives, result.most)
-        ends, incidence = cumulative_incidence(lives, cause, len(result.limits))
-        for place, name in enumerate(result.limits):
-            if len(ends) and incidence[place, -1] > 0.0:
-                curve = np.append(0.0, ends), np.append(0.0, incidence[place])
-                dash, label = DASHES[place % len(DASHES)], design.words(name)
-                marks.append(Line(*curve, dash, steps=True, colour=design.colour, label=label))
+        ends, incidence = cumulative_incidence(
+            np.minimum(result.lives, result.most), cause, len(result.limits)
+        )
+        marks += [
+            Line(
+                *(np.append(0.0, ends), np.append(0.0, share), dash),
+                steps=True,
+                colour=design.colour,
+                label=design.words(name),
+            )
+            for name, share, dash in zip(result.limits, incidence, cycle(DASHES), strict=False)
+            if len(ends) and share[-1] > 0.0
+        ]
     if not marks:
         return message(title, "no limit was reached")
     return Panel(
@@ -319,17 +330,24 @@ def _incidence(designs: Sequence[_Design], axis: Axis) -> Panel:
 def _limits(designs: Sequence[_Design]) -> Panel:
     """Return which limit was first: of cams by angle, else as bars."""
     if any(design.result.angles for design in designs):
-        marks = list[Mark]()
         edges: FloatArray = np.radians(5.0 * np.arange(73))
-        y = Axis("share", "%", limits=(0.0, None))
-        for design in designs:
-            for number, (name, angles) in enumerate(design.result.angles.items()):
-                share = np.histogram(angles % (2.0 * np.pi), edges)[0] / design.result.count
-                alpha, label = 0.8 - 0.4 * (number % 2), design.words(name)
-                places = edges[:-1], edges[1:], share
-                marks.append(Bars(*places, colour=design.colour, alpha=alpha, label=label))
-        caption = "Share of the machines by the angle at which the limit was reached."
-        return Panel("Angle at which the limit is reached", ANGLE, y, marks, caption)
+        return Panel(
+            "Angle at which the limit is reached",
+            ANGLE,
+            Axis("share", "%", limits=(0.0, None)),
+            [
+                Bars(
+                    *(edges[:-1], edges[1:]),
+                    np.histogram(angles % (2.0 * np.pi), edges)[0] / design.result.count,
+                    colour=design.colour,
+                    alpha=0.8 - 0.4 * (number % 2),
+                    label=design.words(name),
+                )
+                for design in designs
+                for number, (name, angles) in enumerate(design.result.angles.items())
+            ],
+            "Share of the machines by the angle at which the limit was reached.",
+        )
     if not any(design.result.observed.any() for design in designs):
         return message("Limit reached first", "no limit was reached")
     names = list(dict.fromkeys(name for design in designs for name in design.result.first_limits))
@@ -340,10 +358,13 @@ def _limits(designs: Sequence[_Design]) -> Panel:
         bars.append(
             Bars(left, left + width, shares, colour=design.colour, alpha=0.8, label=design.named)
         )
-    shown_names = [name.replace("_", " ") for name in names]
     return Panel(
         "Limit reached first",
-        Axis(ticks=range(len(names)), names=shown_names, limits=(-1.0, max(len(names), 1.0))),
+        Axis(
+            ticks=range(len(names)),
+            names=[name.replace("_", " ") for name in names],
+            limits=(-1.0, max(len(names), 1.0)),
+        ),
         share_axis("share"),
         bars,
         "Share of the machines by the limit that they reached first.",
@@ -361,19 +382,18 @@ def life_overview(result: LifeResult, lives: Mapping[str, Rows], no_effects: str
     no_effects : str
         Why there are no effects of the inputs, or an empty text.
     """
-    scenario, groups, excluded = result.scenario, dict[str, Rows](), list(EXCLUDED)
-    if result.raw.fatigue:
-        excluded.remove(NO_FATIGUE)
+    scenario, groups = result.scenario, dict[str, Rows]()
+    excluded = excluded_effects(bool(result.raw.fatigue))
     if scenario.cam is None:
         main = life_sheet(result).first
     else:
         groups["Loads"], main = loads(scenario), shape_panel(unchecked_turn_of(scenario))
         excluded += CAM_EXCLUDED
     if result.count:
-        shares = (result.first_limits.get(name, 0.0) for name in scenario.limit.given)
+        shares = {name: result.first_limits.get(name, 0.0) for name in scenario.limit.given}
         groups["First limit"] = [
             Row(name.replace("_", " "), f"the first in {shown(share, '%', 3)} of the tests")
-            for name, share in zip(scenario.limit.given, shares, strict=True)
+            for name, share in shares.items()
         ]
         title = "What moves the life (with the input at its 10 % and 90 % quantile)"
         groups |= {**lives, title: _movers(result, no_effects)}
@@ -385,9 +405,8 @@ def _movers(result: LifeResult, no_effects: str) -> Rows:
     if no_effects:
         return [Row("inputs", no_effects.replace("\n", ": "))]
     effects = [item for item in result.sensitivity("life") if not item.without_effect]
-    effects.sort(key=lambda item: -item.first.value)
     changes, rows = result.tornado(), list[Row]()
-    for item in effects[:3]:
+    for item in sorted(effects, key=lambda item: -item.first.value)[:3]:
         text = f"{shown(item.first.value, '%', 2)} of the scatter"
         if item.name in changes:
             low, high = (factor.value - 1.0 for factor in changes[item.name].factors)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ from wearsim.units import kind_of
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.lives import fewest_lives, least_survival
 from wearsim.uq.survival.rare_events import RareProbability
+from wearsim.uq.survival.two_levels import UncertainLife
 
 RARE_TESTS = 200  # that are proposed for a probability that is not stated
 _SMALL = 0.01  # probability below which more digits are shown
@@ -42,7 +43,6 @@ ERROR = (
     " error of the model."
 )
 
-_UNKNOWN = (NOTHING, NOTHING)
 _EFFECTS = "what moves the life: Sobol indices of its logarithm"
 
 
@@ -57,9 +57,9 @@ class LifeView(RealisationsView[LifeResult]):
 
     def __init__(self, result: LifeResult) -> None:
         super().__init__(result)
-        limits = ", ".join(limit_texts(result.scenario.limit.given))
+        self._limits = ", ".join(limit_texts(result.scenario.limit.given))
         self.question = (
-            f"How many {result.unit} does the design last, until the first of: {limits}?"
+            f"How many {result.unit} does the design last, until the first of: {self._limits}?"
         )
         self.warnings = (*result.warnings, *remarks(result))
 
@@ -68,51 +68,60 @@ class LifeView(RealisationsView[LifeResult]):
         result = self.result
         if result.count == 0:
             return [Row("life", "no test is completed")]
-        shares = sorted(result.settings.shares, key=lambda share: share != 10.0)
-        rows = [
-            Row(
-                f"B{share:g}",
-                life_text(result, share) + self._plug_in(share),
-                answers={f"b{share:g}": (result.b(share).value, "1")},
-            )
-            for share in shares
+        survived = f"at least {shown(least_survival(result.count), '%', 3)} survive"
+        bound = f"{survived} {count(result.most)} {result.unit}, with 95 % confidence"
+        is_refused = result.rare is not None and not result.rare.is_reliable
+        no_end = not (result.observed.any() or result.is_exact)
+        return [
+            *(
+                Row(
+                    f"B{share:g}",
+                    life_text(result, share) + self._plug_in(share),
+                    answers={f"b{share:g}": (result.b(share).value, "1")},
+                )
+                for share in sorted(result.settings.shares, key=lambda share: share != 10.0)
+            ),
+            *self._target_rows(),
+            *(Row(f"by {name}", rare_text(item)) for name, item in result.rare_estimates.items()),
+            *(
+                [Row("small probability", "not stated; give a greater --rare")]
+                if is_refused
+                else []
+            ),
+            *([Row("no life ended", bound)] if no_end else []),
         ]
-        if result.target is not None:
-            name = f"P(life < {count(result.target)} {result.unit})"
-            chance = result.probability_before(result.target).value
-            rows.append(Row(name, target_text(result), answers={"probability": (chance, "%")}))
-            obstacle = result.probability_obstacle(result.target)
-            if obstacle and result.rare is None and not result.settings.alone:
-                rows.append(Row("tests that sample the other inputs", f"`{rare_command(result)}`"))
-        rows += [Row(f"by {name}", rare_text(item)) for name, item in result.rare_estimates.items()]
-        if result.rare is not None and not result.rare.is_reliable:
-            rows.append(Row("small probability", "not stated; give a greater --rare"))
-        if not result.observed.any() and not result.is_exact:
-            bound = f"at least {shown(least_survival(result.count), '%', 3)}"
-            text = f"{bound} survive {count(result.most)} {result.unit}, with 95 % confidence"
-            rows.append(Row("no life ended", text))
-        return rows
+
+    def _target_rows(self) -> Rows:
+        """Return the probability of a life before the target, or how a small one is found."""
+        result, target = self.result, self.result.target
+        if target is None:
+            return []
+        row = Row(
+            f"P(life < {count(target)} {result.unit})",
+            target_text(result),
+            answers={"probability": (result.probability_before(target).value, "%")},
+        )
+        if not result.probability_obstacle(target) or result.rare or result.settings.alone:
+            return [row]
+        return [row, Row("tests that sample the other inputs", f"`{rare_command(result)}`")]
 
     def study(self) -> Rows:
         """Return rows on limits, realisations, wear factor, ends of the lives and effort."""
         result, settings = self.result, self.result.settings
         done = f"{count(result.count)} done, {count(result.failed)} failed"
         done += f", of {count(settings.plain)}" if result.requested > 1 else ""
-        limits = ", ".join(limit_texts(result.scenario.limit.given))
         factor = f"lives are counted: {settings.reason}"
         if settings.factor:
-            factor = f"{settings.factor} is integrated exactly"
-            if result.levels is not None:
-                factor += f", with its posterior given {_tests_of(result)}"
+            posterior = f", with its posterior given {_tests_of(result)}" if result.levels else ""
             alone = "; nothing else is random, so that one test is sufficient"
-            factor += alone if settings.alone else ""
+            factor = f"{settings.factor} is integrated exactly{posterior}{alone * settings.alone}"
         fresh = f"; {count(result.at_once)} reached a limit at once, when fresh"
         ends = (
             f"{count(int(result.observed.sum()))} ended by a limit, {count(result.censored)}"
             f" censored at {count(result.most)} {result.unit}{fresh if result.at_once else ''}"
         )
         return [
-            Row("life", f"{result.unit} until the first of: {limits}"),
+            Row("life", f"{result.unit} until the first of: {self._limits}"),
             Row("realisations", done if result.finished else f"{done}, unfinished"),
             Row("wear factor", factor),
             Row("lives", ends),
@@ -128,16 +137,19 @@ class LifeView(RealisationsView[LifeResult]):
         if not result.count:
             return []
         competing = competing_table(result, result.b_error)
-        lines = [
-            [name.replace("_", " "), shown(share, "%", 3), self._angle(name)]
-            for name, share in result.first_limits.items()
-        ]
         return [
             *([self._levels()] if result.uncertain is not None else []),
             lives_table([""], [result]),
             *([Table("", competing[1], competing[0])] if competing else []),
             *fit_tables(result),
-            Table("", lines, ["first limit", "share", ""]),
+            Table(
+                "",
+                [
+                    [name.replace("_", " "), shown(share, "%", 3), self._angle(name)]
+                    for name, share in result.first_limits.items()
+                ],
+                ["first limit", "share", ""],
+            ),
             self.observables_table("at the end of the life"),
             self._effects(),
         ]
@@ -147,28 +159,16 @@ class LifeView(RealisationsView[LifeResult]):
         life = self.result.uncertain_life(share)
         if life is None:
             return ""
-        plug_in = rounded_lives(life.low, life.plug_in, life.high)[1]
+        _, plug_in, _ = rounded_lives(life.low, life.plug_in, life.high)
         return f" given {_tests_of(self.result)}; plug-in {plug_in}"
 
     def _levels(self) -> Table:
         """Return predictive and plug-in lives, and what would reduce their uncertainty."""
-        result, lines = self.result, []
-        for share in result.settings.shares:
-            life = result.uncertain_life(share)
-            assert life is not None
-            known = math.isfinite(life.low) and math.isfinite(life.high)
-            low, predictive, plug_in, high = rounded_lives(
-                life.low, life.predictive, life.plug_in, life.high
-            )
-            total = life.by_tests + life.by_realisations
-            parts = (life.by_tests, life.by_realisations)
-            of_total = [shown(part / total, "%", 2) if total else NOTHING for part in parts]
-            deviation = f"{math.sqrt(total):.2g}" if known else NOTHING
-            cells = (predictive, plug_in, f"{low}..{high}", deviation)
-            lines.append([f"B{share:g}", *cells, *(of_total if known else [NOTHING, NOTHING])])
+        result = self.result
+        lives = {share: result.uncertain_life(share) for share in result.settings.shares}
         return Table(
             "",
-            lines,
+            [[f"B{share:g}", *_uncertain_cells(life)] for share, life in lives.items() if life],
             [
                 f"life [{result.unit}], given {_tests_of(result)}",
                 *("predictive", "plug-in", "95 % credible"),
@@ -181,8 +181,8 @@ class LifeView(RealisationsView[LifeResult]):
         if name not in self.result.angles:
             return ""
         low, middle, high = np.degrees(np.quantile(self.result.angles[name], (0.05, 0.5, 0.95)))
-        where = f"at {middle:.1f} deg"
-        return where + (f" (90 % in {low:.1f} to {high:.1f} deg)" if high - low > 0.05 else "")
+        spread = f" (90 % in {low:.1f} to {high:.1f} deg)" if high - low > 0.05 else ""
+        return f"at {middle:.1f} deg{spread}"
 
     def _effects(self) -> Table:
         """Return the Sobol indices of the life, and its change by each input."""
@@ -201,7 +201,7 @@ class LifeView(RealisationsView[LifeResult]):
                     *(
                         map(_change, changes[item.name].factors)
                         if item.name in changes
-                        else _UNKNOWN
+                        else (NOTHING, NOTHING)
                     ),
                 ]
                 for item in result.sensitivity("life")
@@ -212,14 +212,15 @@ class LifeView(RealisationsView[LifeResult]):
     def _no_effects(self) -> str:
         """Return why there are no effects, or an empty text."""
         result = self.result
-        if result.settings.alone:
-            return result.settings.factor
-        if result.count == 1:
-            return TOO_FEW_REALISATIONS
-        if result.are_equal:
-            return "nothing, no two lives differ"
-        if result.effects_obstacle:
-            return f"not stated\n{result.effects_obstacle}"
+        reasons = (
+            (result.settings.alone, result.settings.factor),
+            (result.count == 1, TOO_FEW_REALISATIONS),
+            (result.are_equal, "nothing, no two lives differ"),
+            (result.effects_obstacle, f"not stated\n{result.effects_obstacle}"),
+        )
+        for applies, reason in reasons:
+            if applies:
+                return reason
         return "" if known_effects(result, "life") else too_few(result.fewest_for_indices())
 
     def data(self) -> dict[str, Any]:
@@ -234,16 +235,6 @@ class LifeView(RealisationsView[LifeResult]):
                 "not_stated_because": obstacle or None,
                 "command": rare_command(result) if obstacle and not settings.rare else None,
             }
-        lives = {}
-        for share in settings.shares:
-            (low, high), life = result.b_error(share), result.uncertain_life(share)
-            lives[f"{share:g}"] = {
-                **asdict(result.b(share)),
-                "lower_bound": result.lower_bound(share) if not result.is_exact else None,
-                "numerical_low": low,
-                "numerical_high": high,
-                **({} if life is None else {"given_tests": asdict(life)}),
-            }
         return {
             "title": result.title,
             "unit": result.unit,
@@ -257,7 +248,7 @@ class LifeView(RealisationsView[LifeResult]):
             "maximum": result.most,
             "variable": settings.variable or None,
             "finished": result.finished,
-            "b": lives,
+            "b": {f"{share:g}": _life_data(result, share) for share in settings.shares},
             "probability_before_target": probability,
             "rare": self._rare(),
             "first_limits": result.first_limits,
@@ -289,10 +280,14 @@ class LifeView(RealisationsView[LifeResult]):
     def _rare(self) -> dict[str, Any] | None:
         if self.result.rare is None:
             return None
-        tried = {}
-        for method, item in self.result.rare_estimates.items():
-            known = asdict(item.probability) if item.is_reliable else None
-            tried[method] = {**asdict(item), "probability": known, "refused": not item.is_reliable}
+        tried = {
+            method: {
+                **asdict(item),
+                "probability": asdict(item.probability) if item.is_reliable else None,
+                "refused": not item.is_reliable,
+            }
+            for method, item in self.result.rare_estimates.items()
+        }
         method = next(reversed(tried))
         return {**tried[method], "method": method, "tried": tried}
 
@@ -301,11 +296,12 @@ class LifeView(RealisationsView[LifeResult]):
         from wearsim.studies.life.panels import life_overview  # noqa: PLC0415  (only of pages)
 
         result = self.result
-        groups: dict[str, Rows] = {}
-        if result.count:
-            shares = result.settings.shares
-            groups["Life"] = [Row(f"B{share:g}", _three_digits(result, share)) for share in shares]
-        return life_overview(result, groups, self._no_effects() if result.count else "")
+        if not result.count:
+            return life_overview(result, {}, "")
+        lives = [
+            Row(f"B{share:g}", _three_digits(result, share)) for share in result.settings.shares
+        ]
+        return life_overview(result, {"Life": lives}, self._no_effects())
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""
@@ -327,9 +323,33 @@ def _three_digits(result: LifeResult, share: float) -> str:
         count(float(f"{end:.3g}")) if math.isfinite(end) else NOTHING
         for end in (life.value, life.low, life.high)
     )
-    if life.low == life.high:
-        return f"{value} {result.unit}"
-    return f"{value} {result.unit}, 95 %: {low} to {high}"
+    interval = f", 95 %: {low} to {high}" if life.low != life.high else ""
+    return f"{value} {result.unit}{interval}"
+
+
+def _uncertain_cells(life: UncertainLife) -> list[str]:
+    """Return the cells of a life with its credible interval, and what its uncertainty is due to."""
+    low, predictive, plug_in, high = rounded_lives(
+        life.low, life.predictive, life.plug_in, life.high
+    )
+    cells, total = [predictive, plug_in, f"{low}..{high}"], life.by_tests + life.by_realisations
+    if not (math.isfinite(life.low) and math.isfinite(life.high)):
+        return [*cells, NOTHING, NOTHING, NOTHING]
+    parts = (life.by_tests, life.by_realisations)
+    of_total = (shown(part / total, "%", 2) if total else NOTHING for part in parts)
+    return [*cells, f"{math.sqrt(total):.2g}", *of_total]
+
+
+def _life_data(result: LifeResult, share: float) -> dict[str, Any]:
+    """Return a life with its interval and its numerical error for JSON."""
+    (low, high), life = result.b_error(share), result.uncertain_life(share)
+    return {
+        **asdict(result.b(share)),
+        "lower_bound": result.lower_bound(share) if not result.is_exact else None,
+        "numerical_low": low,
+        "numerical_high": high,
+        **({} if life is None else {"given_tests": asdict(life)}),
+    }
 
 
 def _tests_of(result: LifeResult) -> str:
@@ -340,23 +360,32 @@ def _tests_of(result: LifeResult) -> str:
 
 def lives_table(labels: Sequence[str], results: Sequence[LifeResult]) -> Table:
     """Return lives, their intervals, and the lives with the numerical errors of the tests."""
-    lines = []
-    for label, result in zip(labels, results, strict=True):
-        for share in result.settings.shares:
-            ends, value = result.b_error(share), result.b(share).value
-            parts = [100.0 * (end / value - 1.0) if value > 0.0 else math.nan for end in ends]
-            low, high = (f"{part:+.2g}" if part else "0" for part in parts)
-            error = f"{low}..{high} %" if all(map(math.isfinite, parts)) else NOTHING
-            lines.append([f"{label} B{share:g}".strip(), *life_cells(result, share), error])
+    lines = [
+        [f"{label} B{share:g}".strip(), *life_cells(result, share), _numerical(result, share)]
+        for label, result in zip(labels, results, strict=True)
+        for share in result.settings.shares
+    ]
     return Table(
         "", lines, [f"life [{results[0].unit}]", "estimate", "95 % interval", "numerical error"]
     )
 
 
+def _numerical(result: LifeResult, share: float) -> str:
+    """Return the ends of the numerical error of a life, relative to it."""
+    value = result.b(share).value
+    parts = [
+        100.0 * (end / value - 1.0) if value > 0.0 else math.nan for end in result.b_error(share)
+    ]
+    low, high = (f"{part:+.2g}" if part else "0" for part in parts)
+    return f"{low}..{high} %" if all(map(math.isfinite, parts)) else NOTHING
+
+
 def limit_texts(limits: Mapping[str, float]) -> list[str]:
     """Return limits of a life by name in SI units as texts, "depth 50.00 um"."""
-    units = ((name, limit_unit(name), value) for name, value in limits.items())
-    return [f"{name.replace('_', ' ')} {shown(value, unit)}" for name, unit, value in units]
+    return [
+        f"{name.replace('_', ' ')} {shown(value, limit_unit(name))}"
+        for name, value in limits.items()
+    ]
 
 
 def life_text(result: LifeResult, share: float) -> str:
@@ -406,22 +435,22 @@ def study_options(result: LifeResult) -> list[str]:
 
 def rare_command(result: LifeResult) -> str:
     """Return the command for a small probability of a life before the target."""
-    given = _limits_in_si(result.scenario.limit.given)
-    stem = Path(result.raw.scenario_file).stem.removesuffix("-life")
+    file = result.raw.scenario_file
     return shlex.join(
         [
-            *("wearsim", "life", result.raw.scenario_file, *study_options(result)),
-            *(text for limit in given for text in ("--limit", limit)),
-            *("--rare", str(RARE_TESTS), "-o", f"{stem}-rare-life.h5"),
+            *("wearsim", "life", file, *study_options(result)),
+            *_limit_options(result.scenario.limit.given),
+            *("--rare", str(RARE_TESTS)),
+            *("-o", f"{Path(file).stem.removesuffix('-life')}-rare-life.h5"),
         ]
     )
 
 
-def _limits_in_si(limits: Mapping[str, float]) -> list[str]:
-    """Return limits of a life as arguments of --limit, "depth=5e-05 m"."""
-    units = ((name, kind_of(limit_unit(name)).unit) for name in limits)
-    texts = ((name, "" if unit == "1" else f" {unit}") for name, unit in units)
-    return [f"{name}={limits[name]:.12g}{unit}" for name, unit in texts]
+def _limit_options(limits: Mapping[str, float]) -> Iterator[str]:
+    """Yield the options of limits of a life in SI, "--limit" and "depth=5e-05 m"."""
+    for name, limit in limits.items():
+        unit = kind_of(limit_unit(name)).unit
+        yield from ("--limit", f"{name}={limit:.12g}" + ("" if unit == "1" else f" {unit}"))
 
 
 def target_text(result: LifeResult) -> str:
@@ -429,23 +458,18 @@ def target_text(result: LifeResult) -> str:
     assert result.target is not None
     if obstacle := result.probability_obstacle(result.target):
         return f"not stated: {obstacle}"
-    probability = result.probability_before(result.target)
-    if not 0.0 < probability.value < _SMALL:
-        return part_with_interval(probability)
-    interval = (
-        f" [{probability.low:.2g}, {probability.high:.2g}]"
-        if probability.low < probability.high
-        else ""
-    )
-    return f"{probability.value:.3g}{interval}"
+    chance = result.probability_before(result.target)
+    if not 0.0 < chance.value < _SMALL:
+        return part_with_interval(chance)
+    ends = f" [{chance.low:.2g}, {chance.high:.2g}]" if chance.low < chance.high else ""
+    return f"{chance.value:.3g}{ends}"
 
 
 def rare_text(estimate: RareProbability) -> str:
     """Return the probability of a rare event, or why there is none."""
     if not estimate.is_reliable:
         return f"refused, {estimate.obstacle}"
-    chance = estimate.probability
-    size = estimate.effective_size
+    chance, size = estimate.probability, estimate.effective_size
     return (
         f"{chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}], {count(estimate.tests)} tests,"
         f" variation {shown(estimate.variation, '%', 2)}"

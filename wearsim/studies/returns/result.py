@@ -77,10 +77,9 @@ class FieldReturns(Viewed):
     path = None
 
     def __repr__(self) -> str:
-        fleet = self.returns.fleet
-        failed, unit = int(fleet.failed.sum()), self.unit
-        b10 = f"B10 {self.before(10).predictive:.4g} -> {self.after(10).predictive:.4g} {unit}"
-        return f"<FieldReturns '{self.title}': {failed} of {len(fleet)} units failed, {b10}>"
+        failed = f"{self.returns.failed} of {len(self.returns.fleet)} units failed"
+        b10 = f"B10 {self.before(10).predictive:.4g} -> {self.after(10).predictive:.4g} {self.unit}"
+        return f"<FieldReturns '{self.title}': {failed}, {b10}>"
 
     @property
     def title(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,6 +55,11 @@ class Returns:
     running: BoolArray
     others: dict[str, int]
 
+    @property
+    def failed(self) -> int:
+        """Number of units that failed."""
+        return int(self.fleet.failed.sum())
+
 
 class _Reader:
     """Reader of the rows of a file, which collects the mistakes."""
@@ -70,9 +76,8 @@ class _Reader:
         """Check names and units of the columns."""
         for name in self.units:
             if name not in COLUMNS:
-                near = difflib.get_close_matches(name, COLUMNS, n=1)
-                hint = f" (is it '{near[0]}'?)" if near else ""
-                self.add(line, f"unknown column '{name}'{hint}", None, ", ".join(COLUMNS))
+                what = f"unknown column '{name}'{_hint(name, COLUMNS)}"
+                self.add(line, what, None, ", ".join(COLUMNS))
         if "state" not in self.units:
             self.add(line, "column 'state' is missing", None, " or ".join(_STATES))
         if not {"life", "low"} & set(self.units):
@@ -81,8 +86,12 @@ class _Reader:
         for name in _LIVES:
             written = self.units.get(name)
             if written not in {None, "", unit} and self._seconds(written) is None:
-                expected = f"{name} [{unit}], or a time such as {name} [h]"
-                self.add(line, f"column '{name}' has an unknown unit", f"[{written}]", expected)
+                self.add(
+                    line,
+                    f"column '{name}' has an unknown unit",
+                    f"[{written}]",
+                    f"{name} [{unit}], or a time such as {name} [h]",
+                )
 
     @staticmethod
     def _seconds(unit: str | None) -> float | None:
@@ -98,9 +107,8 @@ class _Reader:
         if text in self.labels:
             return self.labels.index(text)
         if text:
-            near = difflib.get_close_matches(text, self.labels, n=1)
-            hint = f" (is it '{near[0]}'?)" if near else ""
-            self.add(row.line, f"column 'design': unknown design{hint}", f"'{text}'", known)
+            what = f"column 'design': unknown design{_hint(text, self.labels)}"
+            self.add(row.line, what, f"'{text}'", known)
         elif len(self.labels) > 1:
             self.add(row.line, "column 'design' is missing", None, known)
         return 0
@@ -136,13 +144,23 @@ class _Reader:
         elif life is not None:
             return life, life
         elif high is None:
-            what = "failed without a life"
-            self.add(row.line, what, None, "a life, or low and high of the inspections")
+            self.add(
+                row.line,
+                "failed without a life",
+                None,
+                "a life, or low and high of the inspections",
+            )
         elif low is not None and low >= high:
             self.add(row.line, "'low' must be below 'high'", f"{low:g} and {high:g}")
         else:
             return low or 0.0, high
         return 1.0, math.inf
+
+
+def _hint(text: str, known: Sequence[str]) -> str:
+    """Return a question whether the nearest known text is meant, if one is near."""
+    near = difflib.get_close_matches(text, known, n=1)
+    return f" (is it '{near[0]}'?)" if near else ""
 
 
 def read_returns(file: str | Path, designs: Sequence[UnitsOf]) -> Returns:
@@ -173,28 +191,31 @@ def read_returns(file: str | Path, designs: Sequence[UnitsOf]) -> Returns:
     else:
         reader.header(rows[0].line - 1)
     limits = {name.replace("_", " ") for item in designs for name in item.limits}
-    names, spans, numbers, running = list[str](), [], list[int](), list[bool]()
-    others: dict[str, int] = {}
+    units_read, others = [], Counter[str]()
     for row in rows if not reader.mistakes else ():
         state = row.cells["state"].lower()
         if state not in _STATES:
-            near = difflib.get_close_matches(state, _STATES, n=1)
-            hint = f" (is it '{near[0]}'?)" if near else ""
-            got = f"'{row.cells['state']}'" if state else None
-            reader.add(row.line, f"column 'state'{hint}", got, " or ".join(_STATES))
+            reader.add(
+                row.line,
+                f"column 'state'{_hint(state, _STATES)}",
+                f"'{row.cells['state']}'" if state else None,
+                " or ".join(_STATES),
+            )
         number = reader.design(row)
         first, last = reader.span(row, state, number)
         cause = row.cells.get("limit", "").replace("_", " ").lower()
         if cause and cause not in limits:
-            others[cause] = others.get(cause, 0) + 1
+            others[cause] += 1
             # withdrawn at this failure, or at the last inspection before it
             first, last = first or _AT_ONCE, math.inf
-        names.append(row.cells.get("unit") or f"line {row.line}")
-        spans.append((first, last))
-        numbers.append(number)
-        running.append(state == "suspended" and not cause)
+        name = row.cells.get("unit") or f"line {row.line}"
+        units_read.append((name, first, last, number, state == "suspended" and not cause))
     refuse_mistakes(str(file), reader.mistakes)
-    low, high = np.array(spans).T
+    names, low, high, numbers, running = zip(*units_read, strict=True)
     return Returns(
-        str(file), names, Fleet(low, high, np.array(numbers)), np.array(running, dtype=bool), others
+        str(file),
+        list(names),
+        Fleet(np.array(low), np.array(high), np.array(numbers)),
+        np.array(running, dtype=bool),
+        dict(others),
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import pairwise
 from typing import Any
@@ -34,13 +34,10 @@ from wearsim.studies.returns.result import SHARES, FieldReturns
 from wearsim.uq.estimation.intervals import Interval, arrays_of
 from wearsim.uq.survival.fleet import Predicted
 from wearsim.uq.survival.lives import survival_curve
+from wearsim.uq.survival.two_levels import UncertainLife
 
 _MOST = 12  # running units in a table
 _REACHED = Interval(1.0, 1.0, 1.0)  # probability of a unit that is older than the target
-_BASIS = (
-    "Intervals hold the value with a probability of 95 %, given the wear tests, the prior of the"
-    " life factor and the returns; units are independent given these."
-)
 
 
 class FieldReturnsView(DesignsView):
@@ -50,14 +47,17 @@ class FieldReturnsView(DesignsView):
     """
 
     file, group = "units.csv", "Life"
-    basis = _BASIS
+    basis = (
+        "Intervals hold the value with a probability of 95 %, given the wear tests, the prior of"
+        " the life factor and the returns; units are independent given these."
+    )
 
     def __init__(self, result: FieldReturns) -> None:
         self.result, self.title = result, result.title
         self.question = f"How many {result.unit} does the design last, by its returns?"
         self.notes = tuple(
-            f"{number} {'unit' if number == 1 else 'units'} withdrawn by another cause, {cause},"
-            " count as suspended"
+            f"{number} unit{'s' * (number != 1)} withdrawn by another cause, {cause}, count as"
+            " suspended"
             for cause, number in result.returns.others.items()
         )
         self.warnings = tuple(_warnings(result))
@@ -65,8 +65,7 @@ class FieldReturnsView(DesignsView):
     def rows(self) -> Rows:
         """Return the lives before and after the returns, and how well they agree."""
         result, check, rows = self.result, self.result.check, list[Row]()
-        given = f"given {self._tests()}"
-        units = count_of(len(result.returns.fleet), "unit")
+        given, units = f"given {self._tests()}", count_of(len(result.returns.fleet), "unit")
         for number, label in enumerate(result.labels):
             of = f" of {label}" if len(result.labels) > 1 else ""
             before, after = (
@@ -79,37 +78,44 @@ class FieldReturnsView(DesignsView):
             ]
             target = result.designs[number].target
             if target is not None:
-                name = f"P(life < {count(target)} {result.unit}){of}"
-                pair = [
+                before, after = (
                     part_with_interval(lives[number].probability_before(target))
                     for lives in (result.lives_before, result.lives_after)
-                ]
-                rows.append(Row(name, f"{pair[1]}, before {pair[0]}"))
-        failed = int(result.returns.fleet.failed.sum())
-        rows.append(
-            Row("failures", f"{failed} observed, {_numbers(check.before, -1)} predicted before")
-        )
-        surprise = _judged(
-            check.surprise,
-            "the number of failures is not the one predicted",
-            "the number of failures is as predicted",
-        )
-        fit = _judged(
-            check.fit,
-            "lives of the field do not have the predicted distribution",
-            "no contradiction in the distribution of the failures",
-        )
-        return [*rows, Row("agreement before", surprise), Row("goodness of fit after", fit)]
+                )
+                rows.append(
+                    Row(f"P(life < {count(target)} {result.unit}){of}", f"{after}, before {before}")
+                )
+        return [
+            *rows,
+            Row(
+                "failures",
+                f"{result.returns.failed} observed, {_numbers(check.before, -1)} predicted before",
+            ),
+            Row(
+                "agreement before",
+                _judged(
+                    check.surprise,
+                    "the number of failures is not the one predicted",
+                    "the number of failures is as predicted",
+                ),
+            ),
+            Row(
+                "goodness of fit after",
+                _judged(
+                    check.fit,
+                    "lives of the field do not have the predicted distribution",
+                    "no contradiction in the distribution of the failures",
+                ),
+            ),
+        ]
 
     def tables(self) -> list[Table]:
         """Return the returns, lives, failures in bands, what is known, and running units."""
-        result = self.result
-        fleet = result.returns.fleet
-        failed = int(fleet.failed.sum())
+        result, fleet = self.result, self.result.returns.fleet
         known = int((fleet.failed & (fleet.low < fleet.high)).sum())
         inspected = f", {count(known)} of them at an inspection" if known else ""
         units = (
-            f"{count_of(len(fleet), 'unit')}: {count(failed)} failed{inspected},"
+            f"{count_of(len(fleet), 'unit')}: {count(result.returns.failed)} failed{inspected},"
             f" {count(len(result.running))} running"
         )
         factor = result.life_factor
@@ -128,43 +134,49 @@ class FieldReturnsView(DesignsView):
 
     def _tests(self) -> str:
         levels = self.result.posterior.before
-        return f"{levels.specimens} specimens" if levels.specimens else "the specimens"
+        return f"{levels.specimens or 'the'} specimens"
 
     def _lives(self) -> Table:
         """Return lives of shares before and after the returns."""
-        result, lines = self.result, []
-        for number, label in enumerate(result.labels):
-            for share in result.designs[number].settings.shares:
-                cells = [f"{label} B{share:g}" if len(result.labels) > 1 else f"B{share:g}"]
-                for life in (result.before(share, number), result.after(share, number)):
-                    low, value, high = rounded_lives(life.low, life.predictive, life.high)
-                    deviation = math.sqrt(life.by_tests + life.by_realisations)
-                    cells += [value, f"{low}..{high}", f"{deviation:.2g}"]
-                lines.append(cells)
+        result = self.result
+        labels = [f"{label} " if len(result.labels) > 1 else "" for label in result.labels]
+        lines = [
+            [
+                f"{label}B{share:g}",
+                *_cells(result.before(share, number)),
+                *_cells(result.after(share, number)),
+            ]
+            for number, label in enumerate(labels)
+            for share in result.designs[number].settings.shares
+        ]
         columns = ["95 % credible", "sd of ln life"]
         return Table("", lines, [f"life [{result.unit}]", "before", *columns, "after", *columns])
 
     def _bands(self) -> Table:
         """Return predicted and observed failures in bands of lives."""
-        check, lines = self.result.check, []
+        check = self.result.check
         edges = [count(float(f"{edge:.3g}")) for edge in check.edges]
         names = [f"{low} to {high}" for low, high in pairwise(edges)]
-        for place, name in enumerate([*names, "in all"]):
-            if len(names) == 1 and place == 1:
-                continue
-            predicted = (_numbers(item, place) for item in (check.before, check.after))
-            lines.append([name, f"{check.observed[place]:.3g}", *predicted])
+        if len(names) > 1:
+            names.append("in all")
         return Table(
             "",
-            lines,
+            [
+                [
+                    *(name, f"{check.observed[place]:.3g}"),
+                    *(_numbers(item, place) for item in (check.before, check.after)),
+                ]
+                for place, name in enumerate(names)
+            ],
             [f"failures at [{self.result.unit}]", "observed", "predicted before", "after"],
         )
 
     def _known(self) -> Table:
         """Return wear factor and life factor before and after the returns."""
         result, posterior = self.result, self.result.posterior
-        pairs = [result.wear_factor(levels) for levels in (posterior.before, posterior.after)]
-        medians, scatters = zip(*pairs, strict=True)
+        medians, scatters = zip(
+            *map(result.wear_factor, (posterior.before, posterior.after)), strict=True
+        )
         factors = {"life factor": (result.factor_before, result.factor)}
         known = {
             "median of K/H over the life factor [1/Pa]": medians,
@@ -184,59 +196,40 @@ class FieldReturnsView(DesignsView):
         """Return the running units with the least remaining lives."""
         result, target = self.result, self.result.designs[0].target
         units = sorted(result.running, key=lambda unit: unit.remaining.lives[0].value)[:_MOST]
-        designs = {"design": [result.labels[unit.design] for unit in units]}
         columns = {
             "running unit": [unit.name for unit in units],
-            **(designs if len(result.labels) > 1 else {}),
+            "design": [result.labels[unit.design] for unit in units],
             f"age [{result.unit}]": [count(float(f"{unit.age:.4g}")) for unit in units],
             **{
                 f"further life, B{share:g}": [_life(unit.remaining.lives[place]) for unit in units]
                 for place, share in enumerate(SHARES)
             },
         }
+        if len(result.labels) == 1:
+            del columns["design"]
         if target is not None:
             chances = [unit.remaining.survival for unit in units]
-            texts = ["reached" if part is None else part_with_interval(part) for part in chances]
-            columns[f"reaches {count(target)}"] = texts
+            columns[f"reaches {count(target)}"] = [
+                "reached" if part is None else part_with_interval(part) for part in chances
+            ]
         lines = [list(line) for line in zip(*columns.values(), strict=True)]
-        if len(result.running) > _MOST:
-            rest = f"and {count(len(result.running) - _MOST)} more"
-            lines.append([rest, *[""] * (len(columns) - 1)])
+        if (more := len(result.running) - _MOST) > 0:
+            lines.append([f"and {count(more)} more", *[""] * (len(columns) - 1)])
         return Table("", lines, list(columns))
 
     def data(self) -> dict[str, Any]:
         """Return all numbers, lives in their unit."""
         result, posterior, check = self.result, self.result.posterior, self.result.check
-        designs: list[dict[str, Any]] = []
-        for number, label in enumerate(result.labels):
-            design = result.designs[number]
-            b = {
-                f"{share:g}": {
-                    "before": asdict(result.before(share, number)),
-                    "after": asdict(result.after(share, number)),
-                }
-                for share in design.settings.shares
-            }
-            designs.append({"label": label, "b": b, "target": design.target})
-            if design.target is not None:
-                designs[-1]["probability_before_target"] = {
-                    name: asdict(lives[number].probability_before(design.target))
-                    for name, lives in (
-                        ("before", result.lives_before),
-                        ("after", result.lives_after),
-                    )
-                }
         before, after = (
             dict(zip(("k_over_h", "scatter"), map(asdict, result.wear_factor(levels)), strict=True))
             for levels in (posterior.before, posterior.after)
         )
-        fleet = result.returns.fleet
         return {
             "title": result.title,
             "unit": result.unit,
             "returns": result.returns.file,
-            "units": len(fleet),
-            "failed": int(fleet.failed.sum()),
+            "units": len(result.returns.fleet),
+            "failed": result.returns.failed,
             "other_causes": result.returns.others,
             "specimens": posterior.before.specimens,
             "life_factor": {
@@ -245,7 +238,7 @@ class FieldReturnsView(DesignsView):
                 "after": asdict(result.factor),
             },
             "wear_factor_over_life_factor": {"before": before, "after": after},
-            "designs": designs,
+            "designs": [self._design_data(number) for number in range(len(result.labels))],
             "failures": {
                 "edges": check.edges,
                 "observed": check.observed,
@@ -273,31 +266,62 @@ class FieldReturnsView(DesignsView):
             "warnings": list(self.warnings),
         }
 
+    def _design_data(self, number: int) -> dict[str, Any]:
+        """Return lives and probability of a design before and after the returns for JSON."""
+        result, design = self.result, self.result.designs[number]
+        data = {
+            "label": result.labels[number],
+            "b": {
+                f"{share:g}": {
+                    "before": asdict(result.before(share, number)),
+                    "after": asdict(result.after(share, number)),
+                }
+                for share in design.settings.shares
+            },
+            "target": design.target,
+        }
+        if design.target is not None:
+            data["probability_before_target"] = {
+                "before": asdict(result.lives_before[number].probability_before(design.target)),
+                "after": asdict(result.lives_after[number].probability_before(design.target)),
+            }
+        return data
+
     def table(self) -> list[Column]:
         """Return the running units as columns."""
-        result = self.result
-        columns = [
-            Column("unit", [unit.name for unit in result.running]),
-            Column("design", [result.labels[unit.design] for unit in result.running]),
-            Column("age", np.array([unit.age for unit in result.running]), result.unit),
+        result, running = self.result, self.result.running
+        has_target = result.designs[0].target is not None
+        return [
+            Column("unit", [unit.name for unit in running]),
+            Column("design", [result.labels[unit.design] for unit in running]),
+            Column("age", np.array([unit.age for unit in running]), result.unit),
+            *(
+                column
+                for place, share in enumerate(SHARES)
+                for column in columns_of(
+                    f"further life B{share:g}",
+                    arrays_of(unit.remaining.lives[place] for unit in running),
+                    result.unit,
+                )
+            ),
+            *(
+                columns_of(
+                    "reaches target",
+                    arrays_of(unit.remaining.survival or _REACHED for unit in running),
+                )
+                if has_target
+                else []
+            ),
         ]
-        for place, share in enumerate(SHARES):
-            lives = arrays_of(unit.remaining.lives[place] for unit in result.running)
-            columns += columns_of(f"further life B{share:g}", lives, result.unit)
-        if result.designs[0].target is not None:
-            survival = arrays_of(unit.remaining.survival or _REACHED for unit in result.running)
-            columns += columns_of("reaches target", survival)
-        return columns
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return survival, failures in bands of lives, and remaining lives of running units."""
-        result = self.result
         panels = {
-            "survival": _survival(result),
-            "failures": _failures(result),
-            "remaining": _remaining(result),
+            "survival": _survival(self.result),
+            "failures": _failures(self.result),
+            "remaining": _remaining(self.result),
         }
-        return Sheet(result.title, panels, [list(panels)], (15.0, 4.6))
+        return Sheet(self.result.title, panels, [list(panels)], (15.0, 4.6))
 
 
 def _life(life: Interval, unit: str = "") -> str:
@@ -305,9 +329,15 @@ def _life(life: Interval, unit: str = "") -> str:
     return f"{value}{unit} [{low}..{high}]"
 
 
+def _cells(life: UncertainLife) -> tuple[str, str, str]:
+    """Return a life, its interval, and the deviation of its logarithm."""
+    low, value, high = rounded_lives(life.low, life.predictive, life.high)
+    return value, f"{low}..{high}", f"{math.sqrt(life.by_tests + life.by_realisations):.2g}"
+
+
 def _numbers(predicted: Predicted, place: int) -> str:
-    ends = (predicted.low[place], predicted.high[place])
-    return f"{predicted.mean[place]:.3g} [{ends[0]:.0f}, {ends[1]:.0f}]"
+    mean, low, high = (ends[place] for ends in (predicted.mean, predicted.low, predicted.high))
+    return f"{mean:.3g} [{low:.0f}, {high:.0f}]"
 
 
 def _judged(probability: float, contradicted: str, agreed: str) -> str:
@@ -315,19 +345,26 @@ def _judged(probability: float, contradicted: str, agreed: str) -> str:
     return f"p = {probability:.2g}: {contradicted if probability < 0.05 else agreed}"
 
 
-def _warnings(result: FieldReturns) -> Iterator[str]:
+def _warnings(result: FieldReturns) -> list[str]:
     """Return what speaks against the model."""
     fit, factor, prior = result.check.fit, result.factor, result.factor_before
-    if fit < 0.05:
-        yield (
-            f"the lives in the field do not have the predicted distribution (p = {fit:.2g}):"
-            " another limit or another scatter of the inputs than in the scenario"
-        )
-    if result.life_factor > 1.0 and not prior.low < factor.value < prior.high:
-        yield (
-            f"the life factor of {factor.value:.2g} is outside its prior: the computed life is"
-            " systematically wrong, or the units are not those of the scenario"
-        )
+    warnings = (
+        (
+            fit < 0.05,
+            (
+                f"the lives in the field do not have the predicted distribution (p = {fit:.2g}):"
+                " another limit or another scatter of the inputs than in the scenario"
+            ),
+        ),
+        (
+            result.life_factor > 1.0 and not prior.low < factor.value < prior.high,
+            (
+                f"the life factor of {factor.value:.2g} is outside its prior: the computed life is"
+                " systematically wrong, or the units are not those of the scenario"
+            ),
+        ),
+    )
+    return [text for applies, text in warnings if applies]
 
 
 _POINTS = 80
@@ -346,8 +383,7 @@ def _survival(result: FieldReturns) -> Panel:
             (before, _PALE, "before", 0.2),
             (after, colour, "after", 0.25),
         ):
-            chances = [lives.probability_before(float(end)) for end in life]
-            value, high, low = 1.0 - arrays_of(chances)
+            value, high, low = 1.0 - arrays_of(map(lives.probability_before, life.tolist()))
             marks += [
                 Band(life, low, high, colour=shade, alpha=alpha),
                 Line(life, value, colour=shade, label=f"{name}{text}"),
@@ -357,39 +393,52 @@ def _survival(result: FieldReturns) -> Panel:
         curve = survival_curve(ends, fleet.failed[chosen])
         if len(curve.life):
             # up to the oldest unit
-            steps = np.append(0.0, np.append(curve.life, ends.max()))
-            left = np.append(1.0, np.append(curve.survival, curve.survival[-1]))
-            text = f"{name}units (Kaplan-Meier)"
-            marks.append(Line(steps, left, "--", steps=True, colour=_DARK, label=text))
+            marks.append(
+                Line(
+                    np.concatenate([[0.0], curve.life, [ends.max()]]),
+                    np.concatenate([[1.0], curve.survival, curve.survival[-1:]]),
+                    "--",
+                    steps=True,
+                    colour=_DARK,
+                    label=f"{name}units (Kaplan-Meier)",
+                )
+            )
     target = result.designs[0].target
     if target is not None:
         marks.append(Span(target, dash=":", colour="0.4", label=f"target {count(target)}"))
-    text = "Share of the machines that outlast a life, before and after the returns."
-    return Panel("Survival, with 95 % bands", axis, share_axis("survival"), marks, text)
+    return Panel(
+        "Survival, with 95 % bands",
+        axis,
+        share_axis("survival"),
+        marks,
+        "Share of the machines that outlast a life, before and after the returns.",
+    )
 
 
 def _failures(result: FieldReturns) -> Panel:
     """Return predicted and observed failures in bands of lives."""
     check = result.check
     bands = len(check.edges) - 1
-    place = np.arange(bands, dtype=float)
-    names = [f"to {count(float(f'{edge:.3g}'))}" for edge in check.edges[1:]]
-    colours = several_colours(2)
-    marks: list[Mark] = [
-        Bars(place - 0.3, place + 0.3, check.observed[:bands], colour=_PALE, label="observed")
-    ]
+    place, observed = np.arange(bands, dtype=float), check.observed[:bands]
+    after, before = several_colours(2)
+    marks: list[Mark] = [Bars(place - 0.3, place + 0.3, observed, colour=_PALE, label="observed")]
     for shift, predicted, label, colour in (
-        (-0.12, check.before, "predicted before", colours[1]),
-        (0.12, check.after, "predicted after", colours[0]),
+        (-0.12, check.before, "predicted before", before),
+        (0.12, check.after, "predicted after", after),
     ):
-        ends = predicted.low[:bands], predicted.high[:bands]
-        marks.append(Whiskers(place + shift, *ends, colour=colour))
-        marks.append(dots(place + shift, predicted.mean[:bands], "o", colour=colour, label=label))
-    most = max(float(check.after.high[:bands].max()), float(check.observed[:bands].max()))
+        mean, low, high = (ends[:bands] for ends in (predicted.mean, predicted.low, predicted.high))
+        marks += [
+            Whiskers(place + shift, low, high, colour=colour),
+            dots(place + shift, mean, "o", colour=colour, label=label),
+        ]
+    most = max(float(check.after.high[:bands].max()), float(observed.max()))
     return Panel(
         "Failures",
         Axis(
-            f"life [{result.unit}]", ticks=place.tolist(), names=names, limits=(-0.6, bands - 0.4)
+            f"life [{result.unit}]",
+            ticks=place.tolist(),
+            names=[f"to {count(float(f'{edge:.3g}'))}" for edge in check.edges[1:]],
+            limits=(-0.6, bands - 0.4),
         ),
         Axis("units", limits=(0.0, 1.6 * most + 1.0)),
         marks,
@@ -402,13 +451,11 @@ def _remaining(result: FieldReturns) -> Panel:
     title = "Further life of running units"
     if not result.running:
         return message(title, "no unit is running")
-    marks = list[Mark]()
-    age = np.array([unit.age for unit in result.running])
+    marks, age = list[Mark](), np.array([unit.age for unit in result.running])
     for place, (share, colour) in enumerate(zip(SHARES, several_colours(len(SHARES)), strict=True)):
         value, low, high = arrays_of(unit.remaining.lives[place] for unit in result.running)
-        high = np.where(np.isfinite(high), high, np.nan)
         marks += [
-            Whiskers(age, low, high, colour=colour),
+            Whiskers(age, low, np.where(np.isfinite(high), high, np.nan), colour=colour),
             dots(age, value, "o", colour=colour, label=f"B{share:g}"),
         ]
     x, y = (Axis(name, result.unit, 1.0, limits=(0.0, None)) for name in ("age", "further life"))

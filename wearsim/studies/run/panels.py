@@ -18,7 +18,6 @@ from wearsim.report.panels import (
     Axis,
     Band,
     Line,
-    Mark,
     Panel,
     Records,
     Sheet,
@@ -40,11 +39,11 @@ HEIGHT = Axis("height above nominal", "um")
 def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     """Return the panels of a run; measured profiles are drawn over the computed ones."""
     power = np.asarray(result.dissipation).reshape(-1, len(result.y)).max(axis=0)
-    limits = worn_limits(result.y, power, *(profile.y for profile in measured))
+    across = track_axis(result.y, power, *(profile.y for profile in measured))
     panels = {
-        "profiles": _profiles(result, limits, measured),
+        "profiles": _profiles(result, across, measured),
         "depth": depth_panel(result),
-        "dissipation": _dissipation(result, limits),
+        "dissipation": _dissipation(result, across),
         "load": _normal_force(result),
         "pressure": pressure_panel(result),
     }
@@ -63,18 +62,27 @@ def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
     )
 
 
+def track_axis(y: FloatArray, worn: FloatArray, *others: FloatArray) -> Axis:
+    """Return the axis across the track, over what is worn; parameters as of `worn_limits`."""
+    return Axis(Y, "mm", limits=worn_limits(y, worn, *others))
+
+
 def record_texts(result: Result) -> list[str]:
     """Return passes and time of each record, for the slider of a page."""
-    ends = zip(result.record_passes, result.record_time, strict=True)
-    return [f"pass {count(passes)}, {simulated(time)}" for passes, time in ends]
+    return [
+        f"pass {count(passes)}, {simulated(time)}"
+        for passes, time in zip(result.record_passes, result.record_time, strict=True)
+    ]
 
 
 def caption(result: Result) -> str:
     """Return passes, time, model, depth and width of a run in words."""
     depth = f"depth {shown(float(np.max(result.depth[-1])), 'um')}"
     if result.start_height.any():
-        below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
-        depth = f"{depth} worn since the start, depth below nominal {below}"
+        depth += (
+            " worn since the start, depth below nominal"
+            f" {shown(float(np.max(result.depth_below_nominal[-1])), 'um')}"
+        )
     unfinished = "" if result.finished else ", failed" if result.failure else ", unfinished"
     if result.until:
         unfinished = f", stopped at {result.until}"
@@ -86,16 +94,18 @@ def caption(result: Result) -> str:
     )
 
 
-def _profiles(result: Result, limits: tuple[float, float], measured: Sequence[Measured]) -> Panel:
+def _profiles(result: Result, across: Axis, measured: Sequence[Measured]) -> Panel:
     worn, passes = np.asarray(result.profiles), result.record_passes
-    marks: list[Mark] = [Records(result.y, result.start_height - worn, passes)]
     rollers = np.asarray(result.roller_profiles).reshape(len(passes), -1, len(result.y))
-    marks += rollers_at_end(result.y, -rollers[-1])
     return Panel(
         "Worn profile of the cylinder (black: start of the run)",
-        Axis(Y, "mm", limits=limits),
+        across,
         HEIGHT,
-        [*marks, *measured_marks(measured)],
+        [
+            Records(result.y, result.start_height - worn, passes),
+            *rollers_at_end(result.y, -rollers[-1]),
+            *measured_marks(measured),
+        ],
         "Height across the track; at the end the cylinder is"
         f" {shown(float(worn[-1].max()), 'um')} deep.",
         legend="lower right",
@@ -109,36 +119,43 @@ def depth_panel(result: Result) -> Panel:
     passes, depth, error, time = (
         values[drawn] for values in (result.passes, result.depth, result.depth_error, result.time)
     )
-    visible, marks = bool((error > 0.05 * depth).any()), list[Mark]()
     estimate = f"estimated error {shown(float(error[-1]), 'um', 2)} at the end"
-    if visible:
-        low = np.maximum(depth - error, 0.05 * depth) if y.log else depth - error
-        marks.append(Band(passes, low, depth + error, label=estimate, colour=ORANGE, alpha=0.35))
+    low = np.maximum(depth - error, 0.05 * depth) if y.log else depth - error
+    band = Band(passes, low, depth + error, label=estimate, colour=ORANGE, alpha=0.35)
+    is_visible = bool((error > 0.05 * depth).any())
     marker, label = "", "depth"
     if result.stepper == "per-pass":
         estimate = "no stepping error: every roller pass is solved"
     elif len(passes) <= 80:
         marker, label = "o", "depth, one dot per step"
-    label += "" if visible else f"\n({estimate})"
-    more = {"time": (time, "min"), "estimated error": (error, "um")}
-    marks.append(Line(passes, depth, marker=marker, size=2.6, label=label, more=more))
+    label += "" if is_visible else f"\n({estimate})"
     first, last = (shown(float(value), "um") for value in (depth[0], depth[-1]))
     return Panel(
         title,
         x,
         y,
-        marks,
+        [
+            *([band] if is_visible else []),
+            Line(
+                passes,
+                depth,
+                marker=marker,
+                size=2.6,
+                label=label,
+                more={"time": (time, "min"), "estimated error": (error, "um")},
+            ),
+        ],
         f"The depth grows from {first} at pass {count(passes[0])} to {last} at the end.",
         legend="upper left",
     )
 
 
-def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
+def _dissipation(result: Result, across: Axis) -> Panel:
     power = np.asarray(result.dissipation).reshape(len(result.record_passes), -1, len(result.y))
     rollers = power.shape[1]
     return Panel(
         "Dissipated power per length (black: start of the run)",
-        Axis(Y, "mm", limits=limits),
+        across,
         Axis("$P_l$", "W/mm", limits=(0.0, None)),
         [
             Records(
@@ -158,8 +175,7 @@ def _dissipation(result: Result, limits: tuple[float, float]) -> Panel:
 
 
 def _normal_force(result: Result) -> Panel:
-    force = _by_roller(result.normal_force)
-    base = _base_load(result)
+    force, base = _by_roller(result.normal_force), _base_load(result)
     # between the steps, a line would contradict the load; at many of them, the dots are a line
     style: dict[str, Any] = {} if base is None else {"dash": "", "marker": "o", "size": 2.6}
     return Panel(
@@ -176,10 +192,10 @@ def _normal_force(result: Result) -> Panel:
 
 def pressure_panel(result: Result) -> Panel:
     """Return the peak pressure of the rollers against time."""
-    values, x = _by_roller(result.peak_pressure), Axis("time", "min")
+    values = _by_roller(result.peak_pressure)
     return Panel(
         "Peak pressure of the rollers",
-        x,
+        Axis("time", "min"),
         _force_axis("peak pressure", "MPa", values),
         _lines(result, values),
         _first_and_last(values, "MPa"),

@@ -27,7 +27,6 @@ from wearsim.report.view import Column, Columns, Frame, Overview, Row, Rows, wid
 from wearsim.results.study_view import StudyView, varying_inputs, varying_rows
 from wearsim.studies.fatigue.observables import fatigue_scenario
 from wearsim.studies.fatigue.view import (
-    EXCLUDED as NO_FATIGUE,
     fatigue_data,
     fatigue_rows,
     with_sources,
@@ -43,9 +42,6 @@ _NOT_MODEL = (
     " contain the errors of the contact model, of the wear law or of the inputs."
 )
 
-_IN_OVERVIEW = {"roller depth", "width", "lift error, peak to peak"}
-#: what wear tests do not contain
-EXCLUDED = (NO_FATIGUE, "heating", "plastic flow", "load carried by a lubricant film")
 _RECORDS = {
     "cylinder_depth_profiles.csv": "cylinder_depth_profile",
     "roller_depth_profiles.csv": "roller_depth_profile",
@@ -54,6 +50,12 @@ _RECORDS = {
     "cylinder_damage_profiles.csv": "cylinder_damage_profile",
     "roller_damage_profiles.csv": "roller_damage_profile",
 }
+
+
+def excluded_effects(has_fatigue: bool) -> list[str]:
+    """Return what wear tests do not contain; fatigue unless it is computed."""
+    effects = ["heating", "plastic flow", "load carried by a lubricant film"]
+    return effects if has_fatigue else ["fatigue (pitting)", *effects]
 
 
 class RunView(StudyView[Result]):
@@ -65,18 +67,19 @@ class RunView(StudyView[Result]):
 
     verb, sheet = "run", "wearsim.studies.run.panels:run_sheet"
     body, unit, per_unit = "cylinder", "roller passes", 1.0  # of the length of a test
-    excluded: tuple[str, ...] = ()  # besides `EXCLUDED`
+    excluded: tuple[str, ...] = ()  # besides `excluded_effects`
 
     def __init__(self, result: Result) -> None:
         super().__init__(result)
-        raw, is_exact = result.raw, result.stepper == "per-pass"
-        length = f"{count(raw.total_passes / self.per_unit)} {self.unit}"
+        raw = result.raw
         time = simulated(raw.total_passes / raw.kinematics["pass_rate"])
-        self.question = f"How deep does the {self.body} wear in {length} ({time})?"
+        length = f"{count(raw.total_passes / self.per_unit)} {self.unit} ({time})"
+        self.question = f"How deep does the {self.body} wear in {length}?"
         self.heading = "end state" if result.finished else "current state"
         if result.failure:
             self.heading = "state before the failure"
-        self.basis = NO_STEPPING_ERROR if is_exact else _NOT_MODEL
+        self._is_exact = result.stepper == "per-pass"  # every roller pass is solved
+        self.basis = NO_STEPPING_ERROR if self._is_exact else _NOT_MODEL
 
     def standing(self) -> str:
         """Return the passes and the simulated time that the run has reached."""
@@ -93,34 +96,41 @@ class RunView(StudyView[Result]):
             return f"stopped at {result.until}: pass {reached} of {count(total)}, {time}"
         if result.finished:
             return f"finished: {count(passes)} passes, {time}"
-        part = f"{100.0 * passes / total:.1f} %"
-        word = "failed after" if result.failure else "unfinished:"
-        return f"{word} pass {count(passes)} of {count(total)} ({part}), {time}"
+        reached = f"pass {count(passes)} of {count(total)} ({100.0 * passes / total:.1f} %), {time}"
+        return f"{'failed after' if result.failure else 'unfinished:'} {reached}"
 
     def rows(self) -> Rows:
         """Return the observables at the end of the run, the depth with its error first."""
-        result, is_exact = self.result, self.result.stepper == "per-pass"
+        result = self.result
         errors = {name: float(np.max(values[-1])) for name, values in result.errors.items()}
+        errors["depth_below_nominal"] = result.depth_below_nominal_error
 
         def stated(label: str, name: str, unit: str) -> Row:
             values = np.asarray(getattr(result, name)[-1])
-            answers = {name: (float(np.max(values)), unit)}
-            return Row(label, with_error(values, errors.get(name), unit), answers=answers)
+            return Row(
+                label,
+                with_error(values, errors.get(name), unit),
+                answers={name: (float(np.max(values)), unit)},
+            )
 
-        error = None if is_exact else float(np.max(result.depth_error[-1]))
-        answers = {"depth": (float(np.max(result.depth[-1])), "um")}
-        rows = [Row("depth", result.depth[-1], "um", error, answers)]
-        if result.start_height.any():
-            errors["depth_below_nominal"] = result.depth_below_nominal_error
-            below = stated("depth below nominal", "depth_below_nominal", "um")
-            rows = [rows[0]._replace(label="depth worn since the start"), below]
-        if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
-            rows.insert(1, stated("roller depth", "roller_depth", "um"))
-        rows += [
+        started_worn, width = result.start_height.any(), result.width[-1]
+        error = None if self._is_exact else float(np.max(result.depth_error[-1]))
+        return [
+            Row(
+                "depth worn since the start" if started_worn else "depth",
+                *(result.depth[-1], "um", error),
+                {"depth": (float(np.max(result.depth[-1])), "um")},
+            ),
+            *(
+                [stated("roller depth", "roller_depth", "um")]
+                if np.any(np.asarray(result.roller_depth[-1]) > 0.0)
+                else []
+            ),
+            *([stated("depth below nominal", "depth_below_nominal", "um")] if started_worn else []),
             *self.limit_rows(),
             stated("width", "width", "mm")
-            if np.any(result.width[-1])
-            else width_row(result.width[-1], result.raw.width_threshold),
+            if np.any(width)
+            else width_row(width, result.raw.width_threshold),
             stated("worn volume", "worn_volume", "mm^3"),
             stated("dissipated energy", "dissipated_energy", "J"),
             stated("dissipated power", "power", "W"),
@@ -130,12 +140,16 @@ class RunView(StudyView[Result]):
             stated("elastic approach", "elastic_approach", "um"),
             *self.along_angle(),
             *fatigue_rows(result, self.body),
+            self._error_row(error),
         ]
+
+    def _error_row(self, error: float | None) -> Row:
+        """Return the row on the error of the depth [m], also relative to the greatest depth."""
         if error is None:
-            return [*rows, Row("error of depth", NO_STEPPING_ERROR)]
+            return Row("error of depth", NO_STEPPING_ERROR)
         depth, whose = self._greatest_depth()
         part = f", {shown(error / depth, '%', 2)}{whose}" if depth > 0.0 else ""
-        return [*rows, Row("estimated error of depth", f"{shown(error, 'um', 2)}{part}")]
+        return Row("estimated error of depth", f"{shown(error, 'um', 2)}{part}")
 
     def _greatest_depth(self) -> tuple[float, str]:
         """Return the depth to which its error is related, and whose it is if not the cylinder's."""
@@ -146,22 +160,21 @@ class RunView(StudyView[Result]):
 
     def study(self) -> Rows:
         """Return rows on the test, its failure, and the effort of the computation."""
-        result, solves = self.result, count(_last(self.result.solves))
+        result, raw = self.result, self.result.raw
         first, last = (count(float(result.record_passes[place])) for place in (0, -1))
-        failure = [Row("failure", result.failure), Row("failed at", result.raw.failed_at)]
-        if result.stepper == "per-pass":
-            solves += f", {count(_last(result.full_solves))} roller passes solved in full"
+        in_full = f", {count(_last(result.full_solves))} roller passes solved in full"
+        failure = [Row("failure", result.failure), Row("failed at", raw.failed_at)]
         return [
             Row("test", self.standing()),
             *(failure if result.failure else []),
             Row("contact model", result.described_model),
-            Row("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
-            Row("seed", str(result.raw.seed)),
+            Row("stepper", f"{result.stepper}, tolerance {raw.tolerance:g}"),
+            Row("seed", str(raw.seed)),
             Row("records", f"{len(result.record_passes)}, at passes {first} to {last}"),
             Row("strips", str(len(result.y))),
             Row("steps", f"{count(_last(result.steps))}, {count(_last(result.rejected))} rejected"),
-            Row("contact solves", solves),
-            Row("wall time", lapse(result.raw.wall_seconds)),
+            Row("contact solves", count(_last(result.solves)) + in_full * self._is_exact),
+            Row("wall time", lapse(raw.wall_seconds)),
         ]
 
     def random_inputs(self) -> Rows:
@@ -212,33 +225,31 @@ class RunView(StudyView[Result]):
 
     def line(self) -> str:
         """Return the footer of the run, with the estimated errors of its steps and strips."""
-        result = self.result
-        error, has_steps = "no stepping error", result.stepper != "per-pass"
+        result, error = self.result, "no stepping error"
         known = bool(np.isfinite(result.profile_error_by_strips[-1]).all())
-        if has_steps or known:
+        if known or not self._is_exact:
             depth, whose = self._greatest_depth()
-            volume = np.max(result.worn_volume[-1])
-            text, parts = within("depth", np.max(result.depth_error[-1]), depth) + whose, "steps"
+            by_depth, parts = "", "steps"
             if known:
-                parts = "steps and strips"
-                by = (
-                    np.max(part[-1])
+                shares = (
+                    np.max(part[-1]) / depth if depth > 0.0 else 0.0
                     for part in (result.depth_error_by_steps, result.depth_error_by_strips)
                 )
-                steps, strips = (percent(part / depth if depth > 0.0 else 0.0) for part in by)
-                text += f" (steps {steps}, strips {strips})"
-            volume_text = within("worn volume", np.max(result.volume_error[-1]), volume)
-            profile = within("profile", np.max(result.profile_error[-1]), 1.0)
+                by_depth = " (steps {}, strips {})".format(*map(percent, shares))
+                parts = "steps and strips"
+            volume = np.max(result.volume_error[-1]), np.max(result.worn_volume[-1])
             error = (
-                f"{text}, {profile}, {volume_text} (estimated numerical error of the {parts}, not"
-                " of model or inputs)"
+                f"{within('depth', np.max(result.depth_error[-1]), depth)}{whose}{by_depth},"
+                f" {within('profile', np.max(result.profile_error[-1]), 1.0)},"
+                f" {within('worn volume', *volume)} (estimated numerical error of the {parts},"
+                " not of model or inputs)"
             )
         return footer(
             [
                 result.described_model,
                 f"{len(result.y)} strips",
                 result.stepper,
-                *([f"tolerance {result.raw.tolerance:g}"] if has_steps else []),
+                *([] if self._is_exact else [f"tolerance {result.raw.tolerance:g}"]),
             ],
             error,
             lapse(result.raw.wall_seconds),
@@ -246,23 +257,24 @@ class RunView(StudyView[Result]):
 
     def overview(self) -> Overview:
         """Return the worn body, its loads, and limits that are passed or not."""
-        excluded = [*EXCLUDED, "scatter of the inputs", *self.excluded]
-        if self.result.raw.fatigue:
-            excluded.remove(NO_FATIGUE)
-        sheet = self.panels()
-        limits = self.limit_rows(brief=True)
-        limits = limits or [Row("limits", "none in the scenario, table [limit]")]
-        shown_rows = [row for row in self.rows()[1:] if row.label in _IN_OVERVIEW]
+        sheet, has_fatigue = self.panels(), bool(self.result.raw.fatigue)
         return Overview(
             sheet.panels.get("shape", sheet.first),
-            {"Loads": self.loads(), "Limits": limits, "Wear": shown_rows},
-            excluded,
+            {
+                "Loads": self.loads(),
+                "Limits": self.limit_rows(brief=True)
+                or [Row("limits", "none in the scenario, table [limit]")],
+                "Wear": self._rows_of("roller depth", "width", "lift error, peak to peak"),
+            },
+            [*excluded_effects(has_fatigue), "scatter of the inputs", *self.excluded],
         )
 
     def loads(self) -> Rows:
         """Return the loads of the overview."""
-        named = {row.label: row for row in self.rows()}
-        return [named[name] for name in ("normal force", "peak pressure")]
+        return self._rows_of("normal force", "peak pressure")
+
+    def _rows_of(self, *labels: str) -> Rows:
+        return [row for row in self.rows() if row.label in labels]
 
     def profile(self, angle: float | None = None) -> ComputedProfile:
         """Return the worn profile with which measured ones are compared, of a cam at an angle."""
@@ -270,20 +282,22 @@ class RunView(StudyView[Result]):
 
     def columns(self) -> Mapping[str, Columns]:
         """Return history and records."""
-        raw = self.result.raw
-        history = [
+        raw, scenario = self.result.raw, fatigue_scenario(self.result)
+        history = (
             column
             for name, variable in raw.schema.variables.items()
             if variable.kind == "history"
             for column in _columns(name, raw.history[name], variable.dims, name, self.angles())
-        ]
-        scenario = fatigue_scenario(self.result)
-        tables: dict[str, Columns] = {"history.csv": [with_sources(history, scenario)]}
-        for file, name in _RECORDS.items():
-            always = not name.startswith("roller") and name in raw.records
-            if always or (name in raw.records and raw.records[name].any()):
-                tables[file] = [with_sources(self._records(name), scenario)]
-        return tables
+        )
+        given = {file: name for file, name in _RECORDS.items() if name in raw.records}
+        return {
+            "history.csv": [with_sources(history, scenario)],
+            **{
+                file: [with_sources(self._records(name), scenario)]
+                for file, name in given.items()
+                if not name.startswith("roller") or raw.records[name].any()
+            },
+        }
 
     def angles(self) -> Sequence[str]:
         """Return the angles of the stations of a cam in words; none of a cylinder."""
@@ -297,14 +311,14 @@ class RunView(StudyView[Result]):
         """Yield y, and a column for every record and contact."""
         raw = self.result.raw
         yield from _columns("y", raw.static["y"], ("y",), "y")
-        dims = ("y", *ALL_VARIABLES[name].dims[1:-1])
-        angles = self.angles()
+        dims, angles = ("y", *ALL_VARIABLES[name].dims[1:-1]), self.angles()
         quantity = {"depth_profile": "depth", "damage_profile": "damage"}.get(
             name.partition("_")[2], name
         )
         for passes, array in zip(raw.records["record_passes"], raw.records[name], strict=True):
-            title = f"{quantity} at {passes:.12g} passes"
-            yield from _columns(name, np.moveaxis(array, -1, 0), dims, title, angles)
+            yield from _columns(
+                name, np.moveaxis(array, -1, 0), dims, f"{quantity} at {passes:.12g} passes", angles
+            )
 
     def frame(self) -> Frame:
         """Return the history, one row for each step."""
@@ -327,21 +341,21 @@ class RunView(StudyView[Result]):
         brief : bool
             Whether the rows say that limits are passed or failed, and leave out by how much.
         """
-        rows = list[Row]()
-        for item in self.result.limits:
-            unit, name = limit_unit(item["quantity"]), item["quantity"].replace("_", " ")
-            side = "above" if item["excess"] >= 0.0 else "below"
-            by = "" if brief else f", {abs(100.0 * item['excess']):.3g} % {side}"
-            end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)} at the end{by}"
-            words = ("failed", "passed") if brief else ("reached", "not reached")
-            text = words[1]
-            if item["reached"]:
-                passes = item["reached_at_passes"]
-                when = f"{count(round(passes / self.per_unit))} {self.unit.split()[-1]}"
-                time = simulated(passes / self.result.raw.kinematics["pass_rate"])
-                text = f"{words[0]} after about {when}, {time}"
-            rows.append(Row(name if brief else f"limit of {name}", f"{text}: {end}"))
-        return rows
+        return [self._limit_row(item, brief) for item in self.result.limits]
+
+    def _limit_row(self, item: Mapping[str, Any], brief: bool) -> Row:
+        """Return the row of a limit, of `Result.limits`; `brief` as of `limit_rows`."""
+        unit, name = limit_unit(item["quantity"]), item["quantity"].replace("_", " ")
+        side = "above" if item["excess"] >= 0.0 else "below"
+        by = "" if brief else f", {abs(100.0 * item['excess']):.3g} % {side}"
+        end = f"{in_unit(item['at_end'], unit)} of {shown(item['limit'], unit)} at the end{by}"
+        text = "passed" if brief else "not reached"
+        if item["reached"]:
+            passes = item["reached_at_passes"]
+            when = f"{count(round(passes / self.per_unit))} {self.unit.split()[-1]}"
+            time = simulated(passes / self.result.raw.kinematics["pass_rate"])
+            text = f"{'failed' if brief else 'reached'} after about {when}, {time}"
+        return Row(name if brief else f"limit of {name}", f"{text}: {end}")
 
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the run."""
@@ -359,8 +373,9 @@ def _columns(
             for dim, number, length in zip(dims[1:], index, array.shape[1:], strict=True)
             if length > 1
         ]
-        values = array[(slice(None), *index)]
-        yield computed(" ".join([title, *labels]), values, ALL_VARIABLES[name].unit, name)
+        yield computed(
+            " ".join([title, *labels]), array[(slice(None), *index)], ALL_VARIABLES[name].unit, name
+        )
 
 
 def _last(value: Any) -> int:

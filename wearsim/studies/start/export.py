@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -73,20 +72,17 @@ def export_running_in(result: Result, folder: str | Path, *, force: bool = False
     -48.1 um
     """
     if not isinstance(result, Result):
-        kind = type(result).__name__
         raise ResultsFileError(
-            f"worn profiles are those of one wear test, from `wearsim run`, not of a {kind}"
+            "worn profiles are those of one wear test, from `wearsim run`, not of a"
+            f" {type(result).__name__}"
         )
     data = result.raw
     scenario = stored_scenario(data)
-    overrides: dict[str, object] = {"title": f"{scenario.title}, worn"}
-    contents: dict[str, str] = {}
-    if scenario.cam is None:
-        contents["cylinder-worn.csv"] = _profile_text(_cylinder(scenario, data))
-        overrides["cylinder.profile"] = "cylinder-worn.csv"
-    else:
-        contents["cam-worn.csv"] = _surface_text(scenario, data)
-        overrides["cam.start_profile"] = "cam-worn.csv"
+    body, key, text_of = "cylinder", "cylinder.profile", _cylinder_text
+    if scenario.cam is not None:
+        body, key, text_of = "cam", "cam.start_profile", _surface_text
+    contents = {f"{body}-worn.csv": text_of(scenario, data)}
+    overrides: dict[str, object] = {"title": f"{scenario.title}, worn", key: f"{body}-worn.csv"}
     profiles = _rollers(scenario, data)
     names = [f"roller-{number}-worn.csv" for number in range(1, len(profiles) + 1)]
     if len({profile.height.tobytes() for profile in profiles}) == 1:
@@ -103,11 +99,15 @@ def export_running_in(result: Result, folder: str | Path, *, force: bool = False
         contents[copied] = content
         if copied != name:
             overrides[key] = copied
-    removed = [f"cylinder.profile_{key}" for key in _OF_PROFILES]
-    text = apply_overrides(data.scenario_text, data.scenario_file, overrides, removed)
-    scenario_name = f"{Path(data.scenario_file).stem}-worn.toml"
-    pieces = {name: [content] for name, content in {scenario_name: text, **contents}.items()}
-    return RunningIn(write_files(Path(folder), pieces, force=force), list(_notes(scenario, data)))
+    text = apply_overrides(
+        data.scenario_text,
+        data.scenario_file,
+        overrides,
+        [f"cylinder.profile_{key}" for key in _OF_PROFILES],
+    )
+    files = {f"{Path(data.scenario_file).stem}-worn.toml": text, **contents}
+    pieces = {name: [content] for name, content in files.items()}
+    return RunningIn(write_files(Path(folder), pieces, force=force), _notes(scenario, data))
 
 
 def _keys_of_texts(text: str) -> dict[str, str]:
@@ -135,11 +135,11 @@ def _joined(y: FloatArray, height: FloatArray, earlier: Profile | None) -> Profi
     )
 
 
-def _cylinder(scenario: Scenario, data: RunData) -> Profile:
-    """Return the worn profile of the cylinder."""
+def _cylinder_text(scenario: Scenario, data: RunData) -> str:
+    """Return the worn profile of the cylinder as CSV."""
     grid = _grid(data)
-    worn = data.records["cylinder_depth_profile"][-1, 0, 0]
-    return _joined(grid.y, start_height(scenario, grid) - worn, scenario.cylinder.profile)
+    height = start_height(scenario, grid) - data.records["cylinder_depth_profile"][-1, 0, 0]
+    return _profile_text(_joined(grid.y, height, scenario.cylinder.profile))
 
 
 def _rollers(scenario: Scenario, data: RunData) -> list[Profile]:
@@ -168,8 +168,7 @@ def _profile_text(profile: Profile) -> str:
 def _surface_text(scenario: Scenario, data: RunData) -> str:
     """Return the worn surface of a cam as CSV, with all digits."""
     grid, angle = _grid(data), np.ravel(data.static["station_angle"])
-    worn = data.records["cylinder_depth_profile"][-1, :, 0]
-    height = start_height(scenario, grid, angle) - worn
+    height = start_height(scenario, grid, angle) - data.records["cylinder_depth_profile"][-1, :, 0]
     y = (1e3 * grid.y).tolist()
     rows = (
         f"{math.degrees(place)!r},{at!r},{z + 0.0!r}\n"
@@ -179,18 +178,26 @@ def _surface_text(scenario: Scenario, data: RunData) -> str:
     return "".join(["angle [deg],y [mm],height [um]\n", *rows])
 
 
-def _notes(scenario: Scenario, data: RunData) -> Iterator[str]:
-    """Yield what differs between the new test and the continuation of the old one."""
-    load = scenario.load.built
-    passes, total = float(data.records["record_passes"][-1]), data.total_passes
-    if passes < total:
-        yield f"the profiles are those after {passes:.0f} of {total:.0f} passes"
-    if load.stiffness or getattr(load, "feedback", "none") != "none":
-        yield (
-            "the load of the new scenario is that of the old one at its start: it falls with the"
-            " wear of the new test alone"
-        )
-    if not load.constant or scenario.load.terms:
-        yield "the load begins again at time 0"
-    if any(item.role == "process" for item in scenario.random):
-        yield "random processes begin again at time 0"
+def _notes(scenario: Scenario, data: RunData) -> list[str]:
+    """Return what differs between the new test and the continuation of the old one."""
+    load, passes = scenario.load.built, float(data.records["record_passes"][-1])
+    has_feedback = load.stiffness or getattr(load, "feedback", "none") != "none"
+    notes = (
+        (
+            passes < data.total_passes,
+            f"the profiles are those after {passes:.0f} of {data.total_passes:.0f} passes",
+        ),
+        (
+            has_feedback,
+            (
+                "the load of the new scenario is that of the old one at its start: it falls with"
+                " the wear of the new test alone"
+            ),
+        ),
+        (not load.constant or scenario.load.terms, "the load begins again at time 0"),
+        (
+            any(item.role == "process" for item in scenario.random),
+            "random processes begin again at time 0",
+        ),
+    )
+    return [text for applies, text in notes if applies]

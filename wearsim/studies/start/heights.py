@@ -29,23 +29,20 @@ class StartExtent(NamedTuple):
 
 def start_extent(scenario: Scenario, offsets: Iterable[float]) -> StartExtent | None:
     """Return the extent of the start profiles, or None if there is none; offsets of rollers [m]."""
-    cylinder, roller = scenario.cylinder, scenario.roller
-    ends, relief = [], 0.0
-    if cylinder.profile is not None:
-        ends.append((cylinder.profile.y, 0.0))
-        relief += float(np.ptp(cylinder.profile.height))
-    if cylinder.start_surface is not None:
-        ends.append((cylinder.start_surface.y, 0.0))
-        relief += float(np.ptp(cylinder.start_surface.height, axis=1).max())
-    for number, offset in enumerate(offsets):
-        profile = roller_profile(scenario, number)
-        if profile is not None:
-            ends.append((profile.y, offset))
-    relief += max((float(np.ptp(profile.height)) for profile in roller.profiles), default=0.0)
+    cylinder = scenario.cylinder
+    bodies = [body for body in (cylinder.profile, cylinder.start_surface) if body is not None]
+    rollers = ((roller_profile(scenario, number), end) for number, end in enumerate(offsets))
+    ends = [(body.y, 0.0) for body in bodies]
+    ends += [(profile.y, offset) for profile, offset in rollers if profile is not None]
     if not ends:
         return None
-    low = min(float(y[0]) + offset for y, offset in ends)
-    return StartExtent(low, max(float(y[-1]) + offset for y, offset in ends), relief)
+    reliefs = (float(np.ptp(profile.height)) for profile in scenario.roller.profiles)
+    return StartExtent(
+        min(float(y[0]) + offset for y, offset in ends),
+        max(float(y[-1]) + offset for y, offset in ends),
+        sum(float(np.ptp(body.height, axis=-1).max()) for body in bodies)
+        + max(reliefs, default=0.0),
+    )
 
 
 def roller_profile(scenario: Scenario, number: int) -> Profile | None:
@@ -72,8 +69,9 @@ def start_height(scenario: Scenario, grid: Grid, angles: FloatArray | None = Non
     profile, surface = scenario.cylinder.profile, scenario.cylinder.start_surface
     if surface is not None and angles is not None:
         return surface.at(angles, grid.y)
-    none = np.zeros_like(grid.y)
-    height = none if profile is None else np.interp(grid.y, profile.y, profile.height)
+    height = (
+        np.zeros_like(grid.y) if profile is None else np.interp(grid.y, profile.y, profile.height)
+    )
     return height if angles is None else np.broadcast_to(height, (len(angles), len(height)))
 
 
