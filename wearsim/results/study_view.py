@@ -67,13 +67,12 @@ class StudyView(View, Generic[Shown]):
 
     def tables(self) -> list[Table]:
         """Return the study, its details, random inputs and origin."""
-        random = Table("Random inputs", self.random_inputs())
-        tables = (
+        tables = [
             Table(STUDY, self.study()),
             *self.details(),
-            random,
+            Table("Random inputs", self.random_inputs()),
             Table(ORIGIN, self._sources()),
-        )
+        ]
         return [table for table in tables if table.rows]
 
     def _sources(self) -> Rows:
