@@ -90,6 +90,24 @@ def replacement(path: str | Path, storage: Storage = DISK) -> Iterator[IO[bytes]
         storage.synchronise_folder(target.parent)
 
 
+def save_text(text: str, path: Path) -> None:
+    """Write a text in UTF-8.
+
+    Parameters
+    ----------
+    text : str
+    path : Path
+        An existing file is replaced.
+
+    Raises
+    ------
+    ResultsFileError
+        If it cannot be written; an existing file is then unchanged.
+    """
+    with replacement(path) as file:
+        file.write(text.encode("utf-8"))
+
+
 @contextmanager
 def os_errors_converted(path: str | Path) -> Iterator[None]:
     """Convert an OSError into a ResultsFileError with a one-line message.
@@ -126,8 +144,9 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
     except OSError as error:
         if error.errno in {errno.EAGAIN, errno.EACCES}:
             raise busy from error
-        reason = error.strerror or str(error)
-        raise ResultsFileError(f"{path}: cannot be locked for writing ({reason})") from error
+        raise ResultsFileError(
+            f"{path}: cannot be locked for writing ({error.strerror or error})"
+        ) from error
     if os.fstat(file.fileno()).st_nlink == 0:
         raise busy
 

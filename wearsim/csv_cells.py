@@ -44,8 +44,8 @@ def clock_time(text: str) -> float:
     match = _CLOCK.fullmatch(text.strip())
     if match is None:
         raise ValueError(text)
-    seconds = (match["seconds"] or "0").replace(",", ".")
-    return 3600.0 * float(match["hours"]) + 60.0 * float(match["minutes"]) + float(seconds)
+    hours, minutes, seconds = (float((part or "0").replace(",", ".")) for part in match.groups())
+    return 3600.0 * hours + 60.0 * minutes + seconds
 
 
 def iso_time(text: str) -> float:

@@ -71,13 +71,11 @@ def refuse_mistakes(file: str, mistakes: Sequence[Mistake]) -> None:
     ScenarioError
         With the mistakes.
     """
-    if not mistakes:
-        return
-    alike = len({mistake.what for mistake in mistakes}) == 1
-    most = MAX_ALIKE if alike and len(mistakes) > MAX_MISTAKES else MAX_MISTAKES
-    more = len(mistakes) - most
-    rest = [Mistake("", "", f"and {more} more")] if more > 0 else []
-    raise ScenarioError(file, [*mistakes[:most], *rest])
+    if mistakes:
+        alike = len({mistake.what for mistake in mistakes}) == 1
+        most = MAX_ALIKE if alike and len(mistakes) > MAX_MISTAKES else MAX_MISTAKES
+        more = Mistake("", "", f"and {len(mistakes) - most} more")
+        raise ScenarioError(file, [*mistakes[:most], *([more] if len(mistakes) > most else [])])
 
 
 def read_columns(
@@ -137,10 +135,8 @@ def read_columns(
     for name, other in (opposite or {}).items():
         names[name][other] = -1.0
     mistakes: list[Mistake] = []
-    lines = text.removeprefix("\ufeff").splitlines()
-    header, separator = _find_header(lines, names)
-    heads = ", ".join(_head(name, unit) for name, unit in columns.items())
-    expected = f"a header line such as {heads}"
+    lines, header, separator = _find_header(text, names)
+    expected = f"a header line such as {', '.join(map(_head, columns, columns.values()))}"
     if header is None:
         raise mistake_in(file, "the file is empty", None, expected)
     if all(map(_starts_as_number, header.cells)):
@@ -154,13 +150,8 @@ def read_columns(
             "commas, semicolons or tabs between columns",
             key=f"line {header.line}",
         )
-    start = header.line
-    sample = list(_rows(lines[start : start + HEAD_LINES], start, separator))
-    below = _unit_line(header, sample)
-    if below is not None:
-        start = sample.pop(0).line
-    wanted = {name: (unit, (units or {}).get(name)) for name, unit in columns.items()}
-    chosen = _find_columns(header, below, sample, separator, wanted, names, mistakes)
+    heads, sample, start = _heads_and_sample(lines, header, separator)
+    chosen = _find_columns(header, heads, sample, separator, columns, units or {}, names, mistakes)
     body = lines[start:]
     missing = [k for k, mistake in enumerate(mistakes) if mistake.what.startswith("column")]
     if choice and missing and len(chosen) < len(columns):
@@ -184,9 +175,8 @@ def read_columns(
         if column.name == rising:
             _check_order(numbers, data[column.name], rising, either_way, mistakes)
     refuse_mistakes(file, mistakes)
-    falls = rising is not None and data[rising][0] > data[rising][1]
-    order = slice(None, None, -1 if falls else 1)
-    return {column.name: data[column.name][order] * column.factor for column in chosen}
+    step = -1 if rising is not None and data[rising][0] > data[rising][1] else 1
+    return {column.name: data[column.name][::step] * column.factor for column in chosen}
 
 
 class TextRow(NamedTuple):
@@ -211,21 +201,21 @@ def read_texts(text: str) -> tuple[dict[str, str | None], list[TextRow]]:
     rows : list of TextRow
         Cells that are missing at the end of a row are empty.
     """
-    lines = text.removeprefix("\ufeff").splitlines()
-    header, separator = _find_header(lines, {})
+    lines, header, separator = _find_header(text, {})
     if header is None:
         return {}, []
-    heads = [_name_and_unit(cell) for cell in header.cells]
-    rows = []
-    for row in _rows(lines[header.line :], header.line, separator):
-        cells = row.cells + [""] * (len(heads) - len(row.cells))
-        rows.append(TextRow(row.line, dict(zip([name for name, _ in heads], cells, strict=False))))
-    return dict(heads), rows
+    heads = dict(map(_name_and_unit, header.cells))
+    names = [_name_and_unit(cell)[0] for cell in header.cells]
+    rows = [
+        TextRow(row.line, dict(zip(names, row.cells + [""] * len(names), strict=False)))
+        for row in _rows(lines[header.line :], header.line, separator)
+    ]
+    return heads, rows
 
 
 def column_names(text: str) -> list[str]:
     """Return the names of the columns of a CSV file, in lower case; see `read_columns`."""
-    header = _find_header(text.removeprefix("\ufeff").splitlines(), {})[0]
+    header = _find_header(text, {})[1]
     return [_name_and_unit(cell)[0] for cell in header.cells] if header else []
 
 
@@ -240,19 +230,15 @@ def units_of_columns(text: str, names: Mapping[str, Sequence[str]]) -> dict[str,
         Other accepted names of each column.
     """
     accepted = {name: dict.fromkeys((name, *others), 1.0) for name, others in names.items()}
-    lines = text.removeprefix("\ufeff").splitlines()
-    header, separator = _find_header(lines, accepted)
+    lines, header, separator = _find_header(text, accepted)
     if header is None:
         return {}
-    rows = list(_rows(lines[header.line : header.line + HEAD_LINES], header.line, separator))
-    below = _unit_line(header, rows)
-    units: dict[str, str | None] = {}
-    for place, cell in enumerate(header.cells):
-        own_name, unit = _name_and_unit(cell)
-        for name, others in accepted.items():
-            if own_name in {other.casefold() for other in others}:
-                units[name] = below[place] if below and place < len(below) else unit
-    return units
+    return {
+        name: unit
+        for own_name, unit in _heads_and_sample(lines, header, separator)[0]
+        for name, others in accepted.items()
+        if own_name in {other.casefold() for other in others}
+    }
 
 
 def _mistake(line: int, what: str, got: str | None = None, expected: str | None = None) -> Mistake:
@@ -288,82 +274,87 @@ def _name_and_unit(cell: str) -> tuple[str, str | None]:
 
 
 def _find_header(
-    lines: list[str], names: Mapping[str, Mapping[str, float]]
-) -> tuple[_Row | None, str]:
-    """Return the header of a file and its separator.
+    text: str, names: Mapping[str, Mapping[str, float]]
+) -> tuple[list[str], _Row | None, str]:
+    """Return the lines of a file, its header and its separator.
 
     The header is the first line that names all columns, or a comment that does. In a file without
     such a line it is the last line above the first numbers that holds more than units.
     """
+    lines = text.removeprefix("\ufeff").splitlines()
     wanted = [{other.casefold() for other in accepted} for accepted in names.values()]
     complete_comment, before, above = None, None, None
     for place, line in enumerate(lines[:HEAD_LINES]):
-        text = line.strip().lstrip("#")
-        if not text.strip():
+        content = line.strip().lstrip("#")
+        if not content.strip():
             continue
-        separator = next((mark for mark in "\t;," if mark in text), ",")
-        row = _cells(text, place, separator)
+        separator = next((mark for mark in "\t;," if mark in content), ",")
+        row = _cells(content, place, separator)
         heads = {_name_and_unit(cell)[0] for cell in row.cells}
         complete = all(heads & accepted for accepted in wanted)
         if not _has_cells(line):
             complete_comment = complete_comment or ((row, separator) if complete else None)
         elif complete:
-            return row, separator
+            return lines, row, separator
         elif above is None or not all(map(_starts_as_number, row.cells)):
             before, above = above, (row, separator)
         else:
             break
     if before and above and len(before[0].cells) == len(above[0].cells):
         above = before if all(map(is_unit, above[0].cells)) else above
-    return complete_comment or above or (None, ",")
+    return (lines, *(complete_comment or above or (None, ",")))
 
 
-def _unit_line(header: _Row, sample: list[_Row]) -> list[str] | None:
-    """Return the units on the line below a header without units, or None."""
-    cells = sample[0].cells if sample else []
-    if any(_name_and_unit(cell)[1] for cell in header.cells) or not any(cells):
-        return None
-    if any(map(_starts_as_number, filter(None, cells))):
-        return None
-    return [cell.strip("[](){}<> ") for cell in cells]
+def _heads_and_sample(
+    lines: list[str], header: _Row, separator: str
+) -> tuple[list[tuple[str, str | None]], list[_Row], int]:
+    """Return names and units of the columns, the first rows, and the line above these.
+
+    The units of a header without units may stand on the line below it.
+    """
+    start, heads = header.line, [_name_and_unit(cell) for cell in header.cells]
+    sample = list(_rows(lines[start : start + HEAD_LINES], start, separator))
+    below = list(filter(None, sample[0].cells)) if sample else []
+    if below and not any(unit for _, unit in heads) and not any(map(_starts_as_number, below)):
+        start, cells = sample.pop(0)
+        units = {place: cell.strip("[](){}<> ") for place, cell in enumerate(cells)}
+        heads = [(name, units.get(place, unit)) for place, (name, unit) in enumerate(heads)]
+    return heads, sample, start
 
 
 def _find_columns(
     header: _Row,
-    units: list[str] | None,
+    heads: list[tuple[str, str | None]],
     sample: list[_Row],
     separator: str,
-    wanted: Mapping[str, tuple[str, str | None]],
+    wanted: Mapping[str, str],
+    units: Mapping[str, str],
     names: Mapping[str, Mapping[str, float]],
     mistakes: list[Mistake],
 ) -> list[_Column]:
     """Find the required columns in the header, with the readers that the first rows need.
 
-    `wanted` holds the unit to return and the unit given by the caller, by name.
+    `wanted` holds the unit to return by name, `units` those given by the caller.
     """
-    heads = [_name_and_unit(cell) for cell in header.cells]
-    columns = []
-    for name, (unit, given) in wanted.items():
+    columns, got = [], ", ".join(header.cells)
+    for name, unit in wanted.items():
         accepted = {other.casefold(): sign for other, sign in names[name].items()}
         places = [place for place, (other, _) in enumerate(heads) if other in accepted]
         if len(places) == 1:
             (place,) = places
-            written = units[place] if units and place < len(units) else heads[place][1]
-            written = given or written
+            own_name, written = heads[place]
             cells = [row.cells[place] for row in sample if place < len(row.cells)]
-            conversion = conversion_of(cells, separator, unit)
-            factor = accepted[heads[place][0]]
+            conversion, factor = conversion_of(cells, separator, unit), accepted[own_name]
             if conversion not in {clock_time, iso_time}:
-                factor *= _factor(header.line, heads[place][0], written, unit, mistakes)
+                given = units.get(name) or written
+                factor *= _factor(header.line, own_name, given, unit, mistakes)
             columns.append(_Column(name, place, factor, conversion))
         elif places:
             what = f"column '{name}' appears {len(places)} times"
-            got = ", ".join(header.cells)
             mistakes.append(_mistake(header.line, what, got, "one such column"))
         else:
             near = difflib.get_close_matches(name, [other for other, _ in heads], n=1)
             what = f"column '{name}' is missing" + (f" (is it '{near[0]}'?)" if near else "")
-            got = ", ".join(header.cells)
             expected = " or ".join(_head(other, unit) for other in names[name])
             mistakes.append(_mistake(header.line, what, got, expected))
     return columns
@@ -404,7 +395,6 @@ def _regular_numbers(
     marks = set(map(methodcaller("count", separator), body))
     if marks != {len(header.cells) - 1} or "#" in joined or '"' in joined:
         return None
-    places = [column.place for column in columns]
     converters: Any = {c.place: c.conversion for c in columns if c.conversion}
     if comma_number in converters.values() and "." not in joined:
         body = joined.replace(",", ".").split("\n")
@@ -413,7 +403,7 @@ def _regular_numbers(
         table = np.loadtxt(
             body,
             delimiter=separator,
-            usecols=places,
+            usecols=[column.place for column in columns],
             ndmin=2,
             unpack=True,
             converters=converters or None,
@@ -458,16 +448,17 @@ def _number(cell: str, line: int, column: _Column, mistakes: list[Mistake]) -> f
         expected = EXPECTED[column.conversion]
     if number is not None and abs(number) != float("inf"):
         return number
-    what, got = "is not a number", f"'{cell}'" if cell else None
-    if not cell:
-        what = "is missing"
-    elif number is not None or NOT_FINITE.fullmatch(cell):
-        what, got = "must be finite", cell
-    elif column.conversion in {clock_time, iso_time}:
-        what = "is not a time"
-    elif DECIMAL_COMMA.fullmatch(cell):
-        what = "needs a decimal point"
-    mistakes.append(_mistake(line, f"column '{column.name}': {what}", got, expected))
+    is_infinite = bool(cell) and (number is not None or NOT_FINITE.fullmatch(cell))
+    reasons = {
+        "is missing": not cell,
+        "must be finite": is_infinite,
+        "is not a time": column.conversion in {clock_time, iso_time},
+        "needs a decimal point": DECIMAL_COMMA.fullmatch(cell),
+    }
+    reason = next((reason for reason, holds in reasons.items() if holds), "is not a number")
+    got = cell if is_infinite else f"'{cell}'"
+    what = f"column '{column.name}': {reason}"
+    mistakes.append(_mistake(line, what, got if cell else None, expected))
     return None
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 
@@ -25,6 +26,14 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
+
+
+def optional_library(name: str, missing: Exception) -> Any:
+    """Return a module of an optional package; raise an error if it is not installed."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise missing from error
 
 
 class WearsimError(Exception):
@@ -81,9 +90,9 @@ class Mistake:
 
     def __str__(self) -> str:
         where = " ".join(filter(None, (self.table and f"[{self.table}]", self.key)))
-        got = "" if self.got is None else f", got {self.got}"
-        expected = "" if self.expected is None else f", expected {self.expected}"
-        return (f"{where}: {self.what}" if where else self.what) + got + expected
+        text = f"{where}: {self.what}" if where else self.what
+        more = {"got": self.got, "expected": self.expected}
+        return text + "".join(f", {key} {item}" for key, item in more.items() if item is not None)
 
 
 class ScenarioError(WearsimError):
@@ -113,8 +122,8 @@ class ScenarioError(WearsimError):
         self, file: str, mistakes: list[Mistake], *, python: str = "", shell: str = ""
     ) -> None:
         self.file, self.mistakes = file, mistakes
-        message = "\n".join(f"{file}: {mistake}" for mistake in mistakes)
-        super().__init__(message, python=python, shell=shell)
+        lines = (f"{file}: {mistake}" for mistake in mistakes)
+        super().__init__("\n".join(lines), python=python, shell=shell)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.file, self.mistakes), {**self.__dict__, "args": self.args}

@@ -6,12 +6,12 @@ Results files keep this text, so that a run can be repeated without the original
 from __future__ import annotations
 
 import io
-from importlib import import_module
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from wearsim.csv_cells import decode
-from wearsim.errors import ScenarioError, mistake_in
+from wearsim.errors import mistake_in, optional_library
 from wearsim.profiles import ProfileChoice, is_surface, read_profile
 from wearsim.types import Profile
 from wearsim.units import QuantityError, conversion
@@ -65,32 +65,26 @@ def _log_of_tdms(content: bytes, file: str) -> str:
 
     The time is taken from a channel "time", or from the waveform properties of the channel "load".
     """
-
-    def error(what: str, got: str | None = None, expected: str | None = None) -> ScenarioError:
-        return mistake_in(file, what, got, expected)
-
+    error = partial(mistake_in, file)
+    missing = error("TDMS files need another package: pip install 'wearsim[tdms]'")
+    reader = optional_library("nptdms", missing).TdmsFile
     try:
-        reader: Any = import_module("nptdms").TdmsFile
-    except ImportError as failure:
-        raise error("TDMS files need another package: pip install 'wearsim[tdms]'") from failure
-    try:
-        log = reader.read(io.BytesIO(content))
-        channels = [channel for group in log.groups() for channel in group.channels()]
+        groups = reader.read(io.BytesIO(content)).groups()
+        channels = [channel for group in groups for channel in group.channels()]
     except Exception as failure:  # of any kind that the reader raises for a damaged file
         raise error(f"is no TDMS file: {failure}") from failure
     names = ", ".join(channel.name for channel in channels) or "none"
-    named_channels = {
-        name: [channel for channel in channels if channel.name.casefold() == name]
+    times, loads = (
+        [channel for channel in channels if channel.name.casefold() == name]
         for name in ("time", "load")
-    }
-    for name, some in named_channels.items():
-        if len(some) > 1 or (name == "load" and not some):
+    )
+    for name, is_wrong in {"time": len(times) > 1, "load": len(loads) != 1}.items():
+        if is_wrong:
             raise error(f"the channel '{name}' is needed once", names, f"one channel '{name}'")
-    (load,) = named_channels["load"]
+    (load,) = loads
     force = load[:] * _factor(load, "N", error)
-    if named_channels["time"]:
-        (channel,) = named_channels["time"]
-        time = channel[:] * _factor(channel, "s", error)
+    if times:
+        time = times[0][:] * _factor(times[0], "s", error)
     elif "wf_increment" in load.properties:
         time = load.time_track()
     else:

@@ -105,8 +105,11 @@ def levelled(measured: Measured, computed: ComputedProfile) -> Measured:
         shift = _middle(y, depth) - middle
         left, right = y < limits[0] + shift, y > limits[1] + shift
         if min(left.sum(), right.sum()) < _FEWEST:
-            what = "cannot be levelled: there is no unworn surface on both sides of the groove"
-            raise mistake_in(measured.label, what, None, "a longer profile, or a levelled one")
+            raise mistake_in(
+                measured.label,
+                "cannot be levelled: there is no unworn surface on both sides of the groove",
+                expected="a longer profile, or a levelled one",
+            )
         unworn = left | right
         start = np.interp(y - shift, computed.y, computed.start)
         line = np.polyfit(y[unworn], (height - start)[unworn], 1)

@@ -7,7 +7,6 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,17 +14,13 @@ import numpy as np
 
 from wearsim.csv_cells import decode
 from wearsim.csv_tables import read_columns
-from wearsim.errors import ScenarioError, mistake_in
+from wearsim.errors import ScenarioError, mistake_in, optional_library
 from wearsim.quantities import quantity
 from wearsim.types import FloatArray, Profile
 
 _SDF = (b"aISO-", b"bISO-", b"aBCR-", b"bBCR-")
 _X3P = b"PK\x03\x04"
 _HDF5 = b"\x89HDF"
-_EXPORT = (
-    "wearsim export writes its profiles as CSV, of which --profile takes one:"
-    " cylinder_depth_profiles.csv with --columns 'y,-depth at N passes'"
-)
 MAX_POINTS = 1_000_000  # of a filtered profile
 ROW_CHOICES = ("row", "mean_rows", "at")
 _NAMES = (
@@ -37,7 +32,6 @@ _UNITS = (
     ' scenario, profile_units = ["mm", "um"]'
 )
 _CLEARLY = 3.0  # heights above the ends of a profile over those below
-_INSTALL = "pip install 'wearsim[surfaces]'"
 _ALPHA = math.sqrt(math.log(2.0) / math.pi)
 
 
@@ -115,7 +109,7 @@ def load_profile(path: str | Path, choice: ProfileChoice | None = None) -> Profi
     try:
         return read_profile(Path(path).read_bytes(), str(path), choice)
     except OSError as error:
-        raise _error(str(path), f"the file cannot be read ({error.strerror})") from error
+        raise mistake_in(str(path), f"the file cannot be read ({error.strerror})") from error
 
 
 def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None = None) -> Profile:
@@ -149,30 +143,36 @@ def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None =
         if is_surface(content):
             return _chosen_row(_surface(content, file), file, choice)
         if content.startswith(_HDF5):
-            raise _error(file, f"this is a results file; {_EXPORT}")
+            raise mistake_in(
+                file,
+                "this is a results file; wearsim export writes its profiles as CSV, of which"
+                " --profile takes one: cylinder_depth_profiles.csv with --columns"
+                " 'y,-depth at N passes'",
+            )
         content = decode(content)
     if choice.rows:
-        raise _error(file, f"{choice.rows[0]} is for the rows of a surface, and this is a CSV file")
+        raise mistake_in(
+            file, f"{choice.rows[0]} is for the rows of a surface, and this is a CSV file"
+        )
     y, height = choice.columns or ("y", "height")
     # a column chosen by the name "depth" has the sign of one found by that name
     downwards = choice.columns and (height.startswith("-") or height.casefold() == "depth")
     height = height.removeprefix("-")
-    names = y, height
     if y == height:
-        raise _error(file, "position and height need two columns", y)
+        raise mistake_in(file, "position and height need two columns", y)
     columns = read_columns(
         content,
         file,
-        dict.fromkeys(names, "m"),
+        {y: "m", height: "m"},
         aliases={} if choice.columns else {"height": ["z"]},
         opposite={} if choice.columns else {"height": "depth"},
-        units=dict(zip(names, choice.units or (), strict=False)),
+        units=dict(zip((y, height), choice.units or (), strict=False)),
         rising=y,
         either_way=True,
         choice=_NAMES,
     )
-    heights = (-1.0 if downwards else 1.0) * columns[height]
-    return _profile_of(columns[y], heights, file, (y, height), _UNITS)
+    sign = -1.0 if downwards else 1.0
+    return _profile_of(columns[y], sign * columns[height], file, (y, height), _UNITS)
 
 
 def _profile_of(
@@ -216,13 +216,13 @@ def load_lines(path: str | Path) -> list[Profile]:
     try:
         content = Path(path).read_bytes()
     except OSError as error:
-        raise _error(str(path), f"the file cannot be read ({error.strerror})") from error
+        raise mistake_in(str(path), f"the file cannot be read ({error.strerror})") from error
     if not is_surface(content):
         return [read_profile(content, str(path))]
     surface = _surface(content, str(path))
     whole = np.isfinite(surface.height).all(axis=1)
     if not whole.any():
-        raise _error(str(path), "no line was measured at all of its points")
+        raise mistake_in(str(path), "no line was measured at all of its points")
     y = surface.along - 0.5 * (surface.along[0] + surface.along[-1])
     return [_profile_of(y, line, str(path)) for line in surface.height[whole]]
 
@@ -261,12 +261,6 @@ def is_surface(content: bytes) -> bool:
     return content.startswith((*_SDF, _X3P))
 
 
-def _error(
-    file: str, what: str, got: str | None = None, expected: str | None = None
-) -> ScenarioError:
-    return mistake_in(file, what, got, expected)
-
-
 class _Surface(NamedTuple):
     """Heights on a grid [m], shape (rows, points); positions along and across the rows [m]."""
 
@@ -278,48 +272,51 @@ class _Surface(NamedTuple):
 def _surface(content: bytes, file: str) -> _Surface:
     """Return the heights in an SDF or X3P file; NaN where the surface was not measured."""
     name = "SDF" if content.startswith(_SDF) else "X3P"
-    try:
-        reader = import_module("sdfio" if name == "SDF" else "x3pio")
-    except ImportError as error:
-        raise _error(file, f"{name} files need another package: {_INSTALL}") from error
+    missing = mistake_in(
+        file, f"{name} files need another package: pip install 'wearsim[surfaces]'"
+    )
+    reader = optional_library("sdfio" if name == "SDF" else "x3pio", missing)
     try:
         surface = reader.read(io.BytesIO(content))
         if name == "SDF":
             return _Surface(surface.x_axis, surface.y_axis, surface.data)
         (layer,) = surface.layers
-        height = np.atleast_2d(layer.z)
-        return _Surface(layer.x_values, getattr(layer, "y_values", np.zeros(1)), height)
+        across = getattr(layer, "y_values", np.zeros(1))
+        return _Surface(layer.x_values, across, np.atleast_2d(layer.z))
     except Exception as error:  # of any kind that the reader raises for a damaged file
-        raise _error(file, f"is no {name} file of one surface or profile: {error}") from error
+        raise mistake_in(file, f"is no {name} file of one surface or profile: {error}") from error
 
 
 def _chosen_row(surface: _Surface, file: str, choice: ProfileChoice) -> Profile:
     """Return one row of a surface, or the mean of several."""
     if choice.columns or choice.units:
-        raise _error(file, "columns and units are for CSV files; a surface has its own units")
+        raise mistake_in(file, "columns and units are for CSV files; a surface has its own units")
     count, across = len(surface.height), surface.across
     rows = f"{count} rows, {1e3 * across[0]:.6g} to {1e3 * across[-1]:.6g} mm"
-    ways = (
-        "--row 0, --mean-rows 0:10 or --at '1 mm'; in a scenario, profile_row, profile_mean_rows"
-        " or profile_at"
-    )
     if count > 1 and len(choice.rows) != 1:
-        what = "has several rows" if not choice.rows else f"{' and '.join(choice.rows)} are given"
-        raise _error(file, what, rows, f"one of {ways}")
-    first, stop = choice.mean_rows or (choice.row or 0, (choice.row or 0) + 1)
+        raise mistake_in(
+            file,
+            "has several rows" if not choice.rows else f"{' and '.join(choice.rows)} are given",
+            rows,
+            "one of --row 0, --mean-rows 0:10 or --at '1 mm'; in a scenario, profile_row,"
+            " profile_mean_rows or profile_at",
+        )
+    row = choice.row or 0
     if choice.at is not None:
-        first = int(np.abs(across - choice.at).argmin())
-        stop = first + 1
+        row = int(np.abs(across - choice.at).argmin())
         half = 0.5 * float(np.diff(across).max()) if count > 1 else 0.0
         if not across[0] - half <= choice.at <= across[-1] + half:
-            raise _error(file, "at is not on the surface", f"{1e3 * choice.at:.6g} mm", rows)
+            raise mistake_in(file, "at is not on the surface", f"{1e3 * choice.at:.6g} mm", rows)
+    first, stop = choice.mean_rows or (row, row + 1)
     if not 0 <= first < stop <= count:
-        raise _error(file, "there are no such rows", f"{first} to {stop - 1}", f"0 to {count - 1}")
+        raise mistake_in(
+            file, "there are no such rows", f"{first} to {stop - 1}", f"0 to {count - 1}"
+        )
     chosen = surface.height[first:stop]
     known = np.isfinite(chosen)
     measured = known.any(axis=0)
     if np.count_nonzero(measured) < 2:
-        raise _error(
+        raise mistake_in(
             file, "fewer than two points of the rows were measured", f"rows {first} to {stop - 1}"
         )
     total = np.where(known, chosen, 0.0).sum(axis=0)[measured]
@@ -369,16 +366,14 @@ def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
         )
     reach = math.ceil(cutoff / spacing)  # weights beyond are below 1e-6
     distance = spacing * np.arange(-reach, reach + 1) / (_ALPHA * cutoff)
-    weight = np.exp(-np.pi * distance**2)
+    weight, size = np.exp(-np.pi * distance**2), count + 2 * reach
 
     def weighted(values: FloatArray, power: int) -> FloatArray:
         # the sum over points k of weight(y_k - y) (y_k - y)^power values_k
         kernel = (weight * distance**power)[::-1]
-        size = count + 2 * reach
         product = np.fft.rfft(values, size) * np.fft.rfft(kernel, size)
         return np.fft.irfft(product, size)[reach : reach + count]
 
-    ones = np.ones(count)
-    s0, s1, s2 = (weighted(ones, power) for power in range(3))
+    s0, s1, s2 = (weighted(np.ones(count), power) for power in range(3))
     t0, t1 = weighted(height, 0), weighted(height, 1)
     return Profile(y, (s2 * t0 - s1 * t1) / (s0 * s2 - s1 * s1))

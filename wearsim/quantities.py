@@ -54,16 +54,18 @@ def _split(value: object, expected: str) -> tuple[str, str]:
     text = value.strip() if isinstance(value, str) and len(value) <= MAX_CHARACTERS else ""
     number = NUMBER.match(text)
     unit = text[number.end() :].strip() if number else ""
-    what = "is not a quantity"
-    if NOT_FINITE.match(text):
-        what = "must be finite"
-    elif DECIMAL_COMMA.match(text):
-        what = "needs a decimal point"
-    elif number and unit:
-        return number[0], unit
-    elif number or (isinstance(value, int | float) and not isinstance(value, bool)):
-        what = "needs a unit"
-    raise QuantityError(what, as_written(value), expected)
+    is_number = number or (isinstance(value, int | float) and not isinstance(value, bool))
+    reasons = {
+        "must be finite": NOT_FINITE.match(text),
+        "needs a decimal point": DECIMAL_COMMA.match(text),
+        "needs a unit": is_number and not unit,
+        "is not a quantity": not is_number,
+    }
+    for what, holds in reasons.items():
+        if holds:
+            raise QuantityError(what, as_written(value), expected)
+    assert number
+    return number[0], unit
 
 
 def _si(number: str, factor: Fraction) -> float:
@@ -153,15 +155,15 @@ def _within(
 
     `written` returns the value as it is written in a scenario.
     """
-    if number - number != 0.0:  # infinite or not a number
-        what = "must be finite"
-    elif bound == "positive" and number <= 0.0:
-        what = "must be above zero"
-    elif bound == "not negative" and number < 0.0:
-        what = "must not be negative"
-    else:
-        return number
-    raise QuantityError(what, as_written(written(number)), expected)
+    reasons = {
+        "must be finite": number - number != 0.0,  # infinite or not a number
+        "must be above zero": bound == "positive" and number <= 0.0,
+        "must not be negative": bound == "not negative" and number < 0.0,
+    }
+    for what, holds in reasons.items():
+        if holds:
+            raise QuantityError(what, as_written(written(number)), expected)
+    return number
 
 
 def quantity(text: str, unit: str) -> float:

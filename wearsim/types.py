@@ -63,10 +63,9 @@ class Grid:
     def spanning(cls, start: float, stop: float, strips: int) -> Grid:
         """Return the interval from `start` to `stop` [m] divided into `strips` equal strips."""
         spacing = (stop - start) / strips
-        centre = 0.5 * (start + stop)
         # offsets from the middle: a symmetric interval gives a grid symmetric to the bit
         offsets = np.arange(strips, dtype=np.float64) - 0.5 * (strips - 1)
-        return cls(y=centre + offsets * spacing, spacing=spacing)
+        return cls(y=0.5 * (start + stop) + offsets * spacing, spacing=spacing)
 
     @cached_property
     def strips(self) -> int:
@@ -120,14 +119,17 @@ class Profile:
                 raise _profile_error(name, "is not a sequence of numbers") from error
             object.__setattr__(self, name, values)
             if values.ndim != 1 or len(values) < 2:
-                shape = f"shape {values.shape}"
-                raise _profile_error(name, "is not a sequence of points", shape, "two or more")
-            if not np.isfinite(values).all():
-                place = int(np.flatnonzero(~np.isfinite(values))[0])
-                raise _profile_error(name, f"is not finite at point {place}", f"{values[place]}")
+                raise _profile_error(
+                    name, "is not a sequence of points", f"shape {values.shape}", "two or more"
+                )
+            for point in np.flatnonzero(~np.isfinite(values)):  # the first one
+                raise _profile_error(name, f"is not finite at point {point}", f"{values[point]}")
         if len(self.y) != len(self.height):
-            counts = f"{len(self.y)} values of y and {len(self.height)} of height"
-            raise _profile_error("", "y and height have different lengths", counts)
+            raise _profile_error(
+                "",
+                "y and height have different lengths",
+                f"{len(self.y)} values of y and {len(self.height)} of height",
+            )
         steps = np.diff(self.y)
         if not (steps > 0.0).all():
             remedy = "increasing y; reverse both arrays" if (steps < 0.0).all() else "increasing y"
@@ -137,10 +139,11 @@ class Profile:
         for name, most in (("y", _MOST_Y), ("height", 0.5 * np.ptp(self.y))):
             span = float(np.ptp(getattr(self, name)))
             if span > most:
-                expected = "metres: multiply mm by 1e-3, um by 1e-6"
                 over = "" if name == "y" else f" over {np.ptp(self.y):.4g} m of y"
-                got = f"{span:.4g} m{over}"
-                raise _profile_error(name, "has a range that cannot be", got, expected)
+                remedy = "metres: multiply mm by 1e-3, um by 1e-6"
+                raise _profile_error(
+                    name, "has a range that cannot be", f"{span:.4g} m{over}", remedy
+                )
 
     def __repr__(self) -> str:
         y, height = self.y * 1e3, self.height * 1e6

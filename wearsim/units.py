@@ -70,21 +70,22 @@ class QuantityError(ValueError):
     def __init__(self, what: str, got: str | None = None, expected: str | None = None) -> None:
         self.what, self.got, self.expected = what, got, expected
         parts = [what, got and f"got {got}", expected and f"expected {expected}"]
-        super().__init__(", ".join(part for part in parts if part))
+        super().__init__(", ".join(filter(None, parts)))
 
 
 def as_written(value: object) -> str:
     """Return `value` as written in a TOML file, abbreviated if long."""
-    if isinstance(value, dict):
-        return "a table"
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, list | tuple):
-        text = f"[{', '.join(as_written(item) for item in value)}]"
-    elif isinstance(value, str):
-        text = f'"{value}"'
-    else:
-        text = str(value)
+    match value:
+        case dict():
+            return "a table"
+        case bool():
+            return str(value).lower()
+        case list() | tuple():
+            text = f"[{', '.join(as_written(item) for item in value)}]"
+        case str():
+            text = f'"{value}"'
+        case _:
+            text = str(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
@@ -175,8 +176,7 @@ def _unknown_name(name: str) -> str:
     # names of one or two letters are all similar to one another
     cutoff = 0.6 if len(name) > 2 else 1.0
     near = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=cutoff)
-    hint = f" (did you mean '{by_lower[near[0]]}'?)" if near else ""
-    return f"unknown unit '{name}'{hint}"
+    return f"unknown unit '{name}'" + (f" (did you mean '{by_lower[near[0]]}'?)" if near else "")
 
 
 @cache
@@ -216,8 +216,7 @@ def measure(unit: str) -> tuple[Fraction, Dimensions]:
     for name in re.findall(r"[A-Za-z]+", text):
         if name not in _UNITS:
             raise ValueError(_unknown_name(name))
-    product = _product(text)
-    if product is not None:
+    if product := _product(text):
         size, powers = product
         return size, frozenset((f"[{base}]", str(power)) for base, power in powers.items() if power)
     return _measured_by_pint(unit, text)
@@ -239,11 +238,9 @@ def _measured_by_pint(unit: str, text: str) -> tuple[Fraction, Dimensions]:
 def kind_of(unit: str) -> Kind:
     """Return the kind of quantity of `unit`; one without a name is named by its unit."""
     dimensions = measure(unit)[1]
-    for kind in _KINDS:
-        if measure(kind.unit)[1] == dimensions:
-            return kind
     name = f"a quantity in {_normalised(unit)}" if dimensions else "a plain number"
-    return Kind(name, unit, f"1 {_normalised(unit)}")
+    unnamed = Kind(name, unit, f"1 {_normalised(unit)}")
+    return next((kind for kind in _KINDS if measure(kind.unit)[1] == dimensions), unnamed)
 
 
 def conversion(

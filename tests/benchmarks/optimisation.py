@@ -19,7 +19,7 @@ import numpy as np
 
 import wearsim
 from tests.benchmarks.table import save_tables
-from wearsim.report.page.page import save_text
+from wearsim.atomic_write import save_text
 from wearsim_bench.figures.table import markdown_table
 from wearsim_optimise.api import optimise
 

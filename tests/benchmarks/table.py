@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from wearsim.report.page.page import save_text
+from wearsim.atomic_write import save_text
 from wearsim.report.text import brief
 from wearsim_bench.measure.machine import this_machine
 

@@ -69,8 +69,6 @@ _MODULES = {
 }
 #: command-line options by argument of Python, where their names differ
 _OPTIONS = {"limits": "--limit", "most": "--max"}
-FAILED = 1
-INTERRUPTED = 130
 TRACEBACK = "WEARSIM_TRACEBACK"
 
 
@@ -93,11 +91,10 @@ class LazyVerb(TyperCommand):
         """Import the verb and return the context of its command, with the arguments parsed."""
         command = typer.main.get_command(self._load())
         command.name = self.name
-        # Typer adds them to every app; they would install the completion of `wearsim`
-        completion = ("install_completion", "show_completion")
-        command.params = [item for item in command.params if item.name not in completion]
-        shared = kwargs["parent"].find_root().command.params
-        _add_option(command, next(item for item in shared if item.name == "traceback"))
+        # Typer adds two to every app that would install the completion of `wearsim`
+        command.params = [p for p in command.params if not str(p.name).endswith("_completion")]
+        shared = {item.name: item for item in kwargs["parent"].find_root().command.params}
+        _add_option(command, shared["traceback"])
         if command.callback is not None:
             command.callback = checking_arguments(**_OPTIONS)(command.callback)
         return command.make_context(*args, **kwargs)
@@ -165,8 +162,8 @@ def installed_verbs() -> dict[str, LazyVerb]:
     points_by_name, verbs = entry_points(group=GROUP), {}
     for name in sorted(points_by_name.names):
         points = list(points_by_name.select(name=name))
-        line = "; ".join(map(_summary, points))
-        verbs[name] = LazyVerb(name, line, partial(_installed, name, points))
+        load = partial(_installed, name, points)
+        verbs[name] = LazyVerb(name, "; ".join(map(_summary, points)), load)
     return verbs
 
 
@@ -177,8 +174,8 @@ def _distribution(point: EntryPoint) -> str:
 def _summary(point: EntryPoint) -> str:
     # the text itself: parsing all metadata as an e-mail message takes longer
     lines = ((point.dist and point.dist.read_text("METADATA")) or "").splitlines()
-    summaries = [line.partition(": ")[2] for line in lines if line.startswith("Summary: ")]
-    return summaries[0] if summaries else f"From {_distribution(point)}."
+    summaries = (line.partition(": ")[2] for line in lines if line.startswith("Summary: "))
+    return next(summaries, f"From {_distribution(point)}.")
 
 
 class Shell(TyperGroup):
@@ -232,7 +229,7 @@ class Shell(TyperGroup):
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
             typer.echo("interrupted", err=True)
-            raise typer.Exit(INTERRUPTED) from error
+            raise typer.Exit(Interrupted.exit_code) from error
         except BrokenPipeError:  # "wearsim schema | head"
             raise
         except Exception as error:
@@ -242,38 +239,35 @@ class Shell(TyperGroup):
                 typer.echo("".join(traceback.format_exception(error)), err=True, nl=False)
             else:
                 typer.echo(_message(error), err=True)
-            code = error.exit_code if isinstance(error, WearsimError) else FAILED
-            raise typer.Exit(code) from error
+            raise typer.Exit(
+                error.exit_code if isinstance(error, WearsimError) else WearsimError.exit_code
+            ) from error
 
 
 def _message(error: BaseException) -> str:
-    if isinstance(error, SolverError) and error.state:
-        from wearsim.cli.solver_state import solver_state
+    match error:
+        case SolverError() if error.state:
+            from wearsim.cli.solver_state import solver_state
 
-        state = solver_state(error.state)
-        lines = [
-            f"error: {error.at_shell}",
-            *([f"state at the failure: {state}"] if state else []),
-            *getattr(error, "__notes__", ()),
-        ]
-        return "\n".join(lines)
-    if isinstance(error, ScenarioError | Interrupted):  # their messages start with file or progress
-        return error.at_shell
-    if isinstance(error, WearsimError):
-        return f"error: {error.at_shell}"
-    if isinstance(error, OSError):
-        return f"error: {error.filename or 'a file'}: {error.strerror or error}"
-    if isinstance(error, MemoryError):
-        return (
-            f"error: not enough memory ({described(error)}); fewer strips, records, realisations or"
-            " workers take less"
-        )
+            state = solver_state(error.state)
+            lines = [f"error: {error.at_shell}", state and f"state at the failure: {state}"]
+            return "\n".join([*filter(None, lines), *getattr(error, "__notes__", ())])
+        case ScenarioError() | Interrupted():  # their messages start with file or progress
+            return error.at_shell
+        case WearsimError():
+            return f"error: {error.at_shell}"
+        case OSError():
+            return f"error: {error.filename or 'a file'}: {error.strerror or error}"
+        case MemoryError():
+            return (
+                f"error: not enough memory ({described(error)}); fewer strips, records,"
+                " realisations or workers take less"
+            )
     from wearsim.plugins.manager import registry
 
-    plugin = registry().raised_in(error)
     return (
-        f"internal error: {type(error).__name__}: {described(error)}\n"
-        f"this is a defect of {plugin or 'wearsim or of a plugin'}; --traceback shows where"
+        f"internal error: {type(error).__name__}: {described(error)}\nthis is a defect of"
+        f" {registry().raised_in(error) or 'wearsim or of a plugin'}; --traceback shows where"
     )
 
 

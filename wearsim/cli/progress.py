@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
 from wearsim.cli.shared import console, note
@@ -77,8 +78,8 @@ class Display:
             transient=transient,
             disable=quiet or not screen.is_terminal,
         )
-        taken = len("100 %  ") + len(bar) * (_BAR + 1)
-        self.columns = math.inf if self.live.disable else screen.width - taken
+        left = screen.width - len("100 %  ") - len(bar) * (_BAR + 1)
+        self.columns = math.inf if self.live.disable else left
         self.live.add_task("starting")
         (self._task,) = self.live.tasks
         self._quiet, self._now, self._written = quiet, now, now()
@@ -107,8 +108,10 @@ class Display:
 
     def _show_compilation(self, number: int, total: int) -> None:
         """Show that a kernel is being compiled; without a terminal the first one at once."""
-        text = f"compiling kernels, once after installation: {number} of {total}"
-        self.show(text, always=not self._compiling)
+        self.show(
+            f"compiling kernels, once after installation: {number} of {total}",
+            always=not self._compiling,
+        )
         self._compiling = True
 
     def advance(self, done: float, total: float) -> str:
@@ -122,8 +125,13 @@ class Display:
         return f", {lapse(left)} left" if left else ""
 
     def show(self, text: str, *, always: bool = False) -> None:
-        """Show a text on the line, or write it if a second has passed since the last one."""
-        _collect_garbage()
+        """Show a text on the line, or write it if a second has passed since the last one.
+
+        The collector of garbage is enabled, without the objects of the imports; see `app.main`.
+        """
+        if not gc.isenabled():
+            gc.freeze()
+            gc.enable()
         self.live.update(self._task.id, description=text)
         now = self._now()
         if not self.live.disable or not (always or now - self._written >= BETWEEN_LINES):
@@ -152,33 +160,21 @@ class Display:
             note(text)
 
 
-def _collect_garbage() -> None:
-    """Enable the collector of garbage, without the objects of the imports; see `app.main`."""
-    if not gc.isenabled():
-        gc.freeze()
-        gc.enable()
-
-
 class Counter(Display):
     """Display of a number of realisations."""
 
     def __call__(self, done: int, total: int) -> None:
         """Show how many of them are done."""
-        left = self.advance(done, total)
-        self.show(f"{count(done)} of {count(total)} realisations{left}")
+        self.show(f"{count(done)} of {count(total)} realisations{self.advance(done, total)}")
 
 
 class _Noticing(Display):
-    """Display of a study that also reports notices."""
+    """Display of a study that also reports notices, which are shown even if nothing else is."""
 
     @property
     def callbacks(self) -> dict[str, Any]:
         """Arguments with which a study reports to this display, and asks whether to stop."""
-        return {**super().callbacks, "on_notice": self.notice}
-
-    def notice(self, text: str) -> None:
-        """Show a notice, also if nothing else is shown."""
-        self.write(text, also_quiet=True)
+        return {**super().callbacks, "on_notice": partial(self.write, also_quiet=True)}
 
 
 class PartWatcher(_Noticing):
@@ -186,8 +182,10 @@ class PartWatcher(_Noticing):
 
     def __call__(self, done: int, total: int, text: str) -> None:
         """Show how many parts are done, and the text."""
-        left = self.advance(done, total)
-        self.show(f"{count(done)} of {count(total)}, {text}{left}", always=done == total)
+        self.show(
+            f"{count(done)} of {count(total)}, {text}{self.advance(done, total)}",
+            always=done == total,
+        )
 
 
 class RunWatcher(Display):
@@ -205,38 +203,32 @@ class RunWatcher(Display):
 
     def __call__(self, event: Event) -> None:
         """Show an event."""
-        if isinstance(event, Started):
-            self.advance(event.from_passes, event.total_passes)
-            self.write(_start(event))
-        elif isinstance(event, Stepped):
-            self._show_step(event)
-        elif isinstance(event, Warned):
-            self.write(f"warning: {event.message}", also_quiet=True)
-            self.warnings.append(event.message)
-        elif isinstance(event, Finished):
-            self.show(f"done in {lapse(event.wall_seconds)}", always=True)
+        match event:
+            case Started():
+                self.advance(event.from_passes, event.total_passes)
+                done = f"continuing from pass {count(event.from_passes)} of"
+                self.write(
+                    f"{done if event.from_passes else 'running'} {count(event.total_passes)}"
+                    f" passes, {simulated(event.total_time)}, with {event.model}, {event.stepper}"
+                )
+            case Stepped():
+                self._show_step(event)
+            case Warned():
+                self.write(f"warning: {event.message}", also_quiet=True)
+                self.warnings.append(event.message)
+            case Finished():
+                self.show(f"done in {lapse(event.wall_seconds)}", always=True)
 
     def _show_step(self, step: Stepped) -> None:
         left = self.advance(step.passes, step.total_passes)
         part = f" ({100.0 * step.passes / step.total_passes:.0f} %)"
-        text = (
+        self.show(
             f"pass {count(step.passes)}{part if self.live.disable else ''},"
             f" {simulated(step.time)}, depth {shown(step.depth, 'um')},"
-            f" step of {count(step.step_passes)} passes{left}"
+            f" step of {count(step.step_passes)} passes{left}",
+            always=self._is_first_step or step.passes >= step.total_passes,
         )
-        is_last = step.passes >= step.total_passes
-        self.show(text, always=self._is_first_step or is_last)
         self._is_first_step = False
-
-
-def _start(event: Started) -> str:
-    """Return a description of a run: "running 1,000 passes, 2 min, with slender, implicit"."""
-    passes = f"running {count(event.total_passes)} passes"
-    if event.from_passes:
-        passes = (
-            f"continuing from pass {count(event.from_passes)} of {count(event.total_passes)} passes"
-        )
-    return f"{passes}, {simulated(event.total_time)}, with {event.model}, {event.stepper}"
 
 
 class EnsembleWatcher(_Noticing):
@@ -266,17 +258,15 @@ def progress_text(progress: EnsembleProgress, columns: float = math.inf) -> str:
     columns : float
         Greatest length; parts that would exceed it are left out.
     """
-    text = f"{count(progress.done)} of {count(progress.requested)}"
-    if columns == math.inf:
-        text += " realisations"
-    parts = [
+    noun = " realisations" if columns == math.inf else ""
+    text = f"{count(progress.done)} of {count(progress.requested)}{noun}"
+    for part in (
         f"{count(progress.failed)} failed" if progress.failed else "",
         f"{lapse(progress.left)} left" if progress.left > 0.0 else "",
         _estimate(progress),
         f"{progress.rate:.3g}/s" if progress.rate < 1000.0 else f"{count(progress.rate)}/s",
-    ]
-    for part in filter(None, parts):
-        if len(text) + len(f", {part}") <= columns:
+    ):
+        if part and len(text) + len(f", {part}") <= columns:
             text += f", {part}"
     return text
 
@@ -307,7 +297,6 @@ def stop_on_signals(
     stop = threading.Event()
     # a process of loky outlives a process that is ended by a signal, and would warn of it
     os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker:UserWarning")
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
 
     def handle(number: int, frame: Any) -> None:
         stop.set()
@@ -315,8 +304,7 @@ def stop_on_signals(
             signal.signal(caught, signal.SIG_DFL)
         note(message)
 
-    for number in _SIGNALS:
-        signal.signal(number, handle)
+    before = {number: signal.signal(number, handle) for number in _SIGNALS}
     try:
         yield stop
     finally:

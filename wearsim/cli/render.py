@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from wearsim.atomic_write import save_text
 from wearsim.cli.shared import note, write_json, write_list, write_notes, write_table
 from wearsim.errors import printable
 
@@ -48,14 +49,11 @@ def show_view(
     if json:
         write_json({**view.data(), **(view.origin() if stored else {}), **(more or {})})
     else:
-        written = {name: path for name, path in (files or {}).items() if path}
-        _write_tables(view, written, stored, brief)
+        _write_tables(view, files or {}, stored, brief)
         if not stored and (line := view.line()):
             typer.echo(printable(line))
-        fresh = [
-            [text for text in said if text not in known] for said in (view.notes, view.warnings)
-        ]
-        write_notes(*fresh)
+        said = (view.notes, view.warnings)
+        write_notes(*([text for text in texts if text not in known] for texts in said))
     if view.failures:
         note(f"warning: {view.failures}")
 
@@ -79,8 +77,8 @@ def _write_tables(view: View, files: Mapping[str, object], stored: bool, brief: 
 
     tables = [] if brief else [table for table in view.tables() if stored or table.title != ORIGIN]
     place, title = int(bool(tables) and tables[0].title == STUDY), view.title
-    written = (Row(name, str(item)) for name, item in files.items())
-    tables.insert(place, Table(view.heading, [*view.rows(), *written]))
+    rows = [*view.rows(), *(Row(name, str(item)) for name, item in files.items() if item)]
+    tables.insert(place, Table(view.heading, rows))
     for table in tables:
         if table.heads:
             write_list(table.heads, table.rows)
@@ -101,11 +99,9 @@ def draw_figure(sheet: Sheet, path: Path | None) -> None:
 
 def write_table_file(columns: Columns, path: Path) -> None:
     """Write columns as a CSV file."""
-    from wearsim.atomic_write import replacement
     from wearsim.report.csv_files import table_text
 
-    with replacement(path) as file:
-        file.writelines(text.encode("utf-8") for text in table_text(columns))
+    save_text("".join(table_text(columns)), path)
 
 
 def write_surface(surface: Surface, path: Path, *, spline: bool) -> None:
@@ -114,5 +110,5 @@ def write_surface(surface: Surface, path: Path, *, spline: bool) -> None:
 
     surface.save(path, spline=spline)
     form = "chords" if not spline else "chords between the points of the spline"
-    within = f"{form} within {shown(surface.deviation, 'um', 2)}"
-    note(f"surface: {path}, {count(surface.count)} points, {within}")
+    deviation = shown(surface.deviation, "um", 2)
+    note(f"surface: {path}, {count(surface.count)} points, {form} within {deviation}")

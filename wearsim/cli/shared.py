@@ -170,8 +170,13 @@ def write_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
     from rich.table import Table
 
     screen, title = console(), printable(title)
-    table = Table(title=title, title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
-    table.min_width = min(len(title), screen.width)  # keeps a long title on one line
+    table = Table(
+        title=title,
+        title_justify="left",
+        show_header=False,
+        box=box.SIMPLE_HEAD,
+        min_width=min(len(title), screen.width),  # keeps a long title on one line
+    )
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for row in rows:
@@ -184,8 +189,7 @@ def write_list(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     lines = [[printable(cell) for cell in line] for line in (heads, *rows)]
     widths = [max(len(line[column]) for line in lines) for column in range(len(heads))]
     for line in lines:
-        cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
-        typer.echo("  ".join(cells).rstrip())
+        typer.echo("  ".join(map(str.ljust, line, widths)).rstrip())
 
 
 def write_json(data: Mapping[str, Any]) -> None:
@@ -254,9 +258,8 @@ def profile_choice(
     """
     from wearsim.profiles import ProfileChoice
 
-    pairs = {"--columns": columns, "--units": units}
     chosen: list[tuple[str, str] | None] = []
-    for option, text in pairs.items():
+    for option, text in (("--columns", columns), ("--units", units)):
         names = [name.strip() for name in text.split(",")] if text is not None else []
         message = f"'{text}' is not two names, expected position and height such as y,z"
         refuse(text is not None and (len(names) != 2 or not all(names)), message, option)
@@ -343,8 +346,10 @@ def settings_with(settings: list[str] | None, **values: object) -> list[str]:
     **values
         Values by key.
     """
-    given = {key: value for key, value in values.items() if value is not None}
-    return [*(settings or []), *(f"{key}={value}" for key, value in given.items())]
+    return [
+        *(settings or []),
+        *(f"{key}={value}" for key, value in values.items() if value is not None),
+    ]
 
 
 def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
@@ -389,12 +394,12 @@ def check_figure(path: Path | None, force: bool, option: str = "-o") -> None:
 def check_ending(
     path: Path | None, force: bool, option: str, endings: Sequence[str], what: str
 ) -> None:
-    """Check the ending and the folder of a file to be written, if one is named.
+    """Check ending and folder of a file to be written, and that nothing is overwritten unasked.
 
     Parameters
     ----------
     path, force, option
-        As of `check_figure`.
+        As of `check_figure`, also the errors.
     endings : sequence of str
         Known endings, such as ".csv".
     what : str
@@ -403,9 +408,13 @@ def check_ending(
     if path is None:
         return
     known = " or ".join(filter(None, [", ".join(endings[:-1]), endings[-1]]))
-    text = f"'{path}' has no known {what}, expected {known}"
-    refuse(path.suffix.lower() not in endings, text, option)
-    check_new_file(path, force, option)
+    refuse(
+        path.suffix.lower() not in endings,
+        f"'{path}' has no known {what}, expected {known}",
+        option,
+    )
+    refuse(not path.parent.is_dir(), f"folder {path.parent} does not exist", option)
+    refuse_existing(path, force, option)
 
 
 def check_surface(
@@ -428,8 +437,8 @@ def check_surface(
     ResultsFileError
         If the file exists and `force` is false.
     """
-    given = {"--chord": chord, "--points": points, "--position": position, "--spline": spline}
     if path is None:
+        given = {"--chord": chord, "--points": points, "--position": position, "--spline": spline}
         refuse_options(given, "needs a file, --surface")
         return None
     from wearsim.report.surfaces import CHORD, ENDINGS, Sampling, dxf_library
@@ -437,24 +446,15 @@ def check_surface(
     check_ending(path, force, "--surface", ENDINGS, "format of a surface")
     if path.suffix.lower() == ".dxf":
         dxf_library()
-    elsewhere = spline and path.suffix.lower() != ".dxf"
-    refuse(elsewhere, f"is for a .dxf, and the surface is {path}", "--spline")
-    twice = chord is not None and points is not None
-    refuse(twice, "is given beside --chord; delete one of them", "--points")
+    else:
+        refuse(spline, f"is for a .dxf, and the surface is {path}", "--spline")
+    if chord is not None:
+        refuse_options({"--points": points}, "is given beside --chord; delete one of them")
     length = quantity_of(chord, "m", "--chord")
     refuse(length is not None and length <= 0.0, f"'{chord}' is not above 0", "--chord")
     return Sampling(
         CHORD if length is None else length, points, quantity_of(position, "m", "--position")
     )
-
-
-def check_new_file(path: Path, force: bool, option: str = "-o") -> None:
-    """Check the folder of a file to be written, and that nothing is overwritten unasked.
-
-    Parameters and errors as of `check_figure`.
-    """
-    refuse(not path.parent.is_dir(), f"folder {path.parent} does not exist", option)
-    refuse_existing(path, force, option)
 
 
 def refuse_same_file(figure: Path | None, output: Path, inputs: Iterable[Path]) -> None:

@@ -72,10 +72,9 @@ def save_animation(animation: Animation, path: Path) -> None:
     writer: AbstractMovieWriter = kind(fps=animation.per_second)
     first = animation.frame(0)
     width, height = (float(np.ptp(np.array(axis.limits, float))) for axis in (first.x, first.y))
-    size = _WIDTH, round(_ABOVE + (_WIDTH - _ASIDE) * height / width, 1)
     with (
         TemporaryDirectory() as folder,
-        titled_figure(*size) as figure,
+        titled_figure(_WIDTH, round(_ABOVE + (_WIDTH - _ASIDE) * height / width, 1)) as figure,
         replacement(path) as target,
     ):
         part = Path(folder) / path.name

@@ -28,7 +28,6 @@ _UNITS = {
     "rad": ("deg", math.radians(1.0)),
 }
 _IN_MM = {"y", "width", "width_error", "half_length"}  # other lengths are written in um
-_COMMENT = "#"
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]\d+)?")
 
 
@@ -48,9 +47,10 @@ def table_text(columns: Columns, decimal: Literal[".", ","] = ".") -> Iterator[s
     for number, block in enumerate(columns):
         if number == 0:
             for source in dict.fromkeys(column.source for column in block if column.source):
-                yield "".join(f"{_COMMENT} {line}\n" for line in source.splitlines())
-            heads = [c.name if c.unit == "1" else f"{c.name} [{c.unit}]" for c in block]
-            yield _csv([heads], decimal)
+                yield "".join(f"# {line}\n" for line in source.splitlines())
+            yield _csv(
+                [[c.name if c.unit == "1" else f"{c.name} [{c.unit}]" for c in block]], decimal
+            )
         yield _csv(zip(*map(_cells, block), strict=True), decimal)
 
 
@@ -63,10 +63,10 @@ def _cells(column: Column) -> Iterable[str]:
 
 
 def _csv(rows: Iterable[Sequence[str]], decimal: str) -> str:
-    text, delimiter = io.StringIO(), ","
+    text = io.StringIO()
     if decimal == ",":
-        delimiter = ";"
         rows = ([c.replace(".", ",") if _NUMBER.fullmatch(c) else c for c in row] for row in rows)
+    delimiter = ";" if decimal == "," else ","
     csv.writer(text, delimiter=delimiter, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
@@ -83,8 +83,7 @@ def write_csv(
     contents: dict[str, Iterable[str]] = {
         name: table_text(columns, decimal) for name, columns in view.columns().items()
     }
-    scenario, *files = view.stored_files()
-    contents["scenario.toml"] = [scenario[1]]
+    (_, contents["scenario.toml"]), *files = view.stored_files()
     for name, text in files:
         contents[path_in_folder(name, contents)] = [text]
     return write_files(Path(folder), contents, force=force)
@@ -144,5 +143,5 @@ def path_in_folder(path: str, used: Iterable[str]) -> str:
     if inside and str(pure) not in used:
         return str(pure)
     name = pure.name.replace("..", "_").replace(":", "_") or "file"
-    prefixes = itertools.chain([""], (f"{number}-" for number in itertools.count(2)))
-    return next(new for prefix in prefixes if (new := f"inputs/{prefix}{name}") not in used)
+    numbered = (f"inputs/{number}-{name}" for number in itertools.count(2))
+    return next(new for new in itertools.chain([f"inputs/{name}"], numbered) if new not in used)

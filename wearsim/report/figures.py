@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import accumulate, groupby
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -141,19 +141,14 @@ def figure_of(sheet: Sheet) -> Figure:
 
 def _arranged(figure: Figure, sheet: Sheet) -> Iterator[tuple[str, Axes]]:
     """Yield the names of panels with their axes; rows of different lengths are arranged apart."""
-    groups = [list(group) for _, group in groupby(sheet.rows, len)]
-    heights = sheet.heights or [1.0] * len(sheet.rows)
-    if len(groups) == 1:
-        mosaic: Any = [list(row) for row in sheet.rows]
-        ratios: Any = {"width_ratios": sheet.widths, "height_ratios": sheet.heights}
-        yield from figure.subplot_mosaic(mosaic, **ratios).items()
-        return
-    ends = list(accumulate(map(len, groups)))
-    parts = [heights[end - len(group) : end] for group, end in zip(groups, ends, strict=True)]
-    below: Any = figure.subfigures(len(groups), 1, height_ratios=[sum(part) for part in parts])
-    for subfigure, rows, ratios_of in zip(below, groups, parts, strict=True):
-        mosaic = [list(row) for row in rows]
-        yield from subfigure.subplot_mosaic(mosaic, height_ratios=ratios_of).items()
+    rows = zip(map(list, sheet.rows), sheet.heights or [1.0] * len(sheet.rows), strict=True)
+    groups = [list(zip(*group, strict=True)) for _, group in groupby(rows, lambda row: len(row[0]))]
+    parts: Any = [figure]
+    if len(groups) > 1:
+        parts = figure.subfigures(len(groups), 1, height_ratios=[sum(part) for _, part in groups])
+    for part, (mosaic, heights) in zip(parts, groups, strict=True):
+        axes = part.subplot_mosaic([*mosaic], width_ratios=sheet.widths, height_ratios=heights)
+        yield from axes.items()
 
 
 def png_of_panel(panel: Panel, dpi: int = 100, height: float = 3.1) -> bytes:
@@ -165,19 +160,21 @@ def png_of_panel(panel: Panel, dpi: int = 100, height: float = 3.1) -> bytes:
 
 def draw(axes: Axes, panel: Panel) -> None:
     """Draw a panel on axes."""
-    axes.set_title(panel.title)
     if panel.message:
         write_message(axes, panel.title, [panel.message])
         return
-    for along, axis in (("x", panel.x), ("y", panel.y)):
-        scale: Any = {f"{along}scale": "log"} if axis.log else {}
-        axes.set(**{f"{along}label": _label(axis)}, **scale)
+    name_axes(axes, panel.title, _label(panel.x), _label(panel.y))
+    logarithmic = {"xscale": panel.x.log, "yscale": panel.y.log}
+    axes.set(**{scale: "log" for scale, is_log in logarithmic.items() if is_log})
     sides = {False: (axes, panel.y)}
     if panel.right is not None:
-        sides[True] = _second(axes, panel.right), panel.right
+        other = axes.twinx()
+        other.set_ylabel(_label(panel.right))
+        other.spines["right"].set_visible(True)
+        other.grid(visible=False)
+        sides[True] = other, panel.right
     for mark in panel.marks:
-        drawn_on, y = sides[mark.right]
-        _draw(drawn_on, mark, panel.x, y)
+        _draw(mark, panel.x, *sides[mark.right])
     if panel.equal:
         axes.set_aspect("equal")
         axes.set_anchor("N")
@@ -189,31 +186,20 @@ def draw(axes: Axes, panel: Panel) -> None:
         axes.legend(**place, ncols=panel.columns)
 
 
-def _second(axes: Axes, axis: Axis) -> Axes:
-    """Return a second axis at the right."""
-    other = axes.twinx()
-    other.set_ylabel(_label(axis))
-    other.spines["right"].set_visible(True)
-    other.grid(visible=False)
-    return other
-
-
 def _set_axis(axes: Axes, along: str, axis: Axis) -> None:
     """Set limits and ticks of an axis, after all marks are drawn."""
-    limits = [None if end is None else end * axis.scale for end in axis.limits]
-    get, set_limits = getattr(axes, f"get_{along}lim"), getattr(axes, f"set_{along}lim")
+    ticks: Any = axes.xaxis if along == "x" else axes.yaxis
+    limits = axis.ends()
     if any(axis.margin):
-        low, high = get()
-        limits[0] = low - axis.margin[0] * (high - low) if limits[0] is None else limits[0]
-        limits[1] = high + axis.margin[1] * (high - low) if limits[1] is None else limits[1]
-    set_limits(*limits)
-    ticks = axes.xaxis if along == "x" else axes.yaxis
+        low, high = ticks.get_view_interval()
+        below, above = (part * (high - low) for part in axis.margin)
+        limits = axis.ends(low - below, high + above)
+    axes.set(**{f"{along}lim": limits})
     if axis.ticks is not None:
-        names = None if axis.names is None else list(axis.names)
-        ticks.set_ticks([tick * axis.scale for tick in axis.ticks], labels=names, minor=False)
+        ticks.set_ticks([tick * axis.scale for tick in axis.ticks], labels=axis.names)
         ticks.set_minor_locator(NullLocator())
     elif axis.log:
-        low, high = sorted(get())
+        low, high = sorted(ticks.get_view_interval())
         decades = float(np.log10(high / low))
         # powers of ten, twice and five times them are too few in less than a decade
         if decades < 1.0:
@@ -235,26 +221,41 @@ def _plain(value: float) -> str:
     return count(value) if 1e3 <= value < 1e9 else f"{value:g}"
 
 
-def _draw(axes: Axes, mark: Mark, x: Axis, y: Axis) -> None:
+def _draw(mark: Mark, x: Axis, axes: Axes, y: Axis) -> None:
     """Draw a mark on axes, in the units of both."""
     style: dict[str, Any] = {"color": mark.colour, "alpha": mark.alpha}
     named = {**style, "label": mark.label or None}
     match mark:
         case Line():
-            _draw_line(axes, mark, x, y, style)
+            values, style = (
+                np.asarray(mark.y),
+                style | ({"mfc": "white", "zorder": 5} if mark.open else {}),
+            )
+            lines = axes.plot(
+                np.asarray(mark.x) * x.scale,
+                (values.T if values.ndim > 1 else values) * y.scale,
+                ls=mark.dash or "none",
+                marker=mark.marker,
+                lw=mark.width,
+                ms=mark.size,
+                mew=1.4 if mark.marker == "|" else 0.7,
+                drawstyle="steps-post" if mark.steps else "default",
+                markevery=[-1] if mark.at_end else None,
+                **style,
+            )
+            lines[0].set_label(mark.label or "_line")
         case Records():
-            places = mark.x * x.scale
-            chosen = evenly_spaced(len(mark.passes), 24)
-            colours = _Colours(mark.passes)
+            chosen, colours = evenly_spaced(len(mark.passes), 24), _Colours(mark.passes)
             for record in chosen[evenly_spaced(len(chosen), mark.most)]:
                 axes.plot(
-                    places, mark.y[record] * y.scale, mark.dash, color=colours.of(record), lw=1.1
-                )
+                    mark.x * x.scale, mark.y[record] * y.scale, mark.dash,
+                    color=colours.of(record), lw=1.1,
+                )  # fmt: skip
             if mark.label:
                 axes.plot([], [], mark.dash, color=BLACK, label=mark.label)
         case Band():
-            low, high = (end * y.scale for end in (mark.low, mark.high))
             step: Any = "post" if mark.steps else None
+            low, high = mark.low * y.scale, mark.high * y.scale
             axes.fill_between(mark.x * x.scale, low, high, lw=0, step=step, **named)
         case Bars():
             place, size = (x, y) if not mark.horizontal else (y, x)
@@ -266,11 +267,28 @@ def _draw(axes: Axes, mark: Mark, x: Axis, y: Axis) -> None:
             else:
                 axes.bar(low, length, width, bottom=start, align="edge", **named)
         case Whiskers():
-            _draw_whiskers(axes, mark, x, y, style)
+            place, size = (y, x) if mark.horizontal else (x, y)
+            ends = np.array([mark.low, mark.high], dtype=float) * size.scale
+            places = np.broadcast_to(np.asarray(mark.place, dtype=float) * place.scale, ends.shape)
+            both = [places, ends][:: -1 if mark.horizontal else 1]
+            axes.plot(*both, lw=mark.width, solid_capstyle="butt", **style)
         case Span():
-            _draw_span(axes, mark, (x if mark.across == "x" else y).scale, named)
+            along, scale = ("v", x.scale) if mark.across == "x" else ("h", y.scale)
+            if mark.high is not None:
+                span = getattr(axes, f"ax{along}span")
+                span(mark.low * scale, mark.high * scale, lw=0, **named)
+            else:
+                line = getattr(axes, f"ax{along}line")
+                line(mark.low * scale, 0.0, mark.reach, ls=mark.dash, lw=mark.width, **named)
         case Image():
-            _draw_image(axes, mark, x, y)
+            grid = mark.x * x.scale, mark.y * y.scale, mark.value * mark.axis.scale
+            mesh = axes.pcolormesh(
+                *grid, shading="nearest" if np.ndim(mark.x) == 1 else "gouraud",
+                cmap=mark.colours, vmin=0.0, rasterized=True,
+            )  # fmt: skip
+            axes.grid(visible=False)
+            figure: Any = axes.figure
+            figure.colorbar(mesh, ax=axes, label=_label(mark.axis), pad=0.02, aspect=24)
         case Contours():
             grid = mark.x * x.scale, mark.y * y.scale, mark.value
             axes.contourf(*grid, levels=list(mark.levels), colors=list(mark.colours))
@@ -286,60 +304,15 @@ def _draw(axes: Axes, mark: Mark, x: Axis, y: Axis) -> None:
         case Patch():
             axes.fill(mark.x * x.scale, mark.y * y.scale, lw=0, zorder=0, **named)
         case Text():
-            parts = ["axes fraction" if mark.parts == along else "data" for along in ("x", "y")]
-            place_x = mark.x if mark.parts == "x" else mark.x * x.scale
-            place_y = mark.y if mark.parts == "y" else mark.y * y.scale
+            coordinates = {"x": ("data", mark.x * x.scale), "y": ("data", mark.y * y.scale)}
+            if mark.parts:
+                coordinates[mark.parts] = "axes fraction", getattr(mark, mark.parts)
+            (along, at_x), (up, at_y) = coordinates.values()
             axes.annotate(
-                mark.text, (place_x, place_y), xycoords=(parts[0], parts[1]),
+                mark.text, (at_x, at_y), xycoords=(along, up),
                 xytext=mark.offset, textcoords="offset points", ha=mark.anchor,
                 color=mark.colour, weight="bold" if mark.bold else "normal", fontsize=mark.size,
             )  # fmt: skip
-
-
-def _draw_line(axes: Axes, mark: Line, x: Axis, y: Axis, style: dict[str, Any]) -> None:
-    values = np.asarray(mark.y)
-    style |= {"mfc": "white", "zorder": 5} if mark.open else {}
-    lines = axes.plot(
-        np.asarray(mark.x) * x.scale,
-        (values.T if values.ndim > 1 else values) * y.scale,
-        ls=mark.dash or "none",
-        marker=mark.marker,
-        lw=mark.width,
-        ms=mark.size,
-        mew=1.4 if mark.marker == "|" else 0.7,
-        drawstyle="steps-post" if mark.steps else "default",
-        markevery=[-1] if mark.at_end else None,
-        **style,
-    )
-    lines[0].set_label(mark.label or "_line")
-
-
-def _draw_whiskers(axes: Axes, mark: Whiskers, x: Axis, y: Axis, style: dict[str, Any]) -> None:
-    place, size = (y, x) if mark.horizontal else (x, y)
-    places = np.broadcast_to(np.asarray(mark.place, dtype=float) * place.scale, (2, len(mark.low)))
-    ends = np.array([mark.low, mark.high], dtype=float) * size.scale
-    both = (ends, places) if mark.horizontal else (places, ends)
-    axes.plot(*both, lw=mark.width, solid_capstyle="butt", **style)
-
-
-def _draw_span(axes: Axes, mark: Span, scale: float, style: dict[str, Any]) -> None:
-    along = "v" if mark.across == "x" else "h"
-    if mark.high is not None:
-        getattr(axes, f"ax{along}span")(mark.low * scale, mark.high * scale, lw=0, **style)
-        return
-    line = getattr(axes, f"ax{along}line")
-    line(mark.low * scale, 0.0, mark.reach, ls=mark.dash, lw=mark.width, **style)
-
-
-def _draw_image(axes: Axes, mark: Image, x: Axis, y: Axis) -> None:
-    shading: Any = "nearest" if np.ndim(mark.x) == 1 else "gouraud"
-    mesh = axes.pcolormesh(
-        mark.x * x.scale, mark.y * y.scale, mark.value * mark.axis.scale,
-        shading=shading, cmap=mark.colours, vmin=0.0, rasterized=True,
-    )  # fmt: skip
-    axes.grid(visible=False)
-    figure: Any = axes.figure
-    figure.colorbar(mesh, ax=axes, label=_label(mark.axis), pad=0.02, aspect=24)
 
 
 class _Colours:
@@ -364,8 +337,13 @@ def _draw_scale(figure: Figure, sheet: Sheet, beside: list[Axes]) -> None:
     """Draw the scale of the colours of the records beside panels."""
     marks = sheet.panels[sheet.scale_beside[0]].marks
     colours = _Colours(next(mark.passes for mark in marks if isinstance(mark, Records)))
-    mapped = ScalarMappable(colours.norm, colours.map)
-    figure.colorbar(mapped, ax=beside, label=colours.name, aspect=45, pad=0.02)
+    figure.colorbar(
+        ScalarMappable(colours.norm, colours.map),
+        ax=beside,
+        label=colours.name,
+        aspect=45,
+        pad=0.02,
+    )
 
 
 def name_axes(axes: Axes, title: str, x: str, y: str) -> None:

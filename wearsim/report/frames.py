@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+
+from wearsim.errors import optional_library
 
 if TYPE_CHECKING:
     import pandas
@@ -46,16 +47,14 @@ def as_dataset(
         )
         for axis in schema.axes.values()
     }
-    dataset: xarray.Dataset = _library("xarray").Dataset({**axes, **data}, attrs=dict(labels))
-    return dataset
+    return cast("xarray.Dataset", _library("xarray").Dataset({**axes, **data}, attrs=dict(labels)))
 
 
 def dataset_of(
     variables: Mapping[str, tuple[tuple[str, ...], Any]], axes: Mapping[str, list[str]]
 ) -> xarray.Dataset:
     """Return arrays with the names of their axes as a dataset of xarray."""
-    dataset: xarray.Dataset = _library("xarray").Dataset(dict(variables), coords=dict(axes))
-    return dataset
+    return cast("xarray.Dataset", _library("xarray").Dataset(dict(variables), coords=dict(axes)))
 
 
 def concatenated(
@@ -67,10 +66,8 @@ def concatenated(
     """
     library = _library("xarray")
     coordinate = library.IndexVariable(name, list(values), {"units": unit} if unit else {})
-    dataset: xarray.Dataset = library.concat(
-        list(datasets), coordinate, join="outer", data_vars="all", combine_attrs="drop_conflicts"
-    )
-    return dataset
+    options = {"join": "outer", "data_vars": "all", "combine_attrs": "drop_conflicts"}
+    return cast("xarray.Dataset", library.concat(list(datasets), coordinate, **options))
 
 
 def as_frame(
@@ -91,23 +88,17 @@ def as_frame(
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     for name, unit, values in columns:
-        parts = {name: values}
-        if np.ndim(values) > 1:
-            parts = {f"{name}.{number}": part for number, part in enumerate(values.T, 1)}
+        several = enumerate(values.T, 1) if np.ndim(values) > 1 else ()
+        parts = {f"{name}.{number}": part for number, part in several} or {name: values}
         arrays |= parts
         units |= dict.fromkeys(parts, unit)
     library = _library("pandas")
-    frame: pandas.DataFrame = library.DataFrame(
-        arrays, index=library.Index(list(numbers), name=axis)
-    )
+    index = library.Index(list(numbers), name=axis)
+    frame: pandas.DataFrame = library.DataFrame(arrays, index=index)
     frame.attrs["units"] = units
     return frame
 
 
 def _library(name: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise ModuleNotFoundError(
-            f"{name} is not installed; install it with: pip install 'wearsim[data]'", name=name
-        ) from error
+    text = f"{name} is not installed; install it with: pip install 'wearsim[data]'"
+    return optional_library(name, ModuleNotFoundError(text, name=name))

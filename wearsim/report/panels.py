@@ -75,6 +75,11 @@ class Axis:
         """Name with the unit."""
         return f"{self.name} [{self.unit}]" if self.name and self.unit != "1" else self.name
 
+    def ends(self, *default: float) -> list[float | None]:
+        """Return the limits in the unit shown; those that follow the data are None by default."""
+        ends = zip(self.limits, default or (None, None), strict=True)
+        return [other if end is None else float(end * self.scale) for end, other in ends]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Mark:
@@ -87,7 +92,15 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Line(Mark):
+class _Placed(Mark):
+    """What is drawn at places on both axes."""
+
+    x: Any
+    y: Any
+
+
+@dataclass(frozen=True)
+class Line(_Placed):
     """A curve, points without a dash, or several curves of one style.
 
     Parameters
@@ -108,8 +121,6 @@ class Line(Mark):
         Further values under the pointer with their units [SI].
     """
 
-    x: Any
-    y: Any
     dash: str = "-"
     marker: str = ""
     width: float = 1.3
@@ -121,7 +132,7 @@ class Line(Mark):
 
 
 @dataclass(frozen=True)
-class Records(Mark):
+class Records(_Placed):
     """A curve for each record: all of them in a figure, the slider's on a page.
 
     Parameters
@@ -135,8 +146,6 @@ class Records(Mark):
         Greatest number of curves in a figure.
     """
 
-    x: Any
-    y: Any
     passes: Any
     dash: str = "-"
     most: int = 24
@@ -199,7 +208,7 @@ class Span(Mark):
 
 
 @dataclass(frozen=True)
-class Image(Mark):
+class Image(_Placed):
     """Values on a grid as colours, with a scale that starts at zero.
 
     Parameters
@@ -213,19 +222,15 @@ class Image(Mark):
         Name of a colour map.
     """
 
-    x: Any
-    y: Any
     value: Any
     axis: Axis
     colours: str = PRESSURE
 
 
 @dataclass(frozen=True)
-class Contours(Mark):
+class Contours(_Placed):
     """Areas between levels of a value on a grid, of the same shapes as of an `Image`."""
 
-    x: Any
-    y: Any
     value: Any
     levels: Sequence[float]
     colours: Sequence[str]
@@ -233,25 +238,20 @@ class Contours(Mark):
 
 
 @dataclass(frozen=True)
-class Arrows(Mark):
+class Arrows(_Placed):
     """Vectors at points, drawn relative to the longest one."""
 
-    x: Any
-    y: Any
     along_x: Any
     along_y: Any
 
 
 @dataclass(frozen=True)
-class Patch(Mark):
+class Patch(_Placed):
     """A filled polygon, under the other marks."""
-
-    x: Any
-    y: Any
 
 
 @dataclass(frozen=True)
-class Text(Mark):
+class Text(_Placed):
     """A text at a place.
 
     Parameters
@@ -271,8 +271,6 @@ class Text(Mark):
         Whether the text is left out on a page, where the answer states it.
     """
 
-    x: float
-    y: float
     text: str
     parts: Literal["", "x", "y"] = ""
     offset: tuple[float, float] = (0.0, 0.0)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from wearsim.atomic_write import replacement
-from wearsim.errors import PluginError
+from wearsim.atomic_write import save_text
+from wearsim.errors import PluginError, optional_library
 from wearsim.report.csv_files import table_text
 from wearsim.report.view import Column
 from wearsim.types import FloatArray
@@ -105,12 +104,8 @@ class Surface:
         path = Path(path)
         if path.suffix.lower() not in ENDINGS:
             raise ValueError(f"'{path}' has no known format, expected {' or '.join(ENDINGS)}")
-        if path.suffix.lower() == ".csv":
-            text = "".join(table_text([self.columns]))
-        else:
-            text = _dxf(self, spline)
-        with replacement(path) as file:
-            file.write(text.encode("utf-8"))
+        is_table = path.suffix.lower() == ".csv"
+        save_text("".join(table_text([self.columns])) if is_table else _dxf(self, spline), path)
 
 
 def dxf_library() -> Any:
@@ -121,13 +116,13 @@ def dxf_library() -> Any:
     PluginError
         If it is not installed.
     """
-    try:
-        return import_module("ezdxf")
-    except ImportError as error:
-        raise PluginError(
+    return optional_library(
+        "ezdxf",
+        PluginError(
             "DXF needs a package that is not installed (ezdxf); install it with:"
             " pip install 'wearsim[cad]'"
-        ) from error
+        ),
+    )
 
 
 def _dxf(surface: Surface, spline: bool) -> str:
@@ -145,8 +140,7 @@ def _dxf(surface: Surface, spline: bool) -> str:
             knots, controls = closed_spline(points)
             entity = space.add_spline(dxfattribs={"layer": layer})
             entity.control_points = np.column_stack([controls, np.zeros(len(controls))])
-            entity.knots, entity.dxf.degree = knots.tolist(), _DEGREE
-            entity.closed = True
+            entity.knots, entity.dxf.degree, entity.closed = knots.tolist(), _DEGREE, True
         else:
             space.add_lwpolyline(points.tolist(), close=True, dxfattribs={"layer": layer})
     text = io.StringIO()
@@ -169,7 +163,6 @@ def closed_spline(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     closed = np.vstack([points, points[:1]])
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))])
     periodic = make_interp_spline(along, closed, k=_DEGREE, bc_type="periodic")
-    slope = periodic(along[0], 1)
-    ends: Any = [(1, slope)], [(1, slope)]
+    ends: Any = ([(1, periodic(along[0], 1))],) * 2
     clamped = make_interp_spline(along, closed, k=_DEGREE, bc_type=ends)
     return np.asarray(clamped.t), np.asarray(clamped.c)

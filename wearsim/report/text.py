@@ -89,9 +89,7 @@ def count(value: float) -> str:
 
 def count_of(number: int, noun: str, none: str = "") -> str:
     """Return a number of things, "1 unit" or "1,000 units"; of zero another text if it is given."""
-    if not number and none:
-        return none
-    return f"{count(number)} {noun}{'' if number == 1 else 's'}"
+    return none if none and not number else f"{count(number)} {noun}{'' if number == 1 else 's'}"
 
 
 def number_of_realisations(number: int) -> str:
@@ -109,9 +107,7 @@ def pass_unit(greatest: float) -> tuple[float, str]:
     """
     if greatest >= 1e6:
         return 1e6, "million roller passes"
-    if greatest >= 1e4:
-        return 1e3, "thousand roller passes"
-    return 1.0, "roller passes"
+    return (1e3, "thousand roller passes") if greatest >= 1e4 else (1.0, "roller passes")
 
 
 def lapse(seconds: float) -> str:
@@ -137,10 +133,9 @@ def brief(seconds: float) -> str:
     """Return a short time with three digits: "2.5 us", "84 s"."""
     if not math.isfinite(seconds):
         return NOTHING
-    for unit, scale in (("s", 1.0), ("ms", 1e3)):
-        if seconds * scale >= 1.0:
-            return f"{seconds * scale:.3g} {unit}"
-    return f"{seconds * 1e6:.3g} us"
+    larger = ((unit, scale) for unit, scale in (("s", 1.0), ("ms", 1e3)) if seconds * scale >= 1.0)
+    unit, scale = next(larger, ("us", 1e6))
+    return f"{seconds * scale:.3g} {unit}"
 
 
 class Named(NamedTuple):
@@ -161,11 +156,6 @@ class Named(NamedTuple):
     def label(self) -> str:
         """Name with the unit, for an axis or a table."""
         return self.words if self.unit == "1" else f"{self.words} [{self.unit}]"
-
-    @property
-    def per_si(self) -> float:
-        """One SI unit in the engineering unit."""
-        return PER_SI[self.unit]
 
 
 #: observables of an ensemble by name; the last ones are of cams and of fatigue
@@ -210,12 +200,9 @@ def si_key(name: str) -> str:
 
 def statistic_in_words(target: Target) -> str:
     """Return the statistic of a target, "mean of depth" or "95 % quantile of width"."""
-    statistic: str | float = target.statistic
-    if statistic == 0.5:
-        statistic = "median"
-    elif not isinstance(statistic, str):
-        statistic = f"{100.0 * statistic:g} % quantile"
-    return f"{statistic} of {OBSERVABLES[target.observable].words}"
+    statistic = "median" if target.statistic == 0.5 else target.statistic
+    words = statistic if isinstance(statistic, str) else f"{100.0 * statistic:g} % quantile"
+    return f"{words} of {OBSERVABLES[target.observable].words}"
 
 
 def cells(estimate: Interval, unit: str) -> tuple[str, str]:
@@ -242,8 +229,8 @@ def cells(estimate: Interval, unit: str) -> tuple[str, str]:
     value, low, high = (end * PER_SI[unit] for end in (estimate.value, estimate.low, estimate.high))
     sizes = [abs(end) for end in (value, low, high) if end]
     if min(sizes) < _WITHOUT_EXPONENT[0] or max(sizes) >= _WITHOUT_EXPONENT[1]:
-        ends = f"{in_unit(estimate.low, unit)}..{in_unit(estimate.high, unit)}"
-        return in_unit(estimate.value, unit), ends
+        ends = (in_unit(end, unit) for end in (estimate.low, estimate.high))
+        return in_unit(estimate.value, unit), "..".join(ends)
     place = math.floor(math.log10(abs(value))) if value else 0
     decimals = _HALF_WIDTH_DIGITS - 1 - math.floor(math.log10(0.5 * (high - low)))
     decimals = max(min(max(decimals, _MIN_DIGITS - 1 - place), _MAX_DIGITS - 1 - place), 0)
@@ -300,8 +287,9 @@ def with_range(value: float, ends: Sequence[float], scale: float) -> str:
     """Return a value with its 95 % interval, with the digits that the interval leaves."""
     low, high = ends
     digits = 3 if (high - low) > 0.02 * value else 4
-    texts = (in_unit(scale * end, "1", digits) for end in (value, low, high))
-    return "{} ({} to {})".format(*texts)
+    return "{} ({} to {})".format(
+        *(in_unit(scale * end, "1", digits) for end in (value, low, high))
+    )
 
 
 def within(name: str, error: float, value: float) -> str:
@@ -325,16 +313,17 @@ def footer(used: list[str], error: str, time: str) -> str:
 
 def plain(value: Any) -> Any:
     """Convert a value to JSON types: arrays to lists, paths to text, NaN to null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):  # arrays and scalars of numpy
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, Path):
-        return str(value)
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
+    match value:
+        case Mapping():
+            return {str(key): plain(item) for key, item in value.items()}
+        case _ if hasattr(value, "tolist"):  # arrays and scalars of numpy
+            return plain(value.tolist())
+        case list() | tuple():
+            return [plain(item) for item in value]
+        case Path():
+            return str(value)
+        case float() if not math.isfinite(value):
+            return None
     return value
 
 
@@ -366,10 +355,10 @@ def with_error(values: FloatArray, error: float | None, unit: str) -> str:
     digits = min(max(digits, 1), 4)
     last = 10.0 ** (math.floor(math.log10(error)) - 1)  # second digit of the error
     # smaller values than the error are rounded to that digit
-    known = [
+    known = (
         value if abs(value) > error else last * round(value / last)
         for value in np.ravel(values).tolist()
-    ]
+    )
     texts = [in_unit(value, unit, digits) for value in known]
     text = texts[0] if len(set(texts)) == 1 else " / ".join(texts)
     return f"{text} ± {shown(error, unit, 2)}"

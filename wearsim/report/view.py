@@ -11,7 +11,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -90,15 +90,6 @@ class Answer(NamedTuple):
     value: float
     unit: str
     label: str
-
-
-def answers_of(rows: Rows) -> dict[str, Answer]:
-    """Return the numbers that rows state, by name."""
-    return {
-        name: Answer(math.nan if value is None else float(value), unit, row.label)
-        for row in rows
-        for name, (value, unit) in row.answers.items()
-    }
 
 
 def width_row(width: Any, threshold: float) -> Row:
@@ -228,12 +219,15 @@ class View(ABC):
 
         Studies that choose a design ask for them, as objectives and constraints.
         """
-        return answers_of(self.rows())
+        return {
+            name: Answer(math.nan if value is None else float(value), unit, row.label)
+            for row in self.rows()
+            for name, (value, unit) in row.answers.items()
+        }
 
     def panels(self, measured: Sequence[Measured] = ()) -> Sheet:
         """Return the panels; measured profiles are drawn over computed ones."""
-        sheet: Sheet = resolve_name(self.sheet)(self.result, measured)
-        return sheet
+        return cast("Sheet", resolve_name(self.sheet)(self.result, measured))
 
     def overview(self) -> Overview:
         """Return what a page shows first; by default the main panel and the first answers."""

@@ -16,6 +16,7 @@ from typing import (
     TypeAlias,
     TypeVar,
     Union,
+    cast,
     get_args,
     get_origin,
     get_type_hints,
@@ -281,13 +282,12 @@ class StudyData:
     @property
     def labels(self) -> dict[str, Any]:
         """Format and short attributes, which other programs can read in the file."""
-        short = (str, int, float, np.number, np.bool_)
-        every = {
-            "format": self.schema.format,
-            "format_version": self.schema.version,
-            **self.attributes,
+        about = {"format": self.schema.format, "format_version": self.schema.version}
+        return about | {
+            name: value
+            for name, value in self.attributes.items()
+            if isinstance(value, str | int | float | np.number | np.bool_)
         }
-        return {name: value for name, value in every.items() if isinstance(value, short)}
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -311,11 +311,9 @@ def _has_type(value: Any, hint: Any) -> bool:
     if kind is list:
         return isinstance(value, list) and all(_has_type(item, parts[0]) for item in value)
     if kind is dict:
-        items = value.values() if isinstance(value, dict) else ()
-        return isinstance(value, dict) and all(_has_type(item, parts[1]) for item in items)
-    if isinstance(value, bool) or hint is bool:
-        return isinstance(value, bool) and hint is bool
-    return isinstance(value, int | float if hint is float else hint)
+        return isinstance(value, dict) and all(_has_type(v, parts[1]) for v in value.values())
+    is_kind = isinstance(value, int | float if hint is float else hint)
+    return is_kind and isinstance(value, bool) == (hint is bool)
 
 
 def as_plain(value: object) -> object:
@@ -451,5 +449,4 @@ class Stored:
     def __get__(self, result: Any, owner: type) -> Array:
         if result is None:
             return self  # type: ignore[return-value]  # for `help`
-        values: Array = result.values(self._name)
-        return values
+        return cast("Array", result.values(self._name))

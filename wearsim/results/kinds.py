@@ -32,9 +32,8 @@ def kind_of(path: str | Path) -> StudyKind:
     name, about = read_file(path, lambda file: (format_of(file), _about(file)))
     kinds = [kind for kind in study_kinds() if kind.format and kind.format == name]
     marked = [kind for kind in kinds if kind.marked_by and about.get(kind.marked_by)]
-    plain = [kind for kind in kinds if not kind.marked_by]
-    if marked or plain:
-        return (marked or plain)[0]
+    if chosen := [*marked, *(kind for kind in kinds if not kind.marked_by)]:
+        return chosen[0]
     for plugin in about.get("plugins", []):
         if plugin.get("kind") == StudyKind.kind:
             distribution = plugin["distribution"]

@@ -7,7 +7,7 @@ import shlex
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 from wearsim.errors import PluginError, ResultsFileError
 from wearsim.report.text import count
@@ -78,16 +78,12 @@ class StudyView(View, Generic[Shown]):
     def _sources(self) -> Rows:
         """Return rows on scenario, input files, plugins and software."""
         raw = self.result.raw
-        plugins = [
-            f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
-            for item in raw.plugins
-        ]
-        software = (f"{name} {number}" for name, number in raw.software.items())
+        plugins = "{kind} {name} ({distribution} {version})"
         return [
             Row("scenario", raw.scenario_file),
             Row("input files", ", ".join(raw.files) or "none"),
-            Row("plugins", "\n".join(plugins)),
-            Row("software", ", ".join(software)),
+            Row("plugins", "\n".join(plugins.format_map(item) for item in raw.plugins)),
+            Row("software", ", ".join(map(" ".join, raw.software.items()))),
             Row("written", raw.created),
         ]
 
@@ -107,9 +103,8 @@ class StudyView(View, Generic[Shown]):
 
     def ending(self) -> dict[str, Any]:
         """Return file, notes and warnings for JSON."""
-        path = self.result.path
         return {
-            "output": str(path) if path else None,
+            "output": self.result.path and str(self.result.path),
             "notes": list(self.notes),
             "warnings": list(self.warnings),
         }
@@ -159,44 +154,41 @@ class DesignsView(View):
 
     def stored_files(self) -> list[tuple[str, str]]:
         """Return the scenario of the first design and its input files."""
-        view: View = self.result.designs[0].view
-        return view.stored_files()
+        return cast("View", self.result.designs[0].view).stored_files()
 
 
 def columns_of(name: str, ends: Iterable[FloatArray], unit: str = "1") -> list[Column]:
     """Return values and lower and upper ends of their intervals as columns of a CSV file."""
-    names = (name, f"{name} low", f"{name} high")
-    return [Column(title, values, unit) for title, values in zip(names, ends, strict=True)]
+    titles = (name, f"{name} low", f"{name} high")
+    return [Column(*column, unit) for column in zip(titles, ends, strict=True)]
 
 
 def drawn_rows(result: StudyResult[Any]) -> Rows:
     """Return rows on the random inputs of a study: mean and standard deviation of the draws."""
     rows = []
     for key, item in drawn_data(result).items():
-        mean, std, unit = float(item["mean"]), float(item["std"]), item["unit"]
-        text = f"mean {in_engineers_unit(mean, unit, 4)}"
-        if is_constant(mean, std):
-            text = f"{CONSTANT} {in_engineers_unit(mean, unit, 4)}"
-        elif math.isfinite(std):
-            text += f", std {in_engineers_unit(std, unit, 4)}"
-        rows.append(Row(f"drawn {key}", text))
+        mean, std = (
+            in_engineers_unit(float(item[name]), item["unit"], 4) for name in ("mean", "std")
+        )
+        scatter = f", std {std}" if math.isfinite(item["std"]) else ""
+        is_fixed = is_constant(float(item["mean"]), float(item["std"]))
+        rows.append(
+            Row(f"drawn {key}", f"{CONSTANT} {mean}" if is_fixed else f"mean {mean}{scatter}")
+        )
     return rows
 
 
 def drawn_data(result: StudyResult[Any]) -> dict[str, Any]:
     """Return mean and standard deviation of the draws by key, in SI units."""
+    drawn = [(item, result.inputs[item["key"]]) for item in result.raw.inputs if result.count]
     return {
         item["key"]: {
             "unit": item["unit"],
-            "mean": result.inputs[item["key"]].mean(),
-            "std": _std(result.inputs[item["key"]]),
+            "mean": values.mean(),
+            "std": float(values.std(ddof=1)) if values.size > 1 else math.nan,
         }
-        for item in (result.raw.inputs if result.count else [])
+        for item, values in drawn
     }
-
-
-def _std(values: FloatArray) -> float:
-    return float(values.std(ddof=1)) if values.size > 1 else math.nan
 
 
 def varying_inputs(result: StudyResult[Any], drawn: Mapping[str, Any] | None) -> dict[str, str]:
@@ -215,11 +207,13 @@ def varying_inputs(result: StudyResult[Any], drawn: Mapping[str, Any] | None) ->
         random = result.scenario.random
     except (PluginError, ResultsFileError) as error:
         return {"inputs": f"unknown, since the scenario cannot be read here: {error}"}
-    if drawn is None:
-        chosen = [item for item in random if item.role in {"field", "process"}]
-    else:
-        chosen = [item for item in random if not set(item.keys) <= set(drawn)]
-    return {item.name: item.describe() for item in chosen}
+    return {
+        item.name: item.describe()
+        for item in random
+        if (
+            item.role in {"field", "process"} if drawn is None else not set(item.keys) <= set(drawn)
+        )
+    }
 
 
 def varying_rows(varying: Mapping[str, str]) -> Rows:

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
 def study_kinds() -> list[StudyKind]:
     """Return all installed kinds of studies."""
-    kinds = (item.spec for item in registry().all() if item.refusal is None)
-    return [spec for spec in kinds if isinstance(spec, StudyKind)]
+    return [
+        item.spec
+        for item in registry().all()
+        if item.refusal is None and isinstance(item.spec, StudyKind)
+    ]
 
 
 def kind_of_result(result: Any) -> StudyKind:

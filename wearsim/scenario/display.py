@@ -26,16 +26,12 @@ def scenario_html(scenario: Scenario) -> str:
     ----------
     scenario : Scenario
     """
-    given = dict(flat(tomllib.loads(scenario.text)))
     random = {key: item.describe() for item in scenario.random for key in item.keys}
-    inner = {key for key in given for name in random if key.startswith(f"{name}.")}
-    rows = [(key, _value(value)) for key, value in given.items() if key not in inner]
-    rows = [
-        *((key, random.get(key, text)) for key, text in rows if key != "title"),
-        *((key, text) for key, text in random.items() if key not in given),
-    ]
-    panel = None if scenario.cam else _bodies(scenario)
-    return table_html(scenario.title, [Row(*row) for row in rows], panel)
+    inner = tuple(f"{key}." for key in random)
+    given = flat(tomllib.loads(scenario.text))
+    texts = {key: _value(value) for key, value in given if not key.startswith(inner)} | random
+    rows = [Row(key, text) for key, text in texts.items() if key != "title"]
+    return table_html(scenario.title, rows, None if scenario.cam else _bodies(scenario))
 
 
 def _value(value: object) -> str:
@@ -55,15 +51,14 @@ def _bodies(scenario: Scenario) -> Panel:
     half = float(gap.half_width(50e-6))  # where the bodies are 50 um apart
     half = min(half, 0.5 * width) if width else half
     y = np.linspace(-half, half, 201)
-    ground = np.zeros_like(y) if profile is None else np.interp(y, profile.y, profile.height)
-    ground = ground - gap.cylinder_drop(y)
-    axes = Axis("y", "mm"), Axis("height", "um")
+    height = 0.0 if profile is None else np.interp(y, profile.y, profile.height)
     return Panel(
         "Bodies before wear",
-        *axes,
+        Axis("y", "mm"),
+        Axis("height", "um"),
         [
             Line(y, gap.roller_drop(y), colour="#0072b2", label="roller"),
-            Line(y, ground, colour="#b35900", label="cylinder"),
+            Line(y, height - gap.cylinder_drop(y), colour="#b35900", label="cylinder"),
         ],
         "Heights of cylinder and roller across the track before wear.",
     )

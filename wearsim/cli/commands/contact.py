@@ -117,9 +117,11 @@ def contact(
     refuse_inputs(figure, loaded.paths)
     refuse_inputs(figure, [profile] if profile else [], "the profile")
     choice = profile_choice(columns, units, row, mean_rows, at)
-    message = "is needed for --columns, --units, --row, --mean-rows, --at and --filter"
-    chosen = cutoff is not None or choice != ProfileChoice()
-    refuse(profile is None and chosen, message, "--profile")
+    refuse(
+        profile is None and (cutoff is not None or choice != ProfileChoice()),
+        "is needed for --columns, --units, --row, --mean-rows, --at and --filter",
+        "--profile",
+    )
     cylinder, files = loaded.cylinder, dict(loaded.files)
     wavelength = quantity_of(cutoff, "m", "--filter")
     if profile is not None:
@@ -138,24 +140,26 @@ def contact(
     with watching(Display, loaded, kind="contact", fields=with_fields):
         study = wearsim.study_contact(loaded, cylinder.profile, with_fields, True, against)
     view = study.view
-    view.notes = [*study.notes, *_notes_on_means(loaded)]
-    if cylinder.profile and profile and (sign := sign_note(cylinder.profile, choice, str(profile))):
-        view.notes.append(sign)
-    if figure is not None and not has_fields:
-        view.notes.append(
-            f"model '{study.model}' gives no fields; the figure shows its strips only"
-        )
+    further = [
+        sign_note(cylinder.profile, choice, str(profile)) if profile and cylinder.profile else "",
+        f"model '{study.model}' gives no fields; the figure shows its strips only"
+        if figure is not None and not has_fields
+        else "",
+    ]
+    view.notes = [*study.notes, *_notes_on_means(loaded), *filter(None, further)]
     view.start = dict(profile_rows(start))
     show_with_figure(view, figure, json=json, more={"figure": figure, "profile": start})
 
 
 def _notes_on_means(scenario: Scenario) -> list[str]:
     """Return notes that name the random inputs, which are set to their means."""
-    fields = [item.name for item in scenario.random if item.role == "field"]
-    others = [item.name for item in scenario.random if item.role != "field"]
     named = {
-        "random inputs are set to their means": others,
-        "random fields are set to the means of their marginals": fields,
+        "random inputs are set to their means": [
+            item.name for item in scenario.random if item.role != "field"
+        ],
+        "random fields are set to the means of their marginals": [
+            item.name for item in scenario.random if item.role == "field"
+        ],
     }
     return [f"{text}: {', '.join(names)}" for text, names in named.items() if names]
 
@@ -182,8 +186,9 @@ def dissipation(
 ) -> None:
     """Solve one contact for many realisations of its random inputs."""
     check_figure(figure, force, "--figure")
-    options = settings_with(settings, **{"sampling.plan": plan, "seed": seed})
-    loaded = read_scenario(scenario, options)
+    loaded = read_scenario(
+        scenario, settings_with(settings, **{"sampling.plan": plan, "seed": seed})
+    )
     path = output if output is not None else Path(f"{scenario.stem}-dissipation.h5")
     refuse_same_file(figure, path, loaded.paths)
     from wearsim.cli.progress import Counter, watching
@@ -193,15 +198,6 @@ def dissipation(
     show_with_figure(result.view, figure, json=json, files={"results file": result.path})
 
 
-MotionTable = Annotated[
-    Path | None,
-    typer.Option(
-        "--table",
-        metavar="FILE.csv",
-        help="Motion, loads and surface at the angles, one row each; instead of the terminal.",
-        show_default=False,
-    ),
-]
 _MOST_ANGLES = 100_000
 
 
@@ -219,7 +215,15 @@ def cam(
     ] = None,
     settings: Settings = None,
     figure: Figure = None,
-    table: MotionTable = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            "--table",
+            metavar="FILE.csv",
+            help="Motion, loads and surface at the angles, one row each; instead of the terminal.",
+            show_default=False,
+        ),
+    ] = None,
     surface: SurfaceFile = None,
     chord: Chord = None,
     points: Points = None,
@@ -277,7 +281,9 @@ def _angles(text: str) -> list[float]:
         )
         count = (last - first) / step if step else -1.0
         if not 0.0 <= count <= _MOST_ANGLES:
-            what = f"'{part.strip()}' is no range of 1 to {_MOST_ANGLES:,} angles"
-            raise ValueError(f"{what}, expected one such as 0:359:1 deg")
+            raise ValueError(
+                f"'{part.strip()}' is no range of 1 to {_MOST_ANGLES:,} angles, expected one such"
+                " as 0:359:1 deg"
+            )
         angles += [first + step * place for place in range(int(count + 1e-9) + 1)]
     return angles

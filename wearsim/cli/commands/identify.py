@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import wearsim
+from wearsim.atomic_write import save_text
 from wearsim.cli.render import draw_figure, show_with_figure
 from wearsim.cli.shared import (
     Columns,
@@ -182,11 +183,9 @@ def identify(
     loaded = read_scenario(scenario, settings_with(settings, seed=seed))
     from wearsim.studies.identify.inputs import fixed
 
-    overrides: dict[str, object] = {}
-    if fix is not None:
-        with checking("--fix"):
-            overrides = fixed(fix)
-        loaded = loaded.changed(overrides)
+    with checking("--fix"):
+        overrides: dict[str, object] = {} if fix is None else fixed(fix)
+    loaded = loaded.changed(overrides) if overrides else loaded
     if plan:
         without = {"profiles": profiles, "--tests": tests, "-o": output, "--posterior": posterior}
         for name, value in without.items():
@@ -206,11 +205,12 @@ def identify(
     for path in (figure, posterior, levels):
         refuse_same_file(path, output if output is not None else Path(), inputs)
     from wearsim.cli.progress import Counter, watching
-    from wearsim.report.page.page import save_text
 
     distance, bodies = quantity_of(shoulders, "m", "--shoulders"), _shared(share)
-    place = "--before" if before else "T1.csv T2.csv..."
-    with checking(place), watching(Counter, loaded, quiet) as counter:
+    with (
+        checking("--before" if before else "T1.csv T2.csv..."),
+        watching(Counter, loaded, quiet) as counter,
+    ):
         result = wearsim.identify(
             loaded,
             tests if tests is not None else list(profiles or []),
@@ -230,8 +230,9 @@ def identify(
         save_text(result.posterior_toml(), posterior)
         save_text(result.posterior_csv(), posterior.with_suffix(".csv"))
     more = {"posterior": posterior, "both levels": levels}
-    files = {"results file": result.path, **more}
-    show_with_figure(result.view, figure, json=json, files=files, more=more)
+    show_with_figure(
+        result.view, figure, json=json, files={"results file": result.path, **more}, more=more
+    )
 
 
 def _shared(text: str | None) -> tuple[str, ...]:
@@ -240,8 +241,11 @@ def _shared(text: str | None) -> tuple[str, ...]:
         return ()
     name, equals, listed = text.partition("=")
     bodies = tuple(body.strip() for body in listed.split(","))
-    known = name.strip() == "k" and equals and sorted(bodies) == ["cylinder", "roller"]
-    refuse(not known, f"'{text}' is unknown, expected k=cylinder,roller", "--share")
+    refuse(
+        not (name.strip() == "k" and equals and sorted(bodies) == ["cylinder", "roller"]),
+        f"'{text}' is unknown, expected k=cylinder,roller",
+        "--share",
+    )
     return bodies
 
 
@@ -286,10 +290,15 @@ def _sizes(numbers: str | None) -> list[int]:
     first, colon, last = str(numbers).partition(":")
     counts: list[int] = []
     with suppress(ValueError, OverflowError):
-        listed = () if colon else str(numbers).split(",")
-        counts = sizes(int(first), int(last)) if colon else sorted(set(map(int, listed)))
-    wrong = not counts or counts[0] < 2 or counts[-1] > 1000 or (colon and int(first) > int(last))
-    refuse(wrong, f"'{numbers}' is no range of 2 to 1000 tests, expected 3:60 or 3,8,20", "-n")
+        if colon:
+            counts = sizes(int(first), int(last))
+        else:
+            counts = sorted(set(map(int, str(numbers).split(","))))
+    refuse(
+        not counts or counts[0] < 2 or counts[-1] > 1000 or (colon and int(first) > int(last)),
+        f"'{numbers}' is no range of 2 to 1000 tests, expected 3:60 or 3,8,20",
+        "-n",
+    )
     return counts
 
 
@@ -301,7 +310,10 @@ def _measured(text: str | None) -> dict[str, float]:
         std = 0.0
         with suppress(ValueError):
             std = float(value)
-        message = f"'{part}' is no input with a standard deviation above 0, such as load=0.1"
-        refuse(not std > 0.0, message, "--measured")
+        refuse(
+            not std > 0.0,
+            f"'{part}' is no input with a standard deviation above 0, such as load=0.1",
+            "--measured",
+        )
         stds[name.strip()] = std
     return stds

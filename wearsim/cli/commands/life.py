@@ -41,7 +41,6 @@ if TYPE_CHECKING:
     from wearsim.scenario import Scenario
     from wearsim.studies.life.result import LifeResult
 
-Life = "a number of passes, or turns of a cam, or a time such as '200 h'"
 _FILES = {".h5", ".hdf5"}
 
 
@@ -72,7 +71,8 @@ def life(
         str | None,
         typer.Option(
             metavar="LIFE",
-            help=f"Life of which the probability is estimated: {Life}.",
+            help="Life of which the probability is estimated: a number of passes, or turns of a"
+            " cam, or a time such as '200 h'.",
             show_default=False,
         ),
     ] = None,
@@ -192,21 +192,29 @@ def life(
         shares = _shares(b)
     files = [path.suffix.lower() in _FILES for path in designs]
     refuse(len(designs) > 2 and not all(files), "give one design, or two to compare", "SCENARIO")
-    twice = len({path.resolve() for path in designs}) < len(designs)
-    refuse(twice, f"{designs[0]} is given twice", "SCENARIO")
+    refuse(
+        len({path.resolve() for path in designs}) < len(designs),
+        f"{designs[0]} is given twice",
+        "SCENARIO",
+    )
     if any(files):
-        text = "compare two scenarios or two results files, not one of each"
-        refuse(not all(files), text, "SCENARIO")
-        given: dict[str, object] = {
-            "--limit": limit,
-            "--max": most,
-            "--precision": precision,
-            "--sweep": sweep,
-            "--set": settings,
-            "--seed": seed,
-            "--output": output,
-        }
-        refuse_options(given, "has no meaning for results files")
+        refuse(
+            not all(files),
+            "compare two scenarios or two results files, not one of each",
+            "SCENARIO",
+        )
+        refuse_options(
+            {
+                "--limit": limit,
+                "--max": most,
+                "--precision": precision,
+                "--sweep": sweep,
+                "--set": settings,
+                "--seed": seed,
+                "--output": output,
+            },
+            "has no meaning for results files",
+        )
         show_lives(*_reopened(designs, target, shares, posterior), use, json, figure)
         return
     from wearsim.cli.progress import BATCHES, EnsembleWatcher, watching
@@ -240,14 +248,24 @@ def life(
         refuse_same_file(figure, path, scenario.paths)
         with going_on(path):
             check_output(path, force, scenario.paths)
-    arguments |= {"variable": key, "workers": workers, "scheduler": scheduler, "force": force}
     results = []
     for label, scenario, path in zip(labels, scenarios, paths, strict=True):
         if len(scenarios) > 1 and not quiet:
             note(f"{label}: {path}")
         with going_on(path), watching(EnsembleWatcher, scenario, quiet, BATCHES) as watch:
-            lives = wearsim.life(scenario, realisations, path, **arguments, **watch.callbacks)
-        results.append(lives)
+            results.append(
+                wearsim.life(
+                    scenario,
+                    realisations,
+                    path,
+                    variable=key,
+                    workers=workers,
+                    scheduler=scheduler,
+                    force=force,
+                    **arguments,
+                    **watch.callbacks,
+                )
+            )
     show_lives(results, labels, use, json, figure)
 
 
@@ -273,11 +291,13 @@ def _paths(scenarios: Sequence[Scenario], labels: Sequence[str], output: Path | 
     from wearsim.studies.life.settings import results_file
 
     paths = [results_file(scenario) for scenario in scenarios]
-    base = output or paths[0]
     if len(scenarios) == 1:
-        return [base]
-    are_different = output is None and len(set(paths)) == len(paths)
-    return paths if are_different else [path_of(base, label) for label in labels]
+        return [output or paths[0]]
+    return (
+        paths
+        if output is None and len(set(paths)) == len(paths)
+        else [path_of(output or paths[0], label) for label in labels]
+    )
 
 
 def _labels(paths: Sequence[Path]) -> list[str]:
@@ -303,9 +323,8 @@ def _reopened(
     from wearsim.studies.life.comparison import swept_variable
 
     results = [_opened(path, target, shares, posterior) for path in designs]
-    if swept_variable(results) is None:
-        return results, _labels(designs)
-    return results, [result.variable.text for result in results if result.variable]
+    values = [result.variable.text for result in results if result.variable]
+    return results, _labels(designs) if swept_variable(results) is None else values
 
 
 def _opened(
@@ -322,8 +341,12 @@ def _opened(
     if target is not None:
         with checking("--target"):
             life = parse_life(target, result.unit, result.settings.rate, "target")
-        text = f"{life:,.0f} {result.unit} is beyond the maximum of {path}"
-        refuse(life > result.most, f"{text}, {result.most:,.0f} {result.unit}", "--target")
+        refuse(
+            life > result.most,
+            f"{life:,.0f} {result.unit} is beyond the maximum of {path},"
+            f" {result.most:,.0f} {result.unit}",
+            "--target",
+        )
         changed["target"] = life * result.settings.per_unit
     if posterior is not None:
         with checking("--posterior"):
@@ -363,7 +386,6 @@ def show_lives(
         if result.failed and not result.count:
             note(f"warning: {view.failures}")
             raise SolverError(f"{result.path}: all realisations failed")
-    paths = [result.path for result in results]
     if use.is_special:
         view = use.view_of(results, labels)
         files = use.write([view])
@@ -371,13 +393,12 @@ def show_lives(
         return
     if len(results) > 1:
         views.append(comparison_of(results, labels))
-        paths.append(None)
     draw_figure(views[-1].panels(), figure)
     # the comparison is the first part of a page
     files = use.write([views[-1], *views[:-1]])
     more = {"figure": figure, **({"page": use.page} if use.page else {})}
-    first = len(views) - 1 if json else 0
-    for view, path in zip(views[first:], paths[first:], strict=True):
+    paths = [*(result.path for result in results), None]
+    for view, path in list(zip(views, paths, strict=False))[-1 if json else 0 :]:
         show_view(view, json=json, files={"results file": path}, more=more)
     for name, file in {"figure": figure, **files}.items():
         if file is not None and not json:
@@ -413,18 +434,17 @@ def _going_on(
     except (ResultsFileError, Interrupted) as error:
         if len(paths) == 1 or not path.exists():
             raise
-        commands = []
-        for label, scenario, file in zip(labels, scenarios, paths, strict=True):
-            if file.exists():
-                continue
-            words = [
+        missing = [
+            [
                 *("wearsim", "life", scenario.file),
                 *(["--set", f"{key}={label}"] if key else []),
                 *("--seed", str(scenario.seed), "-o", str(file)),
             ]
-            commands.append(shlex.join(words))
+            for label, scenario, file in zip(labels, scenarios, paths, strict=True)
+            if not file.exists()
+        ]
         steps = [
-            *(f"`{command}` with the other options" for command in commands),
+            *(f"`{shlex.join(words)}` with the other options" for words in missing),
             f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`",
         ]
         text = f"{error.at_shell}; the comparison is finished by {', then '.join(steps)}"

@@ -49,8 +49,11 @@ class LifeUse:
         returns, demonstrate = self.returns is not None, self.demonstrate is not None
         refuse(returns and demonstrate, "goes without --returns", "--demonstrate")
         refuse(self.life_factor is not None and not returns, "goes with --returns", "--life-factor")
-        text = "goes with --returns or --demonstrate"
-        refuse(self.table is not None and not self.is_special, text, "--table")
+        refuse(
+            self.table is not None and not self.is_special,
+            "goes with --returns or --demonstrate",
+            "--table",
+        )
         check_ending(self.page, force, "--page", (".html",), "format of a page")
         check_ending(self.table, force, "--table", (".csv",), "format of a table")
 
@@ -72,8 +75,11 @@ class LifeUse:
         units = []
         for label, (scenario, settings) in zip(labels, studies, strict=True):
             laws = {item.name: item.distribution for item in scenario.random}
-            known = isinstance(laws.get(settings.factor), TwoLevels)
-            refuse(not known, f"{NO_LEVELS}: give --posterior", "--returns")
+            refuse(
+                not isinstance(laws.get(settings.factor), TwoLevels),
+                f"{NO_LEVELS}: give --posterior",
+                "--returns",
+            )
             units.append(UnitsOf(label, settings.unit, settings.rate, tuple(scenario.limit.given)))
         read_returns(self.returns, units)
 
@@ -83,15 +89,11 @@ class LifeUse:
         if self.demonstrate is not None:
             with checking("--demonstrate"):
                 view = wearsim.demonstration(results, self.demonstrate, labels=labels).view
-            return view
-        from wearsim.studies.returns.result import LIFE_FACTOR
-
-        assert self.returns is not None
-        factor = LIFE_FACTOR if self.life_factor is None else self.life_factor
-        with checking("--returns"):
-            view = wearsim.field_returns(
-                results, self.returns, life_factor=factor, labels=labels
-            ).view
+        else:
+            assert self.returns is not None
+            given = {} if self.life_factor is None else {"life_factor": self.life_factor}
+            with checking("--returns"):
+                view = wearsim.field_returns(results, self.returns, labels=labels, **given).view
         return view
 
     def write(self, views: Sequence[View]) -> dict[str, Path | None]:

@@ -71,22 +71,20 @@ Level = Annotated[
     ),
 ]
 
-Animate = Annotated[
-    Path | None,
-    typer.Option(
-        "--animate",
-        metavar="FILE",
-        help="Animation of a worn cam instead of the figure: .gif, or .mp4 where ffmpeg is"
-        " installed.",
-        show_default=False,
-    ),
-]
-
 
 def plot(
     file: ResultsFile,
     figure: Figure = None,
-    animate: Animate = None,
+    animate: Annotated[
+        Path | None,
+        typer.Option(
+            "--animate",
+            metavar="FILE",
+            help="Animation of a worn cam instead of the figure: .gif, or .mp4 where ffmpeg is"
+            " installed.",
+            show_default=False,
+        ),
+    ] = None,
     measured: MeasuredFiles = None,
     angle: Angle = None,
     level: Level = False,
@@ -107,8 +105,11 @@ def plot(
     refuse_inputs(path, measured or [], "a measured profile")
     view = wearsim.open_results(file).view
     check_figure(path, force)
-    text = f"requires wear tests; {file} holds none: {view.question}"
-    refuse(measured and view.profile() is None, text, "--measured")
+    refuse(
+        measured and view.profile() is None,
+        f"requires wear tests; {file} holds none: {view.question}",
+        "--measured",
+    )
     choice = profile_choice(columns, units, row, mean_rows, at)
     draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path)
     note(f"figure: {path}")
@@ -147,22 +148,24 @@ def measured_profiles(
 
     at = quantity_of(angle, "rad", "--angle")
     read = {file: load_profile(file, choice) for file in files}
-    signs = (sign_note(profile, choice, str(file)) for file, profile in read.items())
-    write_notes(filter(None, signs))
+    write_notes(filter(None, (sign_note(read[file], choice, str(file)) for file in read)))
     profiles = [
         Measured(file.stem, profile.y, profile.height, at) for file, profile in read.items()
     ]
     test = next((view for view in views if view.profile() is not None), None)
-    text = "is for the run of a cam; ensembles hold the deepest groove"
-    refuse(at is not None and not (test is not None and test.has_angles), text, "--angle")
+    refuse(
+        at is not None and not (test is not None and test.has_angles),
+        "is for the run of a cam; ensembles hold the deepest groove",
+        "--angle",
+    )
     computed = None if test is None else test.profile(at)
     if computed is None:
         return profiles
     if level:
         profiles = [levelled(profile, computed) for profile in profiles]
     for profile in profiles:
-        hint = "" if level else level_hint(profile, computed)
-        note(f"{profile.label}: {residual_text(profile, computed)}{hint}")
+        residual = residual_text(profile, computed)
+        note(f"{profile.label}: {residual}{'' if level else level_hint(profile, computed)}")
     return profiles
 
 
@@ -261,19 +264,16 @@ def export(
         for path in written.paths:
             typer.echo(str(path))
         write_notes(written.notes)
-        if output is None and surface is None:
-            return
     if surface is not None and sampling is not None:
         refuse_inputs(surface, [file], "the surface", option="--surface")
         cam_surface = wearsim.open_results(file).view.surface(sampling)
         refuse(cam_surface is None, f"requires the run of a cam, not {file}", "--surface")
         write_surface(cam_surface, surface, spline=spline)
-        if output is None:
-            return
-    sign: Literal[".", ","] = "," if decimal == "," else "."
-    folder = output if output is not None else Path(file.stem)
-    for path in export_csv(wearsim.open_results(file), folder, force=force, decimal=sign):
-        typer.echo(str(path))
+    if output is not None or (running_in is None and surface is None):
+        sign: Literal[".", ","] = "," if decimal == "," else "."
+        result, folder = wearsim.open_results(file), output or Path(file.stem)
+        for path in export_csv(result, folder, force=force, decimal=sign):
+            typer.echo(str(path))
 
 
 def report(
@@ -313,7 +313,6 @@ def report(
     refuse_inputs(path, measured or [], "a measured profile")
     results = [wearsim.open_results(file) for file in files]
     check_ending(path, force, "-o", (".html", ".htm"), "format of a page")
-    choice = profile_choice(columns, units, row, mean_rows, at)
-    views = [result.view for result in results]
+    choice, views = profile_choice(columns, units, row, mean_rows, at), [r.view for r in results]
     save_report(results, path, measured_profiles(measured or [], choice, views, level, angle))
     note(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")

@@ -78,8 +78,12 @@ def run(
             if getattr(wearsim.open_results(path), "failure", ""):
                 error.add_note(f"the last accepted step is kept: wearsim show {path}")
         raise
-    known = *loaded.notes, *watch.warnings
-    show_view(result.view, json=json, files={"results file": result.path}, known=known)
+    show_view(
+        result.view,
+        json=json,
+        files={"results file": result.path},
+        known=[*loaded.notes, *watch.warnings],
+    )
 
 
 def resume(
@@ -126,30 +130,31 @@ def resume(
         "scheduler": scheduler,
     }
     of_tests = ("failed", "realisations", "workers", "scheduler")
-    tests = (of_tests, progress.EnsembleWatcher, progress.BATCHES)
     kinds: dict[str, tuple[Sequence[str], type[Display], str]] = {
         "run": (("until", "allow_deep"), progress.RunWatcher, progress.CHECKPOINT),
-        **dict.fromkeys(("ensemble", "life"), tests),
+        **dict.fromkeys(
+            ("ensemble", "life"), (of_tests, progress.EnsembleWatcher, progress.BATCHES)
+        ),
     }
-    of_plugins = (("workers", "scheduler"), progress.PartWatcher, progress.PARTS)
-    names, watcher, stopping = kinds.get(kind.name, of_plugins)
-    without = {
-        f"--{name.replace('_', '-')}": options[name] for name in options if name not in names
-    }
-    refuse_options(without, f"has no meaning for a file that holds {kind.holds}")
+    names, watcher, stopping = kinds.get(
+        kind.name, (("workers", "scheduler"), progress.PartWatcher, progress.PARTS)
+    )
+    refuse_options(
+        {f"--{name.replace('_', '-')}": options[name] for name in options if name not in names},
+        f"has no meaning for a file that holds {kind.holds}",
+    )
     refuse(failed and realisations is not None, "extend the ensemble first", "--failed")
     options["scheduler"] = checked_scheduler(scheduler, workers)
     before = open_study(file, kind)
     if names == of_tests and realisations is None and (text := _nothing_to_do(before, failed)):
         note(f"note: nothing to do: {text}")
     with progress.watching(watcher, before, quiet, stopping) as watch:
-        given = {name: options[name] for name in names}
-        result = kind.load("resume")(file, **given, **watch.callbacks)
+        options = {name: options[name] for name in names} | watch.callbacks
+        result = kind.load("resume")(file, **options)
     if isinstance(watch, progress.EnsembleWatcher):
         show_ensemble(result, json, None, watch.workers)
     else:
-        files = {"results file": result.path}
-        show_view(result.view, json=json, files=files, known=watch.warnings)
+        show_view(result.view, json=json, files={"results file": result.path}, known=watch.warnings)
 
 
 def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
@@ -300,6 +305,9 @@ def swept(sweep: str | None, settings: Sequence[str]) -> tuple[str, tuple[str, .
 
     with checking("--sweep"):
         key, values = parse_sweep(sweep)
-    given = any(text.partition("=")[0].strip() == key for text in settings)
-    refuse(given, f"{key} is also the key of --sweep", "--set")
+    refuse(
+        key in (text.partition("=")[0].strip() for text in settings),
+        f"{key} is also the key of --sweep",
+        "--set",
+    )
     return key, values

@@ -82,20 +82,23 @@ def new_plugin(
     from wearsim.plugins import ContactModelSpec, registry
     from wearsim.plugins.template import write_plugin
 
-    known = name in registry().names(ContactModelSpec)
-    refuse(known, f"a contact model named '{name}' is already installed", "NAME")
+    refuse(
+        name in registry().names(ContactModelSpec),
+        f"a contact model named '{name}' is already installed",
+        "NAME",
+    )
     try:
         with checking("NAME"):
             written = write_plugin(name, directory)
     except FileExistsError as error:
-        message = f"{error}; choose another name or --directory"
-        raise typer.BadParameter(message, param_hint="--directory") from error
+        raise typer.BadParameter(
+            f"{error}; choose another name or --directory", param_hint="--directory"
+        ) from error
     except OSError as error:
         raise _unwritable(error, directory, "--directory") from error
     for path in written:
         typer.echo(path)
-    folder = directory / f"wearsim-{name}"
-    note(f"next: cd {folder} && pip install -e '.[dev]' && pytest")
+    note(f"next: cd {directory / f'wearsim-{name}'} && pip install -e '.[dev]' && pytest")
 
 
 @new.command("scenario")
@@ -114,8 +117,11 @@ def _write_scenario(name: Literal["starter", "starter_cam"], file: Path, force: 
     from wearsim.scenario.examples import starter_scenario
 
     try:
-        message = f"{file} is a folder; name a file in it: {file / 'scenario.toml'}"
-        refuse(file.is_dir(), message, "FILE")
+        refuse(
+            file.is_dir(),
+            f"{file} is a folder; name a file in it: {file / 'scenario.toml'}",
+            "FILE",
+        )
         refuse_existing(file, force, "FILE")
         refuse(not file.parent.is_dir(), f"folder {file.parent} does not exist", "FILE")
         file.write_text(starter_scenario(name), encoding="utf-8")

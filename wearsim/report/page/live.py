@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 from bokeh.models.annotations import ColorBar
 
-from wearsim.report.page.plots import draw, draw_marks, is_boxed, limits_of, plain_label, right_ends
+from wearsim.report.page.plots import (
+    draw,
+    draw_marks,
+    is_boxed,
+    plain_label,
+    range_ends,
+    right_ends,
+)
 from wearsim.report.panels import Axis, Panel
 
 
@@ -38,9 +45,10 @@ class _Recorder:
         self.glyphs.append((object(), {}, ""))
 
     def add_layout(self, item: Any, place: str = "center") -> None:
-        if isinstance(item, ColorBar):
-            return
-        self.annotations.append((type(item), item.properties_with_values(include_defaults=False)))
+        if not isinstance(item, ColorBar):
+            self.annotations.append(
+                (type(item), item.properties_with_values(include_defaults=False))
+            )
 
 
 @dataclass(frozen=True)
@@ -77,9 +85,8 @@ def record(panel: Panel) -> Recording:
     """
     recorder = _Recorder()
     draw_marks(recorder, panel)
-    axes = [_kind(axis) for axis in (panel.x, panel.y, panel.right or Axis())]
     looks = (
-        *axes,
+        *map(_kind, (panel.x, panel.y, panel.right or Axis())),
         panel.right is None,
         panel.equal,
         *(look for look, _, _ in recorder.glyphs),
@@ -104,8 +111,12 @@ def _is_plain(columns: Mapping[str, Any]) -> bool:
 
 def _kind(axis: Axis) -> tuple[Any, ...]:
     """Return what cannot be changed in an axis that has been drawn."""
-    ends = tuple(end is None for end in axis.limits)
-    return axis.log, ends, axis.ticks is None or tuple(axis.ticks), tuple(axis.names or ())
+    return (
+        axis.log,
+        tuple(end is None for end in axis.limits),
+        axis.ticks is None or tuple(axis.ticks),
+        tuple(axis.names or ()),
+    )
 
 
 class LiveFigure:
@@ -157,15 +168,14 @@ class LiveFigure:
         for axis, along in ((panel.x, "x"), (panel.y, "y")):
             self._set_axis(axis, along, ends=not is_boxed(panel))
         if panel.right is not None:
-            low, high = right_ends(panel, panel.right)
-            self.figure.extra_y_ranges["right"].update(start=low, end=high)
-        drawn = zip(self.figure.renderers, new.columns, strict=True)
-        for number, (renderer, columns) in enumerate(drawn):
-            further = _further(columns, [frame.columns[number] for frame in frames])
+            self.figure.extra_y_ranges["right"].update(**right_ends(panel, panel.right))
+        states = (new.columns, *(frame.columns for frame in frames))
+        for renderer, columns, *later in zip(self.figure.renderers, *states, strict=True):
+            data = {**columns, **_further(columns, later)}
             if send is not None and _is_plain(columns):
-                send(renderer.data_source.id, {**columns, **further})
+                send(renderer.data_source.id, data)
             else:
-                renderer.data_source.data = {**columns, **further}
+                renderer.data_source.data = data
         for item, values in zip(self._annotations, new.annotations, strict=True):
             item.update(**values)
         for mapper, (low, high) in zip(self._mappers, new.scales, strict=True):
@@ -175,25 +185,18 @@ class LiveFigure:
         return True
 
     def _set_axis(self, axis: Axis, along: str, *, ends: bool) -> None:
-        low, high = limits_of(axis) if ends else (None, None)
-        shown = self.figure.x_range if along == "x" else self.figure.y_range
-        new = {name: end for name, end in (("start", low), ("end", high)) if end is not None}
-        if any(getattr(shown, name) != end for name, end in new.items()):
-            shown.update(**new)
-        drawn = (self.figure.xaxis if along == "x" else self.figure.yaxis)[0]
-        if drawn.axis_label != plain_label(axis.label):
-            drawn.axis_label = plain_label(axis.label)
+        if ends:
+            getattr(self.figure, f"{along}_range").update(**range_ends(axis))
+        getattr(self.figure, f"{along}axis")[0].axis_label = plain_label(axis.label)
 
     def _set_labels(self, labels: list[str]) -> None:
         """Change the entries of the legend whose texts have changed."""
-        for number, (old, new) in enumerate(zip(self._recording.labels, labels, strict=True)):
-            if old == new:
-                continue
-            renderer = self.figure.renderers[number]
-            for legend in self.figure.legend:
-                for item in legend.items:
-                    if renderer in item.renderers:
-                        item.label = {"value": new}
+        items = [item for legend in self.figure.legend for item in legend.items]
+        texts = zip(self.figure.renderers, self._recording.labels, labels, strict=True)
+        for renderer, old, new in texts:
+            for item in items if old != new else ():
+                if renderer in item.renderers:
+                    item.label = {"value": new}
 
 
 def _further(columns: Mapping[str, Any], frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from wearsim.atomic_write import replacement
+from wearsim.atomic_write import save_text
 from wearsim.errors import PluginError
 from wearsim.levelling import Measured
 from wearsim.report.measured import residual_text
@@ -37,8 +37,10 @@ def first_of(views: Sequence[View]) -> dict[str, Any]:
     first: dict[str, Any] = {"groups": groups, "excluded": excluded}
     if panel := next((item.picture for item in overviews if item.picture is not None), None):
         picture = png_of_panel(panel, 130, 5.4 if panel.equal else 3.8)
-        first["picture"] = b64encode(picture).decode()
-        first["caption"] = f"{panel.title}. {panel.caption}"
+        first |= {
+            "picture": b64encode(picture).decode(),
+            "caption": f"{panel.title}. {panel.caption}",
+        }
     return first
 
 
@@ -63,24 +65,6 @@ def save_page(views: Sequence[View], path: Path, measured: Sequence[Measured] = 
     save_text(page_of(views, measured), path)
 
 
-def save_text(text: str, path: Path) -> None:
-    """Write a text in UTF-8.
-
-    Parameters
-    ----------
-    text : str
-    path : Path
-        An existing file is replaced.
-
-    Raises
-    ------
-    ResultsFileError
-        If it cannot be written; an existing file is then unchanged.
-    """
-    with replacement(path) as file:
-        file.write(text.encode("utf-8"))
-
-
 def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
     """Return the page as HTML; parameters and errors as of `save_page`."""
     try:
@@ -100,10 +84,9 @@ def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
         for figure in drawn.values():
             document.add_root(figure)
     script, divisions = components(drawn) if drawn else ("", {})
-    template = Environment(
-        loader=PackageLoader("wearsim.report.page", "."), autoescape=True, trim_blocks=True
-    ).get_template("page.html.jinja")
-    return template.render(
+    templates = PackageLoader("wearsim.report.page", ".")
+    environment = Environment(loader=templates, autoescape=True, trim_blocks=True)
+    return environment.get_template("page.html.jinja").render(
         title=views[0].title,
         first=first_of(views),
         parts=parts,

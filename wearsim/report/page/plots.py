@@ -61,9 +61,11 @@ def panels_of(sheet: Sheet) -> tuple[dict[str, Panel], list[str]]:
     ----------
     sheet : Sheet
     """
-    shown = {name: panel for name, panel in sheet.panels.items() if not panel.figure_only}
     kept = evenly_spaced(len(sheet.steps), MOST_RECORDS) if sheet.steps else ()
-    return shown, [sheet.steps[number] for number in kept]
+    return (
+        {name: panel for name, panel in sheet.panels.items() if not panel.figure_only},
+        [sheet.steps[number] for number in kept],
+    )
 
 
 def plots_of(sheet: Sheet) -> tuple[list[tuple[Panel, Any]], list[str]]:
@@ -91,10 +93,10 @@ def draw(panel: Panel) -> Any:
     for along, axis in (("x", panel.x), ("y", panel.y)):
         _set_axis(plot, along, replace(axis, limits=(None, None)) if is_boxed(panel) else axis)
     if panel.right is not None:
-        low, high = right_ends(panel, panel.right)
-        plot.extra_y_ranges = {"right": Range1d(start=low, end=high)}
-        label = plain_label(panel.right.label)
-        plot.add_layout(LinearAxis(y_range_name="right", axis_label=label), "right")
+        plot.extra_y_ranges = {"right": Range1d(**right_ends(panel, panel.right))}
+        plot.add_layout(
+            LinearAxis(y_range_name="right", axis_label=plain_label(panel.right.label)), "right"
+        )
     for axis in (*plot.xaxis, *plot.yaxis):
         axis.update(axis_label_text_font_style="normal", axis_label_text_font_size="14px")
         axis.update(major_label_text_font_size="13px", major_label_policy=NoOverlap(), **_TEXT)
@@ -106,16 +108,16 @@ def draw(panel: Panel) -> Any:
     return plot
 
 
-def right_ends(panel: Panel, right: Axis) -> list[float]:
-    """Return the ends of the axis at the right of a panel, in its unit.
+def right_ends(panel: Panel, right: Axis) -> dict[str, Any]:
+    """Return the "start" and "end" of the axis at the right of a panel, in its unit.
 
     They make a plain range, since one that follows the data would follow both axes.
     """
-    values = [np.ravel(mark.y) for mark in panel.marks if isinstance(mark, Line) and mark.right]
-    data = np.concatenate(values) * right.scale
+    lines = (mark for mark in panel.marks if isinstance(mark, Line) and mark.right)
+    data = np.concatenate([np.ravel(line.y) for line in lines]) * right.scale
     least, greatest = float(np.nanmin(data)), float(np.nanmax(data))
     margin = 0.05 * (greatest - least)
-    return limits_of(right, least - margin, greatest + margin)
+    return range_ends(right, least - margin, greatest + margin)
 
 
 def is_boxed(panel: Panel) -> bool:
@@ -129,8 +131,8 @@ def is_boxed(panel: Panel) -> bool:
 def draw_marks(plot: Any, panel: Panel) -> None:
     """Draw the marks of a panel on a figure that has its axes."""
     if is_boxed(panel):
-        box = _source(plot, _single({"x": limits_of(panel.x), "y": limits_of(panel.y)}))
-        plot.line("x", "y", source=box, line_alpha=0.0)
+        box = _single({"x": panel.x.ends(), "y": panel.y.ends()})
+        plot.line("x", "y", source=_source(plot, box), line_alpha=0.0)
     for mark in panel.marks:
         y = panel.right if mark.right and panel.right else panel.y
         _draw(plot, mark, panel.x, y, {"y_range_name": "right"} if mark.right else {})
@@ -141,15 +143,14 @@ def plain_label(text: str) -> str:
     return text.replace("$", "").replace("_l", "").replace("_d", "").replace("\n", " ")
 
 
-def limits_of(axis: Axis, *default: float) -> list[Any]:
-    """Return the ends of an axis in its unit; those that follow the data are None by default."""
-    ends = zip(axis.limits, default or (None, None), strict=True)
-    return [other if end is None else float(end * axis.scale) for end, other in ends]
+def range_ends(axis: Axis, *default: float) -> dict[str, Any]:
+    """Return the "start" and "end" of an axis in its unit, without those that follow the data."""
+    ends = zip(("start", "end"), axis.ends(*default), strict=True)
+    return {name: end for name, end in ends if end is not None}
 
 
 def _set_axis(plot: Any, along: str, axis: Axis) -> None:
-    named = zip(("start", "end"), limits_of(axis), strict=True)
-    ends: dict[str, Any] = {name: end for name, end in named if end is not None}
+    ends = range_ends(axis)
     # ticks at the places of the data only, without the lines of annotations
     shown = Range1d(**ends) if len(ends) > 1 else DataRange1d(only_visible=True, **ends)
     plot.update(**{f"{along}_range": shown})
@@ -215,15 +216,21 @@ def _draw(plot: Any, mark: Mark, x: Axis, y: Axis, on: dict[str, Any]) -> None:
         case Image():
             _draw_image(plot, mark, x, y)
         case Contours():
-            grid = np.asarray(mark.x) * x.scale, np.asarray(mark.y) * y.scale
-            plot.contour(*grid, mark.value, list(mark.levels), fill_color=list(mark.colours))
+            plot.contour(
+                np.asarray(mark.x) * x.scale, np.asarray(mark.y) * y.scale, mark.value,
+                list(mark.levels), fill_color=list(mark.colours),
+            )  # fmt: skip
         case Arrows():
             longest = float(np.hypot(mark.along_x, mark.along_y).max(initial=0.0)) or 1.0
             width = 0.04 * float(np.ptp(mark.x)) * x.scale / longest
             height = 0.04 * float(np.ptp(mark.y)) * y.scale / longest
             tail_x, tail_y = np.ravel(mark.x) * x.scale, np.ravel(mark.y) * y.scale
-            tips = tail_x + width * np.ravel(mark.along_x), tail_y + height * np.ravel(mark.along_y)
-            places = {"x": tail_x, "y": tail_y, "tip_x": tips[0], "tip_y": tips[1]}
+            places = {
+                "x": tail_x,
+                "y": tail_y,
+                "tip_x": tail_x + width * np.ravel(mark.along_x),
+                "tip_y": tail_y + height * np.ravel(mark.along_y),
+            }
             data = _source(plot, _single(places))
             plot.segment("x", "y", "tip_x", "tip_y", source=data, **style)
         case Patch():
@@ -238,9 +245,11 @@ def _hover(plot: Any, renderers: Sequence[Any], *tips: tuple[str, str], line: bo
     if None in renderers:  # recorded without a figure
         return
     columns = [text.partition("{")[0] for _, text in tips if text[0] == "@" and "{" in text]
-    printed: Any = dict.fromkeys(columns, "printf")
-    options: Any = {"mode": "vline" if line else "mouse", "formatters": printed}
-    plot.add_tools(HoverTool(renderers=list(renderers), tooltips=list(tips), **options))
+    form: Any = {
+        "mode": "vline" if line else "mouse",
+        "formatters": dict.fromkeys(columns, "printf"),
+    }
+    plot.add_tools(HoverTool(renderers=list(renderers), tooltips=list(tips), **form))
 
 
 def _tip(axis: Axis, column: str, name: str = "") -> tuple[str, str]:
@@ -263,19 +272,20 @@ def _draw_line(
     places = np.asarray(mark.x, dtype=float) * x.scale
     if values.ndim > 1:
         some = values[:MOST_CURVES].astype(np.float32)
-        across = [places.astype(np.float32)] * len(some)
-        curves = _source(plot, {"x": across, "y": list(some)})
-        plot.multi_line("x", "y", source=curves, line_width=1, **style, **named)
+        curves = {"x": [places.astype(np.float32)] * len(some), "y": list(some)}
+        plot.multi_line("x", "y", source=_source(plot, curves), line_width=1, **style, **named)
         return
     if not len(places):
         return
     every = evenly_spaced(len(places), len(places) if mark.dash else MOST_POINTS)
     further, more_tips = _more(mark)
-    chosen = {name: column[every] for name, column in further.items()}
-    source = _source(plot, _single({"x": places[every], "y": values[every], **chosen}))
-    tips = [_tip(x, "x"), _tip(y, "y", mark.label.split("\n")[0]), *more_tips]
-    width = max(1.5 * mark.width, 1.0)
-    line = {"source": source, "line_width": width, "line_dash": _DASHES.get(mark.dash, "solid")}
+    columns = {"x": places, "y": values, **further}
+    source = _source(plot, _single({name: column[every] for name, column in columns.items()}))
+    line = {
+        "source": source,
+        "line_width": max(1.5 * mark.width, 1.0),
+        "line_dash": _DASHES.get(mark.dash, "solid"),
+    }
     if mark.dash and mark.steps:
         plot.step("x", "y", mode="after", **line, **style, **named)
         # values under the pointer need a line, which steps do not have
@@ -291,15 +301,19 @@ def _draw_line(
         }
         points = plot.scatter("x", "y", source=source, **look, **style, **named)
         pointed = pointed if mark.dash else points
-    _hover(plot, [pointed], *tips, line=bool(mark.dash))
+    of_y = _tip(y, "y", mark.label.split("\n")[0])
+    _hover(plot, [pointed], _tip(x, "x"), of_y, *more_tips, line=bool(mark.dash))
 
 
 def _draw_records(plot: Any, mark: Records, x: Axis, y: Axis, named: dict[str, Any]) -> None:
     """Draw the record of the slider; the values of the others are kept beside it."""
     chosen = evenly_spaced(len(mark.passes), MOST_RECORDS)
     values = np.asarray(mark.y) * y.scale
-    kept = {str(place): values[record] for place, record in enumerate(chosen)}
-    columns = {"x": np.asarray(mark.x) * x.scale, **kept, "shown": values[chosen[-1]]}
+    columns = {
+        "x": np.asarray(mark.x) * x.scale,
+        **{str(place): values[record] for place, record in enumerate(chosen)},
+        "shown": values[chosen[-1]],
+    }
     source = _source(plot, _single(columns), f"{RECORD} {mark.label or y.name}")
     style = {"color": _colour(mark.colour), "line_dash": _DASHES[mark.dash], "line_width": 2}
     line = plot.line("x", "shown", source=source, **style, **named)
@@ -318,9 +332,8 @@ def _draw_band(
     plot.varea("x", "low", "high", source=source, **style, **named)
     # values under the pointer need a line, which areas do not have
     line = plot.line("x", "high", source=source, line_alpha=0.0)
-    unit = "" if y.unit == "1" else f" {plain_label(y.unit)}"
-    ends = f"@low{{%.5g}} to @high{{%.5g}}{unit}"
-    _hover(plot, [line], (plain_label(mark.label) or "interval", ends), line=True)
+    name, end = _tip(y, "high", mark.label or "interval")
+    _hover(plot, [line], (name, f"@low{{%.5g}} to {end}"), line=True)
 
 
 def _draw_bars(
@@ -356,19 +369,21 @@ def _draw_span(plot: Any, mark: Span, scale: float, named: dict[str, Any]) -> No
     low, colour = float(mark.low * scale), _colour(mark.colour)
     across = mark.across == "x"
     if mark.high is not None:
-        names = ("left", "right") if across else ("bottom", "top")
-        ends: dict[str, Any] = dict(zip(names, (low, float(mark.high * scale)), strict=True))
+        high: Any = float(mark.high * scale)
+        ends = {"left": low, "right": high} if across else {"bottom": low, "top": high}
         plot.add_layout(BoxAnnotation(fill_color=colour, fill_alpha=mark.alpha, **ends))
         return
-    rule = Rule(
-        location=low, dimension="height" if across else "width", line_color=colour,
-        line_dash=_DASHES[mark.dash], line_width=max(1.5 * mark.width, 1.0),
+    plot.add_layout(
+        Rule(
+            location=low, dimension="height" if across else "width", line_color=colour,
+            line_dash=_DASHES[mark.dash], line_width=max(1.5 * mark.width, 1.0),
+        )
     )  # fmt: skip
-    plot.add_layout(rule)
     if named:  # an annotation has no entry in the legend, a line without points has
-        nothing = _source(plot, _single({"x": [], "y": []}))
-        look = {"color": colour, "line_dash": _DASHES[mark.dash], "line_width": 2}
-        plot.line("x", "y", source=nothing, **look, **named)
+        plot.line(
+            "x", "y", source=_source(plot, _single({"x": [], "y": []})),
+            color=colour, line_dash=_DASHES[mark.dash], line_width=2, **named,
+        )  # fmt: skip
 
 
 def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
@@ -383,9 +398,10 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
     else:
         values = np.array([np.interp(across, mark.x, row) for row in values])
         values = np.array([np.interp(up, mark.y, column) for column in values.T]).T
-    greatest = float(np.nanmax(values)) or 1.0
-    mapper = LinearColorMapper(palette=_PALETTES[mark.colours], low=0.0, high=greatest)
-    mapper.nan_color = "rgba(0, 0, 0, 0)"
+    mapper = LinearColorMapper(
+        palette=_PALETTES[mark.colours], low=0.0, high=float(np.nanmax(values)) or 1.0,
+        nan_color="rgba(0, 0, 0, 0)",
+    )  # fmt: skip
     drawn: dict[str, Any] = {
         "image": [values.astype(np.float32)],
         "x": [float(across[0] * x.scale)],
@@ -393,23 +409,23 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
         "dw": [float(np.ptp(across) * x.scale)],
         "dh": [float(np.ptp(up) * y.scale)],
     }
-    names = dict(zip(drawn, drawn, strict=True))
-    picture = plot.image(**names, source=_source(plot, drawn), color_mapper=mapper)
-    bar = ColorBar(color_mapper=mapper, width=12, title=plain_label(mark.axis.label))
-    bar.title_text_font_style = "normal"
-    plot.add_layout(bar, "right")
-    tips = (
+    source = _source(plot, drawn)
+    picture = plot.image(source=source, color_mapper=mapper, **{name: name for name in drawn})
+    title: Any = {"title": plain_label(mark.axis.label), "title_text_font_style": "normal"}
+    plot.add_layout(ColorBar(color_mapper=mapper, width=12, **title), "right")
+    _hover(
+        plot,
+        [picture],
         (plain_label(x.name), f"$x{{0.00}} {x.unit}"),
         (plain_label(y.name), f"$y{{0.00}} {y.unit}"),
         (mark.axis.name, f"@image{{%.5g}} {mark.axis.unit}"),
     )
-    _hover(plot, [picture], *tips)
 
 
 def _regular(places: Any) -> Any:
     """Return evenly spaced places over the range of given ones."""
-    ends = np.nanmin(places), np.nanmax(places)
-    return np.linspace(*ends, min(np.shape(places)[-1] * 4, _CELLS))
+    number = min(np.shape(places)[-1] * 4, _CELLS)
+    return np.linspace(np.nanmin(places), np.nanmax(places), number)
 
 
 def _draw_text(plot: Any, mark: Text, x: Axis, y: Axis) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Container, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import ResultsFileError
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SMALLEST = 96  # bytes: no HDF5 file is shorter
+_TRUNCATED = "is truncated: its end is missing, as after a copy that was cut short"
 # exceptions of h5py, json and numpy on damaged content
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
 Stored = TypeVar("Stored")
@@ -60,8 +61,7 @@ def read_study(path: str | Path, data: type[StudyData]) -> Any:
         axis_lengths({name: file.dataset(name) for name in schema.variables}, schema.variables)
         variables = {name: file.array(name) for name in schema.variables}
         checkpoint = {name: file.array(f"{CHECKPOINT}/{name}") for name in file.names(CHECKPOINT)}
-        content: StudyData = data.from_variables(attributes, variables, checkpoint)
-        return content
+        return cast("StudyData", data.from_variables(attributes, variables, checkpoint))
 
     return read_file(path, take)
 
@@ -105,7 +105,7 @@ def read_file(path: str | Path, take: Callable[[StoredFile], Stored]) -> Stored:
             return take(StoredFile(file))
     except _DAMAGE as error:
         if "truncated" in str(error):
-            raise ResultsFileError(_truncated(path)) from error
+            raise ResultsFileError(f"{path}: {_TRUNCATED}") from error
         text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
         reason = next(iter(text.splitlines()), type(error).__name__)
         raise ResultsFileError(f"{path}: is damaged ({reason})") from error
@@ -134,16 +134,15 @@ def _check_signature(path: str | Path) -> None:
         raise ResultsFileError(f"{path}: there is no such file") from error
     except OSError as error:
         raise ResultsFileError(f"{path}: cannot be read ({error.strerror})") from error
-    if not start:
-        raise ResultsFileError(f"{path}: is empty")
-    if not (start.startswith(_SIGNATURE) or _SIGNATURE.startswith(start)):
-        raise ResultsFileError(f"{path}: is not a results file of wearsim, not even HDF5")
-    if len(start) < _SMALLEST:
-        raise ResultsFileError(_truncated(path))
-
-
-def _truncated(path: str | Path) -> str:
-    return f"{path}: is truncated: its end is missing, as after a copy that was cut short"
+    is_hdf5 = start.startswith(_SIGNATURE) or _SIGNATURE.startswith(start)
+    mistakes = {
+        "is empty": not start,
+        "is not a results file of wearsim, not even HDF5": not is_hdf5,
+        _TRUNCATED: len(start) < _SMALLEST,
+    }
+    for what, found in mistakes.items():
+        if found:
+            raise ResultsFileError(f"{path}: {what}")
 
 
 def format_of(file: StoredFile) -> str:
@@ -174,9 +173,9 @@ def read_attributes(
         If the file is of another kind or layout, or incomplete.
     """
     name = format_of(file)
-    if not name.startswith("wearsim-") and name != schema.format:
-        raise ResultsFileError(f"{path}: is HDF5, but not a results file of wearsim")
     if name != schema.format:
+        if not name.startswith("wearsim-"):
+            raise ResultsFileError(f"{path}: is HDF5, but not a results file of wearsim")
         from wearsim.results.viewed import study_kinds  # noqa: PLC0415  (of an error only)
 
         held = next((kind.holds for kind in study_kinds() if kind.format == name), "results")
@@ -201,15 +200,13 @@ def read_attributes(
 def check_layout(path: str | Path, file: StoredFile, schema: Schema) -> None:
     """Raise a ResultsFileError unless a file has the layout of a schema."""
     version = int(file.attribute("format_version"))
-    if version == schema.version:
-        return
-    remedy = "update wearsim to read it"
-    if version < schema.version:
-        remedy = "repeat the computation, or read it with the version of wearsim that wrote it"
-    raise ResultsFileError(
-        f"{path}: has layout {version} of {schema.format}, and this wearsim reads layout"
-        f" {schema.version}; {remedy}"
-    )
+    if version != schema.version:
+        older = "repeat the computation, or read it with the version of wearsim that wrote it"
+        remedy = older if version < schema.version else "update wearsim to read it"
+        raise ResultsFileError(
+            f"{path}: has layout {version} of {schema.format}, and this wearsim reads layout"
+            f" {schema.version}; {remedy}"
+        )
 
 
 def check_complete(path: str | Path, present: Container[str], names: Iterable[str]) -> None:

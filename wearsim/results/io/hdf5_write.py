@@ -65,8 +65,7 @@ class _File:
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         """Set the position, as a file."""
-        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self._size}[whence]
-        self._place = start + offset
+        self._place = offset + (0, self._place, self._size)[whence]  # from start, place or end
         return self._place
 
     def readinto(self, target: memoryview) -> int:
@@ -279,9 +278,8 @@ def put_rows(dataset: h5py.Dataset, start: int, rows: Array) -> None:
 def _mark_zeros(dataset: h5d.DatasetID, start: int, rows: Array) -> None:
     """Mark a dataset if one of the chunks that rows were written to has zeros only."""
     lengths, marked = _chunks_of(dataset.shape), ZEROS.encode()
-    offset = start % lengths[0]
     firsts = [
-        range(-offset, len(rows), lengths[0]),
+        range(-(start % lengths[0]), len(rows), lengths[0]),
         *(range(0, n, step) for n, step in zip(rows.shape[1:], lengths[1:], strict=True)),
     ]
     for corner in product(*firsts):
@@ -307,11 +305,8 @@ def put_labels(
     """Write short texts and numbers as attributes."""
     space = h5s.create(h5s.SCALAR)
     for name, value in labels.items():
-        if isinstance(value, str):
-            content = _text(value[:_LABEL_LENGTH])
-        else:
-            is_bool = isinstance(value, bool | np.bool_)  # netCDF has none
-            content = np.asarray(int(value) if is_bool else value)
+        number = int(value) if isinstance(value, bool | np.bool_) else value  # netCDF has no bools
+        content = _text(value[:_LABEL_LENGTH]) if isinstance(value, str) else np.asarray(number)
         kind = _kind_of(content.dtype)
         h5a.create(item, name.encode(), kind, space).write(content, kind)
 
@@ -324,9 +319,8 @@ def _kind_of(dtype: np.dtype[Any]) -> h5t.TypeID:
 @cache
 def _kind(name: str, is_unicode: bool) -> h5t.TypeID:
     kind = np.dtype(name)
-    if is_unicode:
-        kind = h5py.string_dtype("utf-8", kind.itemsize)
-    return h5t.py_create(kind, logical=True)
+    utf8 = h5py.string_dtype("utf-8", kind.itemsize)
+    return h5t.py_create(utf8 if is_unicode else kind, logical=True)
 
 
 def _text(text: str) -> Array:

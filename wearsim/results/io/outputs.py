@@ -6,11 +6,11 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from wearsim.atomic_write import refuse_if_locked, refuse_inputs, write_lock
 from wearsim.errors import ResultsFileError, WearsimError
-from wearsim.results.io.files import as_path
+from wearsim.results.io.files import as_path, read_file
 
 if TYPE_CHECKING:
     from wearsim.results.io.stored_file import StoredFile
@@ -41,17 +41,17 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
     if force not in {True, False}:  # "no" would replace a file
         raise TypeError(f"force must be True or False, got {force!r}")
     refuse_inputs(path, inputs)
-    target, suffix = path.resolve(), path.suffix
-    folder = target.parent
-    if suffix.lower() in _OTHER_KINDS:
-        name = Path(path).with_suffix(".h5").name
-        raise _refused(path, f"no results file ends in {suffix}", f"choose another, such as {name}")
-    if target.is_dir():
-        raise _refused(path, "is a folder", "name a file in it")
-    if not folder.is_dir():
-        raise _refused(path, f"there is no folder {folder}", "make it, or choose another")
-    if target.exists() and not target.is_file():
-        raise _refused(path, "is not a regular file", "choose another")
+    target = path.resolve()
+    folder, other = target.parent, f"choose another, such as {path.stem}.h5"
+    refusals = (
+        (path.suffix.lower() in _OTHER_KINDS, f"no results file ends in {path.suffix}", other),
+        (target.is_dir(), "is a folder", "name a file in it"),
+        (not folder.is_dir(), f"there is no folder {folder}", "make it, or choose another"),
+        (target.exists() and not target.is_file(), "is not a regular file", "choose another"),
+    )
+    for refused, what, remedy in refusals:
+        if refused:
+            raise _refused(path, what, remedy)
     refuse_if_locked(path)
     if not force:
         _refuse_existing(path)
@@ -92,11 +92,10 @@ def _refuse_existing(path: str | Path) -> None:
     if not Path(path).resolve().exists():
         return
     verb = _continuing(path)
-    known = "already exists and is unfinished" if verb else "already exists"
     python = f'wearsim.{verb}("{path}") continues it, ' if verb else ""
     shell = f"`wearsim resume {path}` continues it, " if verb else ""
     raise ResultsFileError(
-        f"{path}: {known}",
+        f"{path}: already exists{' and is unfinished' if verb else ''}",
         python=f"{python}force=True replaces it, output=... chooses another",
         shell=f"{shell}--force replaces it, -o chooses another",
     )
@@ -104,14 +103,12 @@ def _refuse_existing(path: str | Path) -> None:
 
 def _continuing(path: str | Path) -> str:
     """Return the function that continues an unfinished study; "" for any other file."""
-    from wearsim.results.io.files import read_file  # noqa: PLC0415
-
     # by a variable that only files of this kind have
     verbs = {"step": "resume", "realisation": "resume_ensemble"}
 
-    def take(file: StoredFile) -> tuple[bool, str]:
-        finished = bool(file.attribute("finished"))
-        return finished, next((verb for name, verb in verbs.items() if name in file), "")
+    def take(file: StoredFile) -> tuple[Any, str]:
+        known = (verb for name, verb in verbs.items() if name in file)
+        return file.attribute("finished"), next(known, "")
 
     try:
         finished, known = read_file(path, take)

@@ -44,8 +44,7 @@ class StoredFile:
     @property
     def handle(self) -> int:
         """Number of the open file of the operating system."""
-        number: int = self._file.id.get_vfd_handle()
-        return number
+        return int(self._file.id.get_vfd_handle())
 
     def attribute(self, name: str) -> Any:
         """Return an attribute of the file, a number or a short text.
@@ -62,8 +61,11 @@ class StoredFile:
         if not h5a.exists(self._file.id, name.encode()):
             raise KeyError(f"lacks the attribute {name}")
         attribute = h5a.open(self._file.id, name.encode())
-        plain = attribute.shape == () and _is_plain(attribute.get_type())
-        if not plain or attribute.get_storage_size() > _LONGEST:
+        if not (
+            attribute.shape == ()
+            and _is_plain(attribute.get_type())
+            and attribute.get_storage_size() <= _LONGEST
+        ):
             raise ValueError(f"the attribute {name} is neither a number nor a short text")
         value = self._file.attrs[name]
         return value.decode("utf-8", ERRORS) if isinstance(value, bytes) else value
@@ -99,13 +101,16 @@ class StoredFile:
         _check_link(folder, last, name)
         stored = h5d.open(folder, last)
         made = stored.get_create_plist()
-        if made.get_layout() == h5d.VIRTUAL or made.get_external_count():
-            raise ValueError(f"{name} is stored in another file")
         filters = {made.get_filter(number)[0] for number in range(made.get_nfilters())}
-        if filters - {h5z.FILTER_FLETCHER32}:
-            raise ValueError(f"{name} is compressed or changed by a filter")
-        if not _is_plain(stored.get_type()):
-            raise ValueError(f"{name} holds neither numbers nor texts of fixed length")
+        elsewhere = made.get_layout() == h5d.VIRTUAL or made.get_external_count()
+        mistakes = {
+            "is stored in another file": elsewhere,
+            "is compressed or changed by a filter": filters - {h5z.FILTER_FLETCHER32},
+            "holds neither numbers nor texts of fixed length": not _is_plain(stored.get_type()),
+        }
+        for what, found in mistakes.items():
+            if found:
+                raise ValueError(f"{name} {what}")
         self._checked[name] = h5py.Dataset(stored, readonly=True)  # keeps its shape
         return self._checked[name]
 
@@ -138,12 +143,11 @@ class StoredFile:
         numbers = math.prod([*lengths, *shape[len(lengths) :]])
         # a chunk is read as a whole
         least = math.prod(chunks) if chunks and numbers else 0
-        dtype = dataset.dtype
-        self._claim(name, max(numbers, least) * dtype.itemsize, SPARE)
+        self._claim(name, max(numbers, least) * dataset.dtype.itemsize, SPARE)
         if chosen:
             values = np.asarray(dataset[chosen])
         else:
-            values = np.empty(shape, dtype)
+            values = np.empty(shape, dataset.dtype)
             dataset.id.read(h5s.ALL, h5s.ALL, values)
         if chunks and numbers and not h5a.exists(dataset.id, ZEROS.encode()):
             _check_zeros(name, dataset, chosen, values)

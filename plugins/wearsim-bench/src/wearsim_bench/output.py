@@ -112,7 +112,7 @@ class Output:
         self._write_text(f"{name}.json", text + "\n")
 
     def _write_text(self, name: str, text: str) -> None:
-        from wearsim.report.page.page import save_text
+        from wearsim.atomic_write import save_text
 
         path = self.folder / name
         save_text(text, path)

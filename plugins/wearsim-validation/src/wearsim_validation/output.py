@@ -145,8 +145,8 @@ def write_files(outcomes: Sequence[Outcome], data: dict[str, Any], folder: Path)
     """Write validation.json and a figure for each case; return the files."""
     import json
 
+    from wearsim.atomic_write import save_text
     from wearsim.report.figures import save_figure
-    from wearsim.report.page.page import save_text
     from wearsim_validation.figure import case_figure
 
     folder.mkdir(parents=True, exist_ok=True)
