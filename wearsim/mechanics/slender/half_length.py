@@ -62,7 +62,9 @@ def new_half_lengths(table: FloatArray, contacts: int) -> HalfLengths:
     """Return the `HalfLengths` of contacts, to be filled."""
     n = (table.shape[2] + 1) // 2
     slopes = np.empty((contacts + 2, 2 * REACH + 1, n + 4 * REACH))
-    slopes[:] = 0.0  # compiled faster than np.zeros
+    flat = slopes.reshape(slopes.size)
+    for i in range(slopes.size):  # numba compiles a loop faster than np.zeros
+        flat[i] = 0.0
     return HalfLengths(
         table,
         np.empty(contacts),
