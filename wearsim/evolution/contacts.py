@@ -69,7 +69,9 @@ def contact_batch(
         worn = problem.at_contacts(roller_depth)
         changes["variation"] = _creepage_variation(problem, cylinder_depth, worn)
     if problem.free:
-        changes["rolling_radius"] = _rolling_radius(problem, worn)
+        drop = np.asarray(problem.roller_drop)[problem.roller]
+        radius = problem.kinematics.roller_radius - drop - worn
+        changes["rolling_radius"] = _of_contacts(problem, radius)
         changes["bearing_torque"] = _bearing_torque(problem, loads, worn)
     return batch.replaced(**changes)
 
@@ -106,13 +108,6 @@ def unworn_contacts(problem: WearProblem) -> ContactBatch:
     loads = np.broadcast_to(force + problem.inputs.normal_force_offset, problem.shape)
     cylinder, roller = np.zeros((1, 1, 1, 1)), np.zeros((1, problem.rollers, 1, 1))
     return contact_batch(problem, problem.nominal_gap, loads, cylinder, roller)
-
-
-def _rolling_radius(problem: WearProblem, roller_depth: FloatArray) -> FloatArray:
-    """Return the rolling radius of free rollers, shape (all contacts, strips) [m]."""
-    assert problem.roller_drop is not None  # of free rollers
-    radius = problem.kinematics.roller_radius - problem.roller_drop[problem.roller] - roller_depth
-    return _of_contacts(problem, radius)
 
 
 def _creepage_variation(

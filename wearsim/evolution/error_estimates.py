@@ -13,7 +13,7 @@ from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.loads import load_deviation, smooth_loads
-from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
+from wearsim.evolution.steppers.single_step import carried_loads, solve_present, worn_depths
 from wearsim.mechanics.numerics.linearised_wear import difference_sizes
 from wearsim.mechanics.numerics.step_errors import DEPTH_EXPONENT, VOLUME_EXPONENT
 from wearsim.plugins import BODIES
@@ -42,11 +42,6 @@ def volume_of(problem: WearProblem, depths: Depths) -> FloatArray:
     rollers = worn_volume(depths[1][0], spacing, kinematics.roller_radius)
     mean = mean_along(mean_along(cylinder, axis=1), axis=0)[0, 0]
     return np.asarray(mean + sum_in_order(kinematics.multiplicity[:, None] * rollers, axis=0))
-
-
-def depth_difference(one: WearState, other: WearState) -> Depths:
-    """Return the difference of the depths of two states."""
-    return one.cylinder_depth - other.cylinder_depth, one.roller_depth - other.roller_depth
 
 
 def sizes(problem: WearProblem, state: WearState, differences: FloatArray) -> FloatArray:
@@ -119,7 +114,12 @@ def variation_bias(
     if not problem.varies:
         return None
     start, stop = problem.time(first), problem.time(first + passes)
-    deviations = [item for item in _deviations(problem, start, stop) if np.count_nonzero(item[2])]
+    every_roller = tuple(range(problem.rollers))
+    deviations = [  # field, rollers and standard deviation of all that varies
+        ("normal_force_offset", every_roller, load_deviation(problem, start, stop)),
+        *((item.name, item.rollers, item.paths.deviation(start, stop)) for item in problem.varying),
+    ]
+    deviations = [item for item in deviations if np.count_nonzero(item[2])]
     if not deviations:
         return None
     if follows_trends:
@@ -144,18 +144,17 @@ def variation_bias(
             continue
         chosen |= significant
         # a load and a friction coefficient are never below zero
-        bounded = name in {"normal_force_offset", "friction"}
-        most = 0.9 * values.min(axis=0) if bounded else np.inf
+        most = 0.9 * values.min(axis=0) if name in {"normal_force_offset", "friction"} else np.inf
         size = np.where(significant, np.minimum(deviation, most), 0.0)
         shifts.append((name, np.where(np.isin(problem.roller, rollers)[:, None], size, 0.0)))
     cylinders, all_rollers, energies = (np.zeros_like(values) for values in (*end.depths, first))
     places = chosen.nonzero()[0]
     if places.size:
         part, length = (averaged.at(places), end.at(places), loads[..., places]), passes[places]
-        mean = _wear_and_energy(_shifted_wear(*part, {}, length), length)
+        mean = _shifted_wear(*part, {}, length)
         for name, shift in shifts:
             less, more = (
-                _wear_and_energy(_shifted_wear(*part, {name: change}, length), length)
+                _shifted_wear(*part, {name: change}, length)
                 for change in (-shift[:, places], shift[:, places])
             )
             columns = zip(less, mean, more, strict=True)
@@ -164,26 +163,6 @@ def variation_bias(
             all_rollers[:, :, places] += roller
             energies[places] += energy
     return (cylinders, all_rollers), energies, varies
-
-
-def _deviations(
-    problem: WearProblem, start: FloatArray, stop: FloatArray
-) -> list[tuple[str, tuple[int, ...], FloatArray]]:
-    """Return field, rollers and standard deviation of all that varies between two times [s]."""
-    load = load_deviation(problem, start, stop)
-    return [
-        ("normal_force_offset", tuple(range(problem.rollers)), load),
-        *((item.name, item.rollers, item.paths.deviation(start, stop)) for item in problem.varying),
-    ]
-
-
-def _wear_and_energy(
-    wear: WearIncrement, passes: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the depths of cylinder and rollers [m] and the energy [J] of some passes."""
-    problem = wear.problem
-    power = problem.total_power(problem.values_of(wear.contacts, "power"))
-    return wear.cylinder, wear.roller, power * (passes / problem.kinematics.pass_rate)
 
 
 def biased_coarse_solution(end: WearState, coarse: WearState, bias: Depths) -> WearState:
@@ -200,9 +179,10 @@ def biased_coarse_solution(end: WearState, coarse: WearState, bias: Depths) -> W
     bias : tuple of ndarray
         Depths of the result of `variation_bias`.
     """
+    differences = (one - other for one, other in zip(coarse.depths, end.depths, strict=True))
     along = sum(
         sum_in_order((a * b).sum(axis=-1), axis=axis).sum(axis=0)
-        for axis, a, b in zip((0, 1), depth_difference(coarse, end), bias, strict=True)
+        for axis, a, b in zip((0, 1), differences, bias, strict=True)
     )
     part = UNCERTAIN * np.where(along < 0.0, -1.0, 1.0)[:, None]
     return coarse.with_added((part * bias[0], part * bias[1]))
@@ -214,8 +194,11 @@ def _shifted_wear(
     loads: FloatArray,
     shifts: dict[str, FloatArray],
     passes: FloatArray,
-) -> WearIncrement:
-    """Return the wear of some passes on the profiles of `end` with loads and inputs shifted."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return wear and energy of some passes on the profiles of `end`, loads and inputs shifted.
+
+    They are the depths of cylinder and rollers [m], and the energy [J].
+    """
     values = {
         name: getattr(problem.inputs, name) + shift
         for name, shift in shifts.items()
@@ -223,7 +206,8 @@ def _shifted_wear(
     }
     shifted = problem.with_inputs(replace(problem.inputs, **values)) if values else problem
     contacts = solve_present(shifted, end, loads + shifts.get("normal_force_offset", 0.0))
-    return WearIncrement(shifted, contacts, passes)
+    energy = shifted.total_power(contacts.power) * (passes / shifted.kinematics.pass_rate)
+    return *worn_depths(shifted, contacts, passes), energy
 
 
 def half_quadrature(problem: WearProblem, state: WearState) -> tuple[WearProblem, WearState]:

@@ -92,13 +92,13 @@ def layer_thickness(problem: WearProblem, contacts: ContactBatchSolution) -> Flo
     It is the depth of the greatest shear stress, and infinite where a body is without contact.
     """
     length = problem.values_of(contacts, "half_length")
-    shares, sums = problem.wear_shares, []
-    for values in (length, (length > 0.0).astype(np.float64)):
-        parts = [shares[body] * values for body in BODIES]
-        cylinder, roller = problem.sum_of_parts(parts[0], parts[1])
-        sums.append(np.concatenate([cylinder[:, 0], roller[0]]))
-    touching = sums[1] > 0.0
-    return np.where(touching, SHEAR_DEPTH * sums[0] / np.where(touching, sums[1], 1.0), np.inf)
+    of_bodies = (
+        problem.sum_of_parts(*(problem.wear_shares[body] * values for body in BODIES))
+        for values in (length, (length > 0.0).astype(np.float64))
+    )
+    lengths, passes = (np.concatenate([one[:, 0], other[0]]) for one, other in of_bodies)
+    touching = passes > 0.0
+    return np.where(touching, SHEAR_DEPTH * lengths / np.where(touching, passes, 1.0), np.inf)
 
 
 def fresh_damage(

@@ -182,8 +182,7 @@ class Evolution:
             moving = [place for place in moving if place not in places]
             growing = self.problem.at(places), self.state.at(places)
             self._waiting.append((self.numbers[places], *grown(*growing, grid)))
-        count = len(self.numbers)
-        kept = np.array([k for k in range(count) if k not in grids], dtype=np.int64)
+        kept = np.flatnonzero(~np.isin(np.arange(len(self.numbers)), [*grids]))
         self.numbers = self.numbers[kept]
         if kept.size:
             self.problem, self.state = self.problem.at(kept), self.state.at(kept)
@@ -193,18 +192,17 @@ class Evolution:
     def fail(self, failures: dict[int, Exception]) -> None:
         """End tests, by number, with the errors given."""
         self.failures.update(failures)
-        if len(self.numbers):
-            self._end_finished()
+        self._end_finished()
 
     def end(self, numbers: Iterable[int]) -> None:
         """End tests, by number, before their stop."""
         self._ended.update(numbers)
-        if len(self.numbers):
-            self._end_finished()
+        self._end_finished()
 
     def _end_finished(self) -> None:
         """Leave only the tests that have neither failed nor ended."""
-        if not (self.failures or self._ended) and max(self.state.passes.tolist()) < self.stop:
+        under_way = max(self.state.passes.tolist()) < self.stop
+        if not self.numbers.size or (under_way and not (self.failures or self._ended)):
             return
         tests = enumerate(zip(self.numbers.tolist(), self.state.passes.tolist(), strict=True))
         over = self.failures.keys() | self._ended
@@ -256,10 +254,7 @@ class Evolution:
                 accepted.append((places[chosen], [item.at(chosen) for item in tried.path]))
         warning = done[0][1].warning if done else None
         advance = self._continued(accepted, warning) if accepted else None
-        if failures:
-            self.fail(failures)
-        else:
-            self._end_finished()
+        self.fail(failures)
         return advance
 
     def _relocate(self) -> None:
@@ -300,8 +295,7 @@ class Evolution:
             except SolverError as error:
                 error.state = error.state or self.state.at(np.array([place])).to_arrays()
                 failures[number] = error
-        if failures:
-            self.fail(failures)
+        self.fail(failures)
         return np.array(lengths)
 
     def _rejected(self, failed: dict[int, Exception], lengths: FloatArray) -> dict[int, Exception]:
@@ -356,8 +350,9 @@ def _finite(tried: Attempt) -> Attempt:
     for values in (end.cylinder_depth, end.energy):
         # reduced, since all() takes twice as long on short arrays
         if not np.logical_and.reduce(np.isfinite(values), axis=None):
-            message = f"a value is not finite after pass {end.passes[0]:.0f}"
-            raise StepError(message, end.to_arrays())
+            raise StepError(
+                f"a value is not finite after pass {end.passes[0]:.0f}", end.to_arrays()
+            )
     return tried
 
 

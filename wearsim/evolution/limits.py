@@ -66,8 +66,7 @@ OF_FATIGUE = "damage", "pitting"
 
 def damage_of(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the effective damage of the tests of a state with fatigue, (realisations,)."""
-    assert state.damage is not None
-    return effective_damage(problem, state.damage[0])
+    return effective_damage(problem, np.asarray(state.damage)[0])
 
 
 @dataclass(frozen=True)
@@ -288,8 +287,7 @@ def _between(
     """
     done, span = start.passes, end.passes - start.passes
     if len(limits) == 1 and limits[0].quantity == "passes":
-        length = limits[0].value - done
-        located = take_side_step(stepper.side_step, problem, start, length)
+        located = take_side_step(stepper.side_step, problem, start, limits[0].value - done)
         return located.replaced(passes=np.full_like(done, limits[0].value))
 
     def trial(places: IntArray, passes: FloatArray) -> tuple[WearState, FloatArray]:
@@ -311,8 +309,7 @@ def _between(
             guess = np.where(
                 known, first * (last / first) ** part, last * np.exp(-high[active] / _POWER)
             )
-        margin = 1e-3 * (last - first)
-        halved = count % 5 == 4
+        margin, halved = 1e-3 * (last - first), count % 5 == 4
         unsure = ~known | halved
         middle = np.where(halved, 0.5 * (first + last), guess)
         guess = np.where(unsure, np.clip(middle, first + margin, last - margin), guess)

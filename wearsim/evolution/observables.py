@@ -108,8 +108,7 @@ def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArr
     weight = cam.panels.weight[:, None]
     per_angle = area * cam.along.length[:, 0] / weight
     total = sum_in_order(weight * per_angle, axis=0)
-    error = integral_error(cam.panels, per_angle)
-    relative = error / np.where(total > 0.0, total, np.inf)
+    relative = integral_error(cam.panels, per_angle) / np.where(total > 0.0, total, np.inf)
     return np.asarray(relative * volume_of(problem, state.depths))
 
 

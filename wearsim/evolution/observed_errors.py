@@ -153,10 +153,8 @@ def observed_errors(
     estimates = dict(zip(observed, columns, strict=True))
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
-    errors = {}
-    peaks: FloatArray | float = 0.0
-    if observed.keys() >= {"width", *OF_EDGES}:
-        peaks = edge_peaks(observed, crown_radius, spacing, roller_width)
+    errors, has_edges = {}, observed.keys() >= {"width", *OF_EDGES}
+    peaks = edge_peaks(observed, crown_radius, spacing, roller_width) if has_edges else 0.0
     for name, values in observed.items():
         scale = 1.0 if name.endswith("angle") else np.abs(values)
         lowest = [
@@ -164,9 +162,7 @@ def observed_errors(
             for names, bound in zip((OF_DEPTH, OF_VOLUME), least, strict=True)
             if name in names
         ]
-        relative = estimates[name]
-        if lowest:
-            relative = np.maximum(relative, lowest[0][:, None])
+        relative = np.maximum(estimates[name], lowest[0][:, None]) if lowest else estimates[name]
         if name in exponents:
             of_force = estimates["normal_force"].max(axis=1, keepdims=True)
             relative = relative + exponents[name] * of_force

@@ -45,10 +45,8 @@ def at_rest(problem: WearProblem, passes: FloatArray) -> BoolArray:
     -------
     ndarray of bool, shape (realisations,)
     """
-    rests = np.zeros(len(passes), dtype=np.bool_)
-    for v, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
-        rests[v] = done < _end_of_pause(pauses, done) - _margin(done)
-    return rests
+    tests = zip(_long(problem), passes.tolist(), strict=True)
+    return np.array([done < _end_of_pause(pauses, done) - _margin(done) for pauses, done in tests])
 
 
 def next_boundaries(problem: WearProblem, passes: FloatArray) -> FloatArray:
@@ -64,13 +62,12 @@ def next_boundaries(problem: WearProblem, passes: FloatArray) -> FloatArray:
     ndarray, shape (realisations,)
         Roller passes; infinite where no pause follows.
     """
-    boundaries = np.full(len(passes), np.inf)
-    for v, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
-        starts_and_ends = pauses.ravel()
-        following = int(np.searchsorted(starts_and_ends, done + _margin(done), side="right"))
-        if following < len(starts_and_ends):
-            boundaries[v] = starts_and_ends[following]
-    return boundaries
+    boundaries = []
+    for pauses, done in zip(_long(problem), passes.tolist(), strict=True):
+        starts_and_ends = np.append(pauses, np.inf)
+        following = np.searchsorted(starts_and_ends, done + _margin(done), side="right")
+        boundaries.append(starts_and_ends[following])
+    return np.array(boundaries)
 
 
 def _long(problem: WearProblem) -> list[FloatArray]:
@@ -125,10 +122,10 @@ def step_or_rest(
 
 def without_load(problem: WearProblem, passes: FloatArray) -> BoolArray:
     """Return whether there is no load at this instant; parameters and result as of `at_rest`."""
-    unloaded = np.zeros(len(passes), dtype=np.bool_)
-    for place, (pauses, done) in enumerate(zip(problem.pauses, passes.tolist(), strict=False)):
-        unloaded[place] = done <= _end_of_pause(pauses, done) + _margin(done)
-    return unloaded
+    if not problem.pauses:
+        return np.zeros(len(passes), dtype=np.bool_)
+    tests = zip(problem.pauses, passes.tolist(), strict=True)
+    return np.array([done <= _end_of_pause(pauses, done) + _margin(done) for pauses, done in tests])
 
 
 def opened(

@@ -63,20 +63,6 @@ class ContactInputs:
         filled = {name: np.array(np.broadcast_to(array, shape)) for name, array in values.items()}
         return replace(self, **filled)
 
-    def with_value_of(self, item: Varying, roller: IntArray, value: FloatArray) -> ContactInputs:
-        """Return these inputs with the value of a process at the contacts it acts on.
-
-        Parameters
-        ----------
-        item : Varying
-        roller : ndarray of int, shape (contacts,)
-            Roller of each contact.
-        value : ndarray
-            Value of the process; broadcasts to (contacts, realisations).
-        """
-        chosen = np.isin(roller, item.rollers)[:, None]
-        return self.with_values({item.name: np.where(chosen, value, getattr(self, item.name))})
-
 
 #: Function that draws the inputs of single passes.
 #:
@@ -308,8 +294,7 @@ class CamStations:
     def at_angle(self, values: FloatArray, angle: float) -> FloatArray:
         """Return values of the stations, first axis, interpolated to an angle [rad]."""
         if self.panels is None:
-            nearest = np.abs(self.angle.ravel() - angle).argmin()
-            return np.asarray(values[nearest])
+            return np.asarray(values[np.abs(self.angle.ravel() - angle).argmin()])
         at = self.panels.values_at_angles(values[self.places], np.array([angle]))
         return np.asarray(at[0])
 
@@ -369,11 +354,9 @@ class CamStations:
 
     def joined(self, others: Sequence[Track]) -> CamStations:
         """Return the stations of several tests, of which each `matches` these."""
-        differing = dict[str, Any]()
+        differing, tests = dict[str, Any](), [self, *others]
         excluded = {"whole", "panels", "relocated", "moved_skids", "recorded"}
-        names = [item.name for item in fields(self) if item.name not in excluded]
-        tests = [self, *others]
-        for name in names:
+        for name in {item.name for item in fields(self)} - excluded:
             values = [getattr(test, name) for test in tests]
             if not all(np.array_equal(v, values[0], equal_nan=True) for v in values[1:]):
                 differing[name] = np.concatenate(values, axis=2)
@@ -492,5 +475,4 @@ def sum_in_order(values: FloatArray, axis: int) -> FloatArray:
     """
     if values.shape[axis] == 1:
         return values.squeeze(axis)
-    total: FloatArray = np.add.accumulate(values, axis=axis).take(-1, axis=axis)
-    return total
+    return np.asarray(np.add.accumulate(values, axis=axis).take(-1, axis=axis))

@@ -56,12 +56,10 @@ def relocated(problem: WearProblem, state: WearState) -> tuple[WearProblem, Wear
         Without past points if the stations have moved.
     """
     cam = problem.kinematics.track
-    if cam.relocated is None or cam.panels is None or not problem.has_spring:
+    if cam.relocated is None or cam.moved_skids is None or not problem.has_spring:
         return problem, state
-    assert cam.moved_skids is not None
-    change, last = _changes(problem, state, cam), state.skid_loads
-    if last is None:
-        last = np.zeros((2, len(change), 1))
+    change = _changes(problem, state, cam)
+    last = np.zeros((2, len(change), 1)) if state.skid_loads is None else state.skid_loads
     force = cam.at_unworn(problem.at_stations(preload_of(problem))[:, 0])
     force = np.maximum(np.abs(force), SMALL * np.abs(force).max())
     if (np.abs(change - last[1]) <= LOOK * force).all():
@@ -153,15 +151,21 @@ def _moved(problem: WearProblem, state: WearState, old: CamStations, new: CamSta
     return at_new.replaced(contacts=contacts)
 
 
+def _moved_stations(old: CamStations, new: CamStations) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the result of `moved_stations` for stations that have been located again."""
+    assert old.panels is not None
+    assert new.panels is not None
+    return moved_stations(old.panels, new.panels)
+
+
 def _moved_errors(
     state: WearState, old: CamStations, new: CamStations, places: IntArray
 ) -> FloatArray | None:
     """Return the errors of the depths at new stations, interpolated along the angle."""
     errors, stations = state.stepping_error, len(state.cylinder_depth)
-    if errors is None or old.panels is None or new.panels is None:
+    if errors is None:
         return None
-    matrix, _, _ = moved_stations(old.panels, new.panels)
-    cylinder = np.tensordot(matrix, errors[:stations][places], axes=1)
+    cylinder = np.tensordot(_moved_stations(old, new)[0], errors[:stations][places], axes=1)
     return np.concatenate([cylinder, errors[stations:]])
 
 
@@ -171,10 +175,7 @@ def _moved_damage(
     """Return damage at new stations, interpolated along the angle, and the points of its rates."""
     if state.damage is None or state.damage_points is None:
         return None, None
-    assert old.along.panels is not None
-    assert new.along.panels is not None
-    matrix, _, _ = moved_stations(old.along.panels, new.along.panels)
-    stations = len(state.cylinder_depth)
+    matrix, stations = _moved_stations(old.along, new.along)[0], len(state.cylinder_depth)
     cylinder = state.damage[:, :stations][:, old.places]
     moved = np.maximum(np.moveaxis(np.tensordot(matrix, cylinder, axes=(1, 1)), 0, 1), 0.0)
     points = np.stack([np.full_like(state.damage_points[0], np.nan), state.damage_points[1]])
@@ -191,9 +192,7 @@ def moved_depth(depth: FloatArray, old: CamStations, new: CamStations) -> FloatA
     old, new : CamStations
         With `panels`.
     """
-    assert old.panels is not None
-    assert new.panels is not None
-    matrix, old_part, new_part = moved_stations(old.panels, new.panels)
+    matrix, old_part, new_part = _moved_stations(old, new)
     new_depth = np.maximum(np.tensordot(matrix, depth, axes=1), 0.0)
     lengths = [stations.length.reshape(-1, *(1,) * (depth.ndim - 1)) for stations in (old, new)]
     for part in np.unique(new_part[new_part >= 0]):

@@ -101,8 +101,7 @@ def sizes_of(problem: WearProblem, depths: FloatArray, between: bool = False) ->
     top = greatest_between if between else partial(np.max, axis=-1)
     tops, stations = top(depths), problem.shape[0]
     cylinder = problem.kinematics.track.greatest_value(tops[:stations])
-    rollers = tops[stations:].max(axis=0)
-    return np.array([cylinder, rollers, volumes_of(problem, depths)])
+    return np.array([cylinder, tops[stations:].max(axis=0), volumes_of(problem, depths)])
 
 
 def _means_below_points(depths: FloatArray) -> float:
@@ -112,8 +111,7 @@ def _means_below_points(depths: FloatArray) -> float:
     of a parabola over a strip is below its vertex by a 24th of the second difference.
     """
     second = 2.0 * depths[:, 1:-1] - depths[:, :-2] - depths[:, 2:]
-    at_deepest = np.where(depths[:, 1:-1] == depths.max(), second, 0.0)
-    return float(at_deepest.max(initial=0.0)) / 24.0
+    return float(second[depths[:, 1:-1] == depths.max()].max(initial=0.0)) / 24.0
 
 
 def _means_and_middles(depths: FloatArray) -> float:

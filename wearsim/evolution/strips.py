@@ -113,13 +113,12 @@ def next_grids(
         return {}
     loaded = (load > 0.0).reshape(-1, state.passes.size, problem.grid.strips)
     counts = loaded.sum(axis=2).min(axis=0).tolist()
-    grids = {}
-    for v, (growth, width, count) in enumerate(zip(problem.growth, free, counts, strict=True)):
-        near = v in outgrown or loaded[:, v, :width].any() or loaded[:, v, -width:].any()
-        grid = _next(problem.grid, growth, count) if width and near else None
-        if grid is not None:
-            grids[v] = grid
-    return grids
+    wider = {
+        v: _next(problem.grid, growth, count)
+        for v, (growth, width, count) in enumerate(zip(problem.growth, free, counts, strict=True))
+        if width and (v in outgrown or loaded[:, v, :width].any() or loaded[:, v, -width:].any())
+    }
+    return {v: grid for v, grid in wider.items() if grid is not None}
 
 
 def fill_strips(state: WearState, place: int) -> bool:
@@ -218,9 +217,8 @@ def averaged(values: FloatArray, old: Grid, new: Grid) -> FloatArray:
     The integral over the strips is kept where the new ones cover the old ones.
     """
     weights = shares(old, new) * (old.spacing / new.spacing)
-    rows = values.reshape(-1, old.strips)
     # row by row, so that the round-off does not depend on the number of rows
-    averages = [(weights * row).sum(axis=-1) for row in rows]
+    averages = [(weights * row).sum(axis=-1) for row in values.reshape(-1, old.strips)]
     return np.array(averages).reshape(*values.shape[:-1], new.strips)
 
 
@@ -259,7 +257,14 @@ def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearStat
     if contacts.separation is not None:  # not known until the contacts are solved
         columns["separation"] = np.full_like(columns["line_load"], np.nan)
     contacts = replace(contacts, y=new.y, **columns)
-    state = state.replaced(**arrays, contacts=contacts, **_auxiliary(problem, state, old))
+    halves = "half_quadrature_solution"
+    auxiliary = {
+        name: state_on_grid(
+            half_quadrature(problem, state)[0] if name == halves else problem, solution, old
+        )
+        for name, solution in state.auxiliary.items()
+    }
+    state = state.replaced(**arrays, contacts=contacts, **auxiliary)
     if abs(new.spacing / old.spacing - 1.0) < _ALIGNED:
         return state  # the added strips are without load
     solved = solve_present(problem, state, carried_loads(problem, state.contacts))
@@ -272,9 +277,7 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
     On added strips the separation of the surfaces is that of the old outer strip plus the increase
     of the gap beyond it, and it decreases at the same rate.
     """
-    new, gap = problem.grid, problem.nominal_gap
-    assert state.part is not None
-    assert state.past_sums is not None
+    new, gap, sums = problem.grid, problem.nominal_gap, np.asarray(state.past_sums)
     arrays = {
         name: averaged(values, old, new)
         for name in ("separation", "part", "whole_steps")
@@ -282,12 +285,11 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
     }
     # strips partly in contact are not joined with others whole
     arrays["whole_steps"] = np.where(arrays["part"] < 1.0, 0.0, np.floor(arrays["whole_steps"]))
-    ratio = old.spacing / new.spacing
-    sums = np.concatenate([ratio * state.past_sums[:, :-1], state.past_sums[:, -1:]], axis=1)
+    sums = np.concatenate([old.spacing / new.spacing * sums[:, :-1], sums[:, -1:]], axis=1)
     if state.separation is None:
         return arrays | {"part": np.ceil(arrays["part"]), "past_sums": sums}
     past = averaged(np.asarray(state.past_wear), old, new)
-    cut = ~np.isnan(state.part[0, 0, :, :1])  # tests that resolve edges
+    cut = ~np.isnan(np.asarray(state.part)[0, 0, :, :1])  # tests that resolve edges
     inside = np.flatnonzero(shares(old, new).sum(axis=1) > 0.0)
     for added, edge in (
         (slice(0, inside[0]), inside[0]),
@@ -297,13 +299,3 @@ def _edges_on_grid(problem: WearProblem, state: WearState, old: Grid) -> dict[st
         arrays["separation"][..., added] = arrays["separation"][..., edge : edge + 1] + beyond
         past[1:, ..., added] = np.where(cut, past[1:, ..., edge : edge + 1], past[1:, ..., added])
     return arrays | {"past_wear": past, "past_sums": sums}
-
-
-def _auxiliary(problem: WearProblem, state: WearState, old: Grid) -> dict[str, WearState]:
-    """Return the auxiliary solutions of a state on the strips of a problem."""
-    solutions = {}
-    for name, solution in state.auxiliary.items():
-        halved = name == "half_quadrature_solution"
-        solution_problem = half_quadrature(problem, state)[0] if halved else problem
-        solutions[name] = state_on_grid(solution_problem, solution, old)
-    return solutions

@@ -37,7 +37,6 @@ def minimum_film(
     modulus, radius = 2.0 * contact_modulus, 1.0 / curvature_x
     speed = viscosity * entrainment_speed / (modulus * radius)
     load = normal_force / (modulus * radius**2)
-    ellipticity = 1.03 * (curvature_x / curvature_y) ** 0.64
-    shape = 1.0 - np.exp(-0.68 * ellipticity)
+    shape = 1.0 - np.exp(-0.68 * (1.03 * (curvature_x / curvature_y) ** 0.64))
     material = (pressure_viscosity * modulus) ** 0.49
     return np.asarray(3.63 * speed**0.68 * material * load**-0.073 * shape * radius)

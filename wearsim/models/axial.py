@@ -227,8 +227,8 @@ class TableProfile(AxialProfile):
             from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  (slow to load)
 
             self._curve = PchipInterpolator(self._y, self._depth)
-        drop = self._curve(np.clip(s, self._y[0], self._y[-1]))
-        return np.maximum(drop, 0.0)  # against round-off
+        # not negative by round-off
+        return np.maximum(self._curve(np.clip(s, self._y[0], self._y[-1])), 0.0)
 
 
 def _spec(

@@ -159,17 +159,14 @@ def _periodic(file: InputFile, arm: bool) -> Callable[[FloatArray], FloatArray]:
     turn = angle[-1] - angle[0]
     if turn > math.tau * (1.0 + 1e-9) or len(angle) < 4:
         got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
-        expected = "at least 4 rows within 360 deg"
-        raise mistake_in(file.path, "is not one turn", got, expected)
+        raise mistake_in(file.path, "is not one turn", got, "at least 4 rows within 360 deg")
     if turn < math.tau * (1.0 - 1e-9):
         angle, force = np.append(angle, angle[0] + math.tau), np.append(force, force[0])
     elif abs(force[-1] - force[0]) > 1e-9 * float(np.abs(force).max()):
         got = f"{force[0]:.6g} and {force[-1]:.6g} {unit}"
-        expected = "equal values at 0 and 360 deg"
-        raise mistake_in(file.path, f"the {name} jumps", got, expected)
-    force[-1] = force[0]
-    spline = CubicSpline(angle - angle[0], force, bc_type="periodic")
-    start = float(angle[0])
+        raise mistake_in(file.path, f"the {name} jumps", got, "equal values at 0 and 360 deg")
+    force[-1], start = force[0], float(angle[0])
+    spline = CubicSpline(angle - start, force, bc_type="periodic")
     return lambda theta: spline(np.mod(theta - start, math.tau))
 
 
@@ -197,14 +194,16 @@ def _read_log(
 ) -> tuple[PiecewiseLinear, FloatArray, FloatArray]:
     """Return the log, its pauses and its gaps [s]."""
     first, second = names or ("time", "load")
-    choice = 'choose other names with load.columns = ["TIME", "LOAD"]'
-    other_names = (
-        {} if names else {"time": ["t"], "load": ["force", "normal force", "normal_force"]}
-    )
     if first == second:
         raise mistake_in(path, "time and load need two columns", first)
-    units = {first: "s", second: "N"}
-    columns = read_columns(text, path, units, aliases=other_names, rising=first, choice=choice)
+    columns = read_columns(
+        text,
+        path,
+        {first: "s", second: "N"},
+        aliases={} if names else {"time": ["t"], "load": ["force", "normal force", "normal_force"]},
+        rising=first,
+        choice='choose other names with load.columns = ["TIME", "LOAD"]',
+    )
     time, load = columns[first], columns[second]
     load = np.where((load < 0.0) & (load >= -ZERO_DRIFT * load.max()), 0.0, load)
     steps = np.diff(time)
@@ -213,9 +212,8 @@ def _read_log(
         before = before[:0]
     missing = np.stack([time[before], time[before + 1]], axis=1)
     if len(before) and gaps == "error":
-        text = gap_text(missing, float(np.median(steps)))
         expected = 'a log without gaps, or load.gaps = "hold" or "interpolate"'
-        raise mistake_in(path, text, None, expected)
+        raise mistake_in(path, gap_text(missing, float(np.median(steps))), None, expected)
     if gaps == "hold":
         time = np.insert(time, before + 1, missing[:, 1])
         load = np.insert(load, before + 1, load[before])
@@ -281,8 +279,7 @@ class ThermalTerm(LoadTerm):
     """
 
     def __init__(self, options: ThermalOptions) -> None:
-        self.gain = options.gain
-        self.time_constant = options.time_constant
+        self.gain, self.time_constant = options.gain, options.time_constant
 
     def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the term after `duration` [s] at constant `power` [W], shape (rollers,) [N]."""

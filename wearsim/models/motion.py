@@ -167,14 +167,14 @@ class Polynomial(MotionLaw):
     ) -> None:
         from numpy.polynomial import Polynomial as Series  # noqa: PLC0415  (few scenarios)
 
-        conditions = [(0.0, [0.0, *start]), (1.0, [rise, *end])]
-        degree = len(start) + len(end) + 1
-        rows, values = [], []
-        for place, derivatives in conditions:
-            for order, value in enumerate(derivatives):
-                powers = [Series.basis(k).deriv(order)(place) for k in range(degree + 1)]
-                rows.append(powers)
-                values.append(value * angle**order)
+        conditions = [
+            (place, order, value)
+            for place, derivatives in ((0.0, [0.0, *start]), (1.0, [rise, *end]))
+            for order, value in enumerate(derivatives)
+        ]
+        powers = [Series.basis(k) for k in range(len(conditions))]
+        rows = [[power.deriv(order)(place) for power in powers] for place, order, _ in conditions]
+        values = [value * angle**order for _, order, value in conditions]
         series = Series(np.linalg.solve(np.array(rows, dtype=np.float64), np.array(values)))
         self._angle = angle
         self._series = [series.deriv(order) if order else series for order in range(3)]
@@ -302,9 +302,8 @@ def read_lift(text: str, path: str, unit: str) -> tuple[FloatArray, FloatArray]:
         text, path, {"angle": "rad", "lift": unit}, aliases=names, rising="angle"
     )
     if len(columns["angle"]) < FEWEST_ROWS:
-        got = f"{len(columns['angle'])} rows"
-        what = "too few rows for a quintic spline"
-        raise mistake_in(path, what, got, f"at least {FEWEST_ROWS}")
+        got, expected = f"{len(columns['angle'])} rows", f"at least {FEWEST_ROWS}"
+        raise mistake_in(path, "too few rows for a quintic spline", got, expected)
     return columns["angle"], columns["lift"]
 
 
@@ -340,8 +339,7 @@ def kinks(angle: FloatArray, lift: FloatArray, noise: float = 0.0) -> tuple[Floa
     floor = np.maximum(1e-3 * np.abs(slope).max(), _FLOOR * scatter)
     corners = angle[1:-1][_isolated(jump, floor)]
     least = np.full(len(third), 0.05 * np.abs(second).max())
-    steps = middle[1:-1][_isolated(third * np.diff(angle[1:-1]), least)]
-    return corners, steps
+    return corners, middle[1:-1][_isolated(third * np.diff(angle[1:-1]), least)]
 
 
 def refuse_kinks(
@@ -362,8 +360,7 @@ def refuse_kinks(
         Name of the quantity, for the message.
     """
     if noise > 0.0:
-        step = float(np.median(np.diff(angle)))
-        count = 1
+        step, count = float(np.median(np.diff(angle))), 1
         while 2 * count * step <= _WIDEST:
             slope = np.abs(np.diff(lift[::count]) / np.diff(angle[::count])).max()
             if _FLOOR * noise * math.sqrt(6.0 / count) / (count * step) <= _BLUNT * slope:
@@ -376,8 +373,7 @@ def refuse_kinks(
     if len(corners):
         got = "a corner at " + ", ".join(f"{math.degrees(at):.6g} deg" for at in corners[:3])
         expected = f"a {name} without corners, or more points where it turns sharply"
-        what = f"the slope of the {name} jumps"
-        raise mistake_in(path, what, got, expected)
+        raise mistake_in(path, f"the slope of the {name} jumps", got, expected)
 
 
 def _spec(

@@ -78,6 +78,13 @@ class Checked:
         state = {**inputs, what.split(maxsplit=1)[0]: value}
         raise SolverError(f"{self._subject} returned {text}; {self._remedy}", state)
 
+    def _texts(self, what: str, expected: str) -> tuple[str, ...]:
+        """Return texts of the plugin after checking them."""
+        texts: Any = getattr(self._plugin, what)
+        if not (isinstance(texts, tuple | list) and all(isinstance(text, str) for text in texts)):
+            raise self._kind_error(what, texts, expected)
+        return tuple(texts)
+
     def _kind_error(self, what: str, value: object, expected: str) -> PluginError:
         """Return the error of a value of another type or shape."""
         returned = f"{self._subject} returned {described_value(value)} as {what}"
@@ -130,11 +137,13 @@ def built_plugin(
             f" a {expected.__name__}"
         )
     own: Built = built
-    if type(built).__module__.partition(".")[0] == "wearsim":
+    of_wearsim = [
+        base for base in type(built).__mro__ if base.__module__.partition(".")[0] == "wearsim"
+    ]
+    if type(built) in of_wearsim:
         return own
-    for base in type(built).__mro__:
-        if base.__module__.partition(".")[0] == "wearsim":
-            _refuse_other_arguments(spec, built, base)
+    for base in of_wearsim:
+        _refuse_other_arguments(spec, built, base)
     return checked(built, spec.name)
 
 
@@ -144,9 +153,8 @@ def _refuse_other_arguments(spec: Any, built: object, base: type[Any]) -> None:
         required = getattr(base, name)
         if not callable(required):
             continue  # a property
-        wanted = inspect.signature(required)
+        wanted, own = inspect.signature(required), getattr(built, name)
         given = [item for item in wanted.parameters.values() if item.name != "self"]
-        own = getattr(built, name)
         try:
             inspect.signature(own).bind(*given)
         except TypeError as error:
@@ -156,7 +164,7 @@ def _refuse_other_arguments(spec: Any, built: object, base: type[Any]) -> None:
                 f" ({', '.join(item.name for item in given)})"
             ) from error
         except ValueError:  # a compiled function without a signature
-            continue
+            pass
 
 
 def is_numeric(value: object) -> bool:

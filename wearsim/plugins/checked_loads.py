@@ -81,15 +81,18 @@ class CheckedLoadTerm(_CheckedPairs, LoadTerm):
 
     def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the state after `duration` [s] at constant `power` [W]."""
-        end: FloatArray = self._plugin.advance(state, power, duration)
-        inputs: dict[str, Any] = {"state": state, "power": power, "duration": duration}
-        return self._checked("advance", end, np.shape(state), signed=True, **inputs)
+        return self._of_rollers("advance", state, power, duration)
 
     def mean_force(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the mean of the term over `duration` [s], shape as `state` [N]."""
-        mean: FloatArray = self._plugin.mean_force(state, power, duration)
+        return self._of_rollers("mean_force", state, power, duration)
+
+    def _of_rollers(
+        self, what: str, state: FloatArray, power: FloatArray, duration: float
+    ) -> FloatArray:
+        values: FloatArray = getattr(self._plugin, what)(state, power, duration)
         inputs: dict[str, Any] = {"state": state, "power": power, "duration": duration}
-        return self._checked("mean_force", mean, np.shape(state), signed=True, **inputs)
+        return self._checked(what, values, np.shape(state), signed=True, **inputs)
 
     def lag(self) -> tuple[float, float] | None:
         """Return gain [N/W] and time constant [s] of a first-order lag, else None."""

@@ -27,10 +27,7 @@ class _CheckedRandomInput(Checked):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the validity, for the user."""
-        warnings: Any = self._plugin.warnings
-        if not (isinstance(warnings, tuple | list) and all(isinstance(w, str) for w in warnings)):
-            raise self._kind_error("warnings", warnings, "a tuple of texts")
-        return tuple(warnings)
+        return self._texts("warnings", "a tuple of texts")
 
     def _marginal(self) -> Distribution:
         marginal: Any = getattr(self._plugin, "marginal", None)
@@ -71,24 +68,19 @@ class CheckedDistribution(_CheckedRandomInput, Distribution):
     @cached_property
     def mean(self) -> float:
         """Mean, by default integrated over the quantiles."""
-        if not self._implements("mean"):
-            return super().mean
-        return self._moment("mean")
+        return self._moment("mean") if self._implements("mean") else super().mean
 
     @cached_property
     def std(self) -> float:
         """Standard deviation, by default integrated over the quantiles."""
-        if not self._implements("std"):
-            return super().std
-        return self._moment("std")
+        return self._moment("std") if self._implements("std") else super().std
 
     def _moment(self, what: str) -> float:
         """Return mean or std, which may be infinite: the scenario then refuses the distribution."""
         value: Any = getattr(self._plugin, what)
         if not (is_numeric(value) and np.shape(value) == ()):
             raise self._kind_error(what, value, "a number")
-        infinite = np.isinf(value)
-        self._checked(what, 0.0 if infinite else value, signed=what == "mean")
+        self._checked(what, 0.0 if np.isinf(value) else value, signed=what == "mean")
         return float(value)
 
     def _implements(self, name: str) -> bool:
@@ -104,15 +96,10 @@ class CheckedJointDistribution(Checked, JointDistribution):
 
     def __init__(self, plugin: JointDistribution, name: str) -> None:
         super().__init__(plugin, name)
-        components: Any = plugin.components
-        if not (
-            isinstance(components, tuple | list) and all(isinstance(c, str) for c in components)
-        ):
-            raise self._kind_error("components", components, "a tuple of names")
-        dimension: Any = plugin.dimension
-        if not (isinstance(dimension, int) and dimension >= 1):
-            raise self._kind_error("dimension", dimension, "a whole number of at least 1")
-        self.components, self.dimension = tuple(components), dimension
+        self.components = self._texts("components", "a tuple of names")
+        self.dimension: Any = plugin.dimension
+        if not (isinstance(self.dimension, int) and self.dimension >= 1):
+            raise self._kind_error("dimension", self.dimension, "a whole number of at least 1")
 
     def values(self, uniform: FloatArray) -> FloatArray:
         """Return the components, shape (draws, components), from uniforms (draws, dimension)."""

@@ -181,8 +181,7 @@ class Registry:
 
     def names(self, kind: type[Spec]) -> list[str]:
         """Return the sorted names of the specs of `kind` that a scenario can select."""
-        specs = self._specs[kind]
-        return sorted(name for name, item in specs.items() if item.refusal is None)
+        return sorted(name for name, item in self._specs[kind].items() if item.refusal is None)
 
     def get(self, kind: type[S], name: str) -> S:
         """Return the spec of `kind` called `name`.
@@ -200,14 +199,17 @@ class Registry:
             return item.spec
         known = self.names(kind)
         text = f"no {kind.kind} is named '{name}'; known: {', '.join(known) or 'none'}"
-        if near := difflib.get_close_matches(name, known, n=1):
-            text += f"; did you mean '{near[0]}'?"
-        for broken in self.broken:
-            text += (
-                f"; plugin '{broken.entry_point}' of {broken.distribution} {broken.version}"
+        near = difflib.get_close_matches(name, known, n=1)
+        parts = [
+            text,
+            *(f"did you mean '{other}'?" for other in near),
+            *(
+                f"plugin '{broken.entry_point}' of {broken.distribution} {broken.version}"
                 f" failed to load ({broken.cause})"
-            )
-        raise PluginError(text)
+                for broken in self.broken
+            ),
+        ]
+        raise PluginError("; ".join(parts))
 
     def registered(self, kind: type[Spec], name: str) -> Registered:
         """Return the spec called `name` with its distribution; errors as in `get`."""
@@ -218,33 +220,39 @@ class Registry:
         for frame, line in reversed(list(traceback.walk_tb(error.__traceback__))):
             package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
             if package in self._packages:
-                code = frame.f_code
-                place = f"{code.co_name}, line {line} of {code.co_filename}"
+                place = f"{frame.f_code.co_name}, line {line} of {frame.f_code.co_filename}"
                 return f"{self._packages[package]}, {place}"
         return None
 
 
 def _fault(kind: type[Spec], spec: Any) -> str | None:
     """Return the first field of a spec with a value that cannot be used, or None."""
-    if not (isinstance(spec.name, str) and spec.name):
-        return f"name {spec.name!r}, expected a text"
-    if not (isinstance(spec.options, type) and issubclass(spec.options, Options)):
-        return f"options {spec.options!r}, expected a class derived from Options"
-    if not isinstance(spec.protocol, int):
-        return f"protocol {spec.protocol!r}, expected the number {PROTOCOL}"
-    if not callable(getattr(spec, "factory", print)):
-        return f"factory {spec.factory!r}, expected a class or a function"
+    derived = isinstance(spec.options, type) and issubclass(spec.options, Options)
+    checks = [
+        ("name", isinstance(spec.name, str) and spec.name, "a text"),
+        ("options", derived, "a class derived from Options"),
+        ("protocol", isinstance(spec.protocol, int), f"the number {PROTOCOL}"),
+        ("factory", callable(getattr(spec, "factory", print)), "a class or a function"),
+    ]
     if isinstance(spec, StudyKind):
-        needed = ("result", "view", *(("read" if spec.read else "data",) if spec.format else ()))
-        for name in needed:
-            reference = getattr(spec, name)
-            module, colon, item = str(reference).partition(":")
-            if not (module and colon and item):
-                return f"{name} {reference!r}, expected a reference 'package.module:name'"
-    field, words = _WORDS.get(kind, ("", ()))
-    if field and getattr(spec, field) not in words:
-        return f"{field} {getattr(spec, field)!r}, expected one of {', '.join(words)}"
-    return None
+        of_file = ("read" if spec.read else "data",) if spec.format else ()
+        checks += [
+            (
+                name,
+                all(str(getattr(spec, name)).partition(":")),
+                "a reference 'package.module:name'",
+            )
+            for name in ("result", "view", *of_file)
+        ]
+    if kind in _WORDS:
+        field, words = _WORDS[kind]
+        checks.append((field, getattr(spec, field) in words, f"one of {', '.join(words)}"))
+    faults = (
+        f"{field} {getattr(spec, field)!r}, expected {expected}"
+        for field, fits, expected in checks
+        if not fits
+    )
+    return next(faults, None)
 
 
 @cache

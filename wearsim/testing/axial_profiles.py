@@ -87,8 +87,7 @@ def drop_is_counted_from_the_highest_line(fixture: AxialProfileFixture) -> None:
 @AXIAL_PROFILE.specified_in("wearsim.plugins.AxialProfile")
 def crown_radius_is_that_of_the_drop(fixture: AxialProfileFixture) -> None:
     """With a crown radius R the drop is s^2/(2 R)."""
-    radius = fixture.instance.crown_radius
+    radius, places = fixture.instance.crown_radius, fixture.places
     if radius is not None:
-        places = fixture.places
         expected = places**2 / (2.0 * radius)
         agree("the drop of a crown", fixture.instance.drop(places), expected, 1e-9, _ROUNDING)

@@ -186,7 +186,7 @@ def agree(
     if (difference <= tolerance * size).all():
         return
     worst = int(np.argmax(difference))
-    index = ", ".join(str(i) for i in np.unravel_index(worst, actual.shape))
+    index = ", ".join(map(str, np.unravel_index(worst, actual.shape)))
     place = f" at index {index}" if actual.ndim else ""
     raise ConformanceError(
         f"{name} is {actual.flat[worst]:.9g}{place}, expected {reference.flat[worst]:.9g}: off by"
@@ -219,16 +219,15 @@ class ConfiguredSpec(Generic[S]):
     @property
     def options(self) -> Options:
         """The validated options; raises PluginError if they are not valid."""
-        context: dict[str, Any] = {"read": self.files.__getitem__}
-        if self.kind is not None:
-            context["quantity"] = Quantity(self.kind)
 
         def component(table: Mapping[str, Any]) -> Any:
             inner = {key: value for key, value in table.items() if key != "distribution"}
             spec = resolve(RandomInputSpec, table["distribution"])
             return spec.factory(ConfiguredSpec(spec, inner, self.kind, self.files).options)
 
-        context["component"] = component
+        context: dict[str, Any] = {"read": self.files.__getitem__, "component": component}
+        if self.kind is not None:
+            context["quantity"] = Quantity(self.kind)
         try:
             return self.spec.options.model_validate(dict(self.raw), context=context)
         except ValidationError as error:
@@ -265,6 +264,12 @@ class Fixture(Generic[S]):
     def instance(self) -> Any:
         """The instance that all checks share: earlier calls must not change later results."""
         return self.fresh()
+
+
+def require_instance(fixture: Fixture[S], kind: type) -> None:
+    """Raise ConformanceError unless the factory has built an object of a class."""
+    got = fixture.instance
+    require(isinstance(got, kind), f"{type(got).__name__} is not a {kind.__name__}")
 
 
 def resolve(kind: type[S], spec: S | str) -> S:

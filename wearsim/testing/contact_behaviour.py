@@ -150,9 +150,8 @@ def no_power_without_creepage(fixture: ContactFixture) -> None:
     force = fixture.case.friction * fixture.case.normal_force
     # the power of the whole load sliding at the base creepage
     scale = force * fixture.case.rolling_speed * 1e-3
-    agree("power without creepage", solution.power, 0.0, 1e-9, scale)
-    agree("force_x without creepage", solution.force_x, 0.0, 1e-9, force)
-    agree("force_y without creepage", solution.force_y, 0.0, 1e-9, force)
+    for name, size in (("power", scale), ("force_x", force), ("force_y", force)):
+        agree(f"{name} without creepage", getattr(solution, name), 0.0, 1e-9, size)
 
 
 @BEHAVIOUR.specified_in(_MODEL)
@@ -210,11 +209,11 @@ def approach_rises_with_load(fixture: ContactFixture) -> None:
 @BEHAVIOUR.specified_in("wearsim.types.Grid")
 def convergence_with_strips(fixture: ContactFixture) -> None:
     """Doubling the number of strips twice changes the result less the second time."""
-    case, solutions = fixture.case, []
-    for times in (1, 2, 4):
-        grid = case.grid(times)
-        point = fixture.point(Creepage(3e-4, 4e-4, 0.3))
-        solutions.append(fixture.fresh(grid).solve_one(case.gap(grid), case.curvature, point))
+    case, point = fixture.case, fixture.point(Creepage(3e-4, 4e-4, 0.3))
+    solutions = [
+        fixture.fresh(grid).solve_one(case.gap(grid), case.curvature, point)
+        for grid in map(case.grid, (1, 2, 4))
+    ]
     for name in ("approach", "peak_pressure", "power", "force_x", "force_y"):
         coarse, middle, fine = (getattr(solution, name) for solution in solutions)
         first, second, noise = abs(middle - coarse), abs(fine - middle), 2e-3 * abs(fine)
@@ -261,13 +260,12 @@ def inputs_unchanged(fixture: ContactFixture) -> None:
     if capabilities.local_friction:
         inputs["friction"] = np.full(strips, fixture.case.friction)
         point = replace(point, friction=inputs["friction"])
-    compliance = None
     if capabilities.wear_compliance:
-        compliance = inputs["wear_compliance"] = np.full(strips, 1e-13)
+        inputs["wear_compliance"] = np.full(strips, 1e-13)
     warm = fixture.solve(fixture.point(normal_force=0.9 * fixture.case.normal_force))
     inputs |= {f"warm.{name}": getattr(warm, name) for name in STRIPS}
     before = {name: values.copy() for name, values in inputs.items()}
-    fixture.solve(point, inputs["gap"], compliance, warm)
+    fixture.solve(point, inputs["gap"], inputs.get("wear_compliance"), warm)
     changed = [name for name, values in inputs.items() if not np.array_equal(values, before[name])]
     require(not changed, f"solve changes its inputs {', '.join(changed)}")
 
@@ -322,8 +320,7 @@ def invalid_input_raises_contact_error(fixture: ContactFixture) -> None:
         )
     for value in (np.nan, np.inf, -np.inf):
         for strip in (fixture.grid.strips // 2, 0):
-            gap = fixture.gap.copy()
-            gap[strip] = value
+            gap = np.where(np.arange(fixture.grid.strips) == strip, value, fixture.gap)
             _require_contact_error(
                 f"a gap of {value:g} m in strip {strip}",
                 lambda gap=gap: fixture.solve(gap=gap),  # type: ignore[misc]

@@ -364,14 +364,15 @@ def _run_single_solves(fixture: ContactFixture, loop: PassLoop) -> None:
         point = fixture.point(
             Creepage(longitudinal, lateral, float(loop.spin[p])),
             friction=float(loop.friction[p]),
+            rolling_speed=float(loop.rolling_speed[g]),
         )
-        point = replace(point, rolling_speed=float(loop.rolling_speed[g]))
         approach = float(gap.min() + loop.fresh_approach[p])
         for _ in range(_LOAD_ITERATIONS):
             displacement = approach - float(unworn.min() + loop.fresh_approach[p])
             load = loop.base_load[p] + loop.terms[:, g].sum() - loop.stiffness * displacement
-            point = replace(point, normal_force=float(load))
-            solution = fixture.model.solve_one(gap, float(loop.longitudinal_curvature[g]), point)
+            solution = fixture.model.solve_one(
+                gap, float(loop.longitudinal_curvature[g]), replace(point, normal_force=float(load))
+            )
             approach = solution.approach
         energy_per_area = solution.dissipation / point.rolling_speed
         loop.cylinder_depth += loop.wear[0] * energy_per_area

@@ -11,6 +11,7 @@ from wearsim.testing.checks import (
     Checks,
     Fixture,
     require,
+    require_instance,
     require_repeatable,
     require_values,
     spec_checks,
@@ -38,8 +39,7 @@ class FatigueLawFixture(Fixture[FatigueLawSpec]):
 @FATIGUE_LAW.specified_in("wearsim.plugins.FatigueLawSpec")
 def factory_builds_a_fatigue_law(fixture: FatigueLawFixture) -> None:
     """The factory builds a FatigueLaw."""
-    law = fixture.instance
-    require(isinstance(law, FatigueLaw), f"{type(law).__name__} is not a FatigueLaw")
+    require_instance(fixture, FatigueLaw)
 
 
 @FATIGUE_LAW.specified_in(_DAMAGE)

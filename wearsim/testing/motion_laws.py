@@ -14,6 +14,7 @@ from wearsim.testing.checks import (
     Fixture,
     agree,
     require,
+    require_instance,
     require_values,
     spec_checks,
 )
@@ -57,8 +58,7 @@ class MotionLawFixture(Fixture[MotionLawSpec]):
 @MOTION_LAW.specified_in("wearsim.plugins.MotionLawSpec")
 def factory_builds_a_motion_law(fixture: MotionLawFixture) -> None:
     """The factory builds a MotionLaw."""
-    law = fixture.instance
-    require(isinstance(law, MotionLaw), f"{type(law).__name__} is not a MotionLaw")
+    require_instance(fixture, MotionLaw)
 
 
 @MOTION_LAW.specified_in("wearsim.plugins.MotionLaw")
@@ -82,19 +82,17 @@ def lift_is_elementwise(fixture: MotionLawFixture) -> None:
 @MOTION_LAW.specified_in(_LIFT)
 def lift_spans_the_rise(fixture: MotionLawFixture) -> None:
     """The lift is zero at the start and, where a rise is required, the rise at the end."""
-    ends = fixture.lift(np.array([0.0, fixture.angle]))[0]
-    scale = fixture.rise
+    ends, scale = fixture.lift(np.array([0.0, fixture.angle]))[0], fixture.rise
     agree("the lift at the start", ends[0], 0.0, 1e-9, scale)
     if fixture.configured.spec.rise != "own":
-        rise = fixture.rise if fixture.configured.spec.rise == "required" else 0.0
+        rise = scale if fixture.configured.spec.rise == "required" else 0.0
         agree("the lift at the end", ends[1], rise, 1e-9, scale)
 
 
 @MOTION_LAW.specified_in(_LIFT)
 def derivatives_match_the_lift(fixture: MotionLawFixture) -> None:
     """The derivatives belong to the lift, and are continuous within the segment."""
-    scale = fixture.rise / fixture.angle
-    last = None
+    scale, last = fixture.rise / fixture.angle, None
     for angle in fixture.parts:
         values = fixture.lift(angle)
         for order, size in ((1, scale), (2, scale / fixture.angle)):

@@ -52,8 +52,7 @@ class StudyKindFixture:
     @cached_property
     def view(self) -> View:
         """View of the result."""
-        view: View = self.spec.load("view")(self.result)
-        return view
+        return self.spec.load("view")(self.result)  # type: ignore[no-any-return]
 
     @cached_property
     def sheet(self) -> Sheet:
@@ -87,9 +86,9 @@ def rows_have_labels_and_texts(fixture: StudyKindFixture) -> None:
 @STUDY_KIND.specified_in(_VIEW)
 def question_and_title_are_stated(fixture: StudyKindFixture) -> None:
     """The view has a title and the question that its first row answers."""
-    view = fixture.view
-    require(bool(view.title), "there is no title")
-    require(view.question.endswith("?"), f"the question is {view.question!r}")
+    require(bool(fixture.view.title), "there is no title")
+    question = fixture.view.question
+    require(question.endswith("?"), f"the question is {question!r}")
 
 
 @STUDY_KIND.specified_in(f"{_VIEW}.data")

@@ -14,6 +14,7 @@ from wearsim.testing.checks import (
     Fixture,
     agree,
     require,
+    require_instance,
     require_repeatable,
     require_values,
     spec_checks,
@@ -77,8 +78,7 @@ class WearLawFixture(Fixture[WearLawSpec]):
 @WEAR_LAW.specified_in("wearsim.plugins.WearLawSpec")
 def factory_builds_a_wear_law(fixture: WearLawFixture) -> None:
     """The factory builds a WearLaw."""
-    law = fixture.instance
-    require(isinstance(law, WearLaw), f"{type(law).__name__} is not a WearLaw")
+    require_instance(fixture, WearLaw)
 
 
 @WEAR_LAW.specified_in(_DEPTH)
@@ -150,10 +150,9 @@ def depth_is_reproducible(fixture: WearLawFixture) -> None:
     for body in BODIES:
         first = fixture.depth(body, contact).copy()
         fixture.depth(body, sliding_contact(200, slides=0.5))
-        repeated = fixture.depth(body, contact)
-        require(np.array_equal(first, repeated), f"{body}: a second call differs")
-        repeated = fixture.fresh().depth_per_pass(body, contact, _SPEED)
-        require(np.array_equal(first, repeated), f"{body}: a new law differs")
+        for what, law in (("a second call", fixture.instance), ("a new law", fixture.fresh())):
+            repeated = law.depth_per_pass(body, contact, _SPEED)
+            require(np.array_equal(first, repeated), f"{body}: {what} differs")
     for name in ("half_length", "line_load", "dissipation"):
         unchanged = np.array_equal(getattr(contact, name), getattr(original, name))
         require(unchanged, f"depth_per_pass changes the {name} of its input")

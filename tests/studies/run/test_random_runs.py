@@ -105,6 +105,18 @@ def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
     assert state.depth_error[0] < 0.02 * depth_of(state)
 
 
+def test_a_run_of_single_passes_under_a_spring_records_the_expectation():
+    drawn = {"creepage__longitudinal": ALL_PER_PASS["creepage__longitudinal"]}
+    spring = {"load__kind": "spring", "load__stiffness": "690 N/mm"}
+    single, expected = (
+        wearsim.run(scenario_of(**spring, **drawn, evolution__stepper=stepper))
+        for stepper in ("per-pass", "auto")
+    )
+    # one roller's creepage is drawn from pass to pass, and the loads are those of its passes
+    loads = [result.normal_force[-1].mean() for result in (single, expected)]
+    assert loads[0] == pytest.approx(loads[1], rel=1e-3)
+
+
 def test_expectation_is_insensitive_to_the_step():
     inputs = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
     depths = [

@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -236,10 +237,9 @@ class Stepper(ABC):
         The integration does not continue from the state returned.
         """
         step = self.scheme(problem, state)
-        if self.pass_by_pass:  # it passes over pauses itself, also within a step
-            end = step(problem, state, passes)
-        else:
-            end = step_or_rest(step, problem, state, passes)
+        if not self.pass_by_pass:  # which passes over pauses itself, also within a step
+            step = partial(step_or_rest, step)
+        end = step(problem, state, passes)
         return with_damage(problem, state, end)[0] if problem.fatigue else end
 
     def rest(

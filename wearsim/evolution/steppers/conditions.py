@@ -56,8 +56,7 @@ def conditions_of(
 
 def _constant_conditions(problem: WearProblem) -> Conditions:
     """Return the conditions of all steps where neither the load nor an input varies."""
-    force = problem.constant_load
-    assert force is not None
+    force = problem.force(np.zeros(len(problem.loads)))
     per_pass = exposure(problem, problem, force)
     return Conditions(force, with_feedback(problem, force, np.zeros(()), ()), per_pass, per_pass)
 

@@ -50,10 +50,8 @@ def with_damage(
         Effective damage before and after the step, and the latter with the error of the step. On a
         cam it is that of the stations.
     """
-    fatigue, damage, points = fatigue_of(problem), start.damage, start.damage_points
-    assert damage is not None
-    assert points is not None
-    passes = end.passes - start.passes
+    fatigue, passes = fatigue_of(problem), end.passes - start.passes
+    damage, points = np.asarray(start.damage), np.asarray(start.damage_points)
     if problem.varies:
         first, last = (_of_varying_load(problem, start, state, passes) for state in (start, end))
     else:
@@ -76,8 +74,7 @@ def with_damage(
         points,
         0.0 if fatigue.reference_area is None else fatigue.slope,
     )
-    points = points.copy()
-    points[0] = start.passes
+    points = np.stack([start.passes, points[1]])
     end = end.replaced(damage=added.reshape(damage.shape), damage_points=points)
     return end, effective_of_rows(problem, sums.reshape(3, -1, len(passes)))
 
@@ -115,8 +112,7 @@ def _of_varying_load(
     times = problem.time(start.passes), problem.time(start.passes + passes)
     here = problem.at_time(*times)
     displacement = displacement_at(here, [state.depths], np.zeros(()))
-    force = mean_force(here, start, passes)
-    mean = with_feedback(here, force, displacement, state.terms)
+    mean = with_feedback(here, mean_force(here, start, passes), displacement, state.terms)
     damage = np.zeros(np.shape(start.stacked))
     for offset, weight in _load_nodes(problem, *times):
         if not weight.any():
@@ -168,6 +164,5 @@ def _load_nodes(
     # round-off of two levels leaves no third one
     middle = np.where(middle < _ROUND_OFF, 0.0, middle)
     total = weights[0] + weights[1] + middle
-    zero = np.zeros_like(left)
-    nodes = [(-left, weights[0]), (zero, middle), (right, weights[1])]
+    nodes = [(-left, weights[0]), (np.zeros_like(left), middle), (right, weights[1])]
     return [(offset, weight / total) for offset, weight in nodes]

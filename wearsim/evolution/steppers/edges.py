@@ -54,21 +54,19 @@ def resolves_edges(problem: WearProblem, contacts: ContactBatchSolution) -> bool
 
     The contact model must return the separation, every contact must have its own body or station,
     and load and inputs must be constant: where they vary, an edge also retreats. The load of a
-    spring falls, and wear advances the edge until the spring has almost no load, see `_unloaded`.
-    The rise of the gap across a strip must be that of crowned bodies.
+    spring falls, and wear advances the edge until the spring has almost no load, see
+    `at_start_of_step`. The rise of the gap across a strip must be that of crowned bodies.
     """
     stations, contacts_each, _ = problem.shape
     varies = problem.varies or (stations == 1 and bool(problem.terms))
     apart = not problem.has_nodes and (stations == 1 or contacts_each == 1)
-    possible = contacts.separation is not None and apart and not varies
-    return possible and problem.has_crowned_gap
+    return contacts.separation is not None and apart and not varies and problem.has_crowned_gap
 
 
 def without_edges(problem: WearProblem, state: WearState) -> WearState:
     """Return a state of tests that do not resolve edges, but may later."""
     fields = dict.fromkeys(FIELDS, np.full((*problem.shape, problem.grid.strips), np.nan))
-    sums = state.past_sums
-    assert sums is not None
+    sums = state.past.sums[..., 0]
     if state.part is None:
         bodies = np.full((len(sums), len(state.stacked), len(state.passes)), np.nan)
         sums = np.concatenate([bodies, sums], axis=1)
@@ -77,10 +75,8 @@ def without_edges(problem: WearProblem, state: WearState) -> WearState:
 
 def with_whole_strips(problem: WearProblem, state: WearState) -> WearState:
     """Return a state that counts for how many steps each strip has been in contact as a whole."""
-    assert state.past_sums is not None
-    assert state.past_wear is not None
     loaded = state.contacts.line_load.reshape(*problem.shape, problem.grid.strips) > 0.0
-    sums = np.concatenate([state.past_wear.sum(axis=-1), state.past_sums], axis=1)
+    sums = np.concatenate([state.past.wear.sum(axis=-1), state.past.sums[..., 0]], axis=1)
     counts = np.where(loaded, SETTLED, 0.0)
     return state.replaced(separation=None, part=1.0 * loaded, whole_steps=counts, past_sums=sums)
 
@@ -91,24 +87,20 @@ def beyond_edges(start: WearState, end: WearState) -> BoolArray:
     Where the edge of a roller crosses much of a strip in a step, the strip protrudes until it is
     worn, and the solution may be one in which another roller wears it that is not close to it.
     """
-    assert start.part is not None
-    assert end.part is not None
-    shape = end.part.shape
-    near = start.contacts.line_load.reshape(shape) > 0.0
-    load = end.contacts.line_load.reshape(shape)
+    before, after = np.asarray(start.part), np.asarray(end.part)
+    near = start.contacts.line_load.reshape(after.shape) > 0.0
+    load = end.contacts.line_load.reshape(after.shape)
     for _ in range(CROSSED):
         near[..., 1:] |= near[..., :-1].copy()
         near[..., :-1] |= near[..., 1:].copy()
     beyond = np.where(near, 0.0, load).max(axis=-1) > MOST_BEYOND * load.max(axis=-1)
-    crossed = np.where(near, np.maximum(end.part - start.part, 0.0), 0.0).sum(axis=-1)
+    crossed = np.where(near, np.maximum(after - before, 0.0), 0.0).sum(axis=-1)
     return np.asarray(beyond.any(axis=(0, 1)) & (crossed.max(axis=(0, 1)) > LEAST_CROSSED))
 
 
 def unresolved(state: WearState) -> BoolArray:
     """Return which tests do not resolve edges, of a state with `FIELDS`."""
-    assert state.part is not None
-    whole: BoolArray = np.isnan(state.part[0, 0, :, 0])
-    return whole
+    return np.asarray(np.isnan(np.asarray(state.part)[0, 0, :, 0]))
 
 
 def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
@@ -122,29 +114,23 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
     """
     if state.separation is None:
         return state
-    assert state.order is not None
-    assert state.past_sums is not None
+    order = np.asarray(state.order)
     if not problem.has_crowned_gap:
-        fields, sums = dict.fromkeys(FIELDS), kernel_input(state.past_sums[:, -1:])
-        return state.replaced(**fields, past_sums=sums, order=np.ones_like(state.order))
+        fields, sums = dict.fromkeys(FIELDS), kernel_input(state.past.sums[:, -1:, :, 0])
+        return state.replaced(**fields, past_sums=sums, order=np.ones_like(order))
     whole, ceases = unresolved(state), _adhesion(problem, state) > CEASING_ADHESION
     if problem.has_spring and problem.shape[0] == 1:
-        ceases |= _unloaded(problem, state)
+        free = with_feedback(problem, problem.force(problem.time(state.passes)), np.zeros(()), ())
+        loads = carried_loads(problem, state.contacts)
+        ceases |= (loads < LEAST_LOAD * free).any(axis=(0, 1))  # the spring is unloaded
     if not (whole != ceases).nonzero()[0].size:
         return state
     ended = ceases & ~whole
     if ended.nonzero()[0].size:
         fields = {n: np.where(ended[:, None], np.nan, getattr(state, n)) for n in FIELDS}
-        state = state.replaced(**fields, order=np.where(ended, 1, state.order))
+        state = state.replaced(**fields, order=np.where(ended, 1, order))
     begins = whole & ~ceases
     return _with_new_edges(problem, state, begins) if begins.nonzero()[0].size else state
-
-
-def _unloaded(problem: WearProblem, state: WearState) -> BoolArray:
-    """Return in which tests the spring of a roller has lost most of its load."""
-    force = problem.force(problem.time(state.passes))
-    free = with_feedback(problem, force, np.zeros(()), ())
-    return np.asarray((carried_loads(problem, state.contacts) < LEAST_LOAD * free).any(axis=(0, 1)))
 
 
 def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
@@ -159,20 +145,15 @@ def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
 def _adhesion(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest part of a contact of each test that adheres, shape (realisations,)."""
     adhesion = state.contacts.adhesion_fraction.reshape(problem.shape)
-    greatest: FloatArray = np.maximum.reduce(adhesion, axis=(0, 1))
-    return greatest
+    return np.asarray(np.maximum.reduce(adhesion, axis=(0, 1)))
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:
     """Return a state in which tests that have worn to a groove resolve edges."""
-    shape = (*problem.shape, problem.grid.strips)
-    assert state.contacts.separation is not None
-    assert state.past_sums is not None
-    assert state.past_wear is not None
-    begins = whole & have_groove(problem, state)
+    shape, begins = (*problem.shape, problem.grid.strips), whole & have_groove(problem, state)
     if not begins.nonzero()[0].size:
         return state
-    separation = state.contacts.separation.reshape(shape)
+    separation = np.asarray(state.contacts.separation).reshape(shape)
     begins &= ~np.isnan(separation).any(axis=(0, 1, 3))
     if not np.count_nonzero(begins):
         return state
@@ -182,7 +163,7 @@ def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) ->
         "part": np.where(loaded, 1.0, 0.0),
         "whole_steps": np.where(loaded, SETTLED, 0.0),
     }
-    column, sums = begins[:, None], state.past_sums.copy()
+    column, sums = begins[:, None], state.past.sums[..., 0].copy()
     fields = {n: np.where(column, values, getattr(state, n)) for n, values in started.items()}
-    sums[:, :-1] = np.where(begins, state.past_wear.sum(axis=-1), sums[:, :-1])
+    sums[:, :-1] = np.where(begins, state.past.wear.sum(axis=-1), sums[:, :-1])
     return state.replaced(**fields, past_sums=sums)

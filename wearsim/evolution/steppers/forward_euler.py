@@ -25,13 +25,13 @@ from wearsim.evolution.steppers.loads import (
     mean_loads,
 )
 from wearsim.evolution.steppers.single_step import (
-    WearIncrement,
     carried_loads,
     contacts_at,
     explicit_step,
     present_problem,
     recovery_at,
     solve_present,
+    worn_depths,
 )
 from wearsim.types import FloatArray
 
@@ -63,11 +63,11 @@ def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
     One iteration is sufficient if it agrees with the rate stored in the state. If the model cannot
     solve a contact on the changed profiles, the stored rate is returned.
     """
-    wear = WearIncrement(present_problem(problem, state), state.contacts, 1.0)
+    wear = worn_depths(present_problem(problem, state), state.contacts, 1.0)
     loaded = problem.values_of(state.contacts, "line_load") > 0.0
     alternating = np.where(loaded.any(axis=(0, 1)), (-1.0) ** np.arange(problem.grid.strips), 0.0)
     # a change of the gap is divided between the bodies in the ratio of their wear
-    cylinder, roller = (alternating * rate.max(axis=-1, keepdims=True) for rate in wear.depths)
+    cylinder, roller = (alternating * rate.max(axis=-1, keepdims=True) for rate in wear)
     profile = cylinder, roller
     rates = state.decay if state.decay is not None else np.zeros(problem.shape[2])
     if not (cylinder.any() or roller.any()):
@@ -86,17 +86,15 @@ def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
     return rates
 
 
-def _decrease(
-    problem: WearProblem, state: WearState, wear: WearIncrement, profile: Depths
-) -> Depths:
+def _decrease(problem: WearProblem, state: WearState, wear: Depths, profile: Depths) -> Depths:
     """Return the decrease of the wear per pass due to a change of the profiles of unit size.
 
     Parameters
     ----------
     problem : WearProblem
     state : WearState
-    wear : WearIncrement
-        Wear of one pass with the contacts of the state.
+    wear : tuple of ndarray
+        Depths of one pass with the contacts of the state.
     profile : tuple of ndarray
         Change of cylinder and rollers, of any size.
     """
@@ -106,10 +104,8 @@ def _decrease(
     changed = state.with_added((factor * profile[0], factor * profile[1]))
     # constant loads: the feedback of a spring on the total descent is weaker than that of strips
     contacts = solve_present(problem, changed, carried_loads(problem, state.contacts))
-    new = WearIncrement(present_problem(problem, state), contacts, 1.0)
-    cylinder, roller = (
-        (old - now) / step[:, None] for old, now in zip(wear.depths, new.depths, strict=True)
-    )
+    new = worn_depths(present_problem(problem, state), contacts, 1.0)
+    cylinder, roller = ((old - now) / step[:, None] for old, now in zip(wear, new, strict=True))
     return cylinder, roller
 
 
@@ -177,8 +173,7 @@ class ExplicitStepper(Stepper):
             profile_error=state.profile_error + added[2],
             steps=state.steps + 1,
         )
-        worst = max(oscillation(contact.line_load) for contact in end.contacts)
-        warning = None
+        worst, warning = max(oscillation(contact.line_load) for contact in end.contacts), None
         # the few strips in contact next to a pause alternate without being unstable
         if worst >= OSCILLATING and not without_load(problem, passes).any():
             ratio = float((step / stability_limit(problem, state)).max())
@@ -201,8 +196,8 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: FloatA
     displacement = displacement_at(here, (start.depths, end.depths), recovery_at(problem, end)[1])
     loads = checked_loads(start, mean_loads(here, start, step, displacement, end.contacts))
     solve = solve_present if problem.varying else contacts_at
-    wear = WearIncrement(here, solve(here, end, loads), step)
-    errors = COVER * 0.5 * state_difference(problem, end, start.with_added(wear.depths))
+    wear = worn_depths(here, solve(here, end, loads), step)
+    errors = COVER * 0.5 * state_difference(problem, end, start.with_added(wear))
     bias = variation_bias(problem, end, start.passes, step)
     if bias is None:
         return errors

@@ -111,14 +111,11 @@ class ImplicitStepper(StepDoublingStepper):
         fixed = state.irreducible
         left = self._left(problem, state, stop, OF_STEPS, fixed)
         scale, contacts, past = (passes / stop) ** PART_EXPONENT / left, end.contacts, end.past
-        assert state.stepping_error is not None
-        assert end.wear_exponents is not None
-        assert end.order is not None
         displaced = np.zeros(step.size)
         if problem.has_spring:
             aim = SHARE * self.tolerance
             of_loads, their_order, displaced = next_steps_of_loads(problem, end, scale, aim, KEEP)
-        work, order = np.empty((5, step.size)), np.empty_like(end.order)
+        work, order = np.empty((5, step.size)), np.empty(step.size, np.int64)
         of_next, estimates = work[:2], work[2:]
         errors = assess_step(
             self.tolerance,
@@ -132,9 +129,9 @@ class ImplicitStepper(StepDoublingStepper):
             displaced,
             state.volume_error - fixed[1],
             end.irreducible if problem.has_nodes else fixed,
-            state.stepping_error,
+            np.asarray(state.stepping_error),
             end.stacked,
-            end.order,
+            np.asarray(end.order),
             past.spans,
             past.wear,
             past.sums,
@@ -145,7 +142,7 @@ class ImplicitStepper(StepDoublingStepper):
             contacts.approach,
             contacts.line_load,
             wear_of_contacts(problem, contacts),
-            end.wear_exponents.reshape(contacts.line_load.shape),
+            np.asarray(end.wear_exponents).reshape(contacts.line_load.shape),
             problem.contact_stiffness,
             problem.grid.spacing,
             problem.volume_weights,
@@ -157,10 +154,8 @@ class ImplicitStepper(StepDoublingStepper):
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0] * left), np.minimum(ratio, of_loads[1])
-        others = end.auxiliary
-        if others:
-            changed = {"order": order, "passes": passes}
-            others = {name: solution.replaced(**changed) for name, solution in others.items()}
+        changed = {"order": order, "passes": passes}
+        others = {name: solution.replaced(**changed) for name, solution in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
             steps=state.steps + 1,
@@ -177,14 +172,13 @@ class ImplicitStepper(StepDoublingStepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step as two halves and as a whole; choose order and length of the next one."""
-        doubled = self.doubled(problem, state, step, stop, scheme)
-        half, end = doubled.path
+        (half, end), added, _, varies = self.doubled(problem, state, step, stop, scheme)
         past, depths, orders = end.past, end.stacked, np.asarray(end.order)
         errors, order = np.empty_like(depths), np.empty_like(orders)
         most = np.full_like(order, MAX_ORDER)
         left = self._left(problem, state, stop, DOUBLED, state.irreducible)
         if not problem.varying:  # many rows of a log average out within a step
-            left = np.where(doubled.varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
+            left = np.where(varies, np.maximum(left, LEAST_AIM_OF_ROWS), left)
         part = (end.passes / stop) ** PART_EXPONENT / left
         scale = part / (DOUBLED_SHARE * self.tolerance)
         over, ratio = next_steps(
@@ -193,10 +187,9 @@ class ImplicitStepper(StepDoublingStepper):
         )
         # local errors miss some of what an abrupt change of wear adds
         allowed = self.tolerance * greatest_depth(end.depths) / part
-        added = doubled.added[0] / np.where(allowed > 0.0, allowed, np.inf)
-        over = np.maximum(over, added)
-        ratio = np.where(added > 1.0, np.minimum(ratio, self.ratio(added)), ratio)
-        over = over * left
+        beyond = added[0] / np.where(allowed > 0.0, allowed, np.inf)
+        over = np.maximum(over, beyond) * left
+        ratio = np.where(beyond > 1.0, np.minimum(ratio, self.ratio(beyond)), ratio)
         if self.by_doubling and not problem.varies:
             least = max(self.tolerance, LEAST_OF_JUMPS)
             of_energy, their_order = next_steps_of_energy(half, end, least, KEEP, most)
@@ -298,12 +291,9 @@ def implicit_step(
     if state.past_spans is None:
         state = with_rates(problem, state)
     state = edges.at_start_of_step(problem, state)
-    here = problem
-    if problem.varying:
-        here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = conditions_of(here, problem, state, passes)
-    order = state.order
-    assert order is not None
+    order = np.asarray(state.order)
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:

@@ -59,31 +59,6 @@ MAX_LINEAR_EXPONENT = 1.0  # of dissipation as a power of line load; 1 in full s
 MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
 
 
-class _Slope:
-    """Exponent of the approach of each contact as a power of its load, from two iterates.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Shape of the loads: stations, contacts, realisations.
-    """
-
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        self._exponent = np.full(shape, APPROACH_EXPONENT)
-        self._last: tuple[FloatArray, FloatArray] | None = None
-
-    def exponent(self, loads: FloatArray, approach: FloatArray) -> FloatArray:
-        """Return the exponent for an iterate with these loads [N] and approaches [m]."""
-        if self._last is not None:
-            rise = np.log(loads / self._last[0])
-            usable = (np.abs(rise) > MIN_LOAD_CHANGE) & (approach > 0.0) & (self._last[1] > 0.0)
-            ratio = np.divide(approach, self._last[1], out=np.ones_like(loads), where=usable)
-            slope = np.log(ratio) / np.where(usable, rise, 1.0)
-            self._exponent = np.where(usable, np.clip(slope, *EXPONENTS), self._exponent)
-        self._last = loads, approach
-        return self._exponent
-
-
 def step_by_formula(
     problem: WearProblem,
     state: WearState,
@@ -160,8 +135,7 @@ def step_by_formula(
     )
     of_step = bodies, resolved, gap, depths, past.part, of_bodies, of_contacts
     base, guess = of_bodies[3], of_bodies[4]
-    assert state.wear_exponents is not None
-    of_strips = state.wear_exponents.copy()
+    of_strips = np.asarray(state.wear_exponents).copy()
     exponents = of_strips.reshape(shape)
     loads = LoadsOfStep(problem, state, conditions, passes, feedback)
     stations, iterations = problem.shape[0], np.zeros(realisations, dtype=np.int64)
@@ -199,8 +173,7 @@ def step_by_formula(
         if loads.vary:
             change = loads.moved(solved, active, change, opening, base, relaxation)
         if problem.slip_profile is not None:
-            moved = np.abs(guess - used).max(axis=(0, 2))
-            change = np.maximum(change, opening * (moved / depth))
+            change = np.maximum(change, opening * (np.abs(guess - used).max(axis=(0, 2)) / depth))
         converged = problem.iteration_tolerance * relaxation
         most_change = CONVERGED * depth
         if np.maximum.reduce(solved.adhesion_fraction) > ADHERING:
@@ -314,10 +287,10 @@ class LoadsOfStep:
         self._shape = feedback.shape
         if self.vary:
             self._before = carried_loads(problem, start.contacts)
-            self._slope = _Slope(self.used.shape)
+            self._exponent = np.full(self.used.shape, APPROACH_EXPONENT)
+            self._last: tuple[FloatArray, FloatArray] | None = None
             least = LEAST_GUESS * np.minimum(self._prescribed, self._before)
-            predicted = self._prescribed + feedback.reshape(problem.shape)
-            self.used = np.maximum(predicted, least)
+            self.used = np.maximum(self._prescribed + feedback.reshape(problem.shape), least)
         self.target = self.used
 
     @property
@@ -349,8 +322,7 @@ class LoadsOfStep:
             Factor on tolerances.
         """
         problem = self._problem
-        nearer = self._equilibrium(solved, base)
-        self.target = np.where(active, nearer, self.target)
+        self.target = np.where(active, self._equilibrium(solved, base), self.target)
         moved = np.abs(self.target / self.used - 1.0).max(axis=(0, 1))
         change = np.maximum(change, opening * moved)
         if problem.has_spring:
@@ -372,15 +344,24 @@ class LoadsOfStep:
         target = with_feedback(problem, self._force, displacement, self.terms(solved))
         if not problem.has_spring:
             return np.maximum(target, LEAST_GUESS * loads)
-        least_gap = problem.gap(*separated(base, problem.shape[0])).min(axis=-1)
-        pressed = approach - least_gap
-        exponent = self._slope.exponent(loads, pressed)
-        target = corrected_loads(problem, loads, target, pressed, exponent)
+        pressed = approach - problem.gap(*separated(base, problem.shape[0])).min(axis=-1)
+        target = corrected_loads(problem, loads, target, pressed, self._slope(loads, pressed))
         unloaded = before < UNLOADED * self._prescribed
         target = np.maximum(target, np.where(unloaded, LEAST_GUESS * before, -np.inf))
         if not (target > 0.0).all():
             checked_loads(self._start, np.where(loads < LOST * before, target, 1.0))
         return np.maximum(target, LEAST_GUESS * loads)
+
+    def _slope(self, loads: FloatArray, approach: FloatArray) -> FloatArray:
+        """Return the exponent of the approach [m] as a power of the load [N], from two iterates."""
+        if self._last is not None:
+            rise = np.log(loads / self._last[0])
+            usable = (np.abs(rise) > MIN_LOAD_CHANGE) & (approach > 0.0) & (self._last[1] > 0.0)
+            ratio = np.divide(approach, self._last[1], out=np.ones_like(loads), where=usable)
+            slope = np.log(ratio) / np.where(usable, rise, 1.0)
+            self._exponent = np.where(usable, np.clip(slope, *EXPONENTS), self._exponent)
+        self._last = loads, approach
+        return self._exponent
 
     def terms(self, solved: ContactBatchSolution) -> FloatArray:
         """Return the load terms at the end of the step, shape (terms, rollers, realisations).

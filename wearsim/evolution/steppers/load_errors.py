@@ -7,7 +7,7 @@ import numpy as np
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import HERTZ, WearState
 from wearsim.evolution.steppers.loads import elastic_approaches, with_feedback
-from wearsim.evolution.steppers.single_step import WearIncrement
+from wearsim.evolution.steppers.single_step import worn_depths
 from wearsim.mechanics.numerics.multistep import MAX_ORDER, ROWS, next_steps
 from wearsim.mechanics.numerics.step_errors import energy_steps
 from wearsim.types import FloatArray, IntArray
@@ -41,17 +41,12 @@ def next_steps_of_loads(
     displaced : ndarray, shape (realisations,)
         Greatest displacement of a roller that the error of its load corresponds to [m].
     """
-    feedback, spans, orders = end.past_feedback, end.past_spans, end.order
-    assert problem.constant_load is not None
-    assert feedback is not None
-    assert spans is not None
-    assert orders is not None
-    whole = with_feedback(problem, problem.constant_load, np.zeros(()), ())
+    feedback, spans, orders = np.asarray(end.past_feedback), end.past.spans, np.asarray(end.order)
+    whole = with_feedback(problem, problem.force(end.passes), np.zeros(()), ())
     scale = np.maximum(whole + feedback[0], LEAST_LOAD * whole)
     relative = (feedback / scale).reshape(ROWS, -1, scale.shape[-1], 1)
     order, of_loads = np.empty_like(orders), np.empty(relative.shape[1:])
-    ones = np.ones_like(of_loads)
-    most = np.full_like(orders, MAX_ORDER)
+    most, ones = np.full_like(orders, MAX_ORDER), np.ones_like(of_loads)
     steps = next_steps(relative, spans, ones, orders, part, aim, keep, most, ones, of_loads, order)
     errors = np.abs(of_loads.reshape(scale.shape) * scale)
     springs = np.broadcast_to(problem.stiffness, scale.shape)
@@ -86,8 +81,7 @@ def next_steps_of_energy(
     order : ndarray of int, shape (realisations,)
         Its order.
     """
-    past, orders = end.past, end.order
-    assert orders is not None
+    past, orders = end.past, np.asarray(end.order)
     order, about = np.empty_like(orders), (start.passes, end.passes, start.energy, end.energy)
     steps = energy_steps(past.sums, past.spans, *about, orders, tolerance, keep, most, order)
     return steps, order
@@ -99,10 +93,9 @@ def unloading(here: WearProblem, state: WearState, exposure: FloatArray) -> Floa
     By the work of the line load on the wear, the approach under a constant load increases by the
     mean of the wear weighted with the line load; the elastic approach is that of unworn bodies.
     """
-    cylinder, roller = WearIncrement(here, state.contacts, 1.0).depths
+    cylinder, roller = worn_depths(here, state.contacts, 1.0)
     line_load = here.values_of(state.contacts, "line_load")
     total = line_load.sum(axis=-1)
     descent = (line_load * (cylinder + here.at_contacts(roller))).sum(axis=-1) / total
-    loads = total * here.grid.spacing
-    slope = HERTZ * np.maximum(elastic_approaches(here, state), 0.0) / loads
+    slope = HERTZ * np.maximum(elastic_approaches(here, state), 0.0) / (total * here.grid.spacing)
     return np.asarray(-here.feedback(descent) / (1.0 + here.stiffness * slope) / exposure)

@@ -98,11 +98,11 @@ def run_passes(
     redraw : callable, optional
         Draws the inputs of single passes, see `Redraw`.
     """
-    loop, ends = run_compiled if is_compiled(problem) else run_in_python, []
-    for place, count in enumerate(np.ceil(passes).astype(np.int64).tolist()):
-        number = np.array([place])
-        ends.append(loop(problem.at(number), state.at(number), count, redraw))
-    return joined_states(ends)
+    loop = run_compiled if is_compiled(problem) else run_in_python
+    tests = zip(np.arange(passes.size)[:, None], np.ceil(passes).tolist(), strict=True)
+    return joined_states(
+        [loop(problem.at(test), state.at(test), int(count), redraw) for test, count in tests]
+    )
 
 
 def is_compiled(problem: WearProblem) -> bool:
@@ -132,7 +132,9 @@ def _passes(
     times = (state.passes[0] + np.arange(count, dtype=np.float64) + 0.5) / kinematics.pass_rate
     inputs = problem.inputs.at(rollers)
     for item in problem.varying:
-        inputs = inputs.with_value_of(item, rollers, item.paths.of_first(times)[:, None])
+        chosen, values = np.isin(rollers, item.rollers), item.paths.of_first(times)
+        before = getattr(inputs, item.name)
+        inputs = inputs.with_values({item.name: np.where(chosen[:, None], values[:, None], before)})
     if redraw is not None:
         inputs = redraw(inputs, first)
     force = problem.at_stations(problem.loads[0].force(times)).reshape(-1, count).T

@@ -12,7 +12,7 @@ from wearsim.errors import StepError
 from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import sum_in_order
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.loads import (
     advanced_terms,
     checked_loads,
@@ -25,41 +25,54 @@ from wearsim.evolution.steppers.loads import (
 )
 from wearsim.types import FloatArray
 
-
-class WearIncrement:
-    """Depth worn off the bodies by `passes` passes with given contacts.
-
-    Parameters
-    ----------
-    problem : WearProblem
-    contacts : ContactBatchSolution
-    passes : float or ndarray, shape (realisations,)
-
-    Attributes
-    ----------
-    parts : ndarray, shape (2, stations, contacts, realisations, strips)
-        Contributions of the contacts to the wear of cylinder and rollers [m].
-    depths : tuple of ndarray
-        Depths of cylinder and rollers worn in the step, shapes as in `WearState` [m].
-    cylinder, roller : ndarray
-        The two depths.
-    """
-
-    def __init__(
-        self, problem: WearProblem, contacts: ContactBatchSolution, passes: FloatArray | float
-    ) -> None:
-        self.parts = problem.wear_parts(contacts, passes)
-        self.depths = problem.sum_of_parts(*self.parts)
-        self.cylinder, self.roller = self.depths
-        self.problem, self.contacts = problem, contacts
-
-
 REALISATION = 2  # axis of the realisations
 SAME_LOAD = 1e-9  # relative change of a load below which a contact is not solved again
 MAX_LOAD_ITERATIONS = 60
 NEWTON_ITERATIONS = 12  # usually half as many; later ones bisect
 LEAST_CORRECTED = 0.1  # load after a correction, over that before it
 LOST = 1e-6  # load over that of the first iteration, below which contact is lost
+
+
+def present_problem(problem: WearProblem, state: WearState) -> WearProblem:
+    """Return the problem with every process at its value at the time of the state."""
+    now = problem.time(state.passes)
+    return problem.at_time(now, now)
+
+
+def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> ContactBatchSolution:
+    """Return the contacts on the present profiles under `loads`, shape (S, C, N) [N].
+
+    A step over many passes leaves them solved on the profile at its end; contacts that carry
+    these loads already are not solved again.
+    """
+    if problem.varying:
+        return solve_present(problem, state, loads)
+    difference = np.abs(carried_loads(problem, state.contacts) - loads).max(axis=(0, 1))
+    others = np.flatnonzero(difference > SAME_LOAD * loads.max(axis=(0, 1)))
+    if not others.size:
+        return state.contacts
+    if others.size == loads.shape[REALISATION]:
+        return solve_present(problem, state, loads)
+    chosen, part = problem.at(others), state.at(others)
+    solved = solve_present(chosen, part, np.take(loads, others, axis=REALISATION))
+    return state.contacts.with_others(state.contacts_of(others), solved)
+
+
+def carried_loads(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
+    """Return the integral of the line load of each contact, shape (S, C, N) [N]."""
+    return np.asarray(problem.values_of(contacts, "line_load").sum(axis=-1) * problem.grid.spacing)
+
+
+def solve_present(
+    problem: WearProblem, state: WearState, loads: FloatArray, cold: bool = False
+) -> ContactBatchSolution:
+    """Solve every contact on the present profiles under `loads`, shape (S, C, N) [N].
+
+    The solver starts from the contacts of the state unless `cold`.
+    """
+    problem = present_problem(problem, state)
+    batch = contact_batch(problem, problem.gap(*state.depths), loads, *state.depths)
+    return problem.model.solve(batch, warm=None if cold else state.contacts)
 
 
 def solve_loaded(
@@ -103,11 +116,11 @@ def solve_loaded(
     """
     first = fresh if elastic is None else elastic
     loads = loads_at(displacement_at(problem, [state.depths], fresh - first))
-    if problem.has_spring:  # a stiff spring may seem unloaded until the approach has converged
+    if problem.has_spring and len(state.contacts) == loads.size:
+        # a stiff spring may seem unloaded until the approach has converged
         loads = np.where(loads > 0.0, loads, carried_loads(problem, state.contacts))
     contacts = solve(problem, state, checked_loads(state, loads))
-    first_loads = loads
-    solves = int(contacts is not state.contacts)
+    first_loads, solves = loads, int(contacts is not state.contacts)
     if not problem.has_spring:
         return contacts, loads, solves
     tolerance = problem.iteration_tolerance
@@ -129,20 +142,12 @@ def solve_loaded(
         if iteration >= NEWTON_ITERATIONS:
             bounded = (low > 0.0) & (high < np.inf)
             corrected = np.where(bounded, np.sqrt(low * np.where(bounded, high, 1.0)), corrected)
-        loads = np.where(open_, corrected, loads)
+        loads, solves = np.where(open_, corrected, loads), solves + 1
         contacts = contacts_at(problem, state, loads)
-        solves += 1
     raise StepError(
         f"the load of a spring and its contact did not converge at pass {state.passes[0]:.0f}",
         state.to_arrays(),
     )
-
-
-def solve_at_present_loads(
-    problem: WearProblem, state: WearState, elastic: FloatArray | None
-) -> tuple[ContactBatchSolution, FloatArray, int]:
-    """Solve every contact at the time of the state with its load; results as `solve_loaded`."""
-    return _solve_now(problem, state, elastic, solve_present)
 
 
 def solve_at_record(
@@ -168,22 +173,19 @@ def solve_at_record(
     elastic = None
     if problem.has_spring and not cold:
         elastic = elastic_approaches(present_problem(problem, state), state)
-    return _solve_now(problem, state, elastic, solve)[:2]
+    return solve_at_present_loads(problem, state, elastic, solve)[:2]
 
 
-def _solve_now(
+def solve_at_present_loads(
     problem: WearProblem,
     state: WearState,
     elastic: FloatArray | None,
-    solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution],
+    solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution] = solve_present,
 ) -> tuple[ContactBatchSolution, FloatArray, int]:
-    """Solve the contacts with their loads at the time of the state; results as `solve_loaded`."""
+    """Solve every contact at the time of the state with its load; results as `solve_loaded`."""
     present = present_problem(problem, state)
     force = present.force(present.time(state.passes))
-
-    def loads_at(displacement: FloatArray) -> FloatArray:
-        return with_feedback(present, force, displacement, state.terms)
-
+    loads_at = partial(with_feedback, present, force, terms=state.terms)
     if problem.varying and solve is contacts_at:
         solve = solve_present  # the contacts were solved with other values of the processes
     fresh = fresh_approach(present, state, force)
@@ -210,61 +212,18 @@ def explicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     The elastic recovery of the start applies to the mean load of the step.
     """
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
-    predicted = state.with_added(WearIncrement(here, state.contacts, passes).depths)
+    predicted = state.with_added(worn_depths(here, state.contacts, passes))
     elastic, recovered = recovery_at(problem, state)
     displacement = displacement_at(here, (state.depths, predicted.depths), recovered)
     mean = mean_loads(here, state, passes, displacement, state.contacts)
     solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, checked_loads(state, mean))
     begun = state.replaced(contacts=contacts)
-    ends = begun.with_added(WearIncrement(here, contacts, passes).depths)
+    ends = begun.with_added(worn_depths(here, contacts, passes))
     worn = worn_state(here, ends, passes, here.values_of(contacts, "power"))
     ended, _, solves = solve_at_present_loads(problem, worn, elastic)
     solves = problem.contacts_each * (solves + (contacts is not state.contacts))
     return worn.replaced(contacts=ended, solves=state.solves + solves)
-
-
-def present_problem(problem: WearProblem, state: WearState) -> WearProblem:
-    """Return the problem with every process at its value at the time of the state."""
-    now = problem.time(state.passes)
-    return problem.at_time(now, now)
-
-
-def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> ContactBatchSolution:
-    """Return the contacts on the present profiles under `loads`, shape (S, C, N) [N].
-
-    A step over many passes leaves them solved on the profile at its end; contacts that carry
-    these loads already are not solved again.
-    """
-    if problem.varying:
-        return solve_present(problem, state, loads)
-    carried = carried_loads(problem, state.contacts)
-    difference = np.abs(carried - loads).max(axis=(0, 1))
-    others = np.flatnonzero(difference > SAME_LOAD * loads.max(axis=(0, 1)))
-    if not others.size:
-        return state.contacts
-    if others.size == loads.shape[REALISATION]:
-        return solve_present(problem, state, loads)
-    chosen, part = problem.at(others), state.at(others)
-    solved = solve_present(chosen, part, np.take(loads, others, axis=REALISATION))
-    return state.contacts.with_others(state.contacts_of(others), solved)
-
-
-def carried_loads(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
-    """Return the integral of the line load of each contact, shape (S, C, N) [N]."""
-    return np.asarray(problem.values_of(contacts, "line_load").sum(axis=-1) * problem.grid.spacing)
-
-
-def solve_present(
-    problem: WearProblem, state: WearState, loads: FloatArray, cold: bool = False
-) -> ContactBatchSolution:
-    """Solve every contact on the present profiles under `loads`, shape (S, C, N) [N].
-
-    The solver starts from the contacts of the state unless `cold`.
-    """
-    problem = present_problem(problem, state)
-    batch = contact_batch(problem, problem.gap(*state.depths), loads, *state.depths)
-    return problem.model.solve(batch, warm=None if cold else state.contacts)
 
 
 def worn_state(
@@ -285,30 +244,35 @@ def worn_state(
     power : ndarray, shape (stations, contacts, realisations)
         Mean dissipated power of the step [W], of the same dissipation as the wear.
     """
-    terms, begin = state.terms, state.passes
+    terms, stop = state.terms, state.passes + passes
     if problem.terms:
         mean = problem.mean_over_turn(problem.per_roller(power))[0]
-        terms = advanced_terms(problem, state, begin + passes, mean)
+        terms = advanced_terms(problem, state, stop, mean)
     return state.replaced(
-        passes=begin + passes,
+        passes=stop,
         terms=terms,
         energy=state.energy + problem.total_power(power) * (passes / problem.kinematics.pass_rate),
     )
+
+
+def worn_depths(
+    problem: WearProblem, contacts: ContactBatchSolution, passes: FloatArray | float
+) -> Depths:
+    """Return the depths that some passes of given contacts wear off cylinder and rollers [m]."""
+    return problem.sum_of_parts(*problem.wear_parts(contacts, passes))
 
 
 def wear_per_pass(
     problem: WearProblem, contacts: ContactBatchSolution
 ) -> tuple[FloatArray, FloatArray]:
     """Return depth [m] and energy [J] per roller pass, (stations + rollers, N, strips) and (N,)."""
-    cylinder, roller = WearIncrement(problem, contacts, 1.0).depths
+    cylinder, roller = worn_depths(problem, contacts, 1.0)
     return np.concatenate([cylinder[:, 0], roller[0]]), energy_per_pass(problem, contacts)
 
 
 def energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
     """Return the energy that all contacts dissipate in a roller pass, shape (N,) [J]."""
-    power = problem.total_power(contacts.power.reshape(problem.shape))
-    per_pass: FloatArray = power / problem.kinematics.pass_rate
-    return per_pass
+    return np.asarray(problem.total_power(contacts.power) / problem.kinematics.pass_rate)
 
 
 def wear_of_contacts(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:

@@ -23,12 +23,12 @@ from wearsim.evolution.steppers.loads import (
     mean_loads,
 )
 from wearsim.evolution.steppers.single_step import (
-    WearIncrement,
     contacts_at,
     recovery_at,
     solve_at_present_loads,
     solve_loaded,
     solve_present,
+    worn_depths,
     worn_state,
 )
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
@@ -161,8 +161,8 @@ def stabilised_step(
         stage = state.replaced(contacts=contacts)
         contacts, rate, elastic, more = _rate(here, stage, passes, change, elastic)
         solves += more
-        changes = zip(weights, (change, before, rate, first), strict=True)
-        before, change = change, _sum(*changes)
+        changes = change, before, rate, first
+        before, change = change, _sum(*zip(weights, changes, strict=True))
     begun = state.replaced(contacts=contacts, decay=decay)
     depths = _never_negative(change[0]), _never_negative(change[1])
     worn = worn_state(here, begun.with_added(depths), passes, change[2])
@@ -208,16 +208,13 @@ def _rate(
         Number of solutions of all contacts.
     """
     stage = state.with_added(change[:2])
-
-    def loads_at(displacement: FloatArray) -> FloatArray:
-        return mean_loads(here, state, passes, displacement, state.contacts)
-
+    loads_at = partial(mean_loads, here, state, passes, contacts=state.contacts)
     fresh = fresh_approach(here, state, mean_force(here, state, passes))
     contacts, _, solves = solve_loaded(here, stage, loads_at, fresh, elastic, solve)
     if here.has_spring:
         elastic = elastic_approaches(here, stage.replaced(contacts=contacts))
-    wear = WearIncrement(here, contacts, passes)
-    return contacts, (*wear.depths, here.values_of(contacts, "power")), elastic, solves
+    change = *worn_depths(here, contacts, passes), here.values_of(contacts, "power")
+    return contacts, change, elastic, solves
 
 
 def _never_negative(depths: FloatArray) -> FloatArray:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wearsim.evolution.error_estimates import (
@@ -29,26 +27,6 @@ from wearsim.types import BoolArray, FloatArray
 # where the difference crosses zero
 LEAST = 0.3
 NEGLIGIBLE = 0.15  # half the relative variance that is neglected, over the tolerance
-
-
-@dataclass(frozen=True)
-class Doubled:
-    """A step taken as two halves and as a whole.
-
-    Parameters
-    ----------
-    path : tuple of WearState
-        States in the middle and at the end.
-    added, reached : ndarray, shape (3, realisations)
-        Errors, as of `sizes`, that the step adds and those at its end.
-    varies : ndarray of bool, shape (realisations,)
-        Whether load or inputs vary within the step other than by a trend that the scheme follows.
-    """
-
-    path: tuple[WearState, WearState]
-    added: FloatArray
-    reached: FloatArray
-    varies: BoolArray
 
 
 class StepDoublingStepper(Stepper):
@@ -83,14 +61,25 @@ class StepDoublingStepper(Stepper):
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step as two halves and as a whole, and estimate the error that it adds."""
-        doubled = self.doubled(problem, state, step, stop, scheme)
-        over = self.excess(problem, state, doubled, stop)
-        return Attempt(doubled.path, over, self.ratio(over))
+        path, added, reached, _ = self.doubled(problem, state, step, stop, scheme)
+        over = excess(self.tolerance, problem, state, path[-1], added, stop, reached)
+        return Attempt(path, over, self.ratio(over))
 
     def doubled(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
-    ) -> Doubled:
-        """Take a step as two halves and as a whole; parameters as of `attempt`."""
+    ) -> tuple[tuple[WearState, WearState], FloatArray, FloatArray, BoolArray]:
+        """Take a step as two halves and as a whole; parameters as of `attempt`.
+
+        Returns
+        -------
+        path : tuple of WearState
+            States in the middle and at the end.
+        added, reached : ndarray, shape (3, realisations)
+            Errors, as of `sizes`, that the step adds and those at its end.
+        varies : ndarray of bool, shape (realisations,)
+            Whether load or inputs vary within the step other than by a trend that the scheme
+            follows.
+        """
         coarse_start = state.coarse_step_solution or state
         half = scheme(problem, state, 0.5 * step)
         end = scheme(problem, half, 0.5 * step)
@@ -131,20 +120,13 @@ class StepDoublingStepper(Stepper):
             profile_error=reached[2] + fixed[2],
             **auxiliary,
         )
-        return Doubled((half, end), added, reached, varies)
+        return (half, end), added, reached, varies
 
     def whole_step(
         self, problem: WearProblem, start: WearState, step: FloatArray, end: WearState, scheme: Step
     ) -> WearState:
         """Return the solution by a whole step from `start`; `end` is that by two halves."""
         return scheme(problem, start, step)
-
-    def excess(
-        self, problem: WearProblem, state: WearState, doubled: Doubled, stop: float
-    ) -> FloatArray:
-        """Return the error of depth and volume that a step adds, relative to its allowance."""
-        end = doubled.path[-1]
-        return excess(self.tolerance, problem, state, end, doubled.added, stop, doubled.reached)
 
     def rest(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float

@@ -11,8 +11,9 @@ depth with 4 to 13.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -92,7 +93,7 @@ def greatest_value(stations: Stations, values: FloatArray) -> FloatArray:
     peak = np.empty((len(stations.numbers), *values.shape[1:]))
     for chosen, places in stations.groups:
         rows = values[places]
-        peak[chosen] = rows[:, 0] if rows.shape[1] == 1 else _peaks(rows).value
+        peak[chosen] = rows[:, 0] if rows.shape[1] == 1 else next(_peaks(rows))
     return np.asarray(np.take_along_axis(peak, _first_of_equal(peak), axis=0)[0])
 
 
@@ -131,8 +132,7 @@ def _with_few(stations: Stations, most: int) -> BoolArray:
 def _first_of_equal(values: FloatArray) -> IntArray:
     """Return the number of the greatest value on the first axis, (1, ...), the first of equals."""
     most = values.max(axis=0)
-    first = (values >= most - _EQUAL * np.abs(most)).argmax(axis=0)
-    return np.asarray(first[None])
+    return np.asarray((values >= most - _EQUAL * np.abs(most)).argmax(axis=0)[None])
 
 
 def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[FloatArray]:
@@ -168,33 +168,22 @@ def _of_panels(rows: FloatArray, start: FloatArray, width: FloatArray) -> list[F
     return [value, start + width * part_of_panel, error, moved]
 
 
-class _Peaks(NamedTuple):
-    """Greatest value of panels, shape (panels, ...), and the values from which it follows.
+def _peaks(rows: FloatArray) -> Iterator[Any]:
+    """Return the peaks of panels of several stations; rows as of `_of_panels`.
 
-    Its angle phi, the second derivative of minus the value by phi, the amplitudes of cosines, the
-    samples, and the number of the greatest of them.
+    They are the greatest value, its angle phi and the second derivative of minus the value by phi,
+    shape (panels, ...); the amplitudes of cosines, the samples, and the number of the greatest of
+    them.
     """
-
-    value: FloatArray
-    phi: FloatArray
-    bend: FloatArray
-    cosines: FloatArray
-    samples: FloatArray
-    place: IntArray
-
-
-def _peaks(rows: FloatArray) -> _Peaks:
-    """Return the peaks of panels of several stations; rows as of `_of_panels`."""
     panels, number, *others = rows.shape
-    points, matrix = _sampling(number)
-    columns = math.prod(others)
+    (points, matrix), columns = _sampling(number), math.prod(others)
     vertices, cosines = np.empty((3, panels, columns)), np.empty((panels, number, columns))
     samples = np.empty((panels, len(points), columns))
     place = np.empty((panels, 1, columns), dtype=np.int64)
     values = kernel_input(rows.reshape(cosines.shape))
     find_peaks(values, matrix, _transform(number), vertices, cosines, samples, place[:, 0])
     results = *vertices, cosines, samples, place
-    return _Peaks(*(result.reshape(*result.shape[:-1], *others) for result in results))
+    return (result.reshape(*result.shape[:-1], *others) for result in results)
 
 
 @kernel

@@ -147,6 +147,11 @@ class Follower:
         return math.sqrt(radius * radius - self.offset * self.offset)
 
     @cached_property
+    def sense(self) -> float:
+        """Sense in which the cam turns: -1 where its surface at the roller runs to the pivot."""
+        return -1.0 if self.swings and self.towards else 1.0
+
+    @cached_property
     def lever(self) -> float:
         """Displacement of the roller's centre per lift: 1, or the length of the arm [m]."""
         return self.arm_length if self.swings else 1.0
@@ -162,8 +167,7 @@ class Follower:
             Where the roller touches the inner flank of a groove.
         """
         s, slope, second = lift
-        pitch = self._arm(lift) if self.swings else self._slide(lift)
-        speed, curvature, angle, speed_rate = pitch
+        speed, curvature, angle, speed_rate = (self._arm if self.swings else self._slide)(lift)
         side = np.where(inner, -1.0, 1.0)
         ratio = 1.0 - side * self.roller_radius * curvature
         with np.errstate(divide="ignore"):
@@ -193,13 +197,12 @@ class Follower:
         u, v = self.rest + s, slope - self.offset
         speed = np.hypot(u, v)
         curvature = (speed**2 + v * slope - u * second) / speed**3
-        rate = (u * slope + v * second) / speed
-        return speed, curvature, np.arctan2(v, u), rate
+        return speed, curvature, np.arctan2(v, u), (u * slope + v * second) / speed
 
     def _arm(self, lift: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return g, kappa_p, alpha and g' of a swinging follower."""
         s, slope, second = lift
-        c, arm, sense = self.centre_distance, self.arm_length, -1.0 if self.towards else 1.0
+        c, arm, sense = self.centre_distance, self.arm_length, self.sense
         psi, q = self.rest + s, 1.0 + sense * slope
         cosine, sine = np.cos(psi), np.sin(psi)
         speed = np.sqrt(c * c + arm * arm * q * q - 2.0 * c * arm * q * cosine)

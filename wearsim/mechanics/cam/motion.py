@@ -153,8 +153,7 @@ class Motion:
             nodes = (middle[:, None] + step * _FIVE).ravel()
             values = self.lift_in(panel.segment, nodes)[2].reshape(-1, len(_FIVE))
             polynomial = values @ np.linalg.inv(np.vander(_FIVE, increasing=True)).T
-            away = (turned[chosen] - middle) / step
-            powers = np.vander(away, len(_FIVE) - 1, increasing=True)
+            powers = np.vander((turned[chosen] - middle) / step, len(_FIVE) - 1, increasing=True)
             jerk[chosen] = (polynomial[:, 1:] * np.arange(1.0, 5.0) * powers).sum(axis=1) / step
         return jerk
 
@@ -180,8 +179,7 @@ def motion_mistakes(
         mistakes.append((last, what, f"{math.degrees(total):.9g} deg", f"360 deg{remedy}"))
     ends = np.array([part.ends for part in segments])
     rises = np.cumsum(ends[:, 0, 1])
-    height = float(np.abs(rises).max())
-    if abs(rises[-1]) > _CLOSURE * height:
+    if abs(rises[-1]) > _CLOSURE * float(np.abs(rises).max()):
         got = f"{show(float(rises[-1]))} after {motion.segment_label(last)}"
         mistakes.append(
             (last, "the lift does not return to its start", got, "rises that sum to zero")

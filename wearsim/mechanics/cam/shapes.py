@@ -41,12 +41,6 @@ class Arc:
     radius: float
     end: float
 
-    def pitch_point(self, normal: float, roller_radius: float) -> tuple[float, float]:
-        """Return the roller's centre where it touches the point with a normal direction [m]."""
-        radius = self.radius + roller_radius
-        x, y = self.centre
-        return x + radius * math.cos(normal), y + radius * math.sin(normal)
-
 
 @dataclass(frozen=True)
 class Line:
@@ -69,8 +63,7 @@ class Line:
 
 def eccentric_cam(base_radius: float, eccentricity: float) -> list[Arc | Line]:
     """Return the profile of an eccentric circle; theta = 0 has its centre below the roller."""
-    arc = Arc("eccentric", (eccentricity, 0.0), base_radius + eccentricity, -math.pi)
-    return [arc]
+    return [Arc("eccentric", (eccentricity, 0.0), base_radius + eccentricity, -math.pi)]
 
 
 def tangent_cam(base_radius: float, nose_radius: float, nose_distance: float) -> list[Arc | Line]:
@@ -136,16 +129,15 @@ def shape_motion(profile: Sequence[Arc | Line], follower: Follower) -> Motion:
     ValueError
         If the follower cannot follow the profile.
     """
-    if follower.swings and follower.towards:  # the cam turns the other way
+    if follower.sense < 0.0:  # the cam turns the other way
         profile = [_mirrored(part) for part in profile]
     if len(profile) == 1:
         return _motion(profile[0].name, [(profile[0], 0.0, math.tau)], follower)
     ends = [_end_angle(profile, number, follower) for number in range(len(profile))]
-    spans = []
-    for number, part in enumerate(profile):
-        start, stop = ends[number - 1], ends[number]
-        span = (stop - start) % math.tau
-        spans.append((part, start % math.tau, span))
+    spans = [
+        (part, ends[number - 1] % math.tau, (ends[number] - ends[number - 1]) % math.tau)
+        for number, part in enumerate(profile)
+    ]
     if not math.isclose(sum(span for *_, span in spans), math.tau, rel_tol=1e-9):
         raise ValueError("the parts of the cam do not follow one another with this follower")
     spans.sort(key=lambda item: item[1])
@@ -165,14 +157,17 @@ def _motion(
     name: str, pieces: Sequence[tuple[Arc | Line, float, float]], follower: Follower
 ) -> Motion:
     """Return the motion over parts of a cam, each with its start and its span."""
-    segments, base = [], 0.0
-    for number, (part, start, span) in enumerate(pieces):
-        lift = _Lift(part, follower, start)
-        if number == 0:
-            base = lift.base
-        concentric = isinstance(part, Arc) and part.centre == (0.0, 0.0)
-        segments.append(Segment(name or part.name, span, lift, dwell=concentric))
-    return Motion(tuple(segments), base)
+    lifts = [_Lift(part, follower, start) for part, start, _ in pieces]
+    segments = (
+        Segment(
+            name or part.name,
+            span,
+            lift,
+            dwell=isinstance(part, Arc) and part.centre == (0.0, 0.0),
+        )
+        for lift, (part, _, span) in zip(lifts, pieces, strict=True)
+    )
+    return Motion(tuple(segments), lifts[0].base)
 
 
 class _Lift:
@@ -186,13 +181,9 @@ class _Lift:
     def __call__(self, angle: FloatArray) -> FloatArray:
         """Return lift and derivatives, shape (3, points)."""
         follower, part = self.follower, self.part
-        sense = -1.0 if follower.swings and follower.towards else 1.0
-        turned = sense * (self.start + np.asarray(angle))
+        turned = follower.sense * (self.start + np.asarray(angle))
         turned = turned + (0.0 if follower.swings else 0.5 * math.pi)
-        if isinstance(part, Arc):
-            lift = self._on_arc(part, turned, sense)
-        else:
-            lift = self._on_line(part, turned, sense)
+        lift = self._on_arc(part, turned) if isinstance(part, Arc) else self._on_line(part, turned)
         if not np.isfinite(lift).all():
             raise ValueError(f"the follower loses the {part.name} of the cam")
         lift[0] -= follower.rest + self.base
@@ -208,11 +199,11 @@ class _Lift:
         cosine, sine = arm * np.cos(at), arm * np.sin(at)
         return np.stack([c - cosine, sine]), np.stack([sine, cosine]), np.stack([cosine, -sine])
 
-    def _on_arc(self, part: Arc, turned: FloatArray, sense: float) -> FloatArray:
+    def _on_arc(self, part: Arc, turned: FloatArray) -> FloatArray:
         follower, rho = self.follower, part.radius + self.follower.roller_radius
         distance, angle = math.hypot(*part.centre), math.atan2(part.centre[1], part.centre[0])
         x, y = distance * np.cos(angle + turned), distance * np.sin(angle + turned)
-        centre, along = np.stack([x, y]), sense * np.stack([-y, x])
+        centre, along = np.stack([x, y]), follower.sense * np.stack([-y, x])
         with np.errstate(invalid="ignore"):
             if follower.swings:
                 c, arm = follower.centre_distance, follower.arm_length
@@ -229,10 +220,10 @@ class _Lift:
         rest = (speed**2).sum(axis=0) + (normal * (second * slope**2 + centre)).sum(axis=0)
         return np.stack([at, slope, -rest / lever])
 
-    def _on_line(self, part: Line, turned: FloatArray, sense: float) -> FloatArray:
+    def _on_line(self, part: Line, turned: FloatArray) -> FloatArray:
         follower, height = self.follower, part.distance + self.follower.roller_radius
         x, y = np.cos(part.normal + turned), np.sin(part.normal + turned)
-        normal, along = np.stack([x, y]), sense * np.stack([-y, x])
+        normal, along = np.stack([x, y]), follower.sense * np.stack([-y, x])
         with np.errstate(invalid="ignore", divide="ignore"):
             if follower.swings:
                 cosine = (follower.centre_distance * x - height) / follower.arm_length
@@ -254,8 +245,9 @@ def _end_angle(profile: Sequence[Arc | Line], number: int, follower: Follower) -
     if not isinstance(arc, Arc):
         raise ValueError("two straight parts of a cam meet at a corner")
     normal = part.end if isinstance(part, Arc) else part.normal
-    sense = -1.0 if follower.swings and follower.towards else 1.0
-    x, y = arc.pitch_point(normal, follower.roller_radius)
+    # the roller's centre where it touches the end
+    reach = arc.radius + follower.roller_radius
+    x, y = arc.centre[0] + reach * math.cos(normal), arc.centre[1] + reach * math.sin(normal)
     radius, direction = math.hypot(x, y), math.atan2(y, x)
     if not follower.swings:
         return -math.asin(follower.offset / radius) - direction
@@ -263,4 +255,4 @@ def _end_angle(profile: Sequence[Arc | Line], number: int, follower: Follower) -
     cosine = (radius**2 + c * c - arm * arm) / (2.0 * radius * c)
     if not -1.0 < cosine < 1.0:
         raise ValueError("the arm does not reach the cam")
-    return sense * (math.acos(cosine) - direction)
+    return follower.sense * (math.acos(cosine) - direction)

@@ -74,10 +74,7 @@ class SkidArc:
     def _spline(self) -> Callable[[FloatArray], FloatArray]:
         from scipy.interpolate import CubicHermiteSpline  # noqa: PLC0415  (slow to import)
 
-        spline: Callable[[FloatArray], FloatArray] = CubicHermiteSpline(
-            self.theta, self.slip, self.slip_per_rad
-        )
-        return spline
+        return CubicHermiteSpline(self.theta, self.slip, self.slip_per_rad)
 
 
 def skid_arcs(

@@ -124,11 +124,7 @@ class SmoothedCurve:
     @property
     def arcs(self) -> list[tuple[float, float]]:
         """Start and end of each part between two dwells; the whole turn without any."""
-        ends = self.dwells
-        if not ends:
-            return []
-        following = [*ends[1:], (ends[0][0] + math.tau, 0.0)]
-        return [(before[1], after[0]) for before, after in zip(ends, following, strict=True)]
+        return _between(self.dwells) if self.dwells else []
 
 
 def smoothed(
@@ -145,16 +141,11 @@ def smoothed(
     dwells : bool
         Whether to look for dwells, on which the spline is constant.
     """
-    count = int(np.clip(len(angle) // 2, _FEWEST_KNOTS, _MOST_KNOTS))
-    count = min(count, len(angle))
+    count = min(int(np.clip(len(angle) // 2, _FEWEST_KNOTS, _MOST_KNOTS)), len(angle))
     spacing = math.tau / count
-    first = _fitted(angle, values, angle[0] + spacing * np.arange(count), (), noise)
-    if not dwells:
-        return first.curve
-    found = _dwells(first, values)
-    if not found:
-        return first.curve
-    return _fitted(angle, values, _knots(found, spacing), found, noise).curve
+    first, freedom = _fitted(angle, values, angle[0] + spacing * np.arange(count), (), noise)
+    found = _dwells(first, freedom, values) if dwells else ()
+    return _fitted(angle, values, _knots(found, spacing), found, noise)[0] if found else first
 
 
 def _around() -> FloatArray:
@@ -176,40 +167,24 @@ def _basis(knots: FloatArray, angle: FloatArray, order: int) -> FloatArray:
     """Return a derivative of the periodic B-splines at angles, shape (angles, knots)."""
     from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import)
 
-    count = len(knots)
-    unit_vectors = np.eye(count)[np.arange(count + DEGREE) % count]
-    values = BSpline(_extended(knots), unit_vectors, DEGREE)(_within(knots, angle), nu=order)
-    return np.asarray(values)
+    unit_vectors = np.eye(len(knots))[np.arange(len(knots) + DEGREE) % len(knots)]
+    spline = BSpline(_extended(knots), unit_vectors, DEGREE)
+    return np.asarray(spline(_within(knots, angle), nu=order))
+
+
+def _between(dwells: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return start and end of the parts between dwells."""
+    following = [*dwells[1:], (dwells[0][0] + math.tau, 0.0)]
+    return [(before[1], after[0]) for before, after in zip(dwells, following, strict=True)]
 
 
 def _knots(dwells: Sequence[tuple[float, float]], spacing: float) -> FloatArray:
     """Return knots of the parts between dwells, triple at their ends."""
     knots: list[float] = []
-    following = [*dwells[1:], (dwells[0][0] + math.tau, 0.0)]
-    for (_, start), (stop, _) in zip(dwells, following, strict=True):
+    for start, stop in _between(dwells):
         inner = np.linspace(start, stop, max(2, round((stop - start) / spacing)) + 1)[1:-1]
         knots += [start] * 3 + inner.tolist() + [stop] * 3
     return np.sort(np.mod(knots, math.tau))
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A spline with the standard errors of its derivatives.
-
-    Parameters
-    ----------
-    curve : SmoothedCurve
-    freedom : float
-        Effective number of coefficients.
-    """
-
-    curve: SmoothedCurve
-    freedom: float
-
-    def standard_errors(self, angle: FloatArray, order: int) -> FloatArray:
-        """Return the standard errors of a derivative at angles."""
-        rows = _basis(self.curve.knots, angle, order) @ self.curve.factor
-        return np.asarray(np.sqrt((rows**2).sum(axis=1)))
 
 
 def _fitted(
@@ -218,8 +193,8 @@ def _fitted(
     knots: FloatArray,
     dwells: Sequence[tuple[float, float]],
     noise: float | None,
-) -> _Fit:
-    """Return the spline with the greatest restricted likelihood."""
+) -> tuple[SmoothedCurve, float]:
+    """Return the spline with the greatest restricted likelihood, and its degrees of freedom."""
     from scipy.interpolate import BSpline  # noqa: PLC0415  (slow to import)
     from scipy.linalg import eigh  # noqa: PLC0415
 
@@ -240,8 +215,7 @@ def _fitted(
     middle = float(values.mean())
     centred = values - middle
     moment = vectors.T @ (design.T @ centred)
-    weight = np.exp(_LN_LAMBDA)[:, None]
-    diagonal = (1.0 - part) + weight * part
+    diagonal = (1.0 - part) + np.exp(_LN_LAMBDA)[:, None] * part
     # the sum of squares and the penalty together
     squares = np.maximum(centred @ centred - (moment**2 / diagonal).sum(axis=1), 1e-300)
     curved = np.count_nonzero(part)
@@ -257,13 +231,12 @@ def _fitted(
     deviation = float(np.sqrt(residual @ residual / max(len(centred) - freedom, 1.0)))
     factor = deviation * (tied @ (vectors / np.sqrt(diagonal[best])))
     coefficients = tied @ (vectors @ free) + middle
-    along = _around()
-    rows = _basis(knots, along, 2) @ factor
+    rows = _basis(knots, _around(), 2) @ factor
     error = float(np.sqrt((rows**2).sum(axis=1).mean()))
     curve = SmoothedCurve(
         knots, coefficients, deviation, angle, residual, error, tuple(dwells), factor
     )
-    return _Fit(curve, freedom)
+    return curve, freedom
 
 
 def _tied(knots: FloatArray, dwells: Sequence[tuple[float, float]]) -> FloatArray:
@@ -277,22 +250,24 @@ def _tied(knots: FloatArray, dwells: Sequence[tuple[float, float]]) -> FloatArra
     return free[:, free.any(axis=0)]
 
 
-def _dwells(fit: _Fit, values: FloatArray) -> tuple[tuple[float, float], ...]:
+def _dwells(
+    curve: SmoothedCurve, freedom: float, values: FloatArray
+) -> tuple[tuple[float, float], ...]:
     """Return the dwells: where slope and acceleration are zero within their errors.
 
     A dwell that is too long would bend the curve beside it, so that its ends are moved inwards.
     """
-    curve, length = fit.curve, math.tau / fit.freedom
-    along = _around()
+    along, length = _around(), math.tau / freedom
     derivatives = curve(along)
     still = np.ones(_SAMPLES, dtype=np.bool_)
     for order in (1, 2):
-        still &= np.abs(derivatives[order]) < _SURE * fit.standard_errors(along, order)
+        rows = _basis(curve.knots, along, order) @ curve.factor
+        standard_errors = np.sqrt((rows**2).sum(axis=1))
+        still &= np.abs(derivatives[order]) < _SURE * standard_errors
     if still.all():
         return ()
     turned = int(np.flatnonzero(~still)[0])  # an angle of motion, from which the runs are counted
-    around = np.roll(still, -turned)
-    changes = np.flatnonzero(np.diff(around.astype(np.int8), append=0)) + 1
+    changes = np.flatnonzero(np.diff(np.roll(still, -turned).astype(np.int8), append=0)) + 1
     dwells = []
     for start, stop in changes.reshape(-1, 2).tolist():
         low, high = (along[1] * (turned + place) for place in (start, stop - 1))

@@ -185,16 +185,15 @@ def moved_stations(old: Stations, new: Stations) -> tuple[FloatArray, IntArray, 
             continue
         middle = 0.5 * (panel.start + panel.stop)
         angles = panel.start + (panel.stop - panel.start) * lobatto(number)[0]
-        inside = angles + 1e-9 * (middle - angles)  # on this side of an edge
-        within = np.searchsorted(starts, inside, side="right") - 1
+        # on this side of an edge
+        within = np.searchsorted(starts, angles + 1e-9 * (middle - angles), side="right") - 1
         for row, place in enumerate(within.tolist()):
             other, count, begin = old.panels[place], old.numbers[place], int(old.first[place])
             part = np.clip((angles[row] - other.start) / (other.stop - other.start), 0.0, 1.0)
             matrix[first + row, begin : begin + count] = interpolation(count, np.array([part]))[0]
         parts += [int(np.searchsorted(common, middle))] * number
     middles = np.array([0.5 * (panel.start + panel.stop) for panel in old.panels])[old.panel]
-    old_part = np.where(kept, -1, np.searchsorted(common, middles))
-    return matrix, old_part, np.array(parts)
+    return matrix, np.where(kept, -1, np.searchsorted(common, middles)), np.array(parts)
 
 
 def choose_stations(
@@ -218,10 +217,11 @@ def choose_stations(
         has one.
     """
     places = np.linspace(0.0, 1.0, _SAMPLES)
-    scale = 0.0
-    for panel in panels:
-        sample = quantities(panel, panel.start + (panel.stop - panel.start) * places[::8])
-        scale = np.maximum(scale, np.abs(sample).max(axis=1))
+    samples = (
+        quantities(panel, panel.start + (panel.stop - panel.start) * places[::8])
+        for panel in panels
+    )
+    scale = np.max([np.abs(sample).max(axis=1) for sample in samples], axis=0)
 
     def split(panel: Panel, halvings: int) -> list[tuple[Panel, int]]:
         if panel.dwell or number is not None:

@@ -38,8 +38,7 @@ def surface_points(
     turned = np.exp(1j * np.asarray(theta))
     position = follower.rest + kinematics.lift
     if follower.swings:
-        c, arm = follower.centre_distance, follower.arm_length
-        sense = -1.0 if follower.towards else 1.0
+        c, arm, sense = follower.centre_distance, follower.arm_length, follower.sense
         q = 1.0 + sense * kinematics.lift_per_rad
         x, y = c - arm * np.cos(position), arm * np.sin(position)
         normal_x, normal_y = c - q * arm * np.cos(position), q * arm * np.sin(position)

@@ -90,13 +90,9 @@ def start_edges(strips: EdgeStrips, separation: FloatArray, approach: FloatArray
         Approach of each contact [m].
     """
     contacts, n = strips.gap.shape
-    rows, realisations, _ = strips.rows.shape
-    along_cam = strips.bodies[len(strips.bodies) - 1, 0] > 0
-    for b in range(rows):
-        for v in range(realisations):
-            for i in range(n):
-                # the contacts of a roller along a cam meet it one after another
-                strips.greatest[b, v, i] = 1.0 if along_cam else 0.0
+    realisations = strips.rows.shape[1]
+    # the contacts of a roller along a cam meet it one after another
+    strips.greatest[:] = 1.0 if strips.bodies[len(strips.bodies) - 1, 0] > 0 else 0.0
     for k in range(contacts):
         one, other = strips.bodies[k // realisations, 0], strips.bodies[k // realisations, 1]
         v, least = k % realisations, np.inf
@@ -112,8 +108,7 @@ def start_edges(strips: EdgeStrips, separation: FloatArray, approach: FloatArray
             if 0.0 < part < 1.0:
                 rise = 2.0 * apart / (1.0 - part) ** 2
             elif part <= 0.0:
-                ahead = separation[k, min(i + 1, n - 1)]
-                ahead = max(ahead, separation[k, max(i - 1, 0)])
+                ahead = max(separation[k, min(i + 1, n - 1)], separation[k, max(i - 1, 0)])
                 rise = ahead - apart
                 if rise > 0.0:
                     kept = (NONE - elastic / rise) / (NONE - FULL)
@@ -139,16 +134,19 @@ def part_at(strips: EdgeStrips, k: int, i: int, level: float, grown: float) -> f
 @subroutine
 def sum_of_wear(strips: EdgeStrips, wear: FloatArray, sums: FloatArray) -> None:
     """Fill the wear of each body by all contacts."""
-    rows, realisations, n = sums.shape
-    for b in range(rows):
-        for v in range(realisations):
-            for i in range(n):
-                sums[b, v, i] = 0.0
+    _, realisations, n = sums.shape
+    sums[:] = 0.0
     for k in range(wear.shape[1]):
         for side in range(2):
             b = strips.bodies[k // realisations, side]
             for i in range(n):
                 sums[b, k % realisations, i] += wear[side, k, i]
+
+
+@subroutine
+def share_ahead(strips: EdgeStrips, part: float, b: int, v: int, i: int) -> float:
+    """Return the share of the wear by others that lowers the part ahead of an edge too."""
+    return max(strips.greatest[b, v, i] - part, 0.0) / (1.0 - part) if part < 1.0 else 1.0
 
 
 @subroutine
@@ -172,9 +170,7 @@ def by_others(
         b, v = strips.bodies[k // realisations, side], k % realisations
         of_others = sums[b, v, i] - wear[side, k, i]
         if of_others > 0.0:
-            share = 1.0
-            if part < 1.0:
-                share = max(strips.greatest[b, v, i] - part, 0.0) / (1.0 - part)
+            share = share_ahead(strips, part, b, v, i)
             ahead += share * of_others
             joint += (1.0 - share) * of_others
             grown += share * of_others / sums[b, v, i] * (strips.added[b, v, i] + sums[b, v, i])
@@ -236,9 +232,7 @@ def linearise_edges(
         for i in range(n if strips.resolved[k % realisations] else 0):
             for side in range(2):
                 b, v = strips.bodies[k // realisations, side], k % realisations
-                part, share = strips.part[k, i], 1.0
-                if part < 1.0:
-                    share = max(strips.greatest[b, v, i] - part, 0.0) / (1.0 - part)
+                share = share_ahead(strips, strips.part[k, i], b, v, i)
                 gaps[k, i] -= share * (sums[b, v, i] - scaled[side, k, i])
 
 
@@ -372,9 +366,8 @@ def end_edges(
                 crossed[b, v, i] |= whole_steps[k, i] < SETTLED
                 depths[b, v, i] += ratio * wear[side, k, i]
                 parts[b, v, i] = max(parts[b, v, i], part)
-            fields[1, k, i] = part
             steps = min(whole_steps[k, i] + 1.0, SETTLED)
-            fields[2, k, i] = steps if part >= 1.0 else 0.0
+            fields[1, k, i], fields[2, k, i] = part, steps if part >= 1.0 else 0.0
     for b in range(rows):
         for v in range(realisations):
             for i in range(n):
@@ -481,20 +474,18 @@ def fill_separations(
     parts : ndarray, shape (bodies, realisations, strips)
         Result [m].
     """
-    rows, realisations, n = parts.shape
+    _, realisations, n = parts.shape
     one_station = bodies[len(bodies) - 1, 0] == 0
+    parts[:] = 0.0
     for v in range(realisations):
-        for b in range(rows):
-            for i in range(n):
-                parts[b, v, i] = 0.0
         for c in range(len(bodies) if resolved[v] else 0):
             b, k = bodies[c, 0], c * realisations + v
             for i in range(n):
                 first = c == 0 or bodies[c - 1, 0] != b
-                least = separation[k, i] if first else min(parts[b, v, i], separation[k, i])
-                parts[b, v, i] = least
+                parts[b, v, i] = (
+                    separation[k, i] if first else min(parts[b, v, i], separation[k, i])
+                )
         for i in range(n if resolved[v] and one_station else 0):
             parts[0, v, i] *= share[v]
             for c in range(len(bodies)):
-                apart = separation[c * realisations + v, i]
-                parts[bodies[c, 1], v, i] = apart - parts[0, v, i]
+                parts[bodies[c, 1], v, i] = separation[c * realisations + v, i] - parts[0, v, i]

@@ -359,10 +359,7 @@ def end_step(
         sums[last, v, 0] += worn_passes[v] * sum_rates[last, v, 0]
         energy[v] = sums[last, v, 0]
         decreased[v] = energy[v] < 0.0
-    for b in range(rows):
-        for v in range(realisations):
-            for i in range(n):
-                change[b, v, i] = 0.0
+    change[:] = 0.0
     if separation.shape[1] > 0:
         fill_separations(bodies, resolved, fields[0], share, change)
     for b in range(rows):

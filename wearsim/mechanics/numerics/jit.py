@@ -74,10 +74,6 @@ class Kernel:
                 self._dispatcher = _compiled(self._function)
         return self._dispatcher
 
-    def is_compiled_by(self, dispatcher: object) -> bool:
-        """Return whether `dispatcher` is that of this kernel."""
-        return dispatcher is self._dispatcher
-
     @property
     def is_ready(self) -> bool:
         """Whether this process has compiled the function or read it from the cache."""
@@ -122,7 +118,7 @@ def _prepared_numba() -> Any:
             """Report the kernel; subroutines are compiled as a part of it."""
             dispatcher = event.data["dispatcher"]
             self.levels.append(config.OPT)
-            if any(kernel.is_compiled_by(dispatcher) for kernel in _KERNELS):
+            if any(kernel._dispatcher is dispatcher for kernel in _KERNELS):
                 config.OPT = min(config.OPT, OPTIMISATION)
                 for report in _REPORTS:
                     report(dispatcher.__name__)
@@ -322,10 +318,7 @@ def kernel_input(array: FloatArray) -> FloatArray:
 
 def kernel_inputs(*arrays: FloatArray) -> list[FloatArray]:
     """Return arrays as of `kernel_input`."""
-    for array in arrays:
-        if not (array.flags.carray and array.dtype == np.float64):
-            return [kernel_input(array) for array in arrays]
-    return [*arrays]
+    return [kernel_input(array) for array in arrays]
 
 
 def _cache_folder() -> Path | None:

@@ -56,12 +56,8 @@ def linearised_wear(
     """
     contacts, n = line_load.shape
     realisations = len(compliance)
-    # written as loops in this file: np.zeros and array expressions take longer to compile
-    worn = np.empty((2 * len(bodies), realisations, n))
-    for b in range(2 * len(bodies)):
-        for v in range(realisations):
-            for i in range(n):
-                worn[b, v, i] = 0.0
+    worn = np.empty((2 * len(bodies), realisations, n))  # np.zeros takes longer to compile
+    worn[:] = 0.0
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for side in range(2):
@@ -141,10 +137,9 @@ def wear_of_bodies(
     contacts, n = loads.shape
     rows, realisations = worn.shape[0], worn.shape[1]
     part, scaled = np.empty((rows, realisations, n)), np.empty((rows, realisations, n))
-    for b in range(rows):
-        for v in range(realisations):
-            for i in range(n):
-                worn[b, v, i] = part[b, v, i] = scaled[b, v, i] = 0.0
+    worn[:] = 0.0
+    part[:] = 0.0
+    scaled[:] = 0.0
     for k in range(contacts):
         c, v = k // realisations, k % realisations
         for side in range(2):
@@ -159,23 +154,19 @@ def wear_of_bodies(
                 continue
             rise = np.log(loads[k, i] / old_loads[k, i])
             if abs(rise) > MIN_LOG_CHANGE:
-                slope = np.log(new / old) / rise
-                exponents[k, i] = min(max(slope, LEAST_EXPONENT), greatest)
+                exponents[k, i] = min(max(np.log(new / old) / rise, LEAST_EXPONENT), greatest)
     sizes = np.empty((3, realisations))
     for v in range(realisations):
         difference, greatest_opening, deepest = 0.0, 0.0, 0.0
         for c in range(len(bodies)):
-            one, other = bodies[c, 0], bodies[c, 1]
+            one, other, k = bodies[c, 0], bodies[c, 1], c * realisations + v
             for i in range(n):
                 opening = worn[one, v, i] + worn[other, v, i]
-                depth = base[one, v, i] + base[other, v, i] + opening
-                opened = part[one, v, i] + part[other, v, i]
-                k = c * realisations + v
-                linear[k, i] = opened
-                rest = scaled[one, v, i] + scaled[other, v, i] - opened
+                linear[k, i] = part[one, v, i] + part[other, v, i]
+                rest = scaled[one, v, i] + scaled[other, v, i] - linear[k, i]
                 difference = max(difference, abs(rest) * min(slopes[k, i], 1.0))
                 greatest_opening = max(greatest_opening, opening)
-                deepest = max(deepest, depth)
+                deepest = max(deepest, base[one, v, i] + base[other, v, i] + opening)
         sizes[0, v], sizes[1, v] = difference, greatest_opening
         sizes[2, v] = deepest if deepest > 0.0 else np.inf
     return sizes
@@ -308,9 +299,8 @@ def carried_errors(
             elastic = FOUNDATION * (approaches[k] - least) / greatest
             opened, held = 0.0, stiffness[k] / spacing
             for i in range(n):
-                weight[i] = 0.0
-                if loads[k, i] > 0.0:
-                    weight[i] = 1.0 / (elastic + soft[one, i] + soft[other, i])
+                stiff = 1.0 / (elastic + soft[one, i] + soft[other, i])
+                weight[i] = stiff if loads[k, i] > 0.0 else 0.0
                 opened += weight[i] * (whole[one, v, i] + whole[other, v, i])
                 held += weight[i]
             for i in range(n):

@@ -42,8 +42,7 @@ def bracketed_roots(
     f0, f1 = function(x0), function(x1)
     done = np.zeros(len(x0), dtype=bool)
     root, third, f_third = np.empty_like(x0), x0, f0
-    inside = (first > x0) & (first < x1)
-    point = np.where(inside, first, 0.5 * (x0 + x1))
+    point = np.where((first > x0) & (first < x1), first, 0.5 * (x0 + x1))
     scale = np.maximum(np.abs(x0), np.abs(x1))
     for _ in range(_MOST):
         value = function(point)

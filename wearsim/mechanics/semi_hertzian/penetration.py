@@ -261,12 +261,10 @@ def displacement_at(
     part, pressed = place - here, 0.0
     for i in range(len(depth)):
         if depth[i] > 0.0:
-            half_length = np.sqrt(2.0 * depth[i] / curvature)
-            tau = min(np.log(half_length / spacing), HIGHEST)
+            tau = min(np.log(np.sqrt(2.0 * depth[i] / curvature) / spacing), HIGHEST)
             near = read_value(table, tau, abs(i - here))
             if part > 0.0:
-                following = read_value(table, tau, abs(i - here - 1))
-                near += part * (following - near)
+                near += part * (read_value(table, tau, abs(i - here - 1)) - near)
             pressed += depth[i] * near
     return pressed
 

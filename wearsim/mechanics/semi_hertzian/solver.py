@@ -80,8 +80,7 @@ def read_local_hertz(table: FloatArray, ratio: float) -> tuple[float, float, flo
     ratio : float
         B/A; values beyond the table are replaced by its end.
     """
-    end = table.shape[0] - 1.0
-    position = min(max((np.log(ratio) - FLATTEST) / STEP, 0.0), end)
+    position = min(max((np.log(ratio) - FLATTEST) / STEP, 0.0), table.shape[0] - 1.0)
     node = min(max(int(position), 1), table.shape[0] - 3)
     s = position - node
     before = -s * (s - 1.0) * (s - 2.0) / 6.0

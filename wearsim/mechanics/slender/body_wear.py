@@ -112,8 +112,7 @@ def fill_responses(k: int, state: NewtonState, system: DepthSystem) -> bool:
     unit_load, total = state.unit_load, 0.0
     if not invert_in_place(matrix[k], size):
         return False
-    for row in range(size):
-        unit_load[k, row] = 0.0
+    unit_load[k] = 0.0
     for column in range(size):
         s0 = s1 = s2 = s3 = 0.0
         for row in range(0, size, PANEL):
@@ -296,8 +295,7 @@ def factor_depths(shared: FloatArray, state: NewtonState, system: DepthSystem) -
             j = place[k, column]
             opened = number[b, j] if b >= 0 else -1
             for row in range(rows if opened >= 0 else 0):
-                wear = softness[0, row] * response[k, column, row]
-                block[b, opened, unknown[0, row]] += wear
+                block[b, opened, unknown[0, row]] += softness[0, row] * response[k, column, row]
             opened = number[c, j] if c >= 0 else -1
             for row in range(rows if opened >= 0 else 0):
                 outer[opened, unknown[1, row]] += softness[1, row] * response[k, column, row]
@@ -371,11 +369,8 @@ def solve_depths(
     """
     depth, outer_depth, number = system.depth, system.outer_depth, system.number
     place, step, size, count = state.place, state.step, system.size, system.total[0]
-    for b in range(len(size)):
-        for unknown in range(size[b]):
-            depth[b, unknown] = 0.0
-    for unknown in range(count):
-        outer_depth[unknown] = 0.0
+    depth[:] = 0.0
+    outer_depth[:] = 0.0
     for k in range(len(step)):
         b, c = system.touched[k, 0], system.touched[k, 1]
         for row in range(state.size[k]):

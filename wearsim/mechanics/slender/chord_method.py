@@ -194,8 +194,7 @@ def set_anchor(
             state.guard_row[g, r, c] = constants.unit * work[1, abs(state.guard[g, r] - j)]
         add_around(j, 0, n - 1, constants.unit * q, work[0], state.surface[g])
         for d in range(min(n, REACH + 1)):
-            slope = constants.unit * q * (work[1, d] - work[0, d])
-            near[d, j + 2 * REACH] = slope
+            near[d, j + 2 * REACH] = constants.unit * q * (work[1, d] - work[0, d])
     if constants.curvature_influence.shape[0] > 0:
         row = np.full(line_load.shape, -1)
         for r in range(count):
@@ -218,8 +217,7 @@ def fill_remainder(g: int, loads: Loads, constants: ContactConstants, state: Cho
     square, cube, value, tangent = state.work[0], state.work[1], state.work[2], state.work[3]
     first, last = state.active[g, 0], state.active[g, state.loaded[g] - 1]
     far = 0  # counted, as a maximum is not vectorised
-    for i in range(n):
-        remainder[g, i] = 0.0
+    remainder[g] = 0.0
     for i in range(first, last + 1):
         q0 = loads.anchor[g, i]
         x = loads.line_load[g, i] - q0
@@ -331,8 +329,7 @@ def solve_from_anchor(
     for _ in range(MAX_CHORD):
         if not _solve_chord(g, load, loads, constants, state):
             return False
-        for i in range(state.gap.shape[0]):
-            before[i] = state.remainder[g, i]
+        before[: state.gap.shape[0]] = state.remainder[g]
         fill_remainder(g, loads, constants, state)
         residual = 0.0
         for r in range(state.loaded[g]):

@@ -231,8 +231,7 @@ def _gather(
         for d in range(max(-REACH, c - REACH), min(REACH, c + REACH) + 1):
             shift = np.uint64(2 * REACH + d)
             for i in range(start, stop):
-                derivative = part[abs(d), i + shift] * slope[k, REACH + c - d, i + shift]
-                gathered[far + c, i] += derivative
+                gathered[far + c, i] += part[abs(d), i + shift] * slope[k, REACH + c - d, i + shift]
 
 
 @subroutine

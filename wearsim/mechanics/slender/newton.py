@@ -155,20 +155,17 @@ def check_convergence(
     ready = iteration <= CAUTIOUS or (change < 1e-3 and not left)
     for k in range(contacts if ready else 0):
         first, end = state.left[k], state.right[k]
-        if add_penetrated(k, first, end, iteration, unit, state, approach, line_load):
-            entered = True
+        entered |= add_penetrated(k, first, end, iteration, unit, state, approach, line_load)
     shrinking = min(max(change / before, AT_BEST), 1.0) if before > 0.0 else FIRST
     if not shrinking < SHRINKING:
-        for k in range(contacts):
-            state.fresh[k] = True
+        state.fresh[:] = True
     if left or entered:
         return CONTINUE, 0.0
     if not change * shrinking < TOLERANCE:
         return CONTINUE, change
     for k in range(contacts):
         first, end = complete_surface(k, approach[k], table, unit, line_load, lengths, state)
-        if add_penetrated(k, first, end, iteration, unit, state, approach, line_load):
-            entered = True
+        entered |= add_penetrated(k, first, end, iteration, unit, state, approach, line_load)
     return (CONTINUE, 0.0) if entered else (CONVERGED, change)
 
 
@@ -219,8 +216,7 @@ def start_strips(
             lowest[k] = min(lowest[k], gap[k, i])
             softness[k, i] = these.compliance[k, i]
             if members is not None:  # as if all contacts wore the same strips
-                both = worn[k, 0, i] + worn[k, 1, i]
-                softness[k, i] += contacts * both
+                softness[k, i] += contacts * (worn[k, 0, i] + worn[k, 1, i])
             corrected = corrected or softness[k, i] > 0.0
         missing = add_missing_load(these.loads[k] / these.spacing, line_load[k])
         corrected = missing > MUCH or corrected
@@ -417,9 +413,9 @@ def solve_slender(
     """
     contacts, n, failed = gap.shape[1], gap.shape[2], 0
     unit = 1.0 / (np.pi * contact_modulus)
-    gap, compliance, loads = borrowed((gap, compliance, loads))
-    line_load, approach = borrowed((line_load, approach))
-    table, half_length = borrowed(table), borrowed(half_length)
+    gap, compliance, loads, line_load, approach, table, half_length = borrowed(
+        (gap, compliance, loads, line_load, approach, table, half_length)
+    )
     owned = new_newton_state(contacts, n), new_half_lengths(curvature_influence, contacts)
     state, lengths = borrowed(owned)
     members: Any = None

@@ -417,7 +417,5 @@ def fill_separation(
     first, last = state.left[k], state.right[k] - 1
     for i in range(gap.shape[1]):
         near = min(max(i, first), last)
-        beyond = gap[k, i] - gap[k, near]
-        separation[k, i] = max(state.surface[k, near] + beyond - approach, 0.0)
-        if line_load[k, i] > 0.0:
-            separation[k, i] = 0.0
+        beyond = state.surface[k, near] + (gap[k, i] - gap[k, near]) - approach
+        separation[k, i] = max(beyond, 0.0) if not line_load[k, i] > 0.0 else 0.0

@@ -58,8 +58,7 @@ def _fill_growth(
 ) -> None:
     """Fill the growth of ln q beyond the anchor; parameters as of `fill_factor_growth`."""
     line_load, anchor, great = loads.line_load, loads.anchor, 0
-    for i in range(size):
-        growth[i] = 0.0
+    growth[:size] = 0.0
     for i in range(first, last + 1):
         x = (line_load[g, i] - anchor[g, i]) / max(anchor[g, i], 1e-300)
         great += int(abs(x) > SMALL)
@@ -110,8 +109,7 @@ def _wear_strips(
         total += line_load[g, i]
     mean = passes.creepage[p, 0] - mean / total
     scale, change, great = constants.spacing * np.exp(state.lengths.log_scale[g]), work, 0
-    for i in range(first, last + 1):
-        change[i] = 0.0
+    change[:] = 0.0
     if anchored:
         growth = state.work[0]
         _fill_growth(g, first, last, loads, growth, line_load.shape[1] + 4 * REACH)

@@ -197,8 +197,8 @@ def spin_turns(
     """
     turn = spin * half_length
     straight = TURNED * TURNED * (slip_x * slip_x + slip_y * slip_y)
-    strong = abs(spin) * modulus_y > SPIN_LIMIT * steepness
-    return (straight < turn * turn) | strong  # `or` would branch
+    # `or` would branch
+    return (straight < turn * turn) | (abs(spin) * modulus_y > SPIN_LIMIT * steepness)
 
 
 @subroutine

@@ -296,8 +296,8 @@ def _parabolic(a: float, steep: float, peak: float) -> tuple[float, float, float
     kappa = min(steep * a**2 / peak, 2.0 * a)
     # x = a - s; the traction is G s in adhesion and peak s(2a - s)/a^2 in slip
     slip_force = peak * kappa**2 * (3.0 * a - kappa) / (3.0 * a**2)
-    edge = kappa - a  # x at the onset of slip
-    return 2.0 * a - kappa, slip_force, -0.25 * peak * (a**2 - edge**2) ** 2 / a**2
+    # slip begins at x = kappa - a
+    return 2.0 * a - kappa, slip_force, -0.25 * peak * (a**2 - (kappa - a) ** 2) ** 2 / a**2
 
 
 @subroutine

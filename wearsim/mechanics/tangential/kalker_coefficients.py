@@ -197,9 +197,8 @@ def coefficient(which: int, ratio: float, nu: float, table: Spline) -> float:
     value = total / (1.0 - nu) if which == 3 else 1.0 / total
     if place < low:  # continued towards the limit at a/b = 0
         edge = math.exp(low)
-        excess = value / short_limit(edge, nu)[which] - 1.0
-        decay = math.pow(ratio / edge, _FADE[which])
-        return short_limit(ratio, nu)[which] * (1.0 + excess * decay)
+        excess = (value / short_limit(edge, nu)[which] - 1.0) * math.pow(ratio / edge, _FADE[which])
+        return short_limit(ratio, nu)[which] * (1.0 + excess)
     if place > high:  # continued towards the limit at b/a = 0
         slenderness, edge = 1.0 / ratio, math.exp(-high)
         excess = value / long_limit(edge, nu)[which] - 1.0

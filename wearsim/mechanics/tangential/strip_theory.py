@@ -266,8 +266,7 @@ def strip_contacts(
             tractions,
         )
         peak = length = adhering = sum_x = sum_y = moment = power = torque[k] = 0.0
-        for i in range(n):
-            dissipation[k, i] = 0.0
+        dissipation[k] = 0.0
         for i in range(first, last + 1):
             here = i - first
             dissipation[k, i] = rolling_speed[k] * tractions.work[here]
@@ -291,8 +290,7 @@ def compile_strip_contacts() -> None:
     strip, contact = np.ones((1, 1)), np.ones(1)
     elasticity = StripElasticity(1e11, 4e10, np.ones((2, 2)))
     slips = (contact, contact, contact, contact)  # rolling speed, both creepages, and spin
-    sums = np.empty((len(SUMS), 1))
-    filled = np.empty((1, 1)), sums, np.empty(1)
+    filled = np.empty((1, 1)), np.empty((len(SUMS), 1)), np.empty(1)
     strip_contacts(strip, strip, contact, 1.0, elasticity, *slips, strip, strip, strip, *filled)
 
 

@@ -153,9 +153,7 @@ def strip_of(
     part = math.sqrt(y * y + (1.0 - twist * twist) * x * x) - y * twist
     shift = square / part if part > 0.0 else 0.0
     if shift < a:
-        along, across = 0.0, 0.0
-        if shift > 0.0:
-            along, across = -x / shift, -(y / shift + twist)
+        along, across = (-x / shift, -(y / shift + twist)) if shift > 0.0 else (0.0, 0.0)
     else:
         shift = a
         # the longitudinal slip that the shift is computed from

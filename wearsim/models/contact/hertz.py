@@ -88,11 +88,9 @@ class HertzModel(SingleContactModel):
         materials: tuple[Material, Material],
         patch: Patch | None = None,
     ) -> None:
-        self.theory = theory
-        self._grid = grid
+        self.theory, self._grid, self.patch = theory, grid, patch
         self._pair: ElasticPair = combine(*materials)
         self._tangential = self._pair
-        self.patch = patch
 
     def with_creep_factor(self, factor: float) -> Self:
         """Return the model with its tangential compliance divided by a factor."""
@@ -245,40 +243,36 @@ class HertzModel(SingleContactModel):
 
 
 def _check(gap: FloatArray, longitudinal_curvature: float, normal_force: float) -> None:
-    state = {"gap": gap, "normal_force": normal_force}
-    if not np.isfinite(gap).all():
-        raise ContactError("the gap has a value that is not finite", state)
-    if not (normal_force > 0.0 and math.isfinite(normal_force)):
-        raise ContactError(
-            f"the contact is lost: its load is {normal_force:.4g} N; raise the load", state
-        )
-    if not (longitudinal_curvature > 0.0 and math.isfinite(longitudinal_curvature)):
-        raise ContactError(
-            f"the relative curvature along rolling is {longitudinal_curvature:.4g} 1/m, expected a"
-            " positive value; check the radii",
-            state,
-        )
+    """Raise a ContactError unless gap, curvature along rolling and load can have a contact."""
+    curvature = f"the relative curvature along rolling is {longitudinal_curvature:.4g} 1/m"
+    for possible, text in (
+        (np.isfinite(gap).all(), "the gap has a value that is not finite"),
+        (
+            0.0 < normal_force < math.inf,
+            f"the contact is lost: its load is {normal_force:.4g} N; raise the load",
+        ),
+        (
+            0.0 < longitudinal_curvature < math.inf,
+            f"{curvature}, expected a positive value; check the radii",
+        ),
+    ):
+        if not possible:
+            raise ContactError(text, {"gap": gap, "normal_force": normal_force})
 
 
 def _failure(status: int, state: Mapping[str, Any], spacing: float) -> ContactError:
+    """Return the error of a patch that was not found."""
     width = 2e3 * state["half_width"]
-    if status == parabola_fit.NO_CURVATURE:
-        text = (
-            f"the gap's fitted curvature over {width:.4g} mm is {state['curvature']:.4g} 1/m, and"
-            " Hertz needs it positive: no parabola approximates the worn profile;"
-            " use contact.model = 'slender'"
-        )
-    elif status == parabola_fit.TOO_FEW_STRIPS:
-        text = (
-            f"the patch, {width:.4g} mm wide, covers fewer than three strips of"
-            f" {spacing * 1e3:.4g} mm, too few to fit a parabola; raise contact.strips"
-        )
-    else:
-        text = (
-            f"the patch and the parabola fitted over it did not converge in {LIMIT} iterations;"
-            " use contact.model = 'slender'"
-        )
-    return ContactError(text, dict(state))
+    texts = {
+        parabola_fit.NO_CURVATURE: f"the gap's fitted curvature over {width:.4g} mm is"
+        f" {state['curvature']:.4g} 1/m, and Hertz needs it positive: no parabola approximates the"
+        " worn profile; use contact.model = 'slender'",
+        parabola_fit.TOO_FEW_STRIPS: f"the patch, {width:.4g} mm wide, covers fewer than three"
+        f" strips of {spacing * 1e3:.4g} mm, too few to fit a parabola; raise contact.strips",
+        parabola_fit.NOT_CONVERGED: "the patch and the parabola fitted over it did not converge in"
+        f" {LIMIT} iterations; use contact.model = 'slender'",
+    }
+    return ContactError(texts[status], dict(state))
 
 
 def strips_over_patch(
@@ -300,13 +294,11 @@ def strips_over_patch(
     materials : tuple of Material
         Materials of the two bodies.
     """
-    patch: Patch | None = getattr(options, "patch", None)
-    if patch is not None:
-        b = patch.b
-    else:
+    patch: Patch | HertzContact | None = getattr(options, "patch", None)
+    if patch is None:
         modulus = combine(*materials).contact_modulus
-        b = hertz(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus).b
-    return Grid.spanning(-b, b, options.my)
+        patch = hertz(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus)
+    return Grid.spanning(-patch.b, patch.b, options.my)
 
 
 SPEC = ContactModelSpec(

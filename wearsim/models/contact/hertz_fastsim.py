@@ -158,13 +158,20 @@ class HertzFastsim(HertzModel):
         refuse_unclaimed(self, batch, wear_compliance, coupling)
         self._check_shapes(batch)
         if batch.bearing_torque is not None:
-            batch = self._with_balanced_creepage(batch, warm)
+            _, normal = self._solved(batch)  # line loads do not depend on the creepage
+            batch = with_balanced_creepage(
+                batch,
+                normal.line_load,
+                normal.half_length,
+                self._grid,
+                self._tangential,
+                warm,
+                lambda trial: self._solved(trial)[1].torque,
+            )
         patches, results = self._solved(batch)
-        columns = results._asdict()
-        del columns["torque"]
         return ContactBatchSolution(
             y=_column(self._grid.y),
-            **columns,
+            **{name: column for name, column in results._asdict().items() if name != "torque"},
             approach=patches.approach,
             peak_pressure=patches.peak_pressure,
             longitudinal_creepage=np.array(batch.longitudinal, dtype=np.float64),
@@ -198,21 +205,6 @@ class HertzFastsim(HertzModel):
         if first_failed < contacts:
             raise self._error_of(first_failed, batch)
         return patches, results
-
-    def _with_balanced_creepage(
-        self, batch: ContactBatch, warm: ContactBatchSolution | None
-    ) -> ContactBatch:
-        """Return the contacts with the creepages at which the tractions balance the torques."""
-        _, at_given_creepage = self._solved(batch)  # line loads do not depend on the creepage
-        return with_balanced_creepage(
-            batch,
-            at_given_creepage.line_load,
-            at_given_creepage.half_length,
-            self._grid,
-            self._tangential,
-            warm,
-            lambda trial: self._solved(trial)[1].torque,
-        )
 
     def friction_points(self, batch: ContactBatch) -> tuple[FloatArray, FloatArray]:
         """Return the points of the friction coefficients: the ends of the `mx` steps."""

@@ -70,11 +70,9 @@ class StripModel(ContactModel):
     def __init__(
         self, theory: TangentialTheory, grid: Grid, materials: tuple[Material, Material]
     ) -> None:
-        self.theory = theory
-        self._grid = grid
+        self.theory, self._grid = theory, grid
         self._pair: ElasticPair = combine(*materials)
-        self._tangential = self._pair
-        self._table = influence_table(grid.strips)
+        self._tangential, self._table = self._pair, influence_table(grid.strips)
 
     def with_creep_factor(self, factor: float) -> Self:
         """Return the model with its tangential compliance divided by a factor."""

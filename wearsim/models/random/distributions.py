@@ -56,8 +56,8 @@ def _read_quantiles(file: InputFile, unit: str) -> tuple[FloatArray, FloatArray]
         # the last, so that the mean is that of the samples. With equal steps from 0 to 1 the two
         # extremes would have half the weight of the others.
         places = (np.arange(len(samples)) + 0.5) / len(samples)
-        ends = samples[:1], samples[-1:]
-        return np.concatenate([[0.0], places, [1.0]]), np.concatenate([ends[0], samples, ends[1]])
+        values = np.concatenate([samples[:1], samples, samples[-1:]])
+        return np.concatenate([[0.0], places, [1.0]]), values
     read = read_columns(
         file.text, file.path, {"probability": "1", "value": unit}, rising="probability"
     )
@@ -320,15 +320,17 @@ class MixtureOptions(Options):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        if len(self.of) < 2:
-            got = f"{len(self.of)} in 'of'"
-            raise QuantityError("needs two distributions or more", got, _TABLE)
-        if len(self.weights) != len(self.of):
-            got = f"{len(self.weights)} weights for {len(self.of)} distributions"
-            raise QuantityError("needs a weight for each distribution", got, f"{len(self.of)}")
-        if not all(0.0 < weight < float("inf") for weight in self.weights):
-            got = as_written(self.weights)
-            raise QuantityError("'weights' must be above 0", got, "shares such as [0.7, 0.3]")
+        count, weights = len(self.of), len(self.weights)
+        positive = all(0.0 < weight < math.inf for weight in self.weights)
+        unequal = f"{weights} weights for {count} distributions"
+        shares = as_written(self.weights), "shares such as [0.7, 0.3]"
+        for fits, what, got, expected in (
+            (count > 1, "needs two distributions or more", f"{count} in 'of'", _TABLE),
+            (weights == count, "needs a weight for each distribution", unequal, f"{count}"),
+            (positive, "'weights' must be above 0", *shares),
+        ):
+            if not fits:
+                raise QuantityError(what, got, expected)
         return self
 
 

@@ -54,8 +54,7 @@ class White(FrictionField):
     """
 
     def __init__(self, options: WhiteOptions, marginal: Distribution) -> None:
-        self.frame = options.frame
-        self.marginal = marginal
+        self.frame, self.marginal = options.frame, marginal
 
     def values(self, x: FloatArray, y: FloatArray, uniforms: Uniforms) -> FloatArray:
         """Return one realisation at the points of a grid, shape (points, strips)."""
@@ -80,8 +79,7 @@ class GaussianField(FrictionField):
     """
 
     def __init__(self, options: GaussianFieldOptions, marginal: Distribution) -> None:
-        self.frame = options.frame
-        self.marginal = marginal
+        self.frame, self.marginal = options.frame, marginal
         self.correlation_length = options.correlation_length
 
     def values(self, x: FloatArray, y: FloatArray, uniforms: Uniforms) -> FloatArray:
@@ -191,10 +189,9 @@ class OrnsteinUhlenbeck(Process):
     """
 
     def __init__(self, options: OrnsteinUhlenbeckOptions, marginal: Distribution) -> None:
-        self.marginal = marginal
+        self.marginal, self.level = marginal, options.level
         self.correlation_time = options.correlation_time
         self.spacing = options.spacing or options.correlation_time / _STEPS
-        self.level = options.level
 
     def path(self, points: int, uniforms: Uniforms) -> FloatArray:
         """Return one realisation at the times 0, spacing, 2 spacing, ..., shape (points,)."""

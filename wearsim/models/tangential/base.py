@@ -12,7 +12,6 @@ import numpy as np
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.hertz.ellipse import HertzContact
-from wearsim.mechanics.tangential.kalker_coefficients import Flexibilities, one_flexibility
 from wearsim.models.tangential.torque_balance import balanced_creepage
 from wearsim.types import ContactFields, ContactSolution, FloatArray, OperatingPoint
 
@@ -289,9 +288,18 @@ class EllipseStrips(Strips):
         )
 
 
-def covered_share(strips: Strips) -> FloatArray | float:
-    """Return the fraction of each strip in contact, the weight of integrals over a strip."""
-    return strips.coverage if isinstance(strips, EllipseStrips) else 1.0
+def covered_tractions(
+    strips: Strips, slip: LocalSlip, rolling_speed: float, integrals: FloatArray
+) -> Tractions:
+    """Return the tractions from integrals of a march, (4, strips), with the work of the slip.
+
+    Integrals over a strip are weighted by the fraction of it in contact.
+    """
+    if isinstance(strips, EllipseStrips):
+        integrals[:3] *= strips.coverage
+    force_x, force_y, moment, adhesion = integrals
+    work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
+    return Tractions(force_x, force_y, moment, spread_work(-rolling_speed * work), adhesion)
 
 
 def equivalent_ellipse(strips: Strips) -> tuple[float, float]:
@@ -304,8 +312,7 @@ def equivalent_ellipse(strips: Strips) -> tuple[float, float]:
     if isinstance(strips, EllipseStrips):
         return strips.ellipse.a, strips.ellipse.b
     a = float(strips.half_length.max())
-    area = 2.0 * float(strips.half_length.sum()) * strips.spacing
-    return a, area / (math.pi * a)
+    return a, 2.0 * float(strips.half_length.sum()) * strips.spacing / (math.pi * a)
 
 
 def peak_pressure(strips: Strips, *, elliptic: bool) -> FloatArray:
@@ -324,23 +331,6 @@ def peak_pressure(strips: Strips, *, elliptic: bool) -> FloatArray:
     inside = strips.half_length > 0.0
     mean = strips.line_load / np.where(inside, strips.half_length, 1.0)
     return np.where(inside, (2.0 / math.pi if elliptic else 0.75) * mean, 0.0)
-
-
-def single_flexibility(strips: Strips, flexibility: Flexibilities, slip: LocalSlip) -> float:
-    """Return the single flexibility [m/Pa] that replaces Kalker's three at this creepage.
-
-    The weights are the mean magnitude of the longitudinal creepage, the lateral creepage and the
-    spin times sqrt(ab) of the equivalent ellipse.
-    """
-    a, b = equivalent_ellipse(strips)
-    return one_flexibility(
-        flexibility.longitudinal,
-        flexibility.lateral,
-        flexibility.spin,
-        load_weighted_mean(strips, np.abs(slip.longitudinal - slip.spin_part)),
-        float(slip.lateral),
-        float(slip.spin) * math.sqrt(a * b),
-    )
 
 
 def touching(strips: Strips) -> slice:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
@@ -17,6 +18,7 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
     creepage_coefficients,
     flexibilities,
     line_limit_coefficients,
+    one_flexibility,
     spline,
 )
 from wearsim.mechanics.tangential.strip_with_spin import (
@@ -30,11 +32,10 @@ from wearsim.models.tangential.base import (
     Strips,
     TangentialTheory,
     Tractions,
-    covered_share,
+    covered_tractions,
     equivalent_ellipse,
+    load_weighted_mean,
     peak_pressure,
-    single_flexibility,
-    spread_work,
     touching,
 )
 from wearsim.types import ContactFields, FloatArray
@@ -92,11 +93,8 @@ class FastsimTheory(TangentialTheory):
         coefficients: CreepageCoefficients | None = None,
         flexibility: Flexibility = "three",
     ) -> None:
-        self.elliptic = bound == "elliptic"
-        self.mx = mx
-        self.kalker = kalker
-        self.coefficients = coefficients
-        self.single = flexibility == "one"
+        self.elliptic, self.single = bound == "elliptic", flexibility == "one"
+        self.mx, self.kalker, self.coefficients = mx, kalker, coefficients
 
     def flexibilities(self, strips: Strips, pair: ElasticPair) -> Flexibilities:
         """Return L1, L2 and L3 of the equivalent ellipse of the strips.
@@ -122,11 +120,19 @@ class FastsimTheory(TangentialTheory):
     def flexibilities_under(
         self, strips: Strips, pair: ElasticPair, slip: LocalSlip
     ) -> Flexibilities:
-        """Return the flexibilities of the march for a creepage."""
-        three = self.flexibilities(strips, pair)
-        return (
-            Flexibilities(*[single_flexibility(strips, three, slip)] * 3) if self.single else three
+        """Return the flexibilities of the march for a creepage.
+
+        The weights of a single one are the mean magnitude of the longitudinal creepage, the lateral
+        creepage and the spin times sqrt(ab) of the equivalent ellipse.
+        """
+        three, (a, b) = self.flexibilities(strips, pair), equivalent_ellipse(strips)
+        one = one_flexibility(
+            *three,
+            load_weighted_mean(strips, np.abs(slip.longitudinal - slip.spin_part)),
+            float(slip.lateral),
+            float(slip.spin) * math.sqrt(a * b),
         )
+        return Flexibilities(one, one, one) if self.single else three
 
     def tractions(
         self,
@@ -143,10 +149,7 @@ class FastsimTheory(TangentialTheory):
         out = np.zeros((4, len(strips.y)))
         # without spin the closed form is exact
         out[:, part] = march(*problem, self.mx) if slip.spin else closed_form(*problem[:5])
-        out[:3] *= covered_share(strips)
-        force_x, force_y, moment, adhesion = out
-        work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
-        return Tractions(force_x, force_y, moment, spread_work(-rolling_speed * work), adhesion)
+        return covered_tractions(strips, slip, rolling_speed, out)
 
     def fields(
         self,
@@ -297,10 +300,7 @@ class FastripTheory(TangentialTheory):
         out = np.zeros((4, len(strips.y)))
         beyond = self._march.flexibilities_under(strips, pair, slip).longitudinal
         out[:, part] = fastrip(*problem, beyond, self.mx)
-        out[:3] *= covered_share(strips)
-        force_x, force_y, moment, adhesion = out
-        work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
-        return Tractions(force_x, force_y, moment, spread_work(-rolling_speed * work), adhesion)
+        return covered_tractions(strips, slip, rolling_speed, out)
 
     def fields(
         self,

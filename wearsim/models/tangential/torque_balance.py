@@ -66,8 +66,16 @@ def balanced_creepage(
     lost = np.flatnonzero(~converged & rolls & ((low >= 0.0) | (high <= 0.0)))
     if len(lost):
         k = int(lost[0])
-        torque, carried = bearing_torque[k], needed[k] + (high[k] if needed[k] > 0.0 else low[k])
-        raise _skidding(float(torque), abs(float(carried)), state_of(k))
+        torque, state = float(bearing_torque[k]), state_of(k)
+        carried = abs(float(needed[k] + (high[k] if needed[k] > 0.0 else low[k])))
+        raise ContactError(
+            f"the roller skids: its torque of {1e3 * torque:.4g} N mm exceeds the"
+            f" {1e3 * carried:.4g} N mm that friction can transmit at a load of"
+            f" {state['normal_force']:.4g} N",
+            {"torque": torque, "carried": carried, **state},
+            remedy="lower creepage.bearing_torque, or raise friction.coefficient or the load",
+            cause="skid",
+        )
     return np.where(converged, creepage, bracketed_roots(excess, -reach, reach, first))
 
 
@@ -105,18 +113,17 @@ def with_balanced_creepage(
     guesses = np.zeros(len(batch)) if guess is None else guess.longitudinal_creepage
     friction = batch.friction.reshape(len(batch), -1).max(axis=1)
     full_slip = friction * half_length.max(axis=1) * batch.longitudinal_curvature
-    added_creepage = 100.0 * np.abs(batch.lateral)
     if batch.variation is not None:
-        added_creepage = added_creepage + np.abs(batch.variation).max(axis=1)
+        variation = np.abs(batch.variation).max(axis=1)
     else:
-        added_creepage = added_creepage + np.abs(batch.spin) * np.abs(grid.y).max()
+        variation = np.abs(batch.spin) * np.abs(grid.y).max()
     creepage = balanced_creepage(
         lambda creepage: torque_of(batch.replaced(longitudinal=creepage)),
         batch.bearing_torque,
         batch.longitudinal,
         np.where(np.isfinite(guesses), guesses, 0.0),
         full_slip / pair.creep_factor,
-        added_creepage,
+        100.0 * np.abs(batch.lateral) + variation,
         lambda k: {
             "normal_force": float(batch.normal_force[k]),
             "line_load": line_load[k],
@@ -124,15 +131,3 @@ def with_balanced_creepage(
         },
     )
     return batch.replaced(longitudinal=creepage)
-
-
-def _skidding(torque: float, carried: float, state: Mapping[str, Any]) -> ContactError:
-    """Return the error of a free roller: friction cannot transmit its bearing torque."""
-    return ContactError(
-        f"the roller skids: its torque of {1e3 * torque:.4g} N mm exceeds the"
-        f" {1e3 * carried:.4g} N mm that friction can transmit at a load of"
-        f" {state['normal_force']:.4g} N",
-        {"torque": torque, "carried": carried, **state},
-        remedy="lower creepage.bearing_torque, or raise friction.coefficient or the load",
-        cause="skid",
-    )

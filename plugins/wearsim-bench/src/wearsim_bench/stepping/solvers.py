@@ -12,10 +12,10 @@ from wearsim.evolution.error_estimates import DEPTHS
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.single_step import (
-    WearIncrement,
     present_problem,
     recovery_at,
     solve_at_present_loads,
+    worn_depths,
 )
 from wearsim.types import FloatArray
 
@@ -47,8 +47,8 @@ class _Rates:
         self.bodies = [name for name in DEPTHS if rates[name].any()]
 
     def _wear(self) -> dict[str, FloatArray]:
-        wear = WearIncrement(present_problem(self.problem, self.state), self.state.contacts, 1.0)
-        return dict(zip(DEPTHS, (wear.cylinder, wear.roller), strict=True))
+        present = present_problem(self.problem, self.state)
+        return dict(zip(DEPTHS, worn_depths(present, self.state.contacts, 1.0), strict=True))
 
     def start(self) -> FloatArray:
         """Return the depths of fresh bodies."""
