@@ -449,13 +449,14 @@ class Result(StudyResult[RunData]):
 
     def _final_errors(self, last: Arrays) -> dict[str, Number]:
         """Return the estimated errors of the final state, the greatest one over the rollers."""
-        errors: dict[str, Number] = {}
-        for name in ESTIMATED:
-            error = last.get(f"{name}_error")
-            if error is not None and ALL_VARIABLES[name].unit != "1":
-                greatest = error.max(axis=0) if "roller" in ALL_VARIABLES[name].dims else error
-                errors[_key(name, "_error")] = _number(greatest)
-        return errors
+        known = {name: last[f"{name}_error"] for name in ESTIMATED if f"{name}_error" in last}
+        return {
+            _key(name, "_error"): _number(
+                error.max(axis=0) if "roller" in ALL_VARIABLES[name].dims else error
+            )
+            for name, error in known.items()
+            if ALL_VARIABLES[name].unit != "1"
+        }
 
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
         """Return the final state of a cam, and depth and lift error per station."""
