@@ -50,13 +50,8 @@ class CamTurn:
 
     def __init__(self, scenario: Scenario) -> None:
         if scenario.cam is None:
-            raise mistake_in(
-                scenario.file,
-                "is needed for the kinematics of a cam",
-                "none",
-                "a table [cam]",
-                table="cam",
-            )
+            what = "is needed for the kinematics of a cam"
+            raise mistake_in(scenario.file, what, "none", "a table [cam]", table="cam")
         self.scenario, self.cam = scenario, scenario.cam
         self._path = path_of(self.cam)
         self.speed = scenario.operation.speed
@@ -225,14 +220,9 @@ class CamTurn:
         try:
             return skid_arcs(self.panels, rolling)
         except ValueError as error:
+            remedy = "a smaller inertia, bearing torque or speed, or a greater load"
             place = {"table": "roller", "key": "inertia"}
-            raise mistake_in(
-                self.scenario.file,
-                str(error),
-                None,
-                "a smaller inertia, bearing torque or speed, or a greater load",
-                **place,
-            ) from error
+            raise mistake_in(self.scenario.file, str(error), None, remedy, **place) from error
 
     def _greatest_torque(self, point: Point) -> FloatArray:
         """Return the greatest torque that friction transmits to the roller [N m]."""
@@ -473,14 +463,10 @@ class CamTurn:
         greatest, theta = self._extreme("radius", self.radius)
         if greatest < follower.centre_distance:
             return []
-        mistake = Mistake(
-            "cam",
-            "base_radius",
-            "the cam reaches the pivot of the arm: its greatest radius is",
-            f"{1e3 * greatest:.6g} mm at {self.place(theta)}",
-            f"less than {1e3 * follower.centre_distance:.6g} mm, follower.centre_distance",
-        )
-        return [mistake]
+        got = f"{1e3 * greatest:.6g} mm at {self.place(theta)}"
+        what = "the cam reaches the pivot of the arm: its greatest radius is"
+        expected = f"less than {1e3 * follower.centre_distance:.6g} mm, follower.centre_distance"
+        return [Mistake("cam", "base_radius", what, got, expected)]
 
     def radius(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the distance of the cam's surface from its axis at angles within a panel [m]."""

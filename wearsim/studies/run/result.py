@@ -99,12 +99,11 @@ class RunData(StudyData):
         """Return the content of a file from its fields, variables and checkpoint."""
         groups = {"static": "static", "history": "history", "records": "record"}
         known = cls.schema_of(attributes, variables).variables
-        by_kind = {
+        by_kind: dict[str, Any] = {
             group: {name: variables[name] for name, item in known.items() if item.kind == kind}
             for group, kind in groups.items()
         }
-        parts: dict[str, Any] = {**attributes, **by_kind}
-        return cls(**parts, checkpoint=checkpoint)
+        return cls(**{**attributes, **by_kind}, checkpoint=checkpoint)
 
     @property
     def variables(self) -> Arrays:
