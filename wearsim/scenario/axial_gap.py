@@ -46,8 +46,7 @@ class AxialGap:
             return None
         if math.isinf(radii[1]):
             return radii[0]
-        curvature = sum(1.0 / radius for radius in radii if radius is not None)
-        return 1.0 / curvature
+        return 1.0 / sum(1.0 / radius for radius in radii if radius is not None)
 
     @cached_property
     def is_crowned(self) -> bool:
@@ -60,7 +59,7 @@ class AxialGap:
 
     def cylinder_drop(self, y: FloatArray) -> FloatArray:
         """Return the drop of the cylinder at axial positions [m]; beyond its ends it is great."""
-        if self._cylinder.crown_radius == math.inf:
+        if not self.has_crowned_cylinder:
             return np.zeros_like(y)
         half = 0.5 * self._cylinder.length
         if math.isinf(half):
@@ -91,8 +90,7 @@ class AxialGap:
         """
         if self.is_crowned:
             return np.asarray(np.sqrt(2.0 * (self.crown_radius or 0.0) * depth))
-        places, drops, _ = self._table
-        return np.asarray(np.interp(depth, drops, places))
+        return np.asarray(np.interp(depth, self._table[1], self._table[0]))
 
     def depth_of(self, area: FloatArray | float) -> FloatArray:
         """Return the depth of a conformal groove with a cross-section [m^2] [m]."""
@@ -100,9 +98,8 @@ class AxialGap:
             root = np.sqrt(2.0 * (self.crown_radius or 0.0))
             return np.asarray((0.75 * np.asarray(area) / root) ** (2.0 / 3.0))
         places, drops, areas = self._table
-        depth = np.interp(area, areas, drops)
         beyond = np.maximum(np.asarray(area) - areas[-1], 0.0) / (2.0 * places[-1])
-        return np.asarray(depth + beyond)
+        return np.asarray(np.interp(area, areas, drops) + beyond)
 
     @property
     def greatest_half_width(self) -> float:
@@ -118,14 +115,13 @@ class AxialGap:
 
     def depth_at(self, half_width: float) -> float:
         """Return the depth of a conformal groove of a half-width [m]."""
-        places, drops, _ = self._table
-        return float(np.interp(half_width, places, drops))
+        return float(np.interp(half_width, *self._table[:2]))
 
     def mean_drop(self, half_width: float) -> float:
         """Return the mean of the gap over a half-width [m]."""
-        places, drops, areas = self._table
-        level = float(np.interp(half_width, places, drops))
-        return level - float(np.interp(half_width, places, areas)) / (2.0 * half_width)
+        places, _, areas = self._table
+        area = float(np.interp(half_width, places, areas))
+        return self.depth_at(half_width) - area / (2.0 * half_width)
 
     def shift(self, tilt: FloatArray, half_width: float) -> FloatArray:
         """Return the axial distance by which tilt moves a contact from the apex [m].
@@ -145,14 +141,12 @@ class AxialGap:
             most = self._table[0][-1]
             half = min(half_width, 0.5 * most)
             middles = np.linspace(-(most - half), most - half, _POINTS)
-            slope = (self.drop(middles + half) - self.drop(middles - half)) / (2.0 * half)
-            slope = np.maximum.accumulate(slope)
+            rise = self.drop(middles + half) - self.drop(middles - half)
+            slope = np.maximum.accumulate(rise / (2.0 * half))
             rising = np.concatenate([[True], np.diff(slope) > 0.0])  # the first of equal ones
             moved = np.interp(-np.asarray(tilt), slope[rising], middles[rising])
             moved = np.where(np.asarray(tilt) == 0.0, 0.0, moved)
-        if math.isfinite(self._half):
-            moved = np.clip(moved, -self._half, self._half)
-        return np.asarray(moved)
+        return np.clip(moved, -self._half, self._half)
 
     @cached_property
     def _table(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -168,10 +162,9 @@ class AxialGap:
         # dense in the middle and at the end, where logarithmic profiles are steep
         places = 0.5 * most * (1.0 - np.cos(np.linspace(0.0, np.pi, _POINTS)))
         drops = np.maximum.accumulate(self._lower(places))
-        drops = drops - drops[0]
+        drops -= drops[0]
         steps = np.diff(places) * 0.5 * (drops[1:] + drops[:-1])
-        below = np.concatenate([[0.0], np.cumsum(steps)])
-        return places, drops, 2.0 * (places * drops - below)
+        return places, drops, 2.0 * (places * drops - np.append(0.0, np.cumsum(steps)))
 
     def _lower(self, s: FloatArray) -> FloatArray:
         return np.minimum(self.drop(s), self.drop(-s))

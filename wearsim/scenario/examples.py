@@ -130,9 +130,13 @@ def scenario_schema() -> dict[str, Any]:
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
         kind = kind or _model(table, model.__doc__, keys)
         tables[table] = kind, Field(... if table in REQUIRED else None, description=model.__doc__)
-    for spec in installed(TableSpec):
-        owned = _model(spec.name, spec.summary, _fields(spec.options))
-        tables[spec.name] = owned, Field(None, description=spec.summary)
+    tables |= {
+        spec.name: (
+            _model(spec.name, spec.summary, _fields(spec.options)),
+            Field(None, description=spec.summary),
+        )
+        for spec in installed(TableSpec)
+    }
     scenario = _model(
         "wearsim scenario",
         "Scenario of a wear simulation of a rolling contact, for wearsim.",

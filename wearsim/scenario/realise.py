@@ -41,13 +41,11 @@ def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
         If a value is out of its bounds.
     """
     owners = {key: item for item in scenario.random for key in item.keys}
-    unknown = [key for key in values if key not in owners]
-    if unknown:
+    if unknown := [key for key in values if key not in owners]:
         raise ValueError(f"no random input sets {unknown[0]}; known: {', '.join(owners) or 'none'}")
     numbers: dict[str, dict[str, Any]] = {}
     for key, value in values.items():
-        missing = [other for other in owners[key].keys if other not in values]
-        if missing:
+        if missing := [other for other in owners[key].keys if other not in values]:
             raise ValueError(f"{owners[key].name} sets {missing[0]} too, which is not given")
         *tables, last = key.split(".")
         place: dict[str, Any] = numbers

@@ -42,8 +42,10 @@ _NO_LENGTH = Mistake(
     "none",
     'one of them, such as duration = "450 min"',
 )
-_WEAR = 'law = "archard-dissipation" and its options'
-_NO_WEAR = Mistake("wear", "", "the table is needed for a run", None, _WEAR)
+_NO_WEAR = Mistake(
+    *("wear", "", "the table is needed for a run"),
+    *(None, 'law = "archard-dissipation" and its options'),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,8 +272,7 @@ class Scenario:
         digest = hashlib.sha256()
         for part in (self.text, *(part for item in sorted(self.files.items()) for part in item)):
             data = part.encode()
-            digest.update(f"{len(data)}:".encode())
-            digest.update(data)
+            digest.update(f"{len(data)}:".encode() + data)
         return digest.hexdigest()
 
     @cached_property
@@ -392,8 +393,8 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
             what = "is a results file, not a scenario"
             shell = f"show it with: wearsim show {path}"
             python = f'open it with wearsim.open_results("{path}")'
-        mistake = Mistake("", "", what)
-        raise ScenarioError(str(path), [mistake], python=python, shell=shell) from error
+        mistakes = [Mistake("", "", what)]
+        raise ScenarioError(str(path), mistakes, python=python, shell=shell) from error
     except OSError as error:
         raise mistake_in(str(path), f"the file cannot be read ({error.strerror})") from error
     return parse_scenario(text, str(path), reader_in(path.parent), overrides)

@@ -79,8 +79,7 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     options = scenario.contact.options
     assert isinstance(options, AutoTable)
     table = calibration()
-    field = next((item.name for item in scenario.random if item.role == "field"), None)
-    if field is not None:
+    if field := next((item.name for item in scenario.random if item.role == "field"), None):
         raise _refusal(scenario, f"{field} is a field, and no error is calibrated for it")
     states, where = _looked_at(scenario, test)
     reason = _coupling(scenario) or _not_calibrated(table, states)
@@ -113,8 +112,8 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
         missing = REFERENCE not in registry().names(ContactModelSpec)
         remedies = [f"install '{REFERENCE}' ({INSTALL[REFERENCE]})"] if missing else []
         if not missing:
-            why = _hindrance(scenario, _choice(scenario, REFERENCE, {}), states, test)
-            why = why.partition(";")[0]
+            of_reference = _choice(scenario, REFERENCE, {})
+            why = _hindrance(scenario, of_reference, states, test).partition(";")[0]
             reason += f"; the exact theory, '{REFERENCE}', is not possible: {why}"
         raise _refusal(scenario, reason, *remedies, *(["raise the tolerance"] if every else []))
     error, model = finest[0]
@@ -219,9 +218,14 @@ def _looked_at(scenario: Scenario, test: bool) -> tuple[list[_State], str]:
     if not test:
         return [_single(scout)], "in this contact"
     evolution = scout.evolution.model_copy(
-        update={"stepper": "auto", "step": None, "nodes": None, "tolerance": _TOLERANCE}
+        update={
+            "stepper": "auto",
+            "step": None,
+            "nodes": None,
+            "tolerance": _TOLERANCE,
+            "strip_error": False,
+        }
     )
-    evolution = evolution.model_copy(update={"strip_error": False})
     seen: list[tuple[WearProblem, WearState]] = []
     run: RunInProgress | None = None
 

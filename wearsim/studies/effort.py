@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import shutil
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -60,27 +59,6 @@ _OF_FILE = 5.0  # memory over the size of the results file
 LARGE = 1e9  # bytes, size of the records of which `check` and `run` warn
 
 
-@dataclass(frozen=True)
-class Effort:
-    """What a run takes, within a factor of three.
-
-    Parameters
-    ----------
-    steps, solves : int
-        Steps, and solutions of all contacts together.
-    seconds : float
-        Wall time [s].
-    memory, file_size : float
-        Memory of the process and size of the results file [bytes].
-    """
-
-    steps: int
-    solves: int
-    seconds: float
-    memory: float
-    file_size: float
-
-
 def forecast_data(
     scenario: Scenario, problem: WearProblem, stepper: str
 ) -> tuple[dict[str, Any], list[str]]:
@@ -121,13 +99,9 @@ def forecast_data(
         "dissipated_energy_J": wear["energy"],
         "lift_error_m": wear.get("lift_error"),
         **{key: wear[key] for key in OF_FATIGUE if key in wear},
-        "steps": effort.steps,
-        "contact_solves": effort.solves,
-        "wall_time_s": effort.seconds,
-        "memory_bytes": effort.memory,
-        "file_bytes": effort.file_size,
+        **effort,
     }
-    return data, list(_warnings(scenario, forecast, wear, effort))
+    return data, list(_warnings(scenario, forecast, wear, effort["wall_time_s"]))
 
 
 def _limits(
@@ -166,7 +140,7 @@ def _check_strips(forecast: WearForecast, passes: float) -> None:
 
 
 def _warnings(
-    scenario: Scenario, forecast: WearForecast, wear: dict[str, float], effort: Effort
+    scenario: Scenario, forecast: WearForecast, wear: dict[str, float], seconds: float
 ) -> Iterator[str]:
     """Return warnings of deep or wide grooves, of contacts that fail, and of a long run."""
     roller, depth = scenario.roller, max(wear["depth"], wear["roller_depth"])
@@ -197,15 +171,16 @@ def _warnings(
     solved = forecast.passes_solved
     # the load of a spring tends to zero, and a step without load is no failure of the run
     if isinstance(forecast.failure, ContactError) and solved < scenario.total_passes:
-        what = forecast.failure.message
-        yield f"forecast of the contacts: after about {solved:.2g} passes {what}"
+        yield (
+            f"forecast of the contacts: after about {solved:.2g} passes {forecast.failure.message}"
+        )
     if text := large_records(scenario, forecast.problem):
         yield text
-    if effort.seconds > LONG:
+    if seconds > LONG:
         less = f"a higher evolution.tolerance than {scenario.evolution.tolerance:g}"
         if scenario.contact.model != "slender":
             less += " or contact.model = 'slender'"
-        time = lapse(float(f"{effort.seconds:.2g}"))
+        time = lapse(float(f"{seconds:.2g}"))
         yield f"forecast of the time: about {time}; {less} takes less"
 
 
@@ -266,8 +241,8 @@ def restarts_of(problem: WearProblem, depth: float) -> float:
     return float((cam.stiffness.ravel() * depth / force).max()) / FALLEN
 
 
-def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effort:
-    """Return what a run takes.
+def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> dict[str, float]:
+    """Return what a run takes, within a factor of three: steps, contacts, time, memory and file.
 
     Parameters
     ----------
@@ -278,14 +253,11 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     """
     problem, passes = forecast.problem, float(scenario.total_passes)
     wear = forecast.at(passes)
-    relative = wear["clearance"] / forecast.elastic
-    steps = _STEPS * (1.0 + relative) ** _STEPS_POWER
+    steps = _STEPS * (1.0 + wear["clearance"] / forecast.elastic) ** _STEPS_POWER
     steps *= (scenario.evolution.tolerance / DEFAULT_TOLERANCE) ** _TOLERANCE_POWER
     records, record = records_of(scenario, problem)
-    if stepper == "stabilised":
-        steps *= _STEPS_OF_STABILISED
-    if problem.has_spring:
-        steps *= _STEPS_OF_SPRING
+    steps *= _STEPS_OF_STABILISED if stepper == "stabilised" else 1.0
+    steps *= _STEPS_OF_SPRING if problem.has_spring else 1.0
     if stepper == "explicit":
         steps = forecast.stable_steps(passes, _STABLE)
     if scenario.evolution.step is not None:
@@ -307,8 +279,8 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
         compiled = problem.model.capabilities.pass_loop
         per_step = (_PASS * solve if compiled else groove) / problem.contacts_each
     else:
-        per_step = _STEP * groove
-        per_step += (_OF_REFERENCE if scenario.contact.spec.reference else 2.0) * solve
+        solves = _OF_REFERENCE if scenario.contact.spec.reference else 2.0
+        per_step = _STEP * groove + solves * solve
         if contacts > 1:
             per_step += _OF_CONTACT * stations * contacts * strips**2
         if stations > 1 and rollers > 1 and wear["roller_depth"] > 0.0:
@@ -317,13 +289,13 @@ def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> Effor
     rows = row * (records if stepper == "per-pass" else steps)
     size = _FILE + records * record + 8.0 * (_CHECKPOINT * stations * contacts * strips + rows)
     system = contacts * rollers * strips**2 if stepper == "implicit" else 0.0
-    return Effort(
-        steps=math.ceil(steps),
-        solves=math.ceil(steps * stages) * problem.contacts_each,
-        seconds=_START
+    return {
+        "steps": math.ceil(steps),
+        "contact_solves": math.ceil(steps * stages) * problem.contacts_each,
+        "wall_time_s": _START
         + steps * per_step
         + restarts * (_STATIONS + _SOLVES_OF_RESTART * groove)
         + _RECORD * max(records - steps, 0.0) * solve,
-        memory=_MEMORY + _OF_FILE * size + _SYSTEM * system,
-        file_size=size,
-    )
+        "memory_bytes": _MEMORY + _OF_FILE * size + _SYSTEM * system,
+        "file_bytes": size,
+    }

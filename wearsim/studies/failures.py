@@ -39,12 +39,11 @@ def explained(
 
 def too_deep(scenario: Scenario, depth: float) -> str:
     """Return that a worn depth [m] is beyond the validity of the models, or an empty text."""
-    radius = scenario.roller.radius
     if depth <= scenario.greatest_valid_depth:
         return ""
     return (
         f"the worn depth of {depth * 1e3:.4g} mm exceeds a tenth of roller.radius ="
-        f" {radius * 1e3:.6g} mm, up to which the contact models hold"
+        f" {scenario.roller.radius * 1e3:.6g} mm, up to which the contact models hold"
     )
 
 
@@ -80,8 +79,7 @@ def length_key(scenario: Scenario) -> str:
 def _edge(error: SolverError, scenario: Scenario) -> tuple[str, str]:
     choice, roller = scenario.contact, scenario.roller
     if choice.width is not None:
-        given = f"contact.width = {choice.width * 1e3:.6g} mm"
-        centre = choice.centre
+        given, centre = f"contact.width = {choice.width * 1e3:.6g} mm", choice.centre
         where = "" if centre is None else f", move contact.centre = {centre * 1e3:.6g} mm"
         remedy = f"raise {given}{where}, or leave it out, and the strips follow the groove"
         return error.message, remedy
@@ -118,8 +116,7 @@ def _too_fine(error: SolverError, scenario: Scenario) -> tuple[str, str]:
         return what, "use contact.model = 'halfspace', or 'hertz-fastsim' for a single contact"
     if choice.strips is None:
         return error.message, "set a lower number contact.strips than the automatic one"
-    width = choice.width or 2.4 * patch.b
-    most = math.floor(math.exp(HIGHEST) * width / patch.a)
+    most = math.floor(math.exp(HIGHEST) * (choice.width or 2.4 * patch.b) / patch.a)
     return error.message, f"lower contact.strips = {choice.strips} to at most {most}"
 
 

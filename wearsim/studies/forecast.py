@@ -108,8 +108,7 @@ class WearForecast:
         self._centres = np.array([middle.min(), middle.max()])
         # of the nominal surfaces: a start profile may fit the roller, without any rise
         half = 0.5 * problem.grid.spacing * max(int(loaded.sum(axis=-1).max()) - 1, 1)
-        least = self._scout.axial_gap.depth_at(half)
-        self.elastic = float(rise.max(initial=least, where=loaded))
+        self.elastic = float(rise.max(initial=self._scout.axial_gap.depth_at(half), where=loaded))
         self._places = places_across(problem)
         self._depths: list[float] = []
         self._rates: list[Rates] = []
@@ -128,12 +127,11 @@ class WearForecast:
         """
         self._extend(passes)
         course, problem = self._course(), self.problem
-        stations = range(problem.shape[0])
 
         def there(name: str) -> FloatArray:
             """Return a column of every station at the passes."""
-            done, column = course["passes"], course[name]
-            return np.array([np.interp(passes, done[:, s], column[:, s]) for s in stations])
+            columns = zip(course["passes"].T, course[name].T, strict=True)
+            return np.array([np.interp(passes, *column) for column in columns])
 
         depth, track = there("total"), problem.kinematics.track
         values = {
@@ -176,10 +174,9 @@ class WearForecast:
 
     def stable_steps(self, passes: float, part: float) -> float:
         """Return the number of explicit steps that each wear a part of q/(pi E*) at most."""
-        modulus = self._scout.pair.contact_modulus
         load = float(self._fresh.contacts.line_load.max())
         rate = (self._rates[0]["cylinder"] + self._rates[0]["roller"]).max()
-        return float(passes * rate / (part * load / (np.pi * modulus)))
+        return float(passes * rate / (part * load / (np.pi * self._scout.pair.contact_modulus)))
 
     def _extend(self, passes: float) -> None:
         """Solve further grooves until the course has some passes, or the contacts fail."""
@@ -243,8 +240,8 @@ class WearForecast:
         if depth == 0.0:
             return self.problem, self._fresh
         scenario, last = self._scout, self._rates[-1]
-        half = float(scenario.axial_gap.half_width(depth + self.elastic))
-        half = min(half, 0.5 * (scenario.roller.width or np.inf))
+        groove, width = depth + self.elastic, scenario.roller.width or np.inf
+        half = min(float(scenario.axial_gap.half_width(groove)), 0.5 * width)
         low, high = self._centres + np.array([-_MARGIN, _MARGIN]) * half
         if scenario.roller.width is not None and not scenario.axial_gap.is_crowned:
             # the lowest point may be away from the middle of the groove
@@ -257,9 +254,8 @@ class WearForecast:
         if scenario is not self.scenario:
             problem = replace(problem, model=prepared_model(scenario, grid))
         worn = np.maximum(depth - problem.nominal_gap + problem.nominal_least_gap[..., None], 0.0)
-        rollers = np.zeros((1, problem.rollers, *worn.shape[2:]))
-        for number in range(problem.rollers):
-            rollers[0, number] = worn[:, problem.roller == number].max(axis=(0, 1))
+        numbers = range(problem.rollers)
+        rollers = np.array([[worn[:, problem.roller == k].max(axis=(0, 1)) for k in numbers]])
         cylinder = np.repeat(worn.max(axis=(0, 1), keepdims=True), len(worn), axis=0)
         share = last["cylinder"] / np.maximum(last["cylinder"] + last["roller"], TINY)
         # a spring needs a first guess of the load on these strips

@@ -100,8 +100,7 @@ def compilation_counted(
     needed : callable
         Returns the names of the kernels of the study; called at the first compilation only.
     """
-    names: set[str] = set()
-    started: set[str] = set()
+    names, started = set[str](), set[str]()
 
     def count(name: str) -> None:
         if not names:

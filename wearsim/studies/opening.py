@@ -145,8 +145,7 @@ def views_of(results: Sequence[Any]) -> list[View]:
     Results that cannot be compared, such as a run and lives of the same design, have none.
     """
     views = [result.view for result in results]
-    comparable = len({kind_of_result(result).compare for result in results}) == 1
-    if len(views) == 1 or not comparable:
+    if len(views) == 1 or len({kind_of_result(result).compare for result in results}) > 1:
         return views
     return [comparison_of(results, labels_of(results)), *views]
 

@@ -94,8 +94,7 @@ def _of_pressure(setup: Setup, load: float, friction: float) -> Iterator[str]:
     text = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
     bodies = ("roller", scenario.roller), (scenario.cylinder.name, scenario.cylinder)
     for name, body in bodies:
-        strength, hardness = body.material.yield_stress, body.material.hardness
-        limit, what = hardness, "its hardness"
+        strength, limit, what = body.material.yield_stress, body.material.hardness, "its hardness"
         if strength is not None:
             factor = min(SHAKEDOWN, 1.0 / friction if friction > 0.0 else SHAKEDOWN)
             limit = factor * strength / math.sqrt(3.0)
@@ -135,10 +134,8 @@ def _of_fatigue(
 
 
 def _of_slip(scenario: Scenario, friction: float) -> Iterator[str]:
-    creepage = scenario.creepage
     for key in ("longitudinal", "yaw"):
-        value = getattr(creepage, key)
-        size = _greatest(scenario, f"creepage.{key}", value or 0.0)
+        size = _greatest(scenario, f"creepage.{key}", getattr(scenario.creepage, key) or 0.0)
         if size > GREATEST_CREEPAGE:
             yield (
                 f"creepage.{key}: a creepage of {size:.3g} exceeds {GREATEST_CREEPAGE:.0%}; it is"
@@ -154,8 +151,7 @@ def _of_width(setup: Setup, force: float) -> Iterator[str]:
         yield from _of_edge(setup, force)
     if scenario.contact.width or scenario.roller.width or force <= 0.0:
         return
-    half_width = setup.widest_patch(force).b
-    crown = scenario.roller.crown_radius
+    half_width, crown = setup.widest_patch(force).b, scenario.roller.crown_radius
     if half_width > WIDEST * scenario.roller.radius:
         form = "" if math.isnan(crown) else f" of {crown * 1e3:.4g} mm"
         key = "axial_profile" if math.isnan(crown) else "crown_radius"

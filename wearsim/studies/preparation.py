@@ -57,9 +57,13 @@ def checked_count(scenario: Scenario, realisations: int) -> int:
     count = whole_number("realisations", realisations, 1000)
     size = bytes_per_realisation(scenario)
     if count * size > MOST_BYTES:
-        what = f"would take {count * size / 1e9:,.4g} GB of memory, {size} bytes each"
-        most = f"at most {MOST_BYTES // size}, which take {MOST_BYTES / 1e9:g} GB"
-        raise mistake_in(scenario.file, what, str(count), most, key="realisations")
+        raise mistake_in(
+            scenario.file,
+            f"would take {count * size / 1e9:,.4g} GB of memory, {size} bytes each",
+            str(count),
+            f"at most {MOST_BYTES // size}, which take {MOST_BYTES / 1e9:g} GB",
+            key="realisations",
+        )
     return count
 
 

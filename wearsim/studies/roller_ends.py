@@ -64,8 +64,7 @@ def edge_in_contact(scenario: Scenario, load: float) -> float:
     It is where the edge is less than the elastic approach below the crown, which in a line contact
     is about twelve times q/(pi E*).
     """
-    roller = scenario.roller
-    modulus = scenario.pair.contact_modulus
+    roller, modulus = scenario.roller, scenario.pair.contact_modulus
     approach = 12.0 * load / (roller.width or math.inf) / (math.pi * modulus)
     if roller.edge_radius:
         return min(roller.edge_radius, math.sqrt(2.0 * roller.edge_radius * approach))
@@ -75,9 +74,7 @@ def edge_in_contact(scenario: Scenario, load: float) -> float:
 def strips_of_roller(scenario: Scenario, least: int, load: float) -> int:
     """Return the number of strips for the width of a roller: `least`, or more for its edges."""
     width, edge = scenario.roller.width or 0.0, edge_in_contact(scenario, load)
-    most = MOST_STRIPS_PER_ROLLER
-    needed = (
-        math.ceil(STRIPS_PER_EDGE * width / edge) if edge * most > STRIPS_PER_EDGE * width else 0
-    )
+    resolves = edge * MOST_STRIPS_PER_ROLLER > STRIPS_PER_EDGE * width
+    needed = math.ceil(STRIPS_PER_EDGE * width / edge) if resolves else 0
     strips = max(least, needed) + 2 * STRIPS_BEYOND
     return strips + (strips + 1) % 2

@@ -55,8 +55,7 @@ class RecordSchedule:
             return cls(float(outputs.every_passes), base, count)
         if outputs.every is not None:
             return cls(outputs.every * scenario.pass_rate, base, count)
-        even = outputs.spacing == "even" or base <= 1.0
-        return cls(base / count if even else 0.0, base, count)
+        return cls(base / count if outputs.spacing == "even" or base <= 1.0 else 0.0, base, count)
 
     def interval_at(self, passes: float) -> float:
         """Return the interval of the records that are kept after some passes, 0 if geometric.
@@ -139,14 +138,13 @@ def due_records(
     advance: Advance, schedule: RecordSchedule, stop: float, pass_by_pass: bool
 ) -> list[Due]:
     """Return the records of a step in order; `stop` is the end of the tests [passes]."""
-    records: list[Due] = []
-    for source, (start, end) in enumerate(pairwise(advance.path)):
-        each = enumerate(zip(start.passes.tolist(), end.passes.tolist(), strict=True))
-        for place, (first, last) in each:
-            between = schedule.due_between(first, last, stop, pass_by_pass)
-            if between:
-                records += [(source + at_end, place, passes) for passes, at_end in between]
-    return sorted(records)
+    ends = pairwise(state.passes.tolist() for state in advance.path)
+    return sorted(
+        (source + at_end, place, passes)
+        for source, steps in enumerate(ends)
+        for place, (first, last) in enumerate(zip(*steps, strict=True))
+        for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
+    )
 
 
 def states_at(
@@ -162,14 +160,11 @@ def states_at(
     due : sequence of Due
         Some of its records in order; each becomes a realisation.
     """
-    places, states = [], []
-    for source, group in groupby(due, key=itemgetter(0)):
-        places.append(np.array([place for _, place, _ in group]))
-        state = advance.path[source].replaced(
-            coarse_step_solution=None, half_quadrature_solution=None
-        )
-        states.append(state.at(places[-1]))
-    problem, state = advance.problem.at(np.concatenate(places)), joined_states(states)
+    groups = {source: [item[1] for item in of] for source, of in groupby(due, key=itemgetter(0))}
+    plain = {"coarse_step_solution": None, "half_quadrature_solution": None}
+    states = [advance.path[k].replaced(**plain).at(np.array(of)) for k, of in groups.items()]
+    problem = advance.problem.at(np.concatenate([*groups.values()]))
+    state = joined_states(states)
     return problem, state_at(stepper, problem, state, np.array([record[2] for record in due]))
 
 

@@ -218,5 +218,7 @@ def test_mistakes_of_the_table_name_key_and_remedy():
         assert part in text
     with pytest.raises(ScenarioError, match="reference: unknown key"):
         short(fatigue={"slope": 1.1, "reference": 1, "cylinder": PITTING})
+    with pytest.raises(ScenarioError, match="no fatigue law is named ''"):
+        short(fatigue={"slope": 1.1, "cylinder": {**PITTING, "law": ""}})
     with pytest.raises(ScenarioError, match="a table with law, its constants and their source"):
         short(fatigue={"slope": 1.1})

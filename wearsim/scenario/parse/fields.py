@@ -131,8 +131,7 @@ def _form(part: Any, quantity: Quantity | None = None) -> str | None:
         return "one of " + ", ".join(as_written(item) for item in get_args(part))
     if _is_model(part) or get_origin(part) is dict:
         return "a table"
-    names = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
-    return names.get(part)
+    return {float: "a number", int: "a whole number", bool: "true or false", str: "text"}.get(part)
 
 
 def _limits(marks: Iterable[Any]) -> dict[str, Any]:
@@ -293,9 +292,8 @@ class RandomInput:
     @property
     def mean(self) -> tuple[float, ...]:
         """Mean of each value that it sets [SI]."""
-        if isinstance(self.distribution, JointDistribution):
-            return self.distribution.mean
-        return (self.scalar.mean,)
+        item = self.distribution
+        return item.mean if isinstance(item, JointDistribution) else (self.scalar.mean,)
 
     @property
     def warnings(self) -> tuple[str, ...]:

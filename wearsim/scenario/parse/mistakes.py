@@ -93,8 +93,7 @@ class Mistakes:
     def add_file(self, error: ScenarioError, table: str, key: str) -> None:
         """Add the mistakes of a file that the table's `key` names."""
         for mistake in error.mistakes:
-            colon = "" if mistake.key else ":"
-            self.add(table, key, f"{error.file}{colon} {mistake}")
+            self.add(table, key, f"{error.file}{'' if mistake.key else ':'} {mistake}")
 
     def raise_any(self) -> None:
         """Raise a ScenarioError if there is any mistake."""
@@ -185,8 +184,13 @@ def validate_options(
     """
     shared = set(model.model_fields).intersection(other_keys.model_fields if other_keys else ())
     for key in sorted(shared):
-        what = "is a key of wearsim and an option of the plugin, which never gets a value"
-        mistakes.add(table, key, what, None, "another name of the option, in the plugin")
+        mistakes.add(
+            table,
+            key,
+            "is a key of wearsim and an option of the plugin, which never gets a value",
+            None,
+            "another name of the option, in the plugin",
+        )
     if shared:
         return None
     # as JSON: its strict mode rejects "3" for 3 but accepts a list for a tuple
@@ -235,11 +239,12 @@ def replace_numbers(
 
 
 def _with_numbers(model: BaseModel, values: Mapping[str, object]) -> dict[str, object]:
-    inner = {key: value for key, value in values.items() if isinstance(value, dict)}
     return {
         **{key: getattr(model, key) for key in model.model_fields_set},
-        **values,
-        **{key: _with_numbers(getattr(model, key), value) for key, value in inner.items()},
+        **{
+            key: _with_numbers(getattr(model, key), value) if isinstance(value, dict) else value
+            for key, value in values.items()
+        },
     }
 
 

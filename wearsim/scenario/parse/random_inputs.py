@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from wearsim.errors import ScenarioError, described
-from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec
+from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec, Spec
 from wearsim.plugins.checked_random import built_random_input
 from wearsim.quantities import Quantity
 from wearsim.scenario.parse.fields import (
@@ -64,6 +64,25 @@ def validate(
     """
     values, refused = _with_means(mistakes, model, raw, table)
     return validate_options(mistakes, model, values, table, other_keys, refused=refused)
+
+
+def choose(
+    mistakes: Mistakes,
+    model: type[BaseModel],
+    key: str,
+    kind: type[Spec],
+    raw: Mapping[str, object],
+    place: str,
+) -> tuple[Any, Any, dict[str, object]]:
+    """Return the own keys of a table, the plugin that one of them names, and the other keys.
+
+    Own keys and plugin are None after adding their mistakes; the other keys are not validated.
+    """
+    keys, rest = split_keys(raw, model)
+    name = keys.get(key, model.model_fields[key].default)
+    values = validate(mistakes, model, keys, place)
+    spec = mistakes.find_plugin(kind, name, place, key) if isinstance(name, str) else None
+    return values, spec, rest
 
 
 def _with_means(
@@ -120,8 +139,10 @@ def _means(
     if item is None or rivals or not _fits(mistakes, item, target, table, key):
         return {}
     mistakes.random[name] = item
-    means = [{"si": float(mean)} if item.quantity else float(mean) for mean in item.mean]
-    return dict(zip(target.components or (key,), means, strict=True))
+    return {
+        part: {"si": float(mean)} if item.quantity else float(mean)
+        for part, mean in zip(target.components or (key,), item.mean, strict=True)
+    }
 
 
 def _refuse_table(
@@ -158,8 +179,13 @@ def _fits(
         got = amount(low, target.quantity)
         mistakes.add(table, key, f"must be {allowed}", got, f"a value {allowed}")
     elif what:
-        expected = f"maxent with support {target.support} or truncated-normal"
-        mistakes.add(table, key, what, item.describe(), expected)
+        mistakes.add(
+            table,
+            key,
+            what,
+            item.describe(),
+            f"maxent with support {target.support} or truncated-normal",
+        )
     return what is None
 
 
@@ -198,8 +224,13 @@ def read_random_input(
     distribution = _build(mistakes, spec, options, name, target.quantity, marginal)
     sets = distribution.components if isinstance(distribution, JointDistribution) else ()
     if sets and sorted(sets) != sorted(target.components):
-        expected = f"a distribution of {' and '.join(target.components)}"
-        mistakes.add(name, "distribution", f"sets {' and '.join(sets)}", as_written(kind), expected)
+        mistakes.add(
+            name,
+            "distribution",
+            f"sets {' and '.join(sets)}",
+            as_written(kind),
+            f"a distribution of {' and '.join(target.components)}",
+        )
     if len(mistakes.entries) > before or table is None:
         return None
     return RandomInput(
@@ -248,8 +279,13 @@ def _check_persistence(
     if redrawn and spec.role == "process":
         what = "is not for a process, which runs through the whole test"
     if what:
-        allowed = '"per-test" or "per-roller"' if name in OF_A_ROLLER else '"per-test"'
-        mistakes.add(name, "persistence", what, as_written(persistence), allowed)
+        mistakes.add(
+            name,
+            "persistence",
+            what,
+            as_written(persistence),
+            ('"per-test" or "per-roller"' if name in OF_A_ROLLER else '"per-test"'),
+        )
 
 
 def _read_marginal(
@@ -257,13 +293,12 @@ def _read_marginal(
 ) -> Distribution | None:
     """Return the marginal distribution of a field or a process."""
     if raw is None:
-        what = "a table with a distribution and its options"
-        mistakes.add(name, "marginal", "is missing", None, what)
+        mistakes.add(
+            name, "marginal", "is missing", None, "a table with a distribution and its options"
+        )
     if not isinstance(raw, dict):
         return None
-    place = f"{name}.marginal"
-    marginal: Distribution | None = _read_scalar(mistakes, raw, place, name, "marginal", quantity)
-    return marginal
+    return _read_scalar(mistakes, raw, f"{name}.marginal", name, "marginal", quantity)
 
 
 def _read_scalar(
@@ -273,7 +308,7 @@ def _read_scalar(
     name: str,
     what: str,
     quantity: Quantity | None,
-) -> Any:
+) -> Distribution | None:
     """Return the distribution of one number that is part of a random input.
 
     Parameters
@@ -295,8 +330,7 @@ def _read_scalar(
     keys, options = split_keys(raw, RandomInputTable)
     kind = keys.pop("distribution", None)
     for key in sorted(keys):
-        text = f"belongs in [{name}], not in its {what}"
-        mistakes.add(place, key, text, as_written(keys[key]))
+        mistakes.add(place, key, f"belongs in [{name}], not in its {what}", as_written(keys[key]))
     spec = None
     if kind is None:
         mistakes.add(place, "distribution", "is missing", None, expected)
@@ -305,10 +339,16 @@ def _read_scalar(
     else:
         spec = mistakes.find_plugin(RandomInputSpec, kind, place, "distribution")
     if spec and spec.role != "scalar":
-        text = f"is a {spec.role}, but a {what} is the distribution of one number"
-        mistakes.add(place, "distribution", text, as_written(kind), expected)
+        mistakes.add(
+            place,
+            "distribution",
+            f"is a {spec.role}, but a {what} is the distribution of one number",
+            as_written(kind),
+            expected,
+        )
         return None
-    return _build(mistakes, spec, options, place, quantity) if spec else None
+    built: Distribution | None = _build(mistakes, spec, options, place, quantity) if spec else None
+    return built
 
 
 def _build(
@@ -323,8 +363,9 @@ def _build(
     before, number = len(mistakes.entries), count(1)
 
     def component(table: dict[str, object]) -> Any:
-        inner = f"{place}.of (entry {next(number)})"
-        return _read_scalar(mistakes, table, inner, place, "component", quantity)
+        return _read_scalar(
+            mistakes, table, f"{place}.of (entry {next(number)})", place, "component", quantity
+        )
 
     options = validate_options(
         mistakes, spec.options, raw, place, RandomInputTable, quantity, component=component

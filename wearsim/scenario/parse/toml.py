@@ -85,8 +85,6 @@ PROFILE = "cylinder.profile"
 PROFILE_FILE = "profile-from-python.csv"
 #: Keys that say how the file of a profile is read.
 _OF_PROFILE_FILES = ("profile_columns", "profile_units", *(f"profile_{key}" for key in ROW_CHOICES))
-AXIAL = "axial_profile"
-CROWN_KEYS = ("crown_radius", "crown_diameter")
 MAX_NESTING = 20  # a scenario has at most five levels
 TOO_DEEP = "is nested too deeply", None, f"at most {MAX_NESTING} levels of tables and lists"
 TABLES: dict[str, type[Options]] = {
@@ -202,10 +200,11 @@ def apply_overrides(
             for group in _ALTERNATIVES.get(prefix, ()):
                 others = set(group) - {key} if key in group else set()
                 unused |= {n for n in others & {*tables[0]} if f"{prefix}.{n}" not in overrides}
-            for whole in (document, plain) if names == ["roller", AXIAL] else ():
-                for name in CROWN_KEYS:  # the key within axial_profile replaces them
-                    if f"roller.{name}" not in overrides:
-                        whole.get("roller", {}).pop(name, None)
+            # the key within axial_profile replaces a crown
+            crown = ("crown_radius", "crown_diameter") if prefix == "roller.axial_profile" else ()
+            for whole, name in itertools.product((document, plain), crown):
+                if f"roller.{name}" not in overrides:
+                    whole.get("roller", {}).pop(name, None)
             tables[0][key] = tables[1][key] = as_toml(value)
             for table, name in itertools.product(tables, unused):
                 del table[name]
@@ -215,13 +214,12 @@ def apply_overrides(
             mistakes.append(Mistake("", dotted, what, as_written(value)))
     if mistakes:
         raise ScenarioError(file, mistakes)
-    for dotted in removed:
+    for dotted, whole in itertools.product(removed, (document, plain)):
         *names, key = dotted.split(".")
-        for whole in (document, plain):
-            holder: Any = whole
-            for name in names:
-                holder = holder.get(name, {})
-            holder.pop(key, None)
+        holder: Any = whole
+        for name in names:
+            holder = holder.get(name, {})
+        holder.pop(key, None)
     written = tomlkit.dumps(document)
     # tables next to dotted keys are written wrongly by tomlkit; the plain text lacks comments
     with suppress(tomllib.TOMLDecodeError):
@@ -319,18 +317,17 @@ def parse_fields(
         text = apply_overrides(text, name, overrides)
         data = parse_toml(text, name)
     files: dict[str, str] = {}
-    profile = (overrides or {}).get(PROFILE)
-    given = profile if isinstance(profile, Profile) else None
+    given: Any = (overrides or {}).get(PROFILE)
 
     def read_and_keep(path: str) -> str:
-        files[path] = csv_of_profile(given) if path == PROFILE_FILE and given else read(path)
+        from_python = path == PROFILE_FILE and isinstance(given, Profile)
+        files[path] = csv_of_profile(given) if from_python else read(path)
         return files[path]
 
     mistakes = Mistakes(name, read_and_keep, keys_by_place)
     top = _read_top(mistakes, data)
     refuse_cylinder(mistakes, data)
-    tables = of_follower(data)
-    sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
+    sections = {table: _read_table(mistakes, table, of_follower(data)) for table in TABLES}
     owned = _read_owned(mistakes, data)
     assemble_cam(mistakes, sections)
     sections |= combine_bodies(mistakes, sections)
@@ -366,8 +363,7 @@ def parse_toml(text: str, name: str) -> dict[str, Any]:
         raise mistake_in(name, *TOO_DEEP) from error
     except ValueError as error:  # a TOMLDecodeError, or an integer with too many digits
         raise ScenarioError(name, [_syntax_mistake(text, str(error))]) from error
-    deep = [Mistake("", key, *TOO_DEEP) for key, value in data.items() if is_deep(value)]
-    if deep:
+    if deep := [Mistake("", key, *TOO_DEEP) for key, value in data.items() if is_deep(value)]:
         raise ScenarioError(name, deep)
     return data
 
@@ -376,8 +372,13 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
     """Return the mistake of invalid TOML, with its place and the line."""
     match = re.fullmatch(r"(?P<what>.*) \(at (?P<place>.*)\)", message, re.DOTALL)
     if re.fullmatch(r".*\.toml", text.strip()):
-        remedy = "TOML; load_scenario reads a file"
-        return Mistake("", "", "is the name of a file, not its text", as_written(text), remedy)
+        return Mistake(
+            "",
+            "",
+            "is the name of a file, not its text",
+            as_written(text),
+            "TOML; load_scenario reads a file",
+        )
     if match is None:
         return Mistake("", "", f"is not valid TOML: {message}")
     what = match["what"][:1].lower() + match["what"][1:]
@@ -426,33 +427,34 @@ def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> A
         mistakes.add(table, "", "the table is missing")
     if table not in data and table in _ABSENT:
         return None
-    raw = data.get(table, {})
-    if not isinstance(raw, dict):
-        mistakes.add(
-            "", table, "is not a table", as_written(raw), f"a line [{table}] and its keys below"
-        )
+    raw: Any = data.get(table, {})
+    if not _is_table(mistakes, table, raw):
         return None
     check_alternatives(mistakes, raw, table)
-    if table in READERS:
-        return READERS[table](mistakes, raw)
-    return validate(mistakes, TABLES[table], raw, table)
+    reader = READERS.get(table)
+    return reader(mistakes, raw) if reader else validate(mistakes, TABLES[table], raw, table)
 
 
 def _read_owned(mistakes: Mistakes, data: Mapping[str, object]) -> dict[str, Options]:
     """Return the tables that belong to plugins, by name; adds their mistakes."""
-    owned = {}
-    for spec in installed(TableSpec):
-        raw = data.get(spec.name)
-        if raw is None:
-            continue
-        if not isinstance(raw, dict):
-            expected = f"a line [{spec.name}] and its keys below"
-            mistakes.add("", spec.name, "is not a table", as_written(raw), expected)
-            continue
-        options = validate(mistakes, spec.options, raw, spec.name)
-        if options is not None:
-            owned[spec.name] = options
-    return owned
+    given: dict[TableSpec, Any] = {
+        spec: data[spec.name] for spec in installed(TableSpec) if spec.name in data
+    }
+    owned = {
+        spec.name: validate(mistakes, spec.options, raw, spec.name)
+        for spec, raw in given.items()
+        if _is_table(mistakes, spec.name, raw)
+    }
+    return {name: options for name, options in owned.items() if options is not None}
+
+
+def _is_table(mistakes: Mistakes, name: str, raw: object) -> bool:
+    """Return whether a value is a table; add the mistake if it is not."""
+    if not isinstance(raw, dict):
+        mistakes.add(
+            "", name, "is not a table", as_written(raw), f"a line [{name}] and its keys below"
+        )
+    return isinstance(raw, dict)
 
 
 def _unused_sampling_note(data: Mapping[str, Any], random: tuple[RandomInput, ...]) -> list[str]:

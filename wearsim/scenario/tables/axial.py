@@ -15,15 +15,14 @@ from wearsim.plugins import AxialPair, AxialProfile, AxialProfileSpec, Options, 
 from wearsim.plugins.checked import built_plugin
 from wearsim.plugins.checked_laws import CheckedAxialProfile
 from wearsim.scenario.axial_gap import AxialGap
-from wearsim.scenario.parse.mistakes import Mistakes, key_of_file, split_keys
-from wearsim.scenario.parse.random_inputs import validate
+from wearsim.scenario.parse.mistakes import Mistakes, key_of_file
+from wearsim.scenario.parse.random_inputs import choose, validate
 from wearsim.units import QuantityError, in_engineers_unit
 
 if TYPE_CHECKING:
     from wearsim.scenario.tables.bodies import Cylinder, Roller
 
 _WIDER = 1.0 + 1e-9
-FILE_FORM = "table"  # form of a key with the name of a file
 AxialKey: TypeAlias = dict[str, object] | str
 
 DESCRIPTION = (
@@ -89,13 +88,9 @@ def read_axial(mistakes: Mistakes, key: AxialKey | None, table: str) -> AxialCho
         return straight()
     if isinstance(key, str):
         forms = registry().names(AxialProfileSpec)
-        key = {"form": key} if key in forms else {"form": FILE_FORM, "file": key}
+        key = {"form": key} if key in forms else {"form": "table", "file": key}
     place = f"{table}.axial_profile"
-    given, rest = split_keys(key, AxialTable)
-    named = validate(mistakes, AxialTable, given, place)
-    if named is None:
-        return None
-    spec = mistakes.find_plugin(AxialProfileSpec, named.form, place, "form")
+    named, spec, rest = choose(mistakes, AxialTable, "form", AxialProfileSpec, key, place)
     options = validate(mistakes, spec.options, rest, place, AxialTable) if spec else None
     return None if options is None else AxialChoice(named.form, options, rest)
 
@@ -130,8 +125,13 @@ def combine_bodies(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str,
         if width is None:
             roller = roller.model_copy(update={"width": length})
         elif width > _WIDER * length:
-            most = f"at most {1e3 * length:.6g} mm, the length of roller.axial_profile"
-            mistakes.add("roller", "width", "exceeds its profile", f"{1e3 * width:.6g} mm", most)
+            mistakes.add(
+                "roller",
+                "width",
+                "exceeds its profile",
+                f"{1e3 * width:.6g} mm",
+                f"at most {1e3 * length:.6g} mm, the length of roller.axial_profile",
+            )
     pair = pair_of(roller, cylinder, elastic)
     other = _built(mistakes, cylinder.name, cylinder.axial_profile, pair)
     if profile is None or other is None:

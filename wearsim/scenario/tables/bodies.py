@@ -56,7 +56,6 @@ MATERIALS = {
     "bronze": Material(110e9, 0.34),
     "ductile-iron": Material(169e9, 0.275),
 }
-MaterialName: TypeAlias = Literal["steel", "aluminium", "bronze", "ductile-iron"]
 
 
 class MaterialTable(Options):
@@ -90,11 +89,12 @@ def _read_material(value: object) -> Material:
 
 MaterialField: TypeAlias = Annotated[
     Material,
-    PlainValidator(_read_material, json_schema_input_type=MaterialName | MaterialTable),
+    PlainValidator(
+        _read_material,
+        json_schema_input_type=Literal["steel", "aluminium", "bronze", "ductile-iron"]
+        | MaterialTable,
+    ),
 ]
-
-
-ChamferAngle: TypeAlias = Annotated[float, Quantity(ANGLE, "positive")]
 
 
 class RollerTable(Options):
@@ -132,7 +132,7 @@ class RollerTable(Options):
     chamfer: PositiveLength | None = Field(
         default=None, description="Width of the chamfers at both edges; needs width."
     )
-    chamfer_angle: ChamferAngle = Field(
+    chamfer_angle: Annotated[float, Quantity(ANGLE, "positive")] = Field(
         default=math.radians(45.0), description="Angle of the chamfers to the axis, up to 90 deg."
     )
     material: MaterialField = Field(description="Name of a material, or a table of its constants.")
@@ -280,13 +280,11 @@ def read_roller(mistakes: Mistakes, raw: Mapping[str, object]) -> Roller | None:
         return None
     radius = _radius(table.radius, table.diameter)
     _check_edges(mistakes, table, radius)
-    form = crown(_radius(table.crown_radius, table.crown_diameter))
-    profiles = read_roller_profiles(mistakes, table.profile)
-    if table.axial_profile is not None:
-        axial = read_axial(mistakes, table.axial_profile, "roller")
-        if axial is None:
-            return None
-        form = axial
+    profiles, given = read_roller_profiles(mistakes, table.profile), table.axial_profile
+    crowned = crown(_radius(table.crown_radius, table.crown_diameter))
+    form = crowned if given is None else read_axial(mistakes, given, "roller")
+    if form is None:
+        return None
     return Roller.model_construct(
         radius=radius,
         axial_profile=form,
@@ -310,16 +308,31 @@ def _check_edges(mistakes: Mistakes, table: RollerTable, radius: float) -> None:
         if table.width is None:
             mistakes.add("roller", key, "needs the width of the roller", text, 'width = "10 mm"')
         elif size > 0.5 * table.width:
-            most = f"at most {0.5e3 * table.width:.6g} mm, half the width"
-            mistakes.add("roller", key, "the edges meet", text, most)
+            mistakes.add(
+                "roller",
+                key,
+                "the edges meet",
+                text,
+                f"at most {0.5e3 * table.width:.6g} mm, half the width",
+            )
         elif size > radius:
-            most = f"at most {1e3 * radius:.6g} mm, the radius of the roller"
-            mistakes.add("roller", key, "is too great", text, most)
+            mistakes.add(
+                "roller",
+                key,
+                "is too great",
+                text,
+                f"at most {1e3 * radius:.6g} mm, the radius of the roller",
+            )
     if len(given) > 1:
         mistakes.add("roller", "chamfer", "an edge is rounded or chamfered", None, "one of them")
     if table.chamfer_angle >= 0.5 * math.pi:
-        angle = f"{math.degrees(table.chamfer_angle):.6g} deg"
-        mistakes.add("roller", "chamfer_angle", "is too great", angle, "less than 90 deg")
+        mistakes.add(
+            "roller",
+            "chamfer_angle",
+            "is too great",
+            f"{math.degrees(table.chamfer_angle):.6g} deg",
+            "less than 90 deg",
+        )
     if "chamfer_angle" in table.model_fields_set and table.chamfer is None:
         mistakes.add("roller", "chamfer_angle", "has no meaning without chamfer")
 

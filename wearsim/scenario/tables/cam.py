@@ -19,7 +19,6 @@ from wearsim.scenario.tables.cam_points import MeasuredPoints
 from wearsim.scenario.tables.start_profiles import read_start_surface
 from wearsim.units import COMPRESSIBILITY, INERTIA, MASS, VISCOSITY, as_written
 
-_WAYS = ("motion", "lift", "profile", "shape")
 _MOST_STATIONS = 1000  # on a part; far more than results need, and matrices of this size
 
 
@@ -202,8 +201,9 @@ def refuse_cylinder(mistakes: Mistakes, data: Mapping[str, object]) -> None:
     """Add the mistakes of tables that go with a cam only, or with a cylinder only."""
     if "cam" in data:
         if "cylinder" in data:
-            what = "a test has either a cylinder or a cam"
-            mistakes.add("cylinder", "", what, None, "one of them")
+            mistakes.add(
+                "cylinder", "", "a test has either a cylinder or a cam", None, "one of them"
+            )
         if "follower" not in data:
             mistakes.add("follower", "", "the table is missing", None, "it goes with [cam]")
     else:
@@ -233,11 +233,15 @@ def read_cam(
     table, follower, roller
         The tables that have been read; None after mistakes.
     """
-    given = [key for key in _WAYS if getattr(table, key) is not None]
+    ways = ("motion", "lift", "profile", "shape")
+    given = [key for key in ways if getattr(table, key) is not None]
     if len(given) != 1:
-        ways = "exactly one of motion, lift, profile and shape is needed"
-        mistakes.add("cam", "motion", ways, " and ".join(given) or "none")
-    stations = table.stations if isinstance(table.stations, int) else None
+        mistakes.add(
+            "cam",
+            "motion",
+            "exactly one of motion, lift, profile and shape is needed",
+            " and ".join(given) or "none",
+        )
     _check_shape(mistakes, table)
     if follower is None or roller is None or len(given) != 1:
         return None
@@ -258,7 +262,7 @@ def read_cam(
         follower.inertia if built.swings else follower.mass,
         follower.contact == "groove",
         follower.clearance or 0.0,
-        stations,
+        table.stations if isinstance(table.stations, int) else None,
         measured,
     )
     form = read_axial(mistakes, table.axial_profile, "cam")

@@ -127,9 +127,15 @@ def read_lift_table(
         choice=CHOICE.format("LIFT"),
     )
     lifts, unit = columns[lift], given.get(lift) or heads.get(lift)
-    if not length:
-        _refuse_wide(path, lift, lifts)
-    else:
+    swing = float(np.ptp(lifts))
+    if not length and swing > _WIDEST:
+        raise mistake_in(
+            path,
+            f"column '{lift}' is too large for an arm: its unit is probably wrong",
+            f"a swing of {math.degrees(swing):.3g} deg",
+            "deg as unit, not rad",
+        )
+    if length:
         found = _checked_lifts(path, lift, unit, lifts, follower)
         if notes is not None:
             notes += found
@@ -157,15 +163,6 @@ def _checked_lifts(
     return notes
 
 
-def _refuse_wide(path: str, column: str, lifts: FloatArray) -> None:
-    """Raise a ScenarioError if an arm swings by more than is possible."""
-    swing = float(np.ptp(lifts))
-    if swing > _WIDEST:
-        got = f"a swing of {math.degrees(swing):.3g} deg"
-        what = f"column '{column}' is too large for an arm: its unit is probably wrong"
-        raise mistake_in(path, what, got, "deg as unit, not rad")
-
-
 def one_turn(
     path: str, angle: FloatArray, values: FloatArray, unit: str
 ) -> tuple[FloatArray, FloatArray]:
@@ -180,13 +177,17 @@ def one_turn(
         angle = np.append(angle[:-1], angle[0] + math.tau)
     elif off > 1e-9:
         if not 0.0 < math.tau - turn < 1.5 * float(steps.max()) + 1e-6:
-            got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
             what = "the angles do not span a turn"
             if abs(math.degrees(turn) / math.tau - 1.0) < _NEAR:
                 what += "; their unit is probably rad, not deg"
             elif abs(math.radians(turn) / math.tau - 1.0) < _NEAR:
                 what += "; their unit is probably deg, not rad"
-            raise mistake_in(path, what, got, "0 to 360 deg")
+            raise mistake_in(
+                path,
+                what,
+                f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg",
+                "0 to 360 deg",
+            )
         return np.append(angle, angle[0] + math.tau), np.append(values, values[0])
     if not closes:
         got = " and ".join(in_engineers_unit(values[k], unit) for k in (0, -1))

@@ -100,8 +100,13 @@ def _check_rises(mistakes: Mistakes, motion: Motion, base_radius: float) -> None
     """Add a mistake if the lift is so large for the base circle that a unit must be wrong."""
     greatest = float(np.ptp(motion.lift(np.linspace(0.0, math.tau, POINTS))[0]))
     if greatest > LARGE * base_radius:
-        what = "lifts the follower far beyond the base circle: the unit of a rise is probably wrong"
-        mistakes.add("cam", "motion", what, beside(greatest, base_radius), "mm as unit, not m")
+        mistakes.add(
+            "cam",
+            "motion",
+            "lifts the follower far beyond the base circle: the unit of a rise is probably wrong",
+            beside(greatest, base_radius),
+            "mm as unit, not m",
+        )
 
 
 def _rise(value: str | None, unit: str) -> float:
@@ -115,8 +120,9 @@ def _from_laws(
     segments = []
     before = len(mistakes.entries)
     if not entries:
-        example = 'at least one, such as {law = "dwell", ...}'
-        mistakes.add("cam", "motion", "has no entries", None, example)
+        mistakes.add(
+            "cam", "motion", "has no entries", None, 'at least one, such as {law = "dwell", ...}'
+        )
         return None
     for number, raw in enumerate(entries, start=1):
         segment = _from_law(mistakes, f"cam.motion (entry {number})", raw, unit)

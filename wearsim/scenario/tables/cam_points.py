@@ -79,8 +79,7 @@ def smoothed_points(
     if noise <= _NO_NOISE * float(np.ptp(values)):
         return None
     curve = smoothed(angle, values)
-    visible = scatter_through_points(angle, noise) > _VISIBLE * peak(curve)
-    return curve if visible else None
+    return curve if scatter_through_points(angle, noise) > _VISIBLE * peak(curve) else None
 
 
 def peak(motion: Callable[[FloatArray], FloatArray]) -> float:
@@ -98,11 +97,9 @@ def motion_of(
     if not dwells:
         return Motion((Segment(name, math.tau, _Turned(curve, 0.0, base)),), base)
     ends = np.mod([end for dwell in dwells for end in dwell], math.tau).tolist()
-    edges = sorted({0.0, *ends, math.tau})
     segments = []
-    for start, stop in itertools.pairwise(edges):
-        middle = 0.5 * (start + stop)
-        if any((middle - low) % math.tau < high - low for low, high in dwells):
+    for start, stop in itertools.pairwise(sorted({0.0, *ends, math.tau})):
+        if any((0.5 * (start + stop) - low) % math.tau < high - low for low, high in dwells):
             segments.append(Segment("dwell", stop - start, _Still(), dwell=True))
         else:
             here = float(curve(np.array([start]))[0, 0])
@@ -161,9 +158,12 @@ def refuse_unit(
     ratio = greatest / base_radius
     if not least <= ratio <= LARGE:
         size = "large" if ratio > LARGE else "small"
-        what = f"column '{column}' is too {size} for the base circle: its unit is probably wrong"
-        remedy = f"{other_unit(unit, smaller=ratio > LARGE)} as unit, not {unit}"
-        raise mistake_in(file, what, beside(greatest, base_radius), remedy)
+        raise mistake_in(
+            file,
+            f"column '{column}' is too {size} for the base circle: its unit is probably wrong",
+            beside(greatest, base_radius),
+            f"{other_unit(unit, smaller=ratio > LARGE)} as unit, not {unit}",
+        )
 
 
 def small_lift(

@@ -56,9 +56,8 @@ def motion_of_profile(
         If the file or the tolerance cannot be used.
     """
     assert table.profile is not None
-    tolerance, text = None, table.lift_tolerance
-    if text is not None:
-        tolerance = Quantity(LENGTH, "not negative").parse(text)
+    text, length = table.lift_tolerance, Quantity(LENGTH, "not negative")
+    tolerance = None if text is None else length.parse(text)
     path = table.profile.path
     angle, radius, x, y = _surface_table(table.profile, table)
     curve = None
@@ -93,8 +92,12 @@ def _surface_table(
         polar = "radius" in heads
         given_columns = column_names(file.text)
         if not polar and not {"x", "y"} & set(given_columns):
-            what = "has neither the columns angle and radius, nor x and y"
-            raise mistake_in(path, what, ", ".join(given_columns), choice)
+            raise mistake_in(
+                path,
+                "has neither the columns angle and radius, nor x and y",
+                ", ".join(given_columns),
+                choice,
+            )
     if polar:
         columns = read_columns(
             file.text,
@@ -173,14 +176,15 @@ def lift_of_surface(
     (px, py), (dx, dy), (ax, ay) = point, first, second
     size = np.hypot(dx, dy)
     curvature = (dx * ay - dy * ax) / size**3
-    tight = curvature * follower.roller_radius < -1.0
-    if tight.any():
+    if (curvature * follower.roller_radius < -1.0).any():
         place = int(np.argmin(curvature))
         at = math.degrees(math.atan2(py[place], px[place])) % 360.0
-        got = f"{-1e3 / curvature[place]:.4g} mm at {at:.4g} deg"
-        expected = f"more than {1e3 * follower.roller_radius:.6g} mm, the radius of the roller"
-        what = "a concave arc is tighter than the roller: its radius is"
-        raise mistake_in(path, what, got, expected)
+        raise mistake_in(
+            path,
+            "a concave arc is tighter than the roller: its radius is",
+            f"{-1e3 / curvature[place]:.4g} mm at {at:.4g} deg",
+            f"more than {1e3 * follower.roller_radius:.6g} mm, the radius of the roller",
+        )
     cx = px + follower.roller_radius * dy / size
     cy = py - follower.roller_radius * dx / size
     centre, polar = np.hypot(cx, cy), np.unwrap(np.arctan2(cy, cx))
@@ -190,17 +194,17 @@ def lift_of_surface(
         cosine = (centre**2 + c * c - arm * arm) / (2.0 * centre * c)
         if (np.abs(cosine) >= 1.0).any():
             raise mistake_in(path, "the arm does not reach the cam")
-        sense = 1.0 if not follower.towards else -1.0
-        theta = polar + sense * np.arccos(cosine)
+        theta = polar + (-1.0 if follower.towards else 1.0) * np.arccos(cosine)
         lift = np.arccos((c * c + arm * arm - centre**2) / (2.0 * c * arm)) - follower.rest
     else:
         theta = polar - np.arcsin(follower.offset / centre)
         lift = np.sqrt(centre**2 - follower.offset**2) - follower.rest
     if (np.diff(theta) <= 0.0).any():
-        place = int(np.argmin(np.diff(theta)))
-        got = f"{math.degrees(theta[place]) % 360.0:.4g} deg"
-        what = "the follower does not follow the surface at"
-        raise mistake_in(path, what, got)
+        raise mistake_in(
+            path,
+            "the follower does not follow the surface at",
+            f"{math.degrees(theta[np.argmin(np.diff(theta))]) % 360.0:.4g} deg",
+        )
     return theta, lift
 
 
@@ -275,12 +279,11 @@ def _of_surface(
     """Return the motion on a smoothed surface, and its noise."""
     parts, dwells = _parts(path, curve, start, follower)
     even = np.linspace(0.0, math.tau, POINTS, endpoint=False)
-    best, squares = parts(even)[2], []
-    for seed in range(_DRAWS):
-        other, _ = _parts(path, curve, start, follower, curve.drawn(seed))
-        squares.append(float(((other(even)[2] - best) ** 2).mean()))
-    scatter = scatter_through_points(curve.angle, curve.noise)
-    scatter /= follower.arm_length if follower.swings else 1.0
+    drawn = (_parts(path, curve, start, follower, curve.drawn(seed))[0] for seed in range(_DRAWS))
+    best = parts(even)[2]
+    squares = [float(((other(even)[2] - best) ** 2).mean()) for other in drawn]
+    lever = follower.arm_length if follower.swings else 1.0
+    scatter = scatter_through_points(curve.angle, curve.noise) / lever
     polar = np.mod(curve.angle + start, math.tau)
     order = np.argsort(polar)
     measured = MeasuredPoints(

@@ -12,11 +12,9 @@ from wearsim.plugins import BODIES, Body, FatigueLaw, FatigueLawSpec, Options, r
 from wearsim.plugins.checked import built_plugin
 from wearsim.plugins.checked_laws import CheckedFatigueLaw
 from wearsim.quantities import PositivePressure, Quantity
-from wearsim.scenario.parse.mistakes import Mistakes, split_keys
-from wearsim.scenario.parse.random_inputs import validate
+from wearsim.scenario.parse.mistakes import Mistakes
+from wearsim.scenario.parse.random_inputs import choose, validate
 from wearsim.units import AREA, as_written, in_engineers_unit
-
-_OF_BODY = "a table with law, its constants and their source"
 
 
 class FatigueTable(Options):
@@ -117,11 +115,22 @@ def read_fatigue(mistakes: Mistakes, raw: Mapping[str, object]) -> FatigueChoice
     if table is None:
         return None
     if not bodies:
-        mistakes.add("fatigue", " or ".join(BODIES), "is needed", "none", _OF_BODY)
+        mistakes.add(
+            "fatigue",
+            " or ".join(BODIES),
+            "is needed",
+            "none",
+            "a table with law, its constants and their source",
+        )
     weakest, area = table.scatter == "weakest-link", table.reference_area
     if weakest and area is None:
-        what = 'is needed with scatter = "weakest-link"'
-        mistakes.add("fatigue", "reference_area", what, None, AREA.expected("positive"))
+        mistakes.add(
+            "fatigue",
+            "reference_area",
+            'is needed with scatter = "weakest-link"',
+            None,
+            AREA.expected("positive"),
+        )
     elif not weakest and area is not None:
         got, remedy = in_engineers_unit(area, "m^2"), 'scatter = "weakest-link"'
         mistakes.add("fatigue", "reference_area", "has no meaning without it", got, remedy)
@@ -132,20 +141,18 @@ def read_fatigue(mistakes: Mistakes, raw: Mapping[str, object]) -> FatigueChoice
 
 def _read_body(mistakes: Mistakes, place: str, raw: Any) -> FatigueLawChoice | None:
     """Return the fatigue law of a body, or None after adding mistakes."""
-    keys, rest = split_keys(raw, FatigueOfBody)
-    table = validate(mistakes, FatigueOfBody, keys, place)
-    name = keys.get("law")
-    spec = (
-        mistakes.find_plugin(FatigueLawSpec, name, place, "law")
-        if name and isinstance(name, str)
-        else None
-    )
+    table, spec, rest = choose(mistakes, FatigueOfBody, "law", FatigueLawSpec, raw, place)
     options = validate(mistakes, spec.options, rest, place, FatigueOfBody) if spec else None
     if table is None or options is None:
         return None
     valid = table.valid_pressure
     if valid is not None and valid[0] >= valid[1]:
         got = as_written([in_engineers_unit(value, "Pa") for value in valid])
-        what = "is not a range of pressures"
-        mistakes.add(place, "valid_pressure", what, got, "the least and then the greatest pressure")
+        mistakes.add(
+            place,
+            "valid_pressure",
+            "is not a range of pressures",
+            got,
+            "the least and then the greatest pressure",
+        )
     return FatigueLawChoice(table.law, options, table.source, valid)

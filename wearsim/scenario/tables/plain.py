@@ -271,14 +271,17 @@ def read_creepage(mistakes: Mistakes, raw: Mapping[str, object]) -> CreepageTabl
     if drive in ("creepage", "free"):
         keys = ("longitudinal", "bearing_torque")
         needed, refused = keys if drive == "creepage" else keys[::-1]
-        rubs = drive == "free" and "bearing_friction" in raw
-        if needed not in raw and not rubs:
+        if needed not in raw and not (drive == "free" and "bearing_friction" in raw):
             mistakes.add("creepage", needed, f'is needed with drive = "{drive}"', "none")
         if refused in raw:
             mistakes.add("creepage", refused, f'has no meaning with drive = "{drive}"')
         if ("bearing_friction" in raw) != ("bearing_diameter" in raw):
-            pair = "bearing_friction and bearing_diameter"
-            mistakes.add("creepage", pair, "are needed together", "one of them")
+            mistakes.add(
+                "creepage",
+                "bearing_friction and bearing_diameter",
+                "are needed together",
+                "one of them",
+            )
         elif "bearing_friction" in raw and drive != "free":
             mistakes.add("creepage", "bearing_friction", f'has no meaning with drive = "{drive}"')
     table = validate(mistakes, CreepageTable, raw, "creepage")
@@ -321,8 +324,13 @@ def check_limits(mistakes: Mistakes, tables: Mapping[str, Any], limits: LimitTab
         return
     for key in () if "fatigue" in tables else ("damage", "pitting"):
         if (limit := getattr(limits, key)) is not None:
-            what, remedy = "needs the fatigue of the bodies", "a table [fatigue]"
-            mistakes.add("limit", key, what, as_written(limit), remedy)
+            mistakes.add(
+                "limit",
+                key,
+                "needs the fatigue of the bodies",
+                as_written(limit),
+                "a table [fatigue]",
+            )
 
 
 def check_lists(mistakes: Mistakes, document: Mapping[str, Any]) -> None:
@@ -331,11 +339,15 @@ def check_lists(mistakes: Mistakes, document: Mapping[str, Any]) -> None:
     rollers = tables.get("operation", {}).get("rollers", 1)
     for table, key in _LISTS:
         value: Any = tables.get(table, {}).get(key)
-        listed = isinstance(value, list | tuple) and isinstance(rollers, int)
-        if listed and len(value) != rollers:
-            got = f"{len(value)} values" if len(value) != 1 else "1 value"
-            expected = f"{rollers}, the value of operation.rollers"
-            mistakes.add(table, key, "a list has one value per roller", got, expected)
+        lists = isinstance(value, list | tuple) and isinstance(rollers, int)
+        if lists and len(value) != rollers:
+            mistakes.add(
+                table,
+                key,
+                "a list has one value per roller",
+                (f"{len(value)} values" if len(value) != 1 else "1 value"),
+                f"{rollers}, the value of operation.rollers",
+            )
 
 
 def check_correlation(mistakes: Mistakes, table: SamplingTable | None) -> None:
@@ -353,8 +365,12 @@ def check_correlation(mistakes: Mistakes, table: SamplingTable | None) -> None:
         if len(pair) < len(names):
             continue  # an input that has mistakes itself adds none here
         for item in [item for item in pair if item.role != "scalar"]:
-            what = f"'{item.name}' is a {item.role}, and only single numbers can be correlated"
-            mistakes.add("sampling", key, what, as_written(item.kind))
+            mistakes.add(
+                "sampling",
+                key,
+                f"'{item.name}' is a {item.role}, and only single numbers can be correlated",
+                as_written(item.kind),
+            )
         first, second = (item.persistence for item in pair)
         if first != second:
             mistakes.add(

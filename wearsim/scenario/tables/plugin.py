@@ -30,7 +30,7 @@ from wearsim.plugins.checked_loads import CheckedLoad, CheckedLoadTerm
 from wearsim.plugins.checked_model import built_model
 from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
-from wearsim.scenario.parse.random_inputs import validate
+from wearsim.scenario.parse.random_inputs import choose, validate
 from wearsim.types import Grid, Material
 from wearsim.units import as_written
 from wearsim.uq.distributions.mixture import Mixture
@@ -199,21 +199,6 @@ PLUGIN_TABLES: dict[str, tuple[type[Options], str, type[Spec]]] = {
 }
 
 
-def _choose(
-    mistakes: Mistakes, table: str, raw: Mapping[str, object]
-) -> tuple[Any, Any, dict[str, object]]:
-    """Return the model of a table's own keys, the spec that it chooses and the other keys.
-
-    The first two are None after adding their mistakes.
-    """
-    model, key, kind = PLUGIN_TABLES[table]
-    keys, rest = split_keys(raw, model)
-    name = keys.get(key, model.model_fields[key].default)
-    values = validate(mistakes, model, keys, table)
-    spec = mistakes.find_plugin(kind, name, table, key) if isinstance(name, str) else None
-    return values, spec, rest
-
-
 def _default_model(mistakes: Mistakes) -> str:
     """Return the model of a scenario that names none: one for a friction field if there is any."""
     default = str(ContactTable.model_fields["model"].default)
@@ -235,11 +220,10 @@ def read_contact(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice
     raw = {"model": _default_model(mistakes), **raw} if "model" not in raw else raw
     if raw["model"] == AUTO:
         return _read_auto(mistakes, raw)
-    keys, spec, rest = _choose(mistakes, "contact", raw)
+    keys, spec, rest = choose(mistakes, *PLUGIN_TABLES["contact"], raw, "contact")
     options = validate(mistakes, spec.options, rest, "contact", ContactTable) if spec else None
-    if keys is None or options is None:
-        return None
-    return ContactChoice(keys.model, options, keys.strips, keys.width, keys.centre)
+    strips = (keys.strips, keys.width, keys.centre) if keys else ()
+    return ContactChoice(keys.model, options, *strips) if keys and options else None
 
 
 def _read_auto(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice | None:
@@ -249,10 +233,9 @@ def _read_auto(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice |
     auto = validate(mistakes, AutoTable, rest, "contact", ContactTable)
     if keys is None or auto is None:
         return None
-    strips = keys.strips, keys.width, keys.centre
-    if auto.chosen is None:
+    strips, chosen = (keys.strips, keys.width, keys.centre), auto.chosen
+    if chosen is None:
         return ContactChoice(AUTO, auto, *strips)
-    chosen = auto.chosen
     spec = mistakes.find_plugin(ContactModelSpec, chosen.model, "contact.chosen", "model")
     options = validate(mistakes, spec.options, chosen.options, "contact.chosen") if spec else None
     if options is None:
@@ -263,16 +246,18 @@ def _read_auto(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice |
 
 def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | None:
     """Return the wear law, or None after adding the mistakes of the table [wear]."""
-    keys, spec, rest = _choose(mistakes, "wear", raw)
+    keys, spec, rest = choose(mistakes, *PLUGIN_TABLES["wear"], raw, "wear")
     options = validate(mistakes, spec.options, rest, "wear", WearTable) if spec else None
     mistakes.notes += _rate_notes(rest)
     if {"wear.factor", "wear.cylinder.k_over_h"} <= mistakes.random.keys():
-        what = "is random, and so is wear.cylinder.k_over_h: the scatter of K/H counts twice"
-        remedy = (
+        mistakes.add(
+            "wear",
+            "factor",
+            "is random, and so is wear.cylinder.k_over_h: the scatter of K/H counts twice",
+            None,
             "one of them: delete factor under [wear], or [wear.factor], if the distribution of"
-            " k_over_h holds the scatter between specimens, as that of identify --posterior does"
+            " k_over_h holds the scatter between specimens, as that of identify --posterior does",
         )
-        mistakes.add("wear", "factor", what, None, remedy)
     return WearChoice(keys.law, options) if keys and options is not None else None
 
 
@@ -296,22 +281,20 @@ def check_contained(mistakes: Mistakes) -> None:
 
 def _rate_notes(raw: Mapping[str, object]) -> list[str]:
     """Return a note for each wear factor in a unit of specific wear rates, such as mm^3/(N m)."""
-    notes = []
-    for body, table in raw.items():
-        value = table.get("k_over_h") if isinstance(table, dict) else None
-        texts = value.values() if isinstance(value, dict) else [value]
-        if any(isinstance(text, str) and _PER_LOAD.search(text) for text in texts):
-            notes.append(
-                f"wear.{body}.k_over_h is in a unit of specific wear rates, and is a volume per"
-                " dissipated energy; a volume per load and sliding distance is"
-                f" wear.{body}.specific_wear_rate, which is divided by measured_friction"
-            )
-    return notes
+    values = {body: keys.get("k_over_h") for body, keys in raw.items() if isinstance(keys, dict)}
+    texts = {b: list(v.values()) if isinstance(v, dict) else [v] for b, v in values.items()}
+    return [
+        f"wear.{body}.k_over_h is in a unit of specific wear rates, and is a volume per"
+        " dissipated energy; a volume per load and sliding distance is"
+        f" wear.{body}.specific_wear_rate, which is divided by measured_friction"
+        for body, given in texts.items()
+        if any(isinstance(text, str) and _PER_LOAD.search(text) for text in given)
+    ]
 
 
 def read_load(mistakes: Mistakes, raw: Mapping[str, object]) -> LoadChoice | None:
     """Return the load with its terms, or None after adding the mistakes of the table [load]."""
-    keys, spec, rest = _choose(mistakes, "load", raw)
+    keys, spec, rest = choose(mistakes, *PLUGIN_TABLES["load"], raw, "load")
     kinds = {known.name: known.role for known in installed(LoadSpec)}
     tables = {
         key: value

@@ -66,8 +66,7 @@ class StartSurface:
             [[self.angle[-1] - math.tau], self.angle, [self.angle[0] + math.tau]]
         )
         rows = np.concatenate([rows[-1:], rows, rows[:1]])
-        inside = (angle >= 0.0) & (angle <= math.tau)
-        theta = np.where(inside, angle, np.mod(angle, math.tau))
+        theta = np.where((angle >= 0.0) & (angle <= math.tau), angle, np.mod(angle, math.tau))
         nearest = known[np.abs(known - theta[:, None]).argmin(axis=1)]
         theta = np.where(np.abs(nearest - theta) < _SAME_ANGLE, nearest, theta)
         # of two stations at one angle the first is before it, as is the end of the turn
@@ -125,13 +124,19 @@ def _surface(file: InputFile) -> StartSurface:
     whole = len(y) == count * len(first)
     grid = y.reshape(-1, count) if whole else np.zeros((0, count))
     if not whole or count < 2 or (grid != grid[0]).any():
-        what = "needs the same positions y, at least two and increasing, at every angle"
-        got = f"{len(y)} rows, {len(angles)} angles"
-        raise mistake_in(file.path, what, got, key="column y")
+        raise mistake_in(
+            file.path,
+            "needs the same positions y, at least two and increasing, at every angle",
+            f"{len(y)} rows, {len(angles)} angles",
+            key="column y",
+        )
     turns = np.diff(angles)
     thrice = (np.abs(turns[1:]) + np.abs(turns[:-1]) < _SAME_ANGLE).any()
     if angles[0] < 0.0 or angles[-1] > math.tau or (turns < -_SAME_ANGLE).any() or thrice:
-        got = f"{math.degrees(angles.min()):.6g} to {math.degrees(angles.max()):.6g} deg"
-        what = "must not fall from row to row, be within 0 to 360 deg and at most twice the same"
-        raise mistake_in(file.path, what, got, key="column angle")
+        raise mistake_in(
+            file.path,
+            "must not fall from row to row, be within 0 to 360 deg and at most twice the same",
+            f"{math.degrees(angles.min()):.6g} to {math.degrees(angles.max()):.6g} deg",
+            key="column angle",
+        )
     return StartSurface(angles, grid[0], height.reshape(grid.shape))

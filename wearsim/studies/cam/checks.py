@@ -64,8 +64,7 @@ def skids_of(turn: CamTurn) -> tuple[Skid, ...]:
     skids: list[Skid] = []
     for arc in turn.arcs:
         start, stop = float(arc.theta[0]), float(arc.theta[-1])
-        inside = (within > start) & (within < stop)
-        energy = float((stations.weight * power)[inside].sum())
+        energy = float((stations.weight * power)[(within > start) & (within < stop)].sum())
         if skids and abs(skids[-1].stop - start) < 1e-12:
             energy, start = energy + skids[-1].energy, skids.pop().start
         skids.append(Skid(start, stop, energy))

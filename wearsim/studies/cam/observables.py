@@ -107,8 +107,8 @@ class CamObservables(CylinderObservables):
         }
         if state.damage is not None:
             damage = state.damage[0, : problem.shape[0]].max(axis=-1)
-            history["station_damage"] = at_every_station(problem, damage)
-            history["damage_angle"] = self.track.greatest(damage).angle
+            angle = self.track.greatest(damage).angle
+            history |= {"station_damage": at_every_station(problem, damage), "damage_angle": angle}
         return history
 
     def record(self, state: WearState) -> dict[str, FloatArray]:
@@ -137,8 +137,7 @@ class CamObservables(CylinderObservables):
         lifts = track.at_unworn(errors)
 
         def deepest(values: FloatArray) -> list[FloatArray]:
-            angles = track.greatest(values.max(axis=-1)).angle.tolist()
-            pairs = enumerate(angles)
+            pairs = enumerate(track.greatest(values.max(axis=-1)).angle.tolist())
             return [np.maximum(track.at_angle(values[:, v], angle), 0.0) for v, angle in pairs]
 
         curves: list[dict[str, Any]] = [

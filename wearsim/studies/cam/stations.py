@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import mistake_in
 from wearsim.evolution.contacts import GRIP
 from wearsim.evolution.quantities import CamStations
 from wearsim.mechanics.cam import moved_stations
@@ -24,7 +24,6 @@ _COMPARED = (
     *("rolling_speed", "longitudinal_curvature", "surface_curvature", "load_factor", "load_rest"),
     *("stiffness", "inertia_torque", "skid"),
 )
-_PLACES = ("angle", "segment", "pressure_angle")
 
 
 def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
@@ -43,11 +42,9 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
     stations = turn.stations
     middles = np.array([0.5 * (panel.start + panel.stop) for panel in stations.panels])
     point = turn.at_stations(stations)
-    numbers = np.array([float(panel.segment) for panel in stations.panels])
-    segments = numbers[stations.panel]
-    within = middles[stations.panel]
+    segments = np.array([float(panel.segment) for panel in stations.panels])[stations.panel]
     stations_of_cam = replace(
-        _values(turn, point, stations.weight, segments, within),
+        _values(turn, point, stations.weight, segments, middles[stations.panel]),
         panels=stations,
         skids=_skids(turn),
     )
@@ -109,10 +106,12 @@ def joined(stations: CamStations) -> CamStations:
     places, first = np.argsort(order)[places.ravel()], first[order]
     if len(first) == len(places):
         return stations
-    arrays = {n: getattr(stations, n)[first] for n in (*_COMPARED, *_PLACES)}
-    for name in ("length", "time_share"):
-        total = np.bincount(places, weights=getattr(stations, name).ravel())
-        arrays[name] = total[:, None, None]
+    names = (*_COMPARED, "angle", "segment", "pressure_angle")
+    arrays = {name: getattr(stations, name)[first] for name in names}
+    arrays |= {
+        name: np.bincount(places, weights=getattr(stations, name).ravel())[:, None, None]
+        for name in ("length", "time_share")
+    }
     return replace(stations, **arrays, places=places, whole=stations)
 
 
@@ -168,10 +167,14 @@ def harmonics_of(turn: CamTurn, stations: int) -> int:
     limit = harmonic_limit(turn, harmonic_depth(turn))
     if limit is None or limit >= FEWEST_HARMONICS:
         return math.floor(min(limit or math.inf, stations / 3.0))
-    what = "feedback of wear through the inertia is unstable above harmonic"
-    remedy = f'at least {FEWEST_HARMONICS}, or feedback = "static"'
-    mistake = Mistake("load", "feedback", what, f"{limit:.3g}", remedy)
-    raise ScenarioError(turn.scenario.file, [mistake])
+    raise mistake_in(
+        turn.scenario.file,
+        "feedback of wear through the inertia is unstable above harmonic",
+        f"{limit:.3g}",
+        f'at least {FEWEST_HARMONICS}, or feedback = "static"',
+        table="load",
+        key="feedback",
+    )
 
 
 def _inertia(turn: CamTurn, point: Point, weight: FloatArray) -> FloatArray:

@@ -153,8 +153,7 @@ def study_cam(
     ['319.538258 N', '324.369394 N']
     """
     scenario = with_chosen_model(as_scenario(scenario), test=False)
-    turn, chosen = turn_of(scenario), None
-    weight = None
+    turn, chosen, weight = turn_of(scenario), None, None
     if angles is None:
         point, weight = turn.at_stations(turn.stations), turn.stations.weight
     else:
@@ -164,8 +163,7 @@ def study_cam(
     patches = setup.patches_at(point)
     grid = contact_grid(setup, turn.normal_range[1])
     problem = build_problem(setup, prepared_model(scenario, grid), grid, {}, angles=chosen)
-    contacts = problem.model.solve(unworn_contacts(problem))
-    contacts = contacts.at(problem.kinematics.track.places)
+    contacts = problem.model.solve(unworn_contacts(problem)).at(problem.kinematics.track.places)
     panels = turn.panels
     steepest = extreme(panels, lambda p, x: np.abs(turn.at(p, x).kinematics.pressure_angle))
     sharpest, _ = extreme(panels, lambda p, x: turn.at(p, x).kinematics.curvature)

@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from wearsim.errors import InfeasibleCamError, Mistake, ScenarioError, mistake_in
+from wearsim.errors import InfeasibleCamError, Mistake, mistake_in
 from wearsim.mechanics.cam import (
     Panel,
     RollerKinematics,
@@ -199,9 +199,15 @@ class CamTurn:
         if inertia == 0.0:
             ratio, theta = extreme(self.panels, self._demand)
             if ratio > 1.0:
-                what = "exceeds the torque that friction transmits, and the roller stops at"
-                what += f" {math.degrees(theta):.4g} deg"
-                raise self._mistake("creepage", "bearing_torque", what, None, "a smaller torque")
+                raise mistake_in(
+                    self.scenario.file,
+                    "exceeds the torque that friction transmits, and the roller stops at"
+                    f" {math.degrees(theta):.4g} deg",
+                    None,
+                    "a smaller torque",
+                    table="creepage",
+                    key="bearing_torque",
+                )
             return []
         scale = inertia * self.speed**2
 
@@ -215,12 +221,14 @@ class CamTurn:
             return skid_arcs(self.panels, rolling)
         except ValueError as error:
             remedy = "a smaller inertia, bearing torque or speed, or a greater load"
-            raise self._mistake("roller", "inertia", str(error), None, remedy) from error
+            place = {"table": "roller", "key": "inertia"}
+            raise mistake_in(self.scenario.file, str(error), None, remedy, **place) from error
 
     def _greatest_torque(self, point: Point) -> FloatArray:
         """Return the greatest torque that friction transmits to the roller [N m]."""
-        friction = self.scenario.friction.coefficient
-        return np.asarray(friction * self.carried(point) * self.scenario.roller.radius)
+        return np.asarray(
+            self.scenario.friction.coefficient * self.carried(point) * self.scenario.roller.radius
+        )
 
     def _demand(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the traction of a rolling free roller, over the limit of friction."""
@@ -305,12 +313,11 @@ class CamTurn:
     @cached_property
     def greatest_skid(self) -> float:
         """Greatest creepage of a skid, 0 without any."""
-        radius = self.scenario.roller.radius
         sizes = [
             np.abs(arc.slip / self.at_angles(arc.theta).kinematics.travel).max()
             for arc in self.arcs
         ]
-        return radius * float(max(sizes, default=0.0))
+        return self.scenario.roller.radius * float(max(sizes, default=0.0))
 
     def drag(self, point: Point) -> FloatArray:
         """Return the torque of the bearing, against the roller's rotation [N m]."""
@@ -334,8 +341,7 @@ class CamTurn:
     @property
     def varies(self) -> bool:
         """Whether a run has more than one station."""
-        single = self.parts[0].dwell or self.cam.stations == 1
-        return len(self.parts) > 1 or not single
+        return len(self.parts) > 1 or not (self.parts[0].dwell or self.cam.stations == 1)
 
     def _represented(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return what the stations must represent: depth in full slip, N ds, traction and slip."""
@@ -346,8 +352,7 @@ class CamTurn:
         rows = [depth, force * travel, travel]
         if self.free:
             most = np.maximum(self._greatest_torque(point), 1e-300)
-            middle = np.full(len(theta), 0.5 * (panel.start + panel.stop))
-            slip = self.slip(theta, middle)
+            slip = self.slip(theta, np.full(len(theta), 0.5 * (panel.start + panel.stop)))
             demand = np.clip(self.torque(point) / most, -1.0, 1.0)
             rows += [np.where(np.isnan(slip), 1.0 + demand, 1.0), np.nan_to_num(slip)]
         return np.stack(rows)
@@ -394,11 +399,6 @@ class CamTurn:
             lift[:, chosen] = self.cam.motion.lift_in(int(number), stations.angle[chosen])
         return self.point(lift, stations.angle, flanks[stations.panel])
 
-    def _mistake(
-        self, table: str, key: str, what: str, got: str | None, expected: str | None
-    ) -> ScenarioError:
-        return mistake_in(self.scenario.file, what, got, expected, table=table, key=key)
-
     def checked(self) -> CamTurn:
         """Return the turn if the roller can follow it.
 
@@ -407,27 +407,30 @@ class CamTurn:
         ScenarioError
             If the cam is undercut, the follower jumps or the roller rolls nowhere.
         """
-        mistakes = []
-        radius = self.scenario.roller.radius
+        mistakes, radius = [], self.scenario.roller.radius
         sharpest, theta = self._extreme("undercut", self._undercut)
         if sharpest >= 1.0 - 1e-9:
             flank = "inner flank" if self.at_angles(np.array([theta])).inner[0] else "cam"
-            got = f"{1e3 * radius / sharpest:.4g} mm at {self.place(theta)}"
-            what = (
-                f"the {flank} is undercut: the pitch curve needs a greater radius than the roller"
+            mistake = Mistake(
+                "cam",
+                "base_radius",
+                f"the {flank} is undercut: the pitch curve needs a greater radius than the roller",
+                f"{1e3 * radius / sharpest:.4g} mm at {self.place(theta)}",
+                f"more than {1e3 * radius:.6g} mm, by a greater base_radius, a smaller roller or a"
+                " gentler motion",
             )
-            expected = f"more than {1e3 * radius:.6g} mm, by a greater base_radius,"
-            expected += " a smaller roller or a gentler motion"
-            mistakes.append(Mistake("cam", "base_radius", what, got, expected))
+            mistakes.append(mistake)
         mistakes += self._reach_mistakes()
         least, theta = self._least_force
         if least <= 0.0 and not self.cam.groove:
-            got = f"{least:.4g} N at {self.place(theta)}"
-            what = "the follower jumps, since the normal force falls to zero or below"
-            expected = (
-                "more than 0 N, by a greater preload or stiffness, or a smaller speed or mass"
+            mistake = Mistake(
+                "load",
+                "preload",
+                "the follower jumps, since the normal force falls to zero or below",
+                f"{least:.4g} N at {self.place(theta)}",
+                "more than 0 N, by a greater preload or stiffness, or a smaller speed or mass",
             )
-            mistakes.append(Mistake("load", "preload", what, got, expected))
+            mistakes.append(mistake)
         if mistakes:
             raise InfeasibleCamError(self.scenario.file, mistakes, self.margins)
         self.arcs  # noqa: B018  (raises where the roller rolls nowhere)
@@ -480,8 +483,7 @@ class CamTurn:
         """Return an angle and its segment in words."""
         motion = self.cam.motion
         number = int(motion.segment_at(np.array([theta]))[0])
-        degrees = round(math.degrees(theta), 4) % 360.0
-        return f"{degrees:.4g} deg, {motion.segment_label(number)}"
+        return f"{round(math.degrees(theta), 4) % 360.0:.4g} deg, {motion.segment_label(number)}"
 
 
 @lru_cache(maxsize=16)

@@ -135,12 +135,11 @@ def ensemble(
     8
     """
     scenario = with_chosen_model(as_scenario(scenario), test=True)
-    precision = named_precision(precision, until)
-    request = checked_request(scenario, realisations, plan, precision)
+    request = checked_request(scenario, realisations, plan, named_precision(precision, until))
     path = as_path(output)
     check_output(path, force, scenario.paths)
-    hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
-    with hands.open(scenario, request.realisations) as (watch, pool):
+    hands = workers, scheduler, progress, on_progress, stop_requested, on_notice
+    with watched_executor(scenario, request.realisations, *hands) as (watch, pool):
         grid = profile_axis(scenario)
         content = ensemble_content(scenario, request, grid)
         with EnsembleFile.create(path, *content, storage) as file:
@@ -226,9 +225,8 @@ def parse_target(text: str, scenario: Scenario | None = None) -> Target:
     """
     with checking_argument("precision"):
         target = Target.parse(text)
-    known = observables_of()
-    if scenario is not None:
-        known = observables_of(cam=bool(scenario.cam), fatigue=bool(scenario.fatigue))
+    given = {} if scenario is None else {"cam": scenario.cam, "fatigue": scenario.fatigue}
+    known = observables_of(**{name: bool(table) for name, table in given.items()})
     if target.observable not in known:
         expected = f"which is not an observable, expected one of {', '.join(known)}"
         raise ArgumentError("precision", f"'{text}' names '{target.observable}', {expected}")
@@ -293,9 +291,9 @@ def resume_ensemble(
     if data.finished and realisations is None and not (repeated or runner.further(before)):
         return before
     target = Target.parse(data.until) if data.until else None
-    hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
+    hands = workers, scheduler, progress, on_progress, stop_requested, on_notice
     with (
-        hands.open(runner.scenario, runner.total) as (watch, pool),
+        watched_executor(runner.scenario, runner.total, *hands) as (watch, pool),
         EnsembleFile.open(path, storage) as opened,
     ):
         runner.compile_kernels()
@@ -325,32 +323,30 @@ def _check_growth(before: EnsembleResult, realisations: int, failed: bool) -> No
         )
 
 
-class Workers(NamedTuple):
-    """Who computes realisations, and who watches; fields as the parameters of `ensemble`."""
-
-    workers: int | None
-    scheduler: str
-    progress: bool
-    on_progress: Watcher | None
-    stop_requested: Callable[[], bool] | None
-    on_notice: Callable[[str], None] | None
-
-    @contextmanager
-    def open(self, scenario: Scenario, realisations: int) -> Iterator[tuple[Any, Any]]:
-        """Give the watcher of the progress and the executor of batches."""
-        shown = shown_progress(self.progress, "EnsembleWatcher", self.on_progress, scenario)
-        with (
-            shown as watch,
-            executor(
-                self.scheduler,
-                self.workers,
-                on_notice=self.on_notice or getattr(watch, "notice", None),
-                stop_requested=self.stop_requested,
-                preload=PRELOAD,
-                realisations=realisations,
-            ) as pool,
-        ):
-            yield watch, pool
+@contextmanager
+def watched_executor(
+    scenario: Scenario,
+    realisations: int,
+    workers: int | None,
+    scheduler: str,
+    progress: bool,
+    on_progress: Watcher | None,
+    stop_requested: Callable[[], bool] | None,
+    on_notice: Callable[[str], None] | None,
+) -> Iterator[tuple[Any, Any]]:
+    """Give the watcher of the progress and the executor of batches; parameters as of `ensemble`."""
+    with (
+        shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
+        executor(
+            scheduler,
+            workers,
+            on_notice=on_notice or getattr(watch, "notice", None),
+            stop_requested=stop_requested,
+            preload=PRELOAD,
+            realisations=realisations,
+        ) as pool,
+    ):
+        yield watch, pool
 
 
 def ensemble_content(

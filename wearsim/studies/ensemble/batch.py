@@ -54,11 +54,13 @@ def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
     that is not linear in the dissipation are stepped one at a time, as are those of other steppers,
     whose steps differ between tests in more than length.
     """
-    linear = all(problem.wear_factors[body] is not None for body in BODIES)
-    one_by_one = problem.free and problem.shape[0] == 1
-    plain = not (one_by_one or problem.terms or problem.has_nodes)
-    single = problem.shape[2] == 1
-    return isinstance(stepper, ImplicitStepper) and linear and plain and single
+    return (
+        isinstance(stepper, ImplicitStepper)
+        and all(problem.wear_factors[body] is not None for body in BODIES)
+        and not (problem.terms or problem.has_nodes)
+        and not (problem.free and problem.shape[0] == 1)
+        and problem.shape[2] == 1
+    )
 
 
 def compatible(one: WearProblem, other: WearProblem) -> bool:
@@ -297,8 +299,9 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         end, deep = advance.end, too_deep_tests(advance, scenario)
         for number, failure in deep.items():
             missing = [dict.fromkeys(rows[number][0], math.nan)] * (records - len(rows[number]))
-            kept = rows[number] + missing
-            results[number] = RunObservations(kept, {}, {}, advance.problem.grid, failure)
+            results[number] = RunObservations(
+                rows[number] + missing, {}, {}, advance.problem.grid, failure
+            )
         tests.end(deep)
         going = [number not in deep for number in advance.numbers.tolist()]
         over = np.flatnonzero((end.passes >= stop) & going)
@@ -344,7 +347,9 @@ def add_strip_errors(
     ended = [
         number
         for number, course in enumerate(courses)
-        if course.passes and number in results and not _is_failed(results[number])
+        if course.passes
+        and isinstance(result := results.get(number), RunObservations)
+        and result.failure is None
     ]
     if stepper is None or not ended:
         return {}
@@ -358,23 +363,17 @@ def add_strip_errors(
         by_strips = strip_errors(other, passes, sizes, course)
         errors = by_strips[:, -1]
         if isinstance(result, RunObservations) and np.isfinite(errors).all():
-            observed = {name: np.array(values) for name, values in course.observed.items()}
-            fresh = np.zeros((3, 1))
             stated = observed_errors(
                 other,
                 np.append(0.0, passes),
-                observed,
-                np.concatenate([fresh, sizes], axis=1),
-                np.concatenate([fresh, by_strips], axis=1),
+                {name: np.array(values) for name, values in course.observed.items()},
+                np.pad(sizes, ((0, 0), (1, 0))),  # 0 at the start
+                np.pad(by_strips, ((0, 0), (1, 0))),
             )
             added[number] = errors, {name: values[-1] for name, values in stated.items()}
             result.scalars["depth_error"] += float(errors[0])
             result.scalars["volume_error"] += float(errors[1])
     return added
-
-
-def _is_failed(result: RunObservations | Exception) -> bool:
-    return not isinstance(result, RunObservations) or result.failure is not None
 
 
 def too_deep_tests(advance: Advance, scenario: Scenario, less: str = "") -> dict[int, StepError]:

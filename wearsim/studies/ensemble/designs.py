@@ -112,12 +112,25 @@ def check_plan(scenario: Scenario, plan: EnsemblePlan, growth: str = "") -> None
             " its realisations",
             "saltelli": "Saltelli's plan is for sensitivity, and its size is chosen beforehand",
         }[plan]
-        expected = f"monte-carlo, sobol or control-variate; or not {growth}"
-        mistakes.append(Mistake("sampling", "plan", what, f'"{plan}" with {growth}', expected))
+        mistakes.append(
+            Mistake(
+                "sampling",
+                "plan",
+                what,
+                f'"{plan}" with {growth}',
+                f"monte-carlo, sobol or control-variate; or not {growth}",
+            )
+        )
     if plan == "saltelli" and scenario.sampling.correlation:
-        what = "Saltelli's plan draws the inputs independently, and these are correlated"
-        expected = "no correlation, or another plan"
-        mistakes.append(Mistake("sampling", "correlation", what, None, expected))
+        mistakes.append(
+            Mistake(
+                "sampling",
+                "correlation",
+                "Saltelli's plan draws the inputs independently, and these are correlated",
+                None,
+                "no correlation, or another plan",
+            )
+        )
     if mistakes:
         raise ScenarioError(scenario.file, mistakes)
 

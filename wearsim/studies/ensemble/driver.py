@@ -293,8 +293,7 @@ class EnsembleWork:
                 self._reached = True
                 return
             self._sizes = self._sizes[1:]
-            due = sorted(number for number in self._deferred if number < self._limit)
-            if due:
+            if due := sorted(number for number in self._deferred if number < self._limit):
                 self.file.put([self._deferred.pop(number) for number in due])
 
     def _is_complete(self) -> bool:

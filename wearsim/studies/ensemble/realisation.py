@@ -16,7 +16,7 @@ from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.strips import averaged, same_strips
 from wearsim.mechanics.numerics.jit import not_cached
-from wearsim.plugins import ContactModel
+from wearsim.plugins import BODIES, ContactModel
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, parse_plan, sources
@@ -96,19 +96,19 @@ def closed_form_depths(
     rollers, speed = scenario.operation.rollers, scenario.rolling_speed
 
     def value(key: str, mean: float | tuple[float, ...]) -> FloatArray:
-        drawn = columns.get(key)
-        if drawn is None:
-            drawn = np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
+        constant = np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
+        drawn = columns.get(key, constant)
         return drawn[:, None] if drawn.ndim == 1 else drawn
 
     creepage, load = scenario.creepage, scenario.load.built
     law = None if scenario.wear is None else scenario.wear.built
-    factors = {}
-    for body in ("cylinder", "roller"):
-        factor = None if law is None else law.depth_per_dissipation(body, speed)
-        if factor is None:
-            return np.full(count, np.nan)
-        factors[body] = factor * speed
+    factors = {
+        body: factor * speed
+        for body in BODIES
+        if law is not None and (factor := law.depth_per_dissipation(body, speed)) is not None
+    }
+    if len(factors) < len(BODIES):
+        return np.full(count, np.nan)
     slip = np.hypot(
         value("creepage.longitudinal", creepage.longitudinal or 0.0),
         value("creepage.yaw", creepage.yaw),
@@ -119,8 +119,7 @@ def closed_form_depths(
     cylinder, roller = (
         value(f"wear.{body}.k_over_h", factors[body])[:, 0] for body in ("cylinder", "roller")
     )
-    share = scenario.cylinder.radius / scenario.roller.radius / rollers
-    opening = cylinder + share * roller
+    opening = cylinder + scenario.cylinder.radius / scenario.roller.radius / rollers * roller
     worn = np.broadcast_to((sliding * force).mean(axis=1) * opening, (count,))
     stiffness = value("load.stiffness", load.stiffness)[:, 0]
     depth = _total_depth(scenario, worn, np.broadcast_to(mean_force, (count,)), stiffness)
@@ -149,8 +148,7 @@ def _total_depth(
     held = np.where((stiffness > 0.0) & (force > 0.0), stiffness, 0.0)
     safe_force = np.where(force > 0.0, force, 1.0)
     # t of artanh x - x = t, which for a soft spring is x^3/3
-    t = passes * worn * held**1.5 / (4.0 * np.sqrt(crown) * safe_force**1.5)
-    x = _inverse(t)
+    x = _inverse(passes * worn * held**1.5 / (4.0 * np.sqrt(crown) * safe_force**1.5))
     reached = safe_force * x**2 / np.where(held > 0.0, held, 1.0)
     # for a soft spring the difference of artanh x and x is dominated by rounding
     return np.asarray(np.where(x > 1e-4, reached, free))
@@ -323,9 +321,8 @@ class RealisationRunner:
         with suppress(Exception):  # an error of the realisation is reported when it is run
             run = self.prepare(0, {})
             state, steps = fresh_state(run.problem), run.scenario.evolution.max_steps
-            next_record = run.schedule.next_record
-            test = Evolution(run.problem, state, run.stepper, run.stop, steps, next_record)
-            next(iter(test), None)
+            test = run.problem, state, run.stepper, run.stop, steps, run.schedule.next_record
+            next(iter(Evolution(*test)), None)
 
     def _model(self, scenario: Scenario, grid: Grid) -> ContactModel:
         """Return the contact model prepared for strips, shared by realisations if possible."""
@@ -359,9 +356,8 @@ class RealisationRunner:
         if self.plan == "control-variate":
             columns = {key: value[None] for key, value in run.setup.values.items()}
             scalars["control"] = float(closed_form_depths(self.scenario, columns, 1)[0])
-        curves = dict(observations.curves)
-        if not same_strips(observations.grid, self.grid):
-            for name, curve in curves.items():
-                if name.endswith("_profile"):
-                    curves[name] = averaged(curve, observations.grid, self.grid)
+        curves, grids = observations.curves, (observations.grid, self.grid)
+        if not same_strips(*grids):
+            profiles = {name: curve for name, curve in curves.items() if name.endswith("_profile")}
+            curves = curves | {name: averaged(curve, *grids) for name, curve in profiles.items()}
         return Outcome(number=run.number, values={**drawn, **courses, **scalars, **curves})

@@ -358,13 +358,13 @@ class EnsembleResult(EnsembleValues):
         statistics: dict[str, FloatArray] = {}
         for name in self.observables:
             course = self.course(name)
-            statistics[f"{name}_mean"], statistics[f"{name}_std"] = course.mean, course.std
-            statistics[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
-        for name in KEPT:
-            if name in self.raw.schema.variables:
-                band = self.band(name)
-                parts = ("mean", "std", "low", "high")
-                statistics |= {f"{name}_{part}": getattr(band, part) for part in parts}
+            quantiles = np.array([course.quantiles[p] for p in QUANTILES])
+            parts = {"mean": course.mean, "std": course.std, "quantiles": quantiles}
+            statistics |= {f"{name}_{part}": values for part, values in parts.items()}
+        for name in [name for name in KEPT if name in self.raw.schema.variables]:
+            band = self.band(name)
+            ends = ("mean", "std", "low", "high")
+            statistics |= {f"{name}_{end}": getattr(band, end) for end in ends}
         return statistics
 
     def is_constant(self, name: str) -> bool:

@@ -182,8 +182,7 @@ def run_sweep(
 ) -> list[Any]:
     """Run the scenarios of a sweep, one per value; the other parameters as of `sweep`."""
     paths = [None if output is None else path_of(output, value) for value in values]
-    same = [path for path in paths if path is not None and paths.count(path) > 1]
-    if same:
+    if same := [path for path in paths if path is not None and paths.count(path) > 1]:
         raise ResultsFileError(
             f"{same[0]}: would be the file of two values; write them differently"
         )

@@ -104,8 +104,7 @@ class Threads:
     """
 
     def __init__(self, workers: int) -> None:
-        self.workers = workers
-        self.describe = f"{workers} threads"
+        self.workers, self.describe = workers, f"{workers} threads"
 
     def results(self, work: Work, batches: Iterator[Batch]) -> Results:
         """Yield every batch with its results, as `Executor.results`."""
@@ -144,9 +143,7 @@ class Processes:
     def __init__(
         self, workers: int, on_notice: Notify | None = None, preload: str = "wearsim"
     ) -> None:
-        self.workers = workers
-        self._preload = preload
-        self.describe = f"{workers} processes"
+        self.workers, self.describe, self._preload = workers, f"{workers} processes", preload
         self._on_notice = on_notice or (lambda message: None)
         self._folder = TemporaryDirectory(prefix="wearsim-", ignore_cleanup_errors=True)
         self._parent_end, self._kept_open = multiprocessing.Pipe(duplex=False)

@@ -46,8 +46,7 @@ def course_of(
         return np.asarray(rate * places)
     first = 1e-3 * min(points[0][0], places[0])
     passes, damage = np.array([(first, rate * first), *points]).T
-    logs = PchipInterpolator(np.log(passes), np.log(damage))(np.log(places))
-    return np.asarray(np.exp(logs))
+    return np.asarray(np.exp(PchipInterpolator(np.log(passes), np.log(damage))(np.log(places))))
 
 
 def other_end(scenario: Scenario) -> str:
@@ -211,9 +210,12 @@ def fatigue_of_lives(result: LifeValues) -> Rows:
     rows = source_rows(result.scenario)
     if first is not None:
         part = first.at(result.most * result.settings.per_unit)
-        text = (
-            f"{shown(part.pitting, '%', 3)} by pitting and {shown(part.wear, '%', 3)} by"
-            f" {other_end(result.scenario)} within {count(result.most)} {result.unit}"
+        rows.insert(
+            0,
+            Row(
+                "first end",
+                f"{shown(part.pitting, '%', 3)} by pitting and {shown(part.wear, '%', 3)} by"
+                f" {other_end(result.scenario)} within {count(result.most)} {result.unit}",
+            ),
         )
-        rows.insert(0, Row("first end", text))
     return rows

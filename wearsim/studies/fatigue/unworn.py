@@ -83,8 +83,8 @@ def unworn_data(scenario: Scenario, problem: WearProblem) -> dict[str, Any] | No
         "cylinder_passes": cylinder,
         "roller_passes": rollers.max(axis=0),
     }
-    damage = rate[: problem.shape[0]].max(axis=-1)
-    angle = float(problem.kinematics.track.greatest(damage).angle[0])
+    of_cam = rate[: problem.shape[0]].max(axis=-1)
+    angle = float(problem.kinematics.track.greatest(of_cam).angle[0])
     return {
         **{name: float(1.0 / n[0]) if n[0] > 0.0 else None for name, n in damages.items()},
         "probability": choice.probability,

@@ -35,13 +35,6 @@ _FIRST_NOISE = Noise(1e-6, 0.2e-3, 0.1e-6)  # of a trace without shoulders, befo
 _NOISE_OF_LIFT = Noise(1e-6, 0.05, 1e-6)  # before noise is fitted to the residuals; lengths in rad
 _BAND = 100  # draws of the band of fitted profiles
 _SUSPECT = 1.6
-_CONFOUNDED = Mistake(
-    "",
-    "curvature",
-    "cannot be distinguished from the groove, since the trace has no unworn shoulders",
-    "true",
-    "a trace with shoulders, or no curvature",
-)
 
 
 @dataclass(frozen=True)
@@ -185,11 +178,22 @@ def identified(
         if trace.noise is not None and trace.depth is not None:
             rows = profiles_of_depth(grown, item.surface, trace.depth)
             suspects = check_width(trace, grown.y, rows)
-            trace = _levelled_again(trace, item, crown_radius, extents_of(grown.y, rows))
+            if item.shoulders is None:  # beyond the predicted groove, if there is something
+                again = level(trace, None, crown_radius, extents_of(grown.y, rows))
+                trace = trace if again.noise is None else again
             if trace.difference or not grown.start.any():
                 depth = _around(*measured_depth(trace, crown_radius, item.curvature))
         elif item.curvature:
-            raise item.refused(_CONFOUNDED)
+            raise item.refused(
+                Mistake(
+                    "",
+                    "curvature",
+                    "cannot be distinguished from the groove, since the trace has no unworn"
+                    " shoulders",
+                    "true",
+                    "a trace with shoulders, or no curvature",
+                )
+            )
         model = TraceLikelihood(
             trace.y,
             trace.height,
@@ -206,8 +210,7 @@ def identified(
         check_covered(likelihood, grown, trace)
         fit = _fit(model, likelihood, trace)
     kernel = kernel_of(likelihood, item.name)
-    step = grown.y[1] - grown.y[0]
-    sizes = grown.depth[item.surface]
+    sizes, step = grown.depth[item.surface], grown.y[1] - grown.y[0]
     model_depth = _interval(size_of(item.surface, sizes), grown, likelihood)
     area = None if item.lift else _interval(sizes.sum(axis=2) * step, grown, likelihood)
     energy = _interval(grown.energy, grown, likelihood)
@@ -220,16 +223,6 @@ def identified(
 def _around(value: float, std: float) -> tuple[float, float, float]:
     """Return a normal value with its 95 % interval."""
     return value, value - 1.96 * std, value + 1.96 * std
-
-
-def _levelled_again(
-    trace: Trace, item: Measurement, crown_radius: float, extents: tuple[float, float]
-) -> Trace:
-    """Level a trace on the shoulders beyond the predicted groove, if there are any."""
-    if item.shoulders is not None:
-        return trace
-    again = level(trace, None, crown_radius, extents)
-    return trace if again.noise is None else again
 
 
 def _with_noise(model: TraceLikelihood) -> TraceLikelihood:
@@ -259,11 +252,9 @@ def _fit(model: TraceLikelihood, likelihood: DrawLikelihood, trace: Trace) -> Fi
     at_best = likelihood.mean[best], likelihood.shift[best]
     worn = np.column_stack([model.worn(best, *at_best), worn])
     forms = model.forms
-    columns = np.column_stack([forms, trace.height[:, None] + worn])
-    white = model.noise.whitened(trace.y, columns)
+    white = model.noise.whitened(trace.y, np.column_stack([forms, trace.height[:, None] + worn]))
     count = forms.shape[1]
-    coefficients = np.linalg.lstsq(white[:, :count], white[:, count:], rcond=None)[0]
-    profiles = forms @ coefficients - worn
+    profiles = forms @ np.linalg.lstsq(white[:, :count], white[:, count:], rcond=None)[0] - worn
     low, high = np.quantile(profiles[:, 1:], (0.025, 0.975), axis=1)
     fit = Fit(trace, profiles[:, 0], low, high)
     if trace.noise is None:
@@ -313,8 +304,7 @@ def exponent(rows: Sequence[Identified]) -> tuple[float, float, float] | None:
         return None
     x = np.log([row.passes for row in rows])
     depth = np.array([row.depth or row.model_depth for row in rows])
-    std = np.log(depth[:, 2] / depth[:, 1]) / 3.92
-    weight = std**-2
+    weight = (np.log(depth[:, 2] / depth[:, 1]) / 3.92) ** -2
     middle = np.average(x, weights=weight)
     spread = float((weight * (x - middle) ** 2).sum())
     slope = float((weight * (x - middle) * np.log(depth[:, 0])).sum()) / spread

@@ -131,25 +131,26 @@ def identify(
     require_run(scenario)
     check_law(scenario)
     scenario = with_chosen_model(scenario, test=True)
-    shared = _checked_share(share)
+    if share and sorted(share) != sorted(_SHARE):
+        raise ValueError(f"share must be {', '.join(_SHARE)}, got {', '.join(share)}")
     width = quantity(shoulders, "m") if isinstance(shoulders, str) else shoulders
     items = _measurements(tests, before, choice, width, curvature)
     files = [path for item in items for path in item.files]
     with output_lock(output, force, [*scenario.paths, *files]):
-        study = _Study(scenario, items, draws, shared)
+        study = _Study(scenario, items, draws, bool(share))
         with shown_progress(progress, "Counter", on_progress, scenario) as watch:
             rows = study.rows(watch)
-        specimens = specimens_of(rows)
-        seconds = time.monotonic() - started
-        fixed = [key_of(key) for key in fix or ()]
-        given = {
-            "measured": tables_of(items),
-            "draws": draws,
-            "shared": shared,
-            "contained": contained_inputs(study.scenario, items, fixed),
-        }
         data = content(
-            study.scenario, specimens, negligible, study.notes, created, seconds, **given
+            study.scenario,
+            specimens_of(rows),
+            negligible,
+            study.notes,
+            created,
+            time.monotonic() - started,
+            measured=tables_of(items),
+            draws=draws,
+            shared=bool(share),
+            contained=contained_inputs(study.scenario, items, [key_of(key) for key in fix or ()]),
         )
         data.warnings.extend(study.left_out)
         if output is not None:
@@ -187,15 +188,6 @@ def _measurements(
     return measurements_of(files, before, choice, shoulders, curvature)
 
 
-def _checked_share(share: Sequence[str]) -> bool:
-    """Return whether both bodies share one unknown factor."""
-    if not share:
-        return False
-    if sorted(share) != sorted(_SHARE):
-        raise ValueError(f"share must be {', '.join(_SHARE)}, got {', '.join(share)}")
-    return True
-
-
 @dataclass(frozen=True)
 class _Ready:
     """A measurement with its scenario, trace, passes and range of depths."""
@@ -218,21 +210,26 @@ class _Study:
         self.left_out: list[str] = []
         self._by_inputs: dict[str, list[_Ready]] = {}
         for item in items:
-            ready = self._ready(item)
-            if ready is None:
-                continue
-            known = sorted(item.values.items()), sorted(item.errors.items())
-            self._by_inputs.setdefault(repr(known), []).append(ready)
+            if ready := self._ready(item):
+                known = sorted(item.values.items()), sorted(item.errors.items())
+                self._by_inputs.setdefault(repr(known), []).append(ready)
         if not self._by_inputs:
-            what = f"no groove can be used: {'; '.join(self.left_out)}"
-            raise mistake_in(items[0].file or items[0].name, what)
+            raise mistake_in(
+                items[0].file or items[0].name, f"no groove can be used: {'; '.join(self.left_out)}"
+            )
 
     def _ready(self, item: Measurement) -> _Ready | None:
         """Read a measurement; None if it is left out."""
         if item.body == "roller" and not self.shared:
-            what = "wear of the roller is measured, and its K/H is that of the scenario"
-            expected = "share = cylinder, roller (--share k=cylinder,roller)"
-            raise item.refused(Mistake("", "body", what, None, expected))
+            raise item.refused(
+                Mistake(
+                    "",
+                    "body",
+                    "wear of the roller is measured, and its K/H is that of the scenario",
+                    None,
+                    "share = cylinder, roller (--share k=cylinder,roller)",
+                )
+            )
         _check_place(self.scenario, item)
         scenario = with_known(self.scenario, item)
         require_run(scenario)
@@ -304,12 +301,14 @@ class _Study:
         wanted = [Wanted(test.item.surface, test.passes, *test.depths) for test in group]
         on_cam = self.scenario.cam is not None
         trajectories = grower.grow_on_cam(wanted) if on_cam else grower.grow(wanted)
-        return [self._identified(ready, trajectories) for ready in group], trajectories
-
-    def _identified(self, ready: _Ready, trajectories: Trajectories) -> Identified:
-        crown = ready.scenario.roller.crown_radius
-        row = identified(ready.item, ready.trace, trajectories, ready.passes, crown)
-        return replace(row, shares=shares(row, trajectories))
+        rows = [
+            identified(
+                *(ready.item, ready.trace, trajectories, ready.passes),
+                ready.scenario.roller.crown_radius,
+            )
+            for ready in group
+        ]
+        return [replace(row, shares=shares(row, trajectories)) for row in rows], trajectories
 
 
 def shares(row: Identified, trajectories: Trajectories) -> dict[str, float]:
@@ -330,8 +329,7 @@ def shares(row: Identified, trajectories: Trajectories) -> dict[str, float]:
     for key, values in trajectories.values.items():
         size = np.abs(values[used])
         if np.ptp(size) > 0.0:
-            rank = size.argsort().argsort()
-            parts[key] = float(np.corrcoef(rank, mean)[0, 1] ** 2)
+            parts[key] = float(np.corrcoef(size.argsort().argsort(), mean)[0, 1] ** 2)
     return parts
 
 
@@ -339,21 +337,32 @@ def _passes(scenario: Scenario, item: Measurement) -> float:
     """Return the passes at which a groove was measured."""
     if item.at is None:
         return float(scenario.total_passes)
-    text, (unit, size) = item.at.strip(), scenario.life_unit
+    text, units = item.at.strip(), {"passes": 1.0, **dict([scenario.life_unit])}
+    unit = next((unit for unit in units if text.endswith(unit)), "")
     try:
-        if text.endswith("passes"):
-            passes = float(text.removesuffix("passes"))
-        elif text.endswith(unit):
-            passes = float(text.removesuffix(unit)) * size
-        else:
-            passes = quantity(text, "s") * scenario.pass_rate
+        number = float(text.removesuffix(unit)) if unit else quantity(text, "s")
+        passes = number * units.get(unit, scenario.pass_rate)
     except ValueError as error:
         what = error.what if isinstance(error, QuantityError) else "is no number of passes"
-        expected = 'a time such as "100 min", or "2e5 passes", of a cam also "1e5 turns"'
-        raise item.refused(Mistake("", "at", what, as_written(item.at), expected)) from error
+        raise item.refused(
+            Mistake(
+                "",
+                "at",
+                what,
+                as_written(item.at),
+                'a time such as "100 min", or "2e5 passes", of a cam also "1e5 turns"',
+            )
+        ) from error
     if not 0.0 < passes <= scenario.total_passes * (1.0 + 1e-9):
-        what, expected = "is not within the test", f"up to {scenario.total_time / 60.0:.6g} min"
-        raise item.refused(Mistake("", "at", what, item.at, expected))
+        raise item.refused(
+            Mistake(
+                "",
+                "at",
+                "is not within the test",
+                item.at,
+                f"up to {scenario.total_time / 60.0:.6g} min",
+            )
+        )
     return passes
 
 
@@ -383,12 +392,22 @@ def _check_place(scenario: Scenario, item: Measurement) -> None:
     if scenario.cam is None:
         for key, value in (("angle", item.angle), ("lift", item.lift)):
             if value is not None:
-                what, expected = "is for a cam, and the scenario has a cylinder", f"no {key}"
-                raise item.refused(Mistake("", key, what, None, expected))
+                raise item.refused(
+                    Mistake(
+                        "", key, "is for a cam, and the scenario has a cylinder", None, f"no {key}"
+                    )
+                )
     elif item.lift is None and item.angle is None and item.body == "cylinder":
-        what = "is needed for a groove of a cam: where the trace crosses it"
-        expected = 'angle = "112 deg" with profile, in a tests file (--tests)'
-        raise item.refused(Mistake("", "angle", what, None, expected))
+        raise item.refused(
+            Mistake(
+                "",
+                "angle",
+                "is needed for a groove of a cam: where the trace crosses it",
+                None,
+                'angle = "112 deg" with profile, in a tests file (--tests)',
+            )
+        )
     elif item.angle is not None and item.body == "roller":
-        what = "has no meaning for a groove of the roller"
-        raise item.refused(Mistake("", "angle", what, None, "no angle"))
+        raise item.refused(
+            Mistake("", "angle", "has no meaning for a groove of the roller", None, "no angle")
+        )

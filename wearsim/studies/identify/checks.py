@@ -30,11 +30,12 @@ def profiles_of_depth(grown: Grown, body: str, depth: float) -> FloatArray:
     chosen = rows[np.arange(len(rows)), record]
     stretch = np.sqrt(depth / chosen.max(axis=1))
     centre = (chosen * grown.y).sum(axis=1) / chosen.sum(axis=1)
-    scaled = [
-        factor**2 * np.interp((grown.y - middle) / factor + middle, grown.y, row)
-        for factor, middle, row in zip(stretch, centre, chosen, strict=True)
-    ]
-    return np.array(scaled)
+    return np.array(
+        [
+            factor**2 * np.interp((grown.y - middle) / factor + middle, grown.y, row)
+            for factor, middle, row in zip(stretch, centre, chosen, strict=True)
+        ]
+    )
 
 
 def extents_of(y: FloatArray, rows: FloatArray) -> tuple[float, float]:
@@ -77,8 +78,8 @@ def check_width(trace: Trace, y: FloatArray, rows: FloatArray) -> list[str]:
 def check_covered(likelihood: DrawLikelihood, grown: Grown, trace: Trace) -> None:
     """Refuse a trace whose best wear factor is at the end of those computed."""
     best = int(likelihood.chi2.argmin())
-    top = grown.ln_k[best, -1]
-    if trace.depth is None and likelihood.mean[best] + likelihood.std[best] > top:
+    reach = likelihood.mean[best] + likelihood.std[best]
+    if trace.depth is None and reach > grown.ln_k[best, -1]:
         raise mistake_in(
             trace.name,
             "the groove may be wider than the trace: without its edges and the unworn"
@@ -86,8 +87,7 @@ def check_covered(likelihood: DrawLikelihood, grown: Grown, trace: Trace) -> Non
             f"a trace of {1e3 * (trace.y[-1] - trace.y[0]):.4g} mm",
             "a longer one",
         )
-    freedom = len(trace.y) - 4
-    ratio = float(likelihood.chi2.min()) / freedom
+    ratio = float(likelihood.chi2.min()) / (len(trace.y) - 4)
     if ratio > _FOREIGN:
         raise mistake_in(
             trace.name,

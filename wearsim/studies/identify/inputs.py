@@ -6,6 +6,7 @@ import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -70,8 +71,15 @@ def with_known(scenario: Scenario, test: Measurement) -> Scenario:
         item = before.get(key)
         if not can_be_random(key) or (item is not None and item.role == "joint"):
             by = "" if item is None else f" alone, since {item.name} sets it with others"
-            what, expected = f"cannot be random{by}", "only a known value in set"
-            raise test.refused(Mistake("", f"std.{key}", what, as_written(error), expected))
+            raise test.refused(
+                Mistake(
+                    "",
+                    f"std.{key}",
+                    f"cannot be random{by}",
+                    as_written(error),
+                    "only a known value in set",
+                )
+            )
         if item is None:
             changed = _changed(known, {key: _normal(key, test.values[key], error)}, test, "std")
             random += [random_input for random_input in changed.random if random_input.name == key]
@@ -91,10 +99,8 @@ def _changed(
         for mistake in error.mistakes:
             place = ".".join(filter(None, (mistake.table, mistake.key)))
             key = next((key for key in values if f"{place}.".startswith(f"{key}.")), None)
-            if key is None:
-                mistakes.append(Mistake("", table, str(mistake)))
-            else:
-                mistakes.append(replace(mistake, key=f"{table}.{key}"))
+            named = replace(mistake, key=f"{table}.{key}")
+            mistakes.append(named if key else Mistake("", table, str(mistake)))
         raise test.refused(*mistakes) from error
 
 
@@ -103,19 +109,16 @@ def _normal(key: str, value: object, error: object) -> dict[str, object]:
     if key in _EITHER_SIGN:
         return {"distribution": "normal", "mean": value, "std": error}
     unit = str(value).strip().partition(" ")[2]
-    zero = f"0 {unit}" if unit else 0
+    support = [f"0 {unit}" if unit else 0, "inf"]
     parent = {"parent_mean": value, "parent_std": error}
-    return {"distribution": "truncated-normal", **parent, "support": [zero, "inf"]}
+    return {"distribution": "truncated-normal", **parent, "support": support}
 
 
 def _number(scenario: Scenario, key: str) -> float:
     """Return the number at a dotted key of a scenario [SI]."""
-    table, *inner = key.split(".")
-    value: Any = getattr(scenario, table)
-    value = getattr(value, "options", value)
-    for name in inner:
-        value = getattr(value, name)
-    return float(value)
+    table, inner = key.split(".", 1)
+    section: Any = getattr(scenario, table)
+    return float(attrgetter(inner)(getattr(section, "options", section)))
 
 
 def _std(item: RandomInput, error: object, key: str, test: Measurement) -> float:
@@ -141,10 +144,15 @@ def _measured(item: RandomInput, value: float, std: float, test: Measurement) ->
     middle = 0.5 * (grid[1:] + grid[:-1])
     weight = np.diff(below) * np.exp(-0.5 * ((middle - value) / std) ** 2)
     if below[-1] - below[0] < _LEAST:
-        what = f"the measured value is out of the scenario's distribution: {item.describe()}"
-        got = f"{amount(value, item.quantity)} with std {amount(std, item.quantity)}"
-        expected = "a value within it, or a wider distribution in the scenario"
-        raise test.refused(Mistake("", f"set.{item.name}", what, got, expected))
+        raise test.refused(
+            Mistake(
+                "",
+                f"set.{item.name}",
+                f"the measured value is out of the scenario's distribution: {item.describe()}",
+                f"{amount(value, item.quantity)} with std {amount(std, item.quantity)}",
+                "a value within it, or a wider distribution in the scenario",
+            )
+        )
     probability = np.concatenate([[0.0], np.cumsum(weight)])
     inside = np.concatenate([[True], weight > 0.0])
     table = TableDistribution(probability[inside] / probability[-1], grid[inside])
@@ -191,8 +199,13 @@ def with_measured(scenario: Scenario, stds: Mapping[str, float]) -> Scenario:
         if key not in names or random[names.index(key)].role == "joint":
             single = [item.name for item in random if item.role != "joint"]
             expected = ", ".join(single) or "a random input"
-            what = "is not a random number of the scenario, so measuring it changes nothing"
-            raise mistake_in(scenario.file, what, None, expected, key=key)
+            raise mistake_in(
+                scenario.file,
+                "is not a random number of the scenario, so measuring it changes nothing",
+                None,
+                expected,
+                key=key,
+            )
         place = names.index(key)
         item = random[place]
         uniform = (np.arange(2001) + 0.5) / 2001

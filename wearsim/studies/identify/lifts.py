@@ -56,14 +56,19 @@ def read_change(item: Measurement, follower: Follower) -> Trace:
     else:
         curve = LiftSpline(other - other[0], np.append(unworn[:-1], unworn[0]), closed=True)
         change = worn - curve(np.mod(angle - other[0], 2.0 * np.pi))[0]
-    angle, change = angle[:-1], change[:-1]
-    count = -(-len(angle) // MOST_POINTS)
-    if count > 1:
-        angle, change = block_means(count, angle, change)
+    angle, change = block_means(-(-(len(angle) - 1) // MOST_POINTS), angle[:-1], change[:-1])
     unworn_points = np.zeros(len(angle), dtype=np.bool_)
-    words = "the lift before the test"
     return Trace(
-        item.name, angle, change, unworn_points, words, None, None, None, 0.0, difference=True
+        item.name,
+        angle,
+        change,
+        unworn_points,
+        "the lift before the test",
+        None,
+        None,
+        None,
+        0.0,
+        difference=True,
     )
 
 
@@ -72,8 +77,7 @@ def _lift(path: Path, item: Measurement, follower: Follower) -> tuple[FloatArray
     try:
         text = decode(path.read_bytes())
     except OSError as error:
-        what = f"the file cannot be read ({error.strerror})"
-        raise mistake_in(str(path), what) from error
+        raise mistake_in(str(path), f"the file cannot be read ({error.strerror})") from error
     choice = item.choice
     angle, lift = read_lift_table(text, str(path), choice.columns, choice.units, follower)
     angle, lift = one_turn(str(path), angle, lift, "rad" if follower.swings else "m")
@@ -101,8 +105,7 @@ class LiftLikelihood(TraceLikelihood):
     @cached_property
     def _between(self) -> FloatArray:
         """Interpolation from the angles of the curves, shape (points, curve angles)."""
-        place = np.mod(self.y, 2.0 * np.pi)
-        eye = np.eye(len(CURVE_ANGLES))
+        place, eye = np.mod(self.y, 2.0 * np.pi), np.eye(len(CURVE_ANGLES))
         return np.stack([np.interp(place, CURVE_ANGLES, row) for row in eye], axis=1)
 
     def worn(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:

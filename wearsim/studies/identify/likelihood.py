@@ -9,6 +9,7 @@ lattice, which is centred and scaled by the moments of the integrand itself.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -129,28 +130,33 @@ class TraceLikelihood:
 
     def chi2(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:
         """Return the sum of squared residuals, shape (columns,)."""
-        values = np.empty(len(draw))
+
+        def squares(some: slice) -> FloatArray:
+            residual = self.residual(draw[some], ln_k[some], shift[some])
+            return np.asarray((residual**2).sum(axis=0))
+
+        return self._by_blocks(len(draw), squares)
+
+    def _by_blocks(self, count: int, values: Callable[[slice], FloatArray]) -> FloatArray:
+        """Return the values of columns, computed for as many at once as memory is meant to hold."""
         block = max(_VALUES // len(self.y), 1)
-        for start in range(0, len(draw), block):
-            some = slice(start, start + block)
-            values[some] = (self.residual(draw[some], ln_k[some], shift[some]) ** 2).sum(axis=0)
-        return values
+        starts = range(0, count, block)
+        return np.concatenate([values(slice(start, start + block)) for start in starts])
 
     def deviance(
         self, models: NoiseModels, draw: IntArray, ln_k: FloatArray, shift: FloatArray
     ) -> FloatArray:
         """Return -2 times the log likelihood, the noise integrated, shape (columns,)."""
-        values = np.empty(len(draw))
-        block = max(_VALUES // len(self.y), 1)
-        for start in range(0, len(draw), block):
-            some = slice(start, start + block)
+        filters = models.decay, models.gain, models.scale, models.lines
+
+        def deviances(some: slice) -> FloatArray:
             sum_ = self.height[:, None] + self.worn(draw[some], ln_k[some], shift[some])
-            filters = models.decay, models.gain, models.scale, models.lines
             squares = squared_residuals(np.ascontiguousarray(sum_.T), *filters)
             score = models.log_weight[:, None] - models.exponent[:, None] * np.log(squares)
             top = score.max(axis=0)
-            values[some] = -2.0 * (top + np.log(np.exp(score - top).sum(axis=0)))
-        return values
+            return np.asarray(-2.0 * (top + np.log(np.exp(score - top).sum(axis=0))))
+
+        return self._by_blocks(len(draw), deviances)
 
     def _start(self) -> tuple[FloatArray, FloatArray]:
         """Return ln K and shift from which the maximum is sought, for each draw."""
@@ -159,9 +165,7 @@ class TraceLikelihood:
         below = self.height.max() - self.height
         weight = np.maximum(below - 0.5 * below.max(), 0.0)
         centre = float((weight * self.y).sum() / weight.sum())
-        shift = centre - self._centroid.mean(axis=1)
-        if not self.lateral:
-            shift = np.zeros_like(shift)
+        shift = centre - self._centroid.mean(axis=1) if self.lateral else np.zeros(len(draws))
         tried = np.linspace(ends[:, 0], ends[:, 1], _STARTS, axis=1)
         owner = np.repeat(draws, _STARTS)
         values = self.chi2(owner, tried.ravel(), shift[owner]).reshape(tried.shape)
@@ -189,9 +193,8 @@ class TraceLikelihood:
             gradient = np.zeros((len(draws), 2))
             for start in range(0, len(draws), block):
                 some = draws[start : start + block]
-                here = position[some]
                 moves = np.array([[0.0, 0.0], [small[0], 0.0], [0.0, small[1]]])
-                tried = (moves[:, None] + here).reshape(-1, 2)
+                tried = (moves[:, None] + position[some]).reshape(-1, 2)
                 residuals = self.residual(np.tile(some, 3), *tried.T).reshape(count, 3, -1)
                 base = residuals[:, 0]
                 # derivatives, shape (2, points, columns)
@@ -218,7 +221,6 @@ class TraceLikelihood:
     def integrated(self) -> DrawLikelihood:
         """Return evidence, mean and standard deviation of ln K for each draw."""
         centre, covariance, chi2 = self.maximum()
-        kept = np.flatnonzero(chi2 < chi2.min() + _DROPPED)
         first = np.array([int(chi2.argmin())])
         residual = self.height + self.worn(first, *centre[first].T)[:, 0]
         models = noise_models(self.y, residual, self.forms, self.least)
@@ -227,15 +229,16 @@ class TraceLikelihood:
         log_evidence = np.full(len(centre), -np.inf)
         place, spread = centre.copy(), np.sqrt(covariance[:, 0, 0])
         covariance *= _FIRST
-        pending = kept
+        pending = np.flatnonzero(chi2 < chi2.min() + _DROPPED)
         for _ in range(_ROUNDS):
             root = np.linalg.cholesky(covariance[pending])
             if not self.lateral:
                 root[:, 1] = 0.0
             points = centre[pending][:, None] + lattice @ root.transpose(0, 2, 1)
             owner = np.repeat(pending, len(lattice))
-            values = self.deviance(models, owner, *points.reshape(-1, 2).T)
-            values = values.reshape(len(pending), -1)
+            values = self.deviance(models, owner, *points.reshape(-1, 2).T).reshape(
+                len(pending), -1
+            )
             least = values.min(axis=1)
             weight = np.exp(-0.5 * (values - least[:, None]))
             total = weight.sum(axis=1)
@@ -283,8 +286,7 @@ class DrawLikelihood:
     def times(self, other: DrawLikelihood) -> DrawLikelihood:
         """Return the product with the likelihood of another trace of the same test."""
         variance = self.std**2 + other.std**2
-        away = self.mean - other.mean
-        evidence = -0.5 * away**2 / variance - 0.5 * np.log(variance)
+        evidence = -0.5 * (self.mean - other.mean) ** 2 / variance - 0.5 * np.log(variance)
         precision = self.std**-2 + other.std**-2
         mean = (self.mean * self.std**-2 + other.mean * other.std**-2) / precision
         return DrawLikelihood(
@@ -344,5 +346,4 @@ def _interpolated(position: FloatArray, y: FloatArray, rows: FloatArray) -> Floa
     flat, offset = np.ascontiguousarray(rows).ravel(), count * np.arange(len(rows))
     index = first + offset
     value = flat[index]
-    value = value + part * (flat[index + 1] - value)
-    return np.asarray(np.where(inside, value, 0.0))
+    return np.asarray(np.where(inside, value + part * (flat[index + 1] - value), 0.0))

@@ -13,7 +13,7 @@ from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.scenario.parse.mistakes import nearest
-from wearsim.scenario.parse.toml import as_toml
+from wearsim.scenario.parse.toml import as_toml, flat
 from wearsim.units import QuantityError, as_written
 
 #: Short names of inputs.
@@ -31,7 +31,6 @@ _KEYS = (
     *("body", "shoulders", "curvature", "runout", "columns", "units", *_ROWS),
 )
 _EXAMPLE = '[[test]] tables with profile = "t1.csv", or depth = "48 um" and depth_std = "1 um"'
-_SIZES = ("profile", "depth", "lift")
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,6 @@ def measurements_of(
             " each, in the same order"
         )
     firsts: Sequence[str | Path | None] = before or [None] * len(files)
-    pairs = zip(files, firsts, strict=True)
     return [
         Measurement(
             str(file),
@@ -154,7 +152,7 @@ def measurements_of(
             shoulders=shoulders,
             curvature=curvature,
         )
-        for file, first in pairs
+        for file, first in zip(files, firsts, strict=True)
     ]
 
 
@@ -179,8 +177,7 @@ def read_tests(path: str | Path) -> list[Measurement]:
     try:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
-        what = f"the file cannot be read ({error.strerror})"
-        raise mistake_in(str(path), what) from error
+        raise mistake_in(str(path), f"the file cannot be read ({error.strerror})") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise mistake_in(str(path), f"is not TOML: {error}") from error
     tests = tables.pop("test", None)
@@ -283,24 +280,48 @@ def _read_test(
         if not isinstance(table.get(key, {}), dict):
             wrong(key, "is not a table", table[key], 'a table such as {load = "310 N"}')
             return Measurement(place)
-    if sum(key in table for key in _SIZES) != 1:
-        wrong("profile, depth or lift", "exactly one of them is needed", None, _EXAMPLE)
-    if "lift" in table:
-        if "before" not in table:
-            wrong("before", "is needed with lift", None, "the lift of the unworn cam")
-        refused = ("angle", "body", "shoulders", "curvature", *_ROWS)
-        for key in [key for key in refused if key in table]:
-            wrong(key, "has no meaning with lift", table[key], "")
-    elif "runout" in table:
-        wrong("runout", "is of a lift", None, "runout with lift only")
-    if "depth" in table and "depth_std" not in table:
-        wrong("depth_std", "is needed with depth", None, "its standard deviation, such as '1 um'")
-    if table.get("body", "cylinder") not in {"cylinder", "roller"}:
-        wrong("body", "is unknown", table["body"], '"cylinder" or "roller"')
-    for key in ("curvature", "runout"):
-        if not isinstance(table.get(key, False), bool):
-            wrong(key, "is not true or false", table[key], "true or false")
-    values, errors = _flat(table.get("set", {})), _flat(table.get("std", {}))
+    of_lift, std = "lift" in table, "its standard deviation, such as '1 um'"
+    one, refused = (
+        sum(key in table for key in ("profile", "depth", "lift")) == 1,
+        ("angle", "body", "shoulders", "curvature"),
+    )
+    checks: list[tuple[bool, str, str, object, str]] = [
+        (not one, "profile, depth or lift", "exactly one of them is needed", None, _EXAMPLE),
+        (
+            *(of_lift and "before" not in table, "before", "is needed with lift", None),
+            "the lift of the unworn cam",
+        ),
+        *(
+            (of_lift and key in table, key, "has no meaning with lift", table.get(key), "")
+            for key in (*refused, *_ROWS)
+        ),
+        (
+            *(not of_lift and "runout" in table, "runout", "is of a lift", None),
+            "runout with lift only",
+        ),
+        (
+            *("depth" in table and "depth_std" not in table, "depth_std", "is needed with depth"),
+            *(None, std),
+        ),
+        (
+            table.get("body", "cylinder") not in {"cylinder", "roller"},
+            *("body", "is unknown", table.get("body"), '"cylinder" or "roller"'),
+        ),
+        *(
+            (
+                not isinstance(table.get(key, False), bool),
+                *(key, "is not true or false", table.get(key), "true or false"),
+            )
+            for key in ("curvature", "runout")
+        ),
+    ]
+    for applies, *mistake in checks:
+        if applies:
+            wrong(*mistake)  # type: ignore[arg-type]
+    values, errors = (
+        {key: value for key, value in flat(table.get(name, {})) if value != {}}
+        for name in ("set", "std")
+    )
     for key, value in values.items():
         if "." not in key and key not in SHORT:
             expected = f"a key of the scenario such as load.normal_force, or {', '.join(SHORT)}"
@@ -350,14 +371,3 @@ def _read_test(
 def _name(name: str, table: Mapping[str, Any]) -> str:
     """Return the name of a test, with the angle of a cam."""
     return f"{name} ({table['angle']})" if isinstance(table.get("angle"), str) else name
-
-
-def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, object]:
-    """Return values by dotted key."""
-    keys: dict[str, object] = {}
-    for key, value in table.items():
-        if isinstance(value, dict):
-            keys |= _flat(value, f"{start}{key}.")
-        else:
-            keys[f"{start}{key}"] = value
-    return keys

@@ -141,10 +141,8 @@ def _kernel(
     passes = float(scenario.total_passes)
     std = DEPTH_ERROR * depth
     grower = Grower(scenario, draws, on_progress=on_progress)
-    wanted = Wanted("cylinder", passes, *depth_range(depth, std))
-    grown = grower.grow([wanted]).by_passes[passes]
-    likelihood = depth_likelihood(depth, std, grown, "cylinder")
-    return kernel_of(likelihood, scenario.file)
+    grown = grower.grow([Wanted("cylinder", passes, *depth_range(depth, std))]).by_passes[passes]
+    return kernel_of(depth_likelihood(depth, std, grown, "cylinder"), scenario.file)
 
 
 def _planned(

@@ -113,8 +113,7 @@ def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> tuple[Likelihoo
     high = max(k.mean + 5.0 * k.variance**0.5 for k in kernels)
     for _ in range(_ROUNDS):
         grid = np.linspace(low, high, _GRID)
-        scores = np.array([log_density(k, grid) for k in kernels])
-        score = scores.sum(axis=0)
+        score = np.array([log_density(k, grid) for k in kernels]).sum(axis=0)
         inside = np.flatnonzero(score > score.max() - _DROPPED)
         if len(inside) > _GRID // 4:
             break
@@ -166,8 +165,7 @@ def content(
     posterior = Posterior.of(kernels)
     centres = np.array([kernel.mean for kernel in kernels])
     spread = float(np.sqrt(max(kernel.variance for kernel in kernels)))
-    ends = centres.min() - 4.0 * spread, centres.max() + 4.0 * spread
-    grid = np.linspace(*ends, _CURVE)
+    grid = np.linspace(centres.min() - 4.0 * spread, centres.max() + 4.0 * spread, _CURVE)
     rows = [row for specimen in specimens for test in specimen.tests for row in test]
     return IdentificationData(
         **origin_of(scenario),
@@ -200,8 +198,7 @@ def _three(quantiles: Sequence[float]) -> dict[str, float]:
 def _test(row: Identified, specimen: Specimen) -> dict[str, Any]:
     """Return the numbers of one measured groove."""
     alone = np.exp(row.kernel.quantile(np.array(_FIVE))).tolist()
-    names = ("value", "low", "high")
-    fit = row.fit
+    names, fit = ("value", "low", "high"), row.fit
     noise = None if fit is None else fit.trace.noise
     return {
         "file": row.item.name,

@@ -119,7 +119,7 @@ def _mean_line(path: object, item: Measurement, notes: list[str]) -> tuple[Profi
         y = lines[0].y
         inside = [line for line in lines if len(line.y) == len(y)]
         heights = np.array([line.height for line in inside])
-        heights = heights - heights.mean(axis=1, keepdims=True)
+        heights -= heights.mean(axis=1, keepdims=True)
         mean = np.median(heights, axis=0) if len(inside) > 4 else heights.mean(axis=0)
         spread = float(np.sqrt(heights.var(axis=0, ddof=1).mean() / len(inside)))
         profile = Profile(y, mean)
@@ -156,8 +156,7 @@ def _without_spikes(profile: Profile) -> BoolArray:
         kept = np.flatnonzero(good)
         # at the ends the window is mirrored, where an inclination looks like a bend
         height = profile.height - np.polyval(_line_of_ends(y[kept], profile.height[kept]), y)
-        spacing = float(np.median(np.diff(y[kept])))
-        half = int(np.clip(0.5 * _WINDOW / spacing, 3, len(kept) // 4))
+        half = int(np.clip(0.5 * _WINDOW / float(np.median(np.diff(y[kept]))), 3, len(kept) // 4))
         padded = np.pad(height[kept], half, mode="symmetric")
         median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1), axis=1)
         away = np.abs(height[kept] - median)
@@ -207,13 +206,9 @@ def _thinned(profile: Profile, item: Measurement, crown_radius: float, averaged:
     """
     y, height = profile.y, profile.height
     count = -(-len(y) // MOST_POINTS)
-    if averaged:
-        y, height = block_means(count, y, height)
-    else:
-        y, height = y[::count], height[::count]
-    unworn = np.zeros(len(y), dtype=np.bool_)
-    trace = Trace(item.name, y, height, unworn, "", None, None, None, 0.0)
-    trace = replace(trace, difference=item.before is not None)
+    y, height = block_means(count, y, height) if averaged else (y[::count], height[::count])
+    points, less = (y, height, np.zeros(len(y), dtype=np.bool_)), item.before is not None
+    trace = Trace(item.name, *points, "", None, None, None, 0.0, difference=less)
     return level(trace, item.shoulders, crown_radius)
 
 

@@ -101,12 +101,11 @@ def time_dependence(scenario: Scenario, shared: bool) -> tuple[str, ...]:
         Whether the wear factors of both bodies have a common unknown factor.
     """
     processes = [item.name for item in scenario.random if item.role == "process"]
-    load = scenario.load.built
     worn = factors(scenario)[1]
     random = any(item.name == ROLLER for item in scenario.random)
     reasons = (
         (bool(processes), f"a random process in time sets {' and '.join(processes)}"),
-        (not load.constant, f"the load '{scenario.load.kind}' depends on time"),
+        (not scenario.load.built.constant, f"the load '{scenario.load.kind}' depends on time"),
         (
             bool(scenario.load.terms),
             f"the load has terms ({', '.join(term.name for term in scenario.load.terms)})",
@@ -137,9 +136,14 @@ def check_law(scenario: Scenario) -> None:
             f" wear.law = 'archard-dissipation', and the wear law is {law}"
         )
     if any(item.name == "wear.factor" for item in scenario.random):
-        what = "is random, and so is what is identified: the scatter of K/H between specimens"
-        remedy = "no such line: delete factor under [wear], or the table [wear.factor]"
-        raise mistake_in(scenario.file, what, None, remedy, table="wear", key="factor")
+        raise mistake_in(
+            scenario.file,
+            "is random, and so is what is identified: the scatter of K/H between specimens",
+            None,
+            "no such line: delete factor under [wear], or the table [wear.factor]",
+            table="wear",
+            key="factor",
+        )
     if factors(scenario)[0] <= 0.0:
         raise mistake_in(
             scenario.file,
@@ -210,11 +214,8 @@ class Grower:
 
     def values(self) -> dict[str, FloatArray]:
         """Return the drawn values by key, shape (draws,); means over rollers and time."""
-        values: dict[str, list[float]] = {}
-        for draws in self.draws:
-            for key, value in {**draws.values, **draws.time_means}.items():
-                values.setdefault(key, []).append(float(np.mean(value)))
-        return {key: np.array(value) for key, value in values.items()}
+        rows = [{**draws.values, **draws.time_means} for draws in self.draws]
+        return {key: np.array([float(np.mean(row[key])) for row in rows]) for key in rows[0]}
 
     def grow(self, wanted: Sequence[Wanted]) -> Trajectories:
         """Run the wear tests of a cylinder.
@@ -245,8 +246,8 @@ class Grower:
         ]
         start = np.max([high for _, high in ends], axis=0)
         span = float((start / np.min([low for low, _ in ends], axis=0)).max())
-        span = max(span, (ABOVE / BELOW) ** 1.5)  # also where rigid bodies do not wear
-        return self._covered(times, start, span, wanted)
+        least = (ABOVE / BELOW) ** 1.5  # also where rigid bodies do not wear
+        return self._covered(times, start, max(span, least), wanted)
 
     def grow_on_cam(self, wanted: Sequence[Wanted]) -> Trajectories:
         """Run the wear tests of a cam; see `grow`.
@@ -311,8 +312,7 @@ class Grower:
             )
             if not (sizes > 0.0).all():
                 where = wanted[int(sizes.argmin())].surface
-                what = "the model does not wear there"
-                raise mistake_in(self.scenario.file, what, key=where)
+                raise mistake_in(self.scenario.file, "the model does not wear there", key=where)
             ratio = float((high / sizes).max())
             if 1.0 / _NEAR < ratio < _NEAR or number == _PILOTS - 1:
                 break
@@ -326,28 +326,23 @@ class Grower:
 
         The numbers of the draws without a failed test are returned too.
         """
-        count = int(np.ceil(np.log(span) / np.log(RATIO))) + 1
+        # interpolation between many tests is hidden by their scatter
+        ratio = RATIO_OF_TESTS if self.reasons and self.count > _FEW else RATIO
+        count = int(np.ceil(np.log(span) / np.log(ratio))) + 1
+        scale = span ** (np.arange(count) / (count - 1) - 1.0)  # up to 1
         if self.reasons:
-            # interpolation between many tests is hidden by their scatter
-            ratio = RATIO if self.count <= _FEW else RATIO_OF_TESTS
-            count = int(np.ceil(np.log(span) / np.log(ratio))) + 1
-            scale = span ** (np.arange(count) / (count - 1) - 1.0)
             tests = [(d, start[d] * s) for d in range(self.count) for s in scale]
             kept, states = self._run(tests, times)
-            shape = (len(kept), count)
             ln_k = np.log(start[kept])[:, None] + np.log(scale)
             by_passes = {
-                item: self._grown(ln_k, [state[place] for state in states], shape)
+                item: self._grown(ln_k, [state[place] for state in states])
                 for place, item in enumerate(times)
             }
         else:
-            stop = times[-1]
-            records = stop * span ** (np.arange(count) / (count - 1) - 1.0)
-            records[-1] = stop
+            records = times[-1] * scale
             kept, states = self._run(list(enumerate(start)), records.tolist())
-            flat = [item for state in states for item in state]
             ln_tau = np.log(start[kept])[:, None] + np.log(records)
-            grown = self._grown(ln_tau, flat, ln_tau.shape)
+            grown = self._grown(ln_tau, [item for state in states for item in state])
             # the energy belongs to the passes of a record, and grows as they do
             by_passes = {
                 item: replace(
@@ -382,17 +377,15 @@ class Grower:
         update = {"passes": max(1, round(passes)), "duration": None, "turns": None}
         return self.scenario.operation.model_copy(update=update)
 
-    def _grown(
-        self, ln_k: FloatArray, states: Sequence[tuple[Any, ...]], shape: tuple[int, ...]
-    ) -> Grown:
+    def _grown(self, ln_k: FloatArray, states: Sequence[tuple[Any, ...]]) -> Grown:
         assert self._grid is not None
         profiles, energies = zip(*states, strict=True)
         depth = {
-            name: np.array([profile[name] for profile in profiles]).reshape(*shape, -1)
+            name: np.array([profile[name] for profile in profiles]).reshape(*ln_k.shape, -1)
             for name in profiles[0]
         }
         start = start_height(self.scenario, self._grid)
-        return Grown(self._grid.y, start, ln_k, depth, np.array(energies).reshape(shape))
+        return Grown(self._grid.y, start, ln_k, depth, np.array(energies).reshape(ln_k.shape))
 
     def _run(
         self, tests: Sequence[tuple[int, float]], passes: Sequence[float], pilot: bool = False
@@ -410,9 +403,8 @@ class Grower:
             evolution = evolution.model_copy(update={"tolerance": TOLERANCE})
         for number, k in tests:
             draws = self.draws[number]
-            ratio = roller / cylinder if self.shared else 0.0
-            mean_factor = factors(draws.scenario)[1]
-            scenario = with_factors(draws.scenario, k, k * ratio if self.shared else mean_factor)
+            of_roller = k * (roller / cylinder) if self.shared else factors(draws.scenario)[1]
+            scenario = with_factors(draws.scenario, k, of_roller)
             scenario = replace(scenario, operation=table, evolution=evolution)
             ready.append(replace(draws, scenario=scenario))
         last = {number: place for place, (number, _) in enumerate(tests)}  # of the greatest wear
@@ -429,8 +421,7 @@ class Grower:
             problem, stepper, _ = assemble_problem(draws, grid, models)
             runs.append(RealisationRun(number, {}, draws, problem, stepper))
             views[number] = view_of(draws.scenario, self._angles)
-        failures: dict[int, Exception] = {}
-        done = 0
+        failures, done = dict[int, Exception](), 0
         for group in batch_groups(runs):
             grown, failed = worn_at_records(group, schedule, grid, views)
             results.update(grown)

@@ -19,9 +19,9 @@ from wearsim.scenario import Scenario, as_scenario, realise
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.api import (
     Watcher,
-    Workers,
     checked_request,
     ensemble_content,
+    watched_executor,
 )
 from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.file.data import EnsembleData
@@ -132,9 +132,9 @@ def life(
         check_output(output, force, scenario.paths)
     runner, content = _prepared(scenario, settings, aim)
     with _results_path(output) as path:
-        hands = Workers(workers, scheduler, progress, on_progress, stop_requested, on_notice)
+        hands = workers, scheduler, progress, on_progress, stop_requested, on_notice
         with (
-            hands.open(scenario, settings.plain) as (watch, pool),
+            watched_executor(scenario, settings.plain, *hands) as (watch, pool),
             EnsembleFile.create(path, *content, storage) as file,
         ):
             runner.compile_kernels()

@@ -124,11 +124,9 @@ class _Group:
         start = self._ratios(self.problem, self.state)
         at_once = np.flatnonzero(start.max(axis=0) >= 1.0)
         for number in at_once.tolist():
-            test = self.tests[number]
-            test.limit = int(start[:, number].argmax())
+            self.tests[number].limit = int(start[:, number].argmax())
             life = {"life": 0.0, "life_low": 0.0, "life_high": 0.0}
-            chosen = np.array([number])
-            self._finish(number, self.problem.at(chosen), self.state.at(chosen), life)
+            self._finish(number, self.problem, self.state, number, life)
         self.evolution.end(at_once.tolist())
         with_courses = self.runs[0].scenario.evolution.strip_error
         courses = [Course() for _ in self.tests]
@@ -139,7 +137,6 @@ class _Group:
                 add_step(courses, advance)
                 add_observed(courses, advance.numbers.tolist(), self._by_limit(relative))
             self._take(advance, relative)
-        failures = self.evolution.failures
         reached = {k: test.outcome for k, test in enumerate(self.tests) if test.outcome is not None}
 
         def observe(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
@@ -148,10 +145,10 @@ class _Group:
         added = add_strip_errors(self.runs, self.problem, courses, reached, observe)
         for number, (errors, observed) in added.items():
             cylinder, roller, volume = courses[number].sizes[-1].tolist()
-            observed["depth"] = errors[0] / max(cylinder, roller)
-            observed["volume"] = errors[1] / volume
-            self._widen(number, observed)
+            of_sizes = {"depth": errors[0] / max(cylinder, roller), "volume": errors[1] / volume}
+            self._widen(number, observed | of_sizes)
         missing = AssertionError("a test has neither ended nor failed")
+        failures = self.evolution.failures
         return [failures.get(k) or test.outcome or missing for k, test in enumerate(self.tests)]
 
     def _by_limit(self, relative: FloatArray) -> dict[str, FloatArray]:
@@ -168,15 +165,14 @@ class _Group:
             Quantities over their limits at the end of the step.
         """
         numbers = advance.numbers.tolist()
+        passes = advance.end.passes.astype(float).tolist()
         for place, number in enumerate(numbers):
-            passes = float(advance.end.passes[place])
-            self.tests[number].history.append((passes, relative[:, place]))
+            self.tests[number].history.append((passes[place], relative[:, place]))
         if advance.problem.fatigue:
             damages = damage_of(advance.problem, advance.end).tolist()
-            for place, number in enumerate(numbers):
+            for number, *point in zip(numbers, passes, damages, strict=True):
                 if self.tests[number].outcome is None:
-                    known = self.tests[number].damage
-                    known.append((float(advance.end.passes[place]), damages[place]))
+                    self.tests[number].damage.append((point[0], point[1]))
         # the only state of a path may be known to be below all limits
         reached = (relative.max(axis=0) >= 1.0) | (len(advance.path) > 2)
         open_places = np.array(
@@ -189,32 +185,24 @@ class _Group:
         )
 
         def locate(chosen: IntArray) -> list[Crossings]:
-            some = open_places[chosen]
-            return first_crossings(self.limits, self.stepper, advance, some, TOLERANCE)
+            return first_crossings(
+                self.limits, self.stepper, advance, open_places[chosen], TOLERANCE
+            )
 
         # a step without crossings solves nothing
         done, failed = bisect_failures(locate, np.arange(len(open_places)))
         self.evolution.fail({numbers[open_places[k]]: error for k, error in failed.items()})
-        for _, crossings in done:
-            for crossing in crossings:
-                self._reached(advance, crossing)
-        self._end_deep(advance)
+        for crossing in [crossing for _, crossings in done for crossing in crossings]:
+            self._reached(advance, crossing)
+        deep = too_deep_tests(advance, self.runs[0].scenario, _LIMITS)
+        for place, number in enumerate(numbers):
+            if number in deep and self.tests[number].outcome is None:
+                self._finish(number, advance.problem, advance.end, place, {}, deep[number])
         self.evolution.end([number for number in numbers if self._is_over(number)])
         for place in np.flatnonzero(advance.end.passes >= self.stop).tolist():
             if self.tests[numbers[place]].outcome is None and numbers[place] not in failed:
-                chosen = np.array([place])
                 life = dict.fromkeys(("life", "life_low", "life_high"), math.inf)
-                some = advance.problem.at(chosen), advance.end.at(chosen)
-                self._finish(numbers[place], *some, life)
-
-    def _end_deep(self, advance: Advance) -> None:
-        """End tests that become too deep before they reach a limit."""
-        deep = too_deep_tests(advance, self.runs[0].scenario, _LIMITS)
-        for place, number in enumerate(advance.numbers.tolist()):
-            if number in deep and self.tests[number].outcome is None:
-                chosen = np.array([place])
-                some = advance.problem.at(chosen), advance.end.at(chosen)
-                self._finish(number, *some, {}, deep[number])
+                self._finish(numbers[place], advance.problem, advance.end, place, life)
 
     def _reached(self, advance: Advance, crossing: Crossings) -> None:
         """Store the tests that have reached a limit, with the numerical error of their lives."""
@@ -229,7 +217,7 @@ class _Group:
         if any(limit.quantity == "peak pressure" for limit in limits):
             self._store_edge_peaks(advance.numbers[crossing.places].tolist(), problem, state)
         for place, number in enumerate(advance.numbers[crossing.places].tolist()):
-            test, chosen = self.tests[number], np.array([place])
+            test = self.tests[number]
             test.limit = int(crossing.limit[place])
             limit, passes = limits[place], float(state.passes[place])
             if limit.unit == "m" and limit.quantity != "width":
@@ -250,7 +238,7 @@ class _Group:
             life = {"life": passes, "life_low": low, "life_high": high}
             scenario, deepest = self.runs[number].scenario, float(depths[place])
             failure = too_deep_failure(scenario, deepest, passes, _LIMITS)
-            self._finish(number, problem.at(chosen), state.at(chosen), life, failure)
+            self._finish(number, problem, state, place, life, failure)
 
     def _errors_by_stations(self, problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
         """Return the errors due to the stations of a cam by quantity, (tests,) [SI]."""
@@ -278,8 +266,7 @@ class _Group:
         test = self.tests[number]
         if test.outcome is None or test.limit < 0:
             return
-        scalars = test.outcome.scalars
-        quantity = self.limits[test.limit].quantity
+        scalars, quantity = test.outcome.scalars, self.limits[test.limit].quantity
         error = float(errors[quantity]) + (test.edge_peak if quantity == "peak pressure" else 0.0)
         added = scalars["life"] * error / max(test.slope, FLAT)
         scalars["life_low"] = max(scalars["life_low"] - added, 0.0)
@@ -336,13 +323,15 @@ class _Group:
     def _finish(
         self,
         number: int,
-        problem: WearProblem,
-        state: WearState,
+        problems: WearProblem,
+        states: WearState,
+        place: int,
         life: dict[str, float],
         failure: StepError | None = None,
     ) -> None:
-        """Store the result of a test that ends in the given state, of one realisation."""
-        test = self.tests[number]
+        """Store the result of a test that ends in the state of a problem at a place."""
+        test, chosen = self.tests[number], np.array([place])
+        problem, state = problems.at(chosen), states.at(chosen)
         rows = [self.first_rows[number], *self._observed(problem, state)]
         scalars = {
             **scalars_of(problem, state),
@@ -350,13 +339,12 @@ class _Group:
             "first_limit": float(test.limit),
             "limit_angle": self._angle(test.limit, problem, state),
         }
-        curves: dict[str, FloatArray]
         (curves,) = curves_at_end(problem, state, [self.runs[number].scenario])
         if problem.fatigue:
-            scalars["damage_per_pass"] = self.first_damage[number]
-            scalars["course_end"] = float(state.passes[0])
-            end = scalars["course_end"], float(damage_of(problem, state)[0])
-            curves["damage_course"] = course_of(test.damage, end, self.first_damage[number])
+            first, end = self.first_damage[number], float(state.passes[0])
+            scalars |= {"damage_per_pass": first, "course_end": end}
+            of_end = end, float(damage_of(problem, state)[0])
+            curves["damage_course"] = course_of(test.damage, of_end, first)
         test.outcome = LifeRun(rows, scalars, curves, problem.grid, failure)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:

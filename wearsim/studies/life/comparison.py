@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -50,35 +50,20 @@ class LifeComparison:
     b10_ratio_bounds: tuple[float, float] = (math.nan, math.nan)
 
 
-class _Pair(NamedTuple):
-    """Lives of two designs, of their common realisations if they are paired.
+def _pair(
+    first: LifeValues, second: LifeValues
+) -> tuple[tuple[LifeDistribution, ...], tuple[FloatArray, ...], float, bool, int]:
+    """Return distributions and lives of two designs, of common realisations if they are paired.
 
-    Parameters
-    ----------
-    distributions : (LifeDistribution, LifeDistribution)
-    lives : (ndarray, ndarray)
-    most : float
-        Life up to which both are known.
-    paired : bool
-        Whether realisations of the same number have common draws.
-    common : int
-        Number of realisations that both have.
+    After them the life up to which both are known, whether realisations of the same number have
+    common draws, and the number of realisations that both have.
     """
-
-    distributions: tuple[LifeDistribution, LifeDistribution]
-    lives: tuple[FloatArray, FloatArray]
-    most: float
-    paired: bool
-    common: int
-
-
-def _pair(first: LifeValues, second: LifeValues) -> _Pair:
     both = (first, second)
     # kappa is known beyond the maximum, and with it the survival
     known = all(item.is_known_throughout for item in both)
     most = math.inf if known else min(item.most for item in both)
     paired = first.raw.seed == second.raw.seed
-    distributions = first.distribution, second.distribution
+    distributions: tuple[LifeDistribution, ...] = (first.distribution, second.distribution)
     lives = tuple(item.known_lives if known else item.lives for item in both)
     common = np.intersect1d(first.numbers, second.numbers)
     exact = [item.exact for item in distributions]
@@ -87,12 +72,9 @@ def _pair(first: LifeValues, second: LifeValues) -> _Pair:
             paired = False
         else:
             places = [np.searchsorted(item.numbers, common) for item in both]
-            parts = zip(distributions, lives, places, strict=True)
-            (first_at, lives_of_first), (second_at, lives_of_second) = [
-                (_at(d, at), of[at]) for d, of, at in parts
-            ]
-            distributions, lives = (first_at, second_at), (lives_of_first, lives_of_second)
-    return _Pair(distributions, (lives[0], lives[1]), most, paired, len(common))
+            distributions = tuple(map(_at, distributions, places))
+            lives = tuple(of[at] for of, at in zip(lives, places, strict=True))
+    return distributions, lives, most, paired, len(common)
 
 
 def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
@@ -117,26 +99,23 @@ def compare_lives(first: LifeResult, second: LifeResult, share: float = 0.1) -> 
             f"{first.title} is in {first.unit} and {second.title} in {second.unit}; their lives"
             " cannot be compared"
         )
-    pair = _pair(first, second)
+    (one, other), lives, most, paired, common = _pair(first, second)
     machine = None
-    if pair.paired and len(pair.lives[0]) == len(pair.lives[1]):
-        machine = same_machine(*pair.lives, pair.most)
+    if paired and len(lives[0]) == len(lives[1]):
+        machine = same_machine(lives[0], lives[1], most)
         if first.settings.alone and second.settings.alone:  # for any wear factor
             machine = Interval(machine.value, machine.value, machine.value)
-    bounds = [item.b_error(100.0 * share) for item in (first, second)]
+    (low, high), (least, greatest) = (item.b_error(100.0 * share) for item in (first, second))
     return LifeComparison(
-        quantile_ratio(*pair.distributions, share, pair.most, pair.paired),
+        quantile_ratio(one, other, share, most, paired),
         machine,
-        two_specimens(*pair.distributions, pair.most, pair.paired),
-        pair.common,
-        _ratios(*bounds),
+        two_specimens(one, other, most, paired),
+        common,
+        (
+            low / greatest if greatest > 0.0 else math.nan,
+            high / least if least > 0.0 else math.inf,
+        ),
     )
-
-
-def _ratios(first: tuple[float, float], second: tuple[float, float]) -> tuple[float, float]:
-    """Return the least and greatest ratio of two ranges of positive numbers."""
-    (low, high), (least, most) = first, second
-    return (low / most if most > 0.0 else math.nan, high / least if least > 0.0 else math.inf)
 
 
 def swept_variable(results: Sequence[Any]) -> DesignVariable | None:

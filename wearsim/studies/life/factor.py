@@ -68,8 +68,7 @@ def exact_factor(scenario: Scenario) -> tuple[ExactFactor | None, str]:
 
     The worn state must depend on factor and passes through their product alone.
     """
-    reason = _obstacle(scenario)
-    if reason:
+    if reason := _obstacle(scenario):
         return None, reason
     (item,) = _factors(scenario)
     pairs = {
@@ -107,8 +106,7 @@ def _obstacle(scenario: Scenario) -> str:
     names = [item.name for item in factors]
     if scenario.wear is None or not set(names) <= {SHARED, *OF_BODIES}:
         return f"{', '.join(names)} is not a factor of all wear"
-    law = scenario.wear.built
-    rates = {body: law.depth_per_dissipation(body, 1.0) for body in BODIES}
+    rates = {body: scenario.wear.built.depth_per_dissipation(body, 1.0) for body in BODIES}
     if any(rate is None for rate in rates.values()):
         return f"the wear law {scenario.wear.law} is not linear in the dissipation"
     if len(names) > 1:
@@ -116,14 +114,12 @@ def _obstacle(scenario: Scenario) -> str:
     if factors[0].scalar.quantile(np.array([0.5 * RARE]))[0] <= 0.0:
         return f"{names[0]} is 0 with a probability, and such a test has no limit"
     body = OF_BODIES.get(names[0])
-    fixed = [other for other, rate in rates.items() if body and other != body and rate]
-    if fixed:
+    if fixed := [other for other, rate in rates.items() if body and other != body and rate]:
         return (
             f"{names[0]} is random and K/H of the {fixed[0]} is not, so that their ratio varies;"
             f" scatter both by {SHARED}"
         )
-    processes = [item.name for item in scenario.random if item.role == "process"]
-    if processes:
+    if processes := [item.name for item in scenario.random if item.role == "process"]:
         return f"{' and '.join(processes)} {'vary' if len(processes) > 1 else 'varies'} in time"
     if not scenario.load.built.constant:
         return f'the load "{scenario.load.kind}" varies in time'
@@ -149,8 +145,7 @@ def with_posterior(scenario: Scenario, file: str | Path) -> Scenario:
     ScenarioError
         If the file cannot be used, or contains the scatter of an input that is random.
     """
-    key, table = posterior_table(scenario, file)
-    return scenario.changed({key: table})
+    return scenario.changed(dict([posterior_table(scenario, file)]))
 
 
 def posterior_table(scenario: Scenario, file: str | Path) -> tuple[str, dict[str, object]]:
@@ -159,6 +154,5 @@ def posterior_table(scenario: Scenario, file: str | Path) -> tuple[str, dict[str
     table: dict[str, object] = {"distribution": "posterior", "file": name}
     if any(item.name == SHARED for item in scenario.random) and scenario.wear is not None:
         options: Any = scenario.wear.options
-        reference = options.cylinder.wear_factor
-        return SHARED, {**table, "over": f"{reference!r} 1/Pa"}
+        return SHARED, {**table, "over": f"{options.cylinder.wear_factor!r} 1/Pa"}
     return CYLINDER, table

@@ -25,16 +25,14 @@ def fit_tables(result: LifeResult) -> list[Table]:
     if exact:
         lines = [[*_cells(result, fit, exact[0]), shown(fit.difference, "%", 2)] for fit in exact]
         head = f"fit to lives with exact K/H [{result.unit}]"
-        heads = [head, *lives, "AIC", "parameters", "greatest difference"]
-        tables.append(Table("", lines, heads))
+        tables.append(Table("", lines, [head, *lives, "AIC", "parameters", "greatest difference"]))
     if len(result.fits) >= 2:
         lines = [
             [*_cells(result, fit, result.fits[0]), _test_text(anderson_darling(fit))]
             for fit in result.fits
         ]
         head = f"fit{' to drawn lives' if exact else ''} [{result.unit}]"
-        heads = [head, *lives, "AIC", "parameters", "Anderson-Darling"]
-        tables.append(Table("", lines, heads))
+        tables.append(Table("", lines, [head, *lives, "AIC", "parameters", "Anderson-Darling"]))
     return tables
 
 
@@ -73,8 +71,9 @@ def fits_data(result: LifeResult) -> dict[str, Any]:
     """Return the fits to the drawn lives, and with K/H integrated exactly."""
 
     def numbers(fit: FittedLives) -> dict[str, Any]:
-        shares = result.settings.shares
-        lives = {f"{share:g}": asdict(fit.interval(share / 100.0)) for share in shares}
+        lives = {
+            f"{share:g}": asdict(fit.interval(share / 100.0)) for share in result.settings.shares
+        }
         return {
             "family": fit.family, "aic": fit.aic, "mu": fit.mu, "sigma": fit.sigma, "b": lives
         }  # fmt: skip

@@ -36,8 +36,7 @@ _MARGIN = 1.3
 def limits_of(scenario: Scenario) -> list[Limit]:
     """Return the limits of a scenario, in the order of its table."""
     named = ((key.replace("_", " "), value) for key, value in scenario.limit.given.items())
-    threshold = scenario.outputs.width_threshold
-    return [Limit(name, value, name, threshold) for name, value in named]
+    return [Limit(name, value, name, scenario.outputs.width_threshold) for name, value in named]
 
 
 def first_length(scenario: Scenario, fixed: Mapping[str, float], most: float) -> float:
@@ -49,8 +48,10 @@ def first_length(scenario: Scenario, fixed: Mapping[str, float], most: float) ->
     length = EXTENSION * float(scenario.total_passes)
     limit = scenario.limit.depth
     if limit is not None and scenario.cam is None:
-        columns = Drawer(scenario, "monte-carlo").columns(0, _SAMPLE)
-        columns |= {key: np.full(_SAMPLE, value) for key, value in fixed.items()}
+        columns = {
+            **Drawer(scenario, "monte-carlo").columns(0, _SAMPLE),
+            **{key: np.full(_SAMPLE, value) for key, value in fixed.items()},
+        }
         with np.errstate(divide="ignore", invalid="ignore"):
             depths = closed_form_depths(scenario, columns, _SAMPLE)
             reached = scenario.total_passes * (limit / depths) ** 1.5
@@ -83,9 +84,8 @@ class LevelRunner(RealisationRunner):
 
     def log_weight(self, realisation: int) -> float:
         """Return the logarithm of the weight of a realisation; 0 without a shift."""
-        if not self.shift:
-            return 0.0
-        return log_weight(self.drawer, self.shift, realisation, self.mixture)
+        shifted = self.drawer, self.shift, realisation, self.mixture
+        return log_weight(*shifted) if self.shift else 0.0
 
     @cached_property
     def drawer(self) -> Drawer:
@@ -231,14 +231,13 @@ class LifeRunner(RealisationRunner):
         if (level, stage) not in self._levels:
             scenario = with_length(self.scenario, min(self.base * EXTENSION**level, self.longest))
             stage_settings = self.settings.stages[stage - 1] if stage else {"shift": {}}
-            changes = changes_of(self.settings.stages[:stage])
             self._levels[level, stage] = LevelRunner(
                 scenario,
                 self.total,
                 self.grid,
                 self.fixed,
                 stage_settings["shift"],
-                changes,
+                changes_of(self.settings.stages[:stage]),
                 stage_settings.get("mixture", ()),
             )
         return self._levels[level, stage]

@@ -178,9 +178,7 @@ class LifeResult(LifeValues):
         8.5e+05, 95 % interval 7.98e+05 to 9.08e+05
         """
         uncertain = self.uncertain_life(percent)
-        if uncertain is None:
-            return self._b(percent, "life")
-        return uncertain.interval.censored(self.most)
+        return uncertain.interval.censored(self.most) if uncertain else self._b(percent, "life")
 
     def uncertain_life(self, percent: float) -> UncertainLife | None:
         """Return the life of a percentage with what is not known of the wear factor.
@@ -297,8 +295,7 @@ class LifeResult(LifeValues):
                 for part in (curve.survival, curve.low, curve.high)
             ]
             return SurvivalCurve(np.concatenate([[0.0], curve.life, last]), *parts)
-        end = min(self.distribution.quantile_of_mean(0.999), self.most)
-        life = np.linspace(0.0, end, _POINTS)
+        life = np.linspace(0.0, min(self.distribution.quantile_of_mean(0.999), self.most), _POINTS)
         estimates = self.uncertain or self.distribution
         ended = [estimates.probability_before(float(n)) for n in life[1:]]
         survival, low, high = (

@@ -133,8 +133,13 @@ def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
         changes[f"limit.{limit.key}"] = limit.value if limit.unit == "1" else written
     changed = scenario.changed(changes) if changes else scenario
     if not changed.limit.given:
-        what, expected = "is needed for a life", 'one limit or more, such as depth = "50 um"'
-        raise mistake_in(scenario.file, what, "none", expected, table="limit")
+        raise mistake_in(
+            scenario.file,
+            "is needed for a life",
+            "none",
+            'one limit or more, such as depth = "50 um"',
+            table="limit",
+        )
     return changed
 
 
@@ -160,8 +165,9 @@ def settings_of(
         aim = None if target is None else per_unit * parse_life(target, unit, rate, "target")
     for share in shares:
         if not 0.0 < share < 100.0:
-            text = f"B{share:g} is not a life, expected percentages between 0 and 100"
-            raise ArgumentError("b", text)
+            raise ArgumentError(
+                "b", f"B{share:g} is not a life, expected percentages between 0 and 100"
+            )
     if most is not None:
         with checking_argument("most"):
             longest = per_unit * parse_life(most, unit, rate, "max")

@@ -85,12 +85,16 @@ def _check_spring(setup: Setup) -> None:
     if model not in ONE_PARABOLA or not stiffness * load or scenario.creepage.drive == "free":
         return
     half = setup.half_width(load, full_slip=False)
-    ratio = half**2 / (2.0 * scenario.axial_gap.radius_at(half)) * stiffness / load
-    if ratio > UNLOADED:
-        what = f"unloads the roller, whose load cannot be followed by contact.model = '{model}'"
+    if half**2 / (2.0 * scenario.axial_gap.radius_at(half)) * stiffness / load > UNLOADED:
         got = in_engineers_unit(stiffness, "N/m")
-        remedy = "contact.model = 'slender', a softer spring or a shorter test"
-        raise mistake_in(scenario.file, what, got, remedy, table="load", key="stiffness")
+        raise mistake_in(
+            scenario.file,
+            f"unloads the roller, whose load cannot be followed by contact.model = '{model}'",
+            got,
+            "contact.model = 'slender', a softer spring or a shorter test",
+            table="load",
+            key="stiffness",
+        )
 
 
 def build_stepper(scenario: Scenario, name: str) -> Stepper:
@@ -180,17 +184,22 @@ def assemble_problem(
     first, multiplicity = merged_rollers(setup)
     drawn = {name: values[first][:, None] for name, values in setup.rollers.items()}
     offsets = setup.inputs_of(first, drawn)["offset"]
-    parts = partial(build, scenario), partial(surfaces, scenario, first, offsets)
-    growth = growth_of(setup, grid, *parts)
+    growth = growth_of(
+        setup, grid, partial(build, scenario), partial(surfaces, scenario, first, offsets)
+    )
     chosen = build(scenario, grid)
     several = len(first) > 1 or setup.passes or scenario.cam
     name = chosen_stepper(scenario, chosen, 2 if several else 1)
     _check_spring(setup)
     if name == "per-pass" and getattr(scenario.load.options, "feedback", "") == "inertia":
-        what = 'follows single turns, without feedback = "inertia"'
-        remedy = 'feedback = "static", or another stepper'
-        mistake = Mistake("evolution", "stepper", what, "per-pass", remedy)
-        raise ScenarioError(scenario.file, [mistake])
+        raise mistake_in(
+            scenario.file,
+            'follows single turns, without feedback = "inertia"',
+            "per-pass",
+            'feedback = "static", or another stepper',
+            table="evolution",
+            key="stepper",
+        )
     stepper = build_stepper(scenario, name)
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not setup.passes):
         raise mistake_in(
@@ -236,9 +245,8 @@ def assemble_problem(
 
 def _fatigue(scenario: Scenario, choice: FatigueChoice) -> Fatigue:
     """Return the fatigue of the bodies of a scenario."""
-    modulus = scenario.pair.contact_modulus
     return Fatigue(
-        {body: law.build(modulus) for body, law in choice.laws.items()},
+        {body: law.build(scenario.pair.contact_modulus) for body, law in choice.laws.items()},
         choice.slope,
         choice.probability,
         choice.reference_area,
@@ -264,24 +272,23 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
         "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
         "creepage_variation": ("creepage.differential_slip = true", creepage.differential_slip),
     }
-    if not scenario.axial_gap.is_crowned and scenario.contact.model in PARABOLA:
-        form = scenario.roller.axial_profile.form
-        raise CapabilityError(
-            f"{scenario.file}: contact model '{scenario.contact.model}' approximates the gap by a"
-            f" parabola, and axial_profile makes it another (form = '{form}' of the roller);"
-            " use contact.model = 'slender'"
-        )
-    if scenario.roller.width is not None and scenario.contact.model in PARABOLA:
-        raise CapabilityError(
-            f"{scenario.file}: contact model '{scenario.contact.model}' approximates the gap by a"
-            " parabola, which does not end with roller.width; use contact.model = 'slender'"
-        )
-    for capability, (setting, needed) in needs.items():
-        if needed and not getattr(model.capabilities, capability):
-            raise CapabilityError(
-                f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
-                f" {setting}; choose another contact.model"
+    form, parabola = scenario.roller.axial_profile.form, scenario.contact.model in PARABOLA
+    refusals = {
+        "approximates the gap by a parabola, and axial_profile makes it another"
+        f" (form = '{form}' of the roller); use contact.model = 'slender'": (
+            parabola and not scenario.axial_gap.is_crowned
+        ),
+        "approximates the gap by a parabola, which does not end with roller.width; use"
+        " contact.model = 'slender'": parabola and scenario.roller.width is not None,
+        **{
+            f"does not support {setting}; choose another contact.model": (
+                needed and not getattr(model.capabilities, capability)
             )
+            for capability, (setting, needed) in needs.items()
+        },
+    }
+    if text := next((text for text, applies in refusals.items() if applies), ""):
+        raise CapabilityError(f"{scenario.file}: contact model '{scenario.contact.model}' {text}")
     return model if factor == 1.0 else model.with_creep_factor(factor)
 
 
@@ -397,9 +404,7 @@ def surfaces(
     """
     roller, cylinder, form = scenario.roller, scenario.cylinder, scenario.axial_gap
     s = grid.y - offset[..., None]
-    height = start_height(scenario, grid, angles)
-    if form.has_crowned_cylinder:
-        height = height - form.cylinder_drop(grid.y)
+    height = start_height(scenario, grid, angles) - form.cylinder_drop(grid.y)
     drop = form.roller_drop(s)
     if roller.profiles:
         drop = drop - roller_height(scenario, rollers, s)

@@ -141,8 +141,12 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
             most = 2.0 * float(scenario.axial_gap.half_width(deep))
             shown = f"{1e3 * most:.4g} mm, a groove of a depth of {1e3 * deep:.4g} mm"
         if limit.value > most:
-            remedy = f"at most {shown}, {what}, or evolution.allow_deep = true"
-            raise _refusal(scenario, limit, "is beyond the validity of the contact models", remedy)
+            raise _refusal(
+                scenario,
+                limit,
+                "is beyond the validity of the contact models",
+                f"at most {shown}, {what}, or evolution.allow_deep = true",
+            )
     setup = draw(scenario)
     forecast = WearForecast(
         setup.scenario, assemble_problem(setup, start_of_run(scenario, setup))[0]
@@ -177,8 +181,12 @@ def limit_warnings(scenario: Scenario, limit: Limit) -> list[str]:
         times *= 2.0
         if times > 2.0**EXTENSIONS:
             last = written_value(limit, end[name])
-            text = f"is not reached in {2**EXTENSIONS} times the test, whose end has about {last}"
-            raise _refusal(scenario, limit, text, "a lower limit, or a longer test")
+            raise _refusal(
+                scenario,
+                limit,
+                f"is not reached in {2**EXTENSIONS} times the test, whose end has about {last}",
+                "a lower limit, or a longer test",
+            )
     if times <= LONGER:
         return []
     last = written_value(limit, float(f"{end[name]:.2g}"))

@@ -174,10 +174,8 @@ class Drawer:
         number = realisation if passes is None else passes
         scenario, table = self.scenario, self.scenario.sampling
         if number != table.realisation:
-            table = table.model_copy(update={"realisation": number})
-            scenario = replace(scenario, sampling=table)
-        numbers = dict.fromkeys((item.name for item in scenario.random), realisation)
-        numbers |= sources or {}
+            scenario = replace(scenario, sampling=table.model_copy(update={"realisation": number}))
+        numbers = {**{item.name: realisation for item in scenario.random}, **(sources or {})}
         drawn = {n: self._values(n) for n in sorted({numbers[item.name] for item in self.items})}
         values = {key: drawn[numbers[item.name]][key] for item in self.items for key in item.keys}
         listed = {
@@ -202,14 +200,14 @@ class Drawer:
     def _values(self, realisation: int) -> dict[str, FloatArray]:
         """Return the values of one realisation, as `columns`, drawn with those after it."""
         if realisation not in self._drawn:
-            ahead = AHEAD if self._drawn else 1
-            count = int(min(ahead, max(self._total - realisation, 1)))
+            count = int(min(AHEAD if self._drawn else 1, max(self._total - realisation, 1)))
             columns = self.columns(realisation, count)
             if len(self._drawn) > BLOCK:
                 self._drawn = {}
-            for place in range(count):
-                values = {key: np.asarray(column[place]) for key, column in columns.items()}
-                self._drawn[realisation + place] = values
+            self._drawn |= {
+                realisation + place: {key: np.asarray(of[place]) for key, of in columns.items()}
+                for place in range(count)
+            }
         return self._drawn[realisation]
 
     def uniforms(self, first: int, count: int) -> dict[str, FloatArray]:
@@ -218,13 +216,8 @@ class Drawer:
         for place in [k for k in range(count) if first + k in self._changes]:
             for name, numbers in self._changed(first + place).items():
                 uniforms[name][place] = numbers
-        if self._shift:
-            for name, shift in self._shift.items():
-                uniforms[name] = np.clip(
-                    scipy.special.ndtr(scipy.special.ndtri(uniforms[name]) + shift),
-                    1.0 - BELOW_ONE,
-                    BELOW_ONE,
-                )
+        for name, shift in self._shift.items():
+            uniforms[name] = _uniform(scipy.special.ndtri(uniforms[name]) + shift)
         return uniforms
 
     def _changed(self, realisation: int) -> dict[str, FloatArray]:
@@ -241,10 +234,7 @@ class Drawer:
             _, scale = self._changes.get(number, (number, 1.0))
             part = math.sqrt(1.0 - scale**2)
             scores = {n: part * scores[n] + scale * z if scores else z for n, z in fresh.items()}
-        return {
-            name: np.clip(scipy.special.ndtr(z), 1.0 - BELOW_ONE, BELOW_ONE)
-            for name, z in scores.items()
-        }
+        return {name: _uniform(z) for name, z in scores.items()}
 
     def columns(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the values drawn for whole tests and rollers in consecutive realisations.
@@ -277,6 +267,11 @@ class Drawer:
         return columns
 
 
+def _uniform(score: FloatArray) -> FloatArray:
+    """Return the uniform numbers of normal scores."""
+    return np.clip(scipy.special.ndtr(score), 1.0 - BELOW_ONE, BELOW_ONE)
+
+
 def units_of(scenario: Scenario) -> dict[str, str]:
     """Return the SI unit of every value that random inputs set, by the scenario's key."""
     return {
@@ -306,12 +301,13 @@ def _paths(scenario: Scenario, item: RandomInput, realisation: int) -> list[Vary
     groups = [rollers] if item.persistence == "per-test" else [(r,) for r in rollers]
     times = process.spacing * np.arange(points, dtype=np.float64)
     stream = Stream(scenario.seed, item.name, "process")
-    paths = []
-    for block, group in enumerate(groups):
-        uniforms = partial(stream.uniforms, realisation=realisation, block=block)
-        value = process.path(points, uniforms) - origin(item.name, item.mean[0])
-        paths.append(Varying(CONTACT_FIELDS[item.name], group, Paths.through(times, value)))
-    return paths
+    blocks = [
+        partial(stream.uniforms, realisation=realisation, block=k) for k in range(len(groups))
+    ]
+    start = origin(item.name, item.mean[0])
+    paths = [Paths.through(times, process.path(points, block) - start) for block in blocks]
+    field = CONTACT_FIELDS[item.name]
+    return [Varying(field, group, path) for group, path in zip(groups, paths, strict=True)]
 
 
 def _means(scenario: Scenario, item: RandomInput, paths: list[Varying]) -> FloatArray:

@@ -59,10 +59,8 @@ def contact_grid(setup: Setup, load: float) -> Grid:
     default = STRIPS_OF_CONTACT if scenario.axial_gap.is_crowned else STRIPS_OF_CONTACT_OF_FORM
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
         return roller_grid(scenario, choice.strips or strips_of_roller(scenario, default, load))
-    if choice.width is None and choice.strips is None:
-        grid = suggested_grid(setup, load)
-        if grid is not None:
-            return Grid(grid.y + centre, grid.spacing)
+    if choice.width is None and choice.strips is None and (grid := suggested_grid(setup, load)):
+        return Grid(grid.y + centre, grid.spacing)
     width = choice.width if choice.width is not None else 2.4 * half_width
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or default)
 
@@ -142,8 +140,7 @@ def strips_over(width: float, half_width: float, tolerance: float, groove: float
     groove : float
         Half-width of the final groove, where the patch at the start need not be resolved [m].
     """
-    per_half_width = strips_per_half_width(half_width, tolerance, groove)
-    strips = int(np.ceil(width / half_width * per_half_width))
+    strips = int(np.ceil(width / half_width * strips_per_half_width(half_width, tolerance, groove)))
     return min(strips + (strips + 1) % 2, MOST_STRIPS)
 
 
@@ -184,8 +181,14 @@ def check_number_of_strips(scenario: Scenario, grid: Grid) -> None:
         most = chosen * math.sqrt(MOST_BYTES / size)
     else:
         return
-    at_most = f"at most {math.floor(most)}"
-    raise mistake_in(scenario.file, what, str(chosen), at_most, table="contact", key="strips")
+    raise mistake_in(
+        scenario.file,
+        what,
+        str(chosen),
+        f"at most {math.floor(most)}",
+        table="contact",
+        key="strips",
+    )
 
 
 def strips_of_run(setup: Setup) -> Grid:
@@ -251,8 +254,7 @@ def shared_strips(scenario: Scenario) -> Grid:
     tilting = tuple(item for item in ranged if CONTACT_FIELDS.keys() >= set(item.keys))
     drawn = Setup(scenario, passes=tilting)
     tilts = float(np.ptp(drawn.tilt_shift(drawn.range_of("tilt"))))
-    wider = 0.5 * (1.25 * grid.strips * grid.spacing + tilts)
-    return lattice(grid, wider)
+    return lattice(grid, 0.5 * (1.25 * grid.strips * grid.spacing + tilts))
 
 
 def lattice(grid: Grid, half: float) -> Grid:
@@ -315,12 +317,10 @@ def growth_of(
     coarse = partial(coarse_grid, scenario)
     if choice.width is not None or ends_roller(scenario, *grid.edges):
         return (Growth(model, surfaces, coarse, 0, by_angle=by_angle),)
-    many = setup.turn.varies
-    most = choice.strips or (STRIPS_OF_MANY_CONTACTS if many else STRIPS_BEFORE_JOINING)
-    last, margin = None, 0.0
-    if setup.varying or setup.passes or not scenario.load.built.constant:
-        margin = 0.5 * setup.patch.b
-    margin += setup.drawn_shift
+    at_once = STRIPS_OF_MANY_CONTACTS if setup.turn.varies else STRIPS_BEFORE_JOINING
+    most = choice.strips or at_once
+    last, changes = None, setup.varying or setup.passes or not scenario.load.built.constant
+    margin = (0.5 * setup.patch.b if changes else 0.0) + setup.drawn_shift
     if scenario.roller.width is not None:
         last = roller_grid(scenario, strips_of_roller(scenario, STRIPS_AT_START, greatest))
     least = LEAST_LOADED if choice.strips is None else FEWEST_PER_HALF_WIDTH
@@ -385,9 +385,7 @@ def realisation_grid(setup: Setup, load: float, loads: FloatArray, centres: Floa
         strips = choice.strips or strips_of_roller(scenario, 121, load)
         shifted = any(OFFSET in item.keys for item in scenario.random)
         return roller_grid(scenario, strips, float(away.max()) if shifted else 0.0)
-    grid = suggested_grid(setup, load)
-    if grid is None:
-        grid = Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
+    grid = suggested_grid(setup, load) or Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
     margin = 0.5 * grid.spacing * grid.strips / mean_b  # 1 where the strips end with the patch
     half = float((away + margin * half_widths).max())
     if choice.strips is not None:
@@ -421,9 +419,11 @@ def _too_many_strips(scenario: Scenario, strips: int, half: float, away: float) 
             if len(shifting) == 1 and scenario.contact.centre is None and known:
                 angle = f"{away / crown * 1e3:.4g} mrad"
                 shift += f", crown radius x tilt = {crown * 1e3:.4g} mm x {angle}"
-        expected = f"{less}, or {coarser}"
-        mistakes.append(Mistake(table, key, f"{shift}: {takes}", item.describe(), expected))
+        mistakes.append(
+            Mistake(table, key, f"{shift}: {takes}", item.describe(), f"{less}, or {coarser}")
+        )
     if not mistakes:
-        expected = f"{coarser}, or inputs that vary less"
-        mistakes.append(Mistake("contact", "strips", takes, None, expected))
+        mistakes.append(
+            Mistake("contact", "strips", takes, None, f"{coarser}, or inputs that vary less")
+        )
     return ScenarioError(scenario.file, mistakes)

@@ -180,8 +180,7 @@ class RunInProgress:
 
     def end_before_limit(self, reason: str) -> Result:
         """Return the result of a run that does not reach its limit, with a warning."""
-        text = "" if self.limit is None else self.limit.text
-        self.warn(f"limit {text} is not reached: {reason}")
+        self.warn(f"limit {self.limit.text if self.limit else ''} is not reached: {reason}")
         data = self.data(finished=True)
         self._write(data)
         return Result(data, self.path)
@@ -213,7 +212,7 @@ class RunInProgress:
         (coarse,) = coarse_courses(first, stepper, float(last[0]), last, most, observe)
         if coarse is not None:
             coarse.observed = history.compute()
-        if coarse is None:
+        else:
             self.warn(
                 "error by strips: not estimated, as the test fails on strips of twice the width"
             )
@@ -290,8 +289,7 @@ class RunInProgress:
             self.recorder.schedule.next_record,
             self.scenario.evolution.max_steps,
         ):
-            at_limit = self.limit and self.limit.crossing(self.stepper, advance, 0)
-            if at_limit:
+            if at_limit := self.limit and self.limit.crossing(self.stepper, advance, 0):
                 self.recorder.end_at(advance, at_limit, self.stop)
                 self.reached = True
                 return
@@ -358,13 +356,15 @@ class RunInProgress:
         due = start == 0.0 or any(start < part * self.stop <= self._passes for part in (0.5, 1.0))
         if not due or REFERENCE not in registry().names(ContactModelSpec):
             return
-        materials = self.scenario.materials
         problem = self.present
-        batch = present_batch(problem, state)
-        tolerance, grid = choice.auto.tolerance, problem.grid
-        factor = self.scenario.friction.creep_factor
         if text := error_above_tolerance(
-            REFERENCE, problem.model, grid, materials, batch, tolerance, factor
+            REFERENCE,
+            problem.model,
+            problem.grid,
+            self.scenario.materials,
+            present_batch(problem, state),
+            choice.auto.tolerance,
+            self.scenario.friction.creep_factor,
         ):
             self.warn(f"contact.model = 'auto': at {self._passes:.6g} passes {text}")
 

@@ -43,8 +43,8 @@ def contact_values(
 
 def load_file(scenario: Scenario) -> tuple[str, str] | None:
     """Return the key and the name of the file that the load reads, if any."""
-    options = scenario.load.options
-    return next(((key, item.path) for key, item in options if isinstance(item, InputFile)), None)
+    files = ((key, item) for key, item in scenario.load.options if isinstance(item, InputFile))
+    return next(((key, item.path) for key, item in files), None)
 
 
 def load_mistake(scenario: Scenario, what: str, got: str, expected: str) -> ScenarioError:

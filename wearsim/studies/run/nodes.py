@@ -94,7 +94,11 @@ class PassQuadrature:
         (load,) = problem.loads
         # the load is 0 in a pause
         self._force = float(load.force(np.zeros(1))[0]) or float(problem.greatest_load[0])
-        self._full_slip = _full_slip_creepage(problem, setup, abs(self._force))
+        curvatures = np.maximum(np.ravel(problem.kinematics.track.longitudinal_curvature), 1e-3)
+        patches = [(at, setup.fresh_patch(abs(self._force), at)) for at in curvatures]
+        # creepage of full slip over friction, in the middle of the unworn bodies' contact: by
+        # Carter's theory the half-length times the curvature along rolling; of a cam, the mean
+        self._full_slip = float(np.mean([at * patch.a for at, patch in patches]))
 
     def _inputs(self, count: int) -> ContactInputs:
         uniforms = self._copula.correlate(self._sampler.uniforms(0, count))
@@ -133,17 +137,6 @@ class PassQuadrature:
             quadrature_error=error,
             passes_per_draw=float(max(per_turn * self.setup.scenario.operation.rollers, 1)),
         )
-
-
-def _full_slip_creepage(problem: WearProblem, setup: Setup, force: float) -> float:
-    """Return the creepage of full slip over friction, in the middle of the unworn bodies' contact.
-
-    By Carter's theory it is the half-length times the curvature along rolling; of a cam, the mean
-    over the stations.
-    """
-    curvatures = np.maximum(np.ravel(problem.kinematics.track.longitudinal_curvature), 1e-3)
-    half_lengths = [curvature * setup.fresh_patch(force, curvature).a for curvature in curvatures]
-    return float(np.mean(half_lengths))
 
 
 def _wear(inputs: ContactInputs, part: slice, force: float, full_slip: float) -> FloatArray:

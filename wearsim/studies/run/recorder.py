@@ -111,7 +111,6 @@ def history_row(
         "descent": worn_descents(present, state),
         "elastic_approach": np.where(loads > 0.0, elastic, 0.0),
     }
-    kinematics, spacing = problem.kinematics, problem.grid.spacing
 
     def per_roller(name: str) -> FloatArray:
         return problem.per_roller(problem.values_of(state.contacts, name))
@@ -123,7 +122,9 @@ def history_row(
         "width": groove_width(problem, state, threshold),
         "worn_volume": volume(problem, state),
         "roller_depth": state.roller_depth[0].max(axis=-1),
-        "roller_worn_volume": worn_volume(state.roller_depth[0], spacing, kinematics.roller_radius),
+        "roller_worn_volume": worn_volume(
+            state.roller_depth[0], problem.grid.spacing, problem.kinematics.roller_radius
+        ),
         "dissipated_energy": state.energy,
         "power": problem.total_power(problem.values_of(state.contacts, "power")),
         "normal_force": problem.mean_over_turn(problem.per_roller(loads))[0],
@@ -167,10 +168,7 @@ class History:
 
     def __len__(self) -> int:
         computed, waiting = self._parts
-        count = len(waiting)
-        for columns in computed:
-            count += columns["passes"].shape[0]
-        return count
+        return len(waiting) + sum(len(columns["passes"]) for columns in computed)
 
     def add(self, problem: WearProblem, state: WearState, before: WearState) -> None:
         """Add a state after a step from the state `before`, at the start of the test itself."""
@@ -193,8 +191,7 @@ class History:
             state, step = joined_states(states), np.concatenate(steps)
             computed = [*computed, self._observed(several, state, step)]
         if len(computed) > 1:
-            names = computed[0]
-            computed = [{n: np.concatenate([part[n] for part in computed]) for n in names}]
+            computed = [{n: np.concatenate([part[n] for part in computed]) for n in computed[0]}]
         self._parts = computed, []
         return computed[0] if computed else {}
 
@@ -230,8 +227,7 @@ def _with_tests_first(row: Variables) -> Variables:
     for name, values in row.items():
         along_y = ALL_VARIABLES[name].dims[-1] == "y"
         axes = [*range(values.ndim)]
-        first = axes.pop(-2 if along_y else -1)
-        tests[name] = values.transpose(first, *axes)
+        tests[name] = values.transpose(axes.pop(-2 if along_y else -1), *axes)
         if name not in _WITHOUT_REALISATION:
             tests[name] = tests[name][..., None, :] if along_y else tests[name][..., None]
     return tests
@@ -283,13 +279,13 @@ class Recorder:
         history: Mapping[str, FloatArray] | None = None,
         records: Mapping[str, FloatArray] | None = None,
     ) -> None:
-        self.stepper = stepper
-        self.schedule = schedule
-        self.threshold = threshold
+        self.stepper, self.schedule, self.threshold = stepper, schedule, threshold
         self._multiplicity = problem.kinematics.multiplicity
         self._by_energy = problem.linear_wear and bool(problem.wear_coefficients.any())
-        sums = {name for error in ERRORS for name in (error, f"{error}_by_strips")}
-        sums |= {f"{name}_error" for name in ESTIMATED}
+        sums = {
+            *(name for error in ERRORS for name in (error, f"{error}_by_strips")),
+            *(f"{name}_error" for name in ESTIMATED),
+        }
         steps = {name: column for name, column in (history or {}).items() if name not in sums}
         self._history = History(stepper, threshold, steps)
         if not steps:
@@ -360,8 +356,7 @@ class Recorder:
 
     def _compute_records(self) -> list[tuple[Grid, Variables]]:
         """Return all records, computed; an interrupt leaves them as they are or computed."""
-        waiting = self._waiting
-        if waiting:
+        if waiting := self._waiting:
             stepper, problem = self.stepper, waiting[0][0]
             starts, passes = (
                 [record[1] for record in waiting],
@@ -374,8 +369,7 @@ class Recorder:
                 singles = zip(starts, passes[:, None], strict=True)
                 state = joined_states([state_at(stepper, problem, *record) for record in singles])
             contents = _with_tests_first(record_row(stepper, several, state))
-            rows = [(problem.grid, row) for row in _rows(contents)]
-            self._records[-len(waiting) :] = rows
+            self._records[-len(waiting) :] = [(problem.grid, row) for row in _rows(contents)]
         return self._records
 
     def _thin(self, passes: float) -> None:
@@ -417,23 +411,24 @@ class Recorder:
         to strips.
         """
         columns = dict(self._history.compute())
-        for name, part in zip(ERRORS, self.errors_by_strips, strict=True):
+        unknown = np.full((len(ERRORS), len(self._history)), np.nan)
+        by_strips = unknown if self.strip_errors is None else self.strip_errors
+        for name, part in zip(ERRORS, by_strips, strict=True):
             by_steps = columns[f"{name}_by_steps"]
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
-            columns[name] = by_steps + np.nan_to_num(part)[:, None]
-            columns[name] = columns[name] + columns.get(f"{name}_by_stations", 0.0)
+            known = by_steps + np.nan_to_num(part)[:, None]
+            columns[name] = known + columns.get(f"{name}_by_stations", 0.0)
         of_turn = np.zeros(len(self._history))
         if "volume_error_by_stations" in columns:
             of_turn = self._of_volume(columns, "volume_error_by_stations")
         for name in self.observed:
-            unknown = np.full_like(columns[name], np.nan)
             by_stations = np.nan_to_num(columns.get(f"{name}_error_by_stations", 0.0))
             if name in _OF_TURN:
                 by_stations = np.abs(columns[name]) * of_turn.reshape(
                     -1, *(1,) * (columns[name].ndim - 1)
                 )
-            error = self.observed_errors.get(name, unknown) + by_stations
-            error = error + columns.get(f"{name}_error_by_steps", 0.0)
+            known = self.observed_errors.get(name, np.full_like(columns[name], np.nan))
+            error = known + by_stations + columns.get(f"{name}_error_by_steps", 0.0)
             columns[f"{name}_error"] = np.minimum(error, np.pi) if name.endswith("angle") else error
         if self._by_energy and self.observed_errors:  # the volume is proportional to the energy
             relative = self._of_volume(columns, "volume_error")[:, None]
@@ -463,18 +458,13 @@ class Recorder:
         return _on_grid(row, grid, self.grid)
 
     @property
-    def errors_by_strips(self) -> FloatArray:
-        """Errors due to the strips, shape (3, steps); nan where they are not known."""
-        unknown = np.full((len(ERRORS), len(self._history)), np.nan)
-        return unknown if self.strip_errors is None else self.strip_errors
-
-    @property
     def records(self) -> dict[str, FloatArray]:
         """The records as arrays, first axis record.
 
         Those made before the strips have grown are averages over the present strips.
         """
-        return _columns([_on_grid(row, grid, self.grid) for grid, row in self._compute_records()])
+        rows = [_on_grid(row, grid, self.grid) for grid, row in self._compute_records()]
+        return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def _on_grid(row: Variables, old: Grid, new: Grid) -> Variables:
@@ -489,8 +479,3 @@ def _rows(columns: Mapping[str, FloatArray]) -> list[Variables]:
     """Return the rows of columns."""
     count = len(next(iter(columns.values())))
     return [{name: column[k] for name, column in columns.items()} for k in range(count)]
-
-
-def _columns(rows: list[Variables]) -> Variables:
-    """Return rows as columns."""
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}

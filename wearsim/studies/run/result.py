@@ -99,12 +99,11 @@ class RunData(StudyData):
         """Return the content of a file from its fields, variables and checkpoint."""
         groups = {"static": "static", "history": "history", "records": "record"}
         known = cls.schema_of(attributes, variables).variables
-        by_kind = {
+        by_kind: dict[str, Any] = {
             group: {name: variables[name] for name, item in known.items() if item.kind == kind}
             for group, kind in groups.items()
         }
-        parts: dict[str, Any] = {**attributes, **by_kind}
-        return cls(**parts, checkpoint=checkpoint)
+        return cls(**{**attributes, **by_kind}, checkpoint=checkpoint)
 
     @property
     def variables(self) -> Arrays:
@@ -449,13 +448,14 @@ class Result(StudyResult[RunData]):
 
     def _final_errors(self, last: Arrays) -> dict[str, Number]:
         """Return the estimated errors of the final state, the greatest one over the rollers."""
-        errors: dict[str, Number] = {}
-        for name in ESTIMATED:
-            error = last.get(f"{name}_error")
-            if error is not None and ALL_VARIABLES[name].unit != "1":
-                greatest = error.max(axis=0) if "roller" in ALL_VARIABLES[name].dims else error
-                errors[_key(name, "_error")] = _number(greatest)
-        return errors
+        known = {name: last[f"{name}_error"] for name in ESTIMATED if f"{name}_error" in last}
+        return {
+            _key(name, "_error"): _number(
+                error.max(axis=0) if "roller" in ALL_VARIABLES[name].dims else error
+            )
+            for name, error in known.items()
+            if ALL_VARIABLES[name].unit != "1"
+        }
 
     def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
         """Return the final state of a cam, and depth and lift error per station."""

@@ -19,7 +19,6 @@ AXES: Mapping[str, Axis] = by_name(
     )
 )
 
-_UNWORN = ("station", "roller", "realisation", "y")
 _STEP = ("step",)
 _TEST = ("step", "realisation")
 _ROLLER = ("step", "roller", "realisation")
@@ -78,15 +77,18 @@ def _with_errors(variables: Iterable[Variable]) -> Iterator[Variable]:
     for item in variables:
         yield item
         if item.name in _ESTIMATED:
-            text = f"estimated error of {_ESTIMATED[item.name]}"
-            yield replace(item, name=f"{item.name}_error", long_name=text)
+            yield replace(
+                item,
+                name=f"{item.name}_error",
+                long_name=f"estimated error of {_ESTIMATED[item.name]}",
+            )
 
 
 VARIABLES: Mapping[str, Variable] = by_name(
     _with_errors(
         (
             Variable("y", ("y",), "m", "axial position", "static"),
-            Variable("nominal_gap", _UNWORN, "m", "gap before wear", "static"),
+            Variable("nominal_gap", _CONTACT[1:], "m", "gap before wear", "static"),
             Variable(
                 "start_height",
                 ("y",),

@@ -91,13 +91,11 @@ class Setup:
             The value where the input is not random, which is also the mean over the passes.
         """
         sizes = [abs(float(value)) for value in (mean, *self.rollers.get(name, ()))]
-        time = self.scenario.total_time
-        for item in self.varying:
-            if item.name == name:
-                values, whole = item.paths.value, (np.zeros(1), np.full(1, time))
-                signed = _changes_sign(values)
-                mean_of_path = np.abs(values).mean() if signed else item.paths.mean(*whole)[0]
-                sizes.append(abs(float(mean_of_path)))
+        whole = np.zeros(1), np.full(1, self.scenario.total_time)
+        for paths in [item.paths for item in self.varying if item.name == name]:
+            signed = _changes_sign(paths.value)
+            mean_of_path = np.abs(paths.value).mean() if signed else paths.mean(*whole)[0]
+            sizes.append(abs(float(mean_of_path)))
         for random in self.passes:
             if len(random.keys) == 1 and CONTACT_FIELDS[random.keys[0]] == name:
                 values = random.scalar.quantile(_MIDPOINTS)
@@ -197,9 +195,12 @@ class Setup:
         """
         scenario, load = self.scenario, self.scenario.load.built
         if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
-            got = f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min"
-            expected = f"0 to {stop / 60.0:.6g} min: a longer log or a shorter operation.duration"
-            raise load_mistake(scenario, "the log does not cover the test", got, expected)
+            raise load_mistake(
+                scenario,
+                "the log does not cover the test",
+                f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min",
+                f"0 to {stop / 60.0:.6g} min: a longer log or a shorter operation.duration",
+            )
         low, high = load.extremes(0.0, stop)
         if isinstance(load, FollowerLoad):
             low, high = turn_of(scenario).normal_range
@@ -208,18 +209,24 @@ class Setup:
             return low, high
         if high <= 0.0:
             when = f"never above zero up to {stop / 60.0:.6g} min" if stop else "zero at the start"
-            what = f"the load is {when}, and there is no contact"
-            raise load_mistake(scenario, what, f"{high:.6g} N", "a load above zero")
+            raise load_mistake(
+                scenario,
+                f"the load is {when}, and there is no contact",
+                f"{high:.6g} N",
+                "a load above zero",
+            )
         if low < 0.0 or (low == 0.0 and not len(load.pauses)):
             before, after = 0.0, stop
             for _ in range(60):  # the first time of the least load, of any kind of load
                 middle = 0.5 * (before + after)
                 reached = load.extremes(0.0, middle)[0] <= low
                 before, after = (before, middle) if reached else (middle, after)
-            what = "the load falls to zero or below, and contact is lost"
-            got = f"{low:.6g} N at {after / 60.0:.6g} min"
-            expected = "a load above zero at all times, or zero for a pause in a log"
-            raise load_mistake(scenario, what, got, expected)
+            raise load_mistake(
+                scenario,
+                "the load falls to zero or below, and contact is lost",
+                f"{low:.6g} N at {after / 60.0:.6g} min",
+                "a load above zero at all times, or zero for a pause in a log",
+            )
         return low, high
 
     @cached_property
@@ -246,9 +253,8 @@ class Setup:
     def drawn_shift(self) -> float:
         """Greatest distance by which the drawn tilt moves contacts [m]."""
         tilts = self.range_of("tilt")
-        if not (self.scenario.creepage.tilt_shifts_contact and any(tilts)):
-            return 0.0
-        return float(np.abs(self.tilt_shift(tilts)).max())
+        shifts = self.scenario.creepage.tilt_shifts_contact and any(tilts)
+        return float(np.abs(self.tilt_shift(tilts)).max()) if shifts else 0.0
 
     @cached_property
     def shift(self) -> float:
@@ -273,21 +279,20 @@ class Setup:
         inputs : mapping of str to ndarray
             Among them offset [m] and tilt [rad], see `inputs`.
         """
-        shifts = self.scenario.creepage.tilt_shifts_contact
-        shift = self.tilt_shift(inputs["tilt"]) if shifts else 0.0
+        shift = (
+            self.tilt_shift(inputs["tilt"]) if self.scenario.creepage.tilt_shifts_contact else 0.0
+        )
         return np.asarray(self.scenario.axial_gap.apexes(inputs["offset"]) + shift)
 
     def centre_of(self, positions: FloatArray) -> float:
         """Return the middle of the strips for contact positions [m]."""
-        if self.scenario.contact.centre is not None:
-            return self.scenario.contact.centre
-        return 0.5 * float(positions.min() + positions.max())
+        given = self.scenario.contact.centre
+        return 0.5 * float(positions.min() + positions.max()) if given is None else given
 
     def tilt_shift(self, tilt: FloatArray | tuple[float, ...]) -> FloatArray:
         """Return the distance by which tilt [rad] moves the contact of unworn bodies [m]."""
-        gap, half = self.scenario.axial_gap, 0.0
-        if not gap.is_crowned:
-            half = self.widest_patch(self.load_range(0.0)[1]).b
+        gap = self.scenario.axial_gap
+        half = 0.0 if gap.is_crowned else self.widest_patch(self.load_range(0.0)[1]).b
         return gap.shift(np.asarray(tilt, dtype=np.float64), half)
 
     @cached_property
@@ -351,8 +356,8 @@ class Setup:
         gap, profile = scenario.axial_gap, self.start_extent
         slipping = 1.0
         if not full_slip:
-            saturated = friction * patch.a * (1.0 / roller.radius + 1.0 / scenario.cylinder.radius)
-            saturated /= scenario.friction.creep_factor
+            rolling = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius
+            saturated = friction * patch.a * rolling / scenario.friction.creep_factor
             ratio = min(float(np.hypot(longitudinal, yaw)) / saturated, 1.0)
             slipping = ratio * (2.0 - ratio)
         start = 0.0 if profile is None else profile.relief
@@ -385,9 +390,9 @@ class Setup:
         cylinder, roller = (law.depth_per_dissipation(body, speed) for body in BODIES)
         if cylinder is not None and roller is not None:
             return (cylinder + share * roller) * friction_slip * speed
-        modulus = scenario.pair.contact_modulus
         curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
-        half_length = np.sqrt(4.0 * line_load / (np.pi * modulus * curvature))
+        stiffness = np.pi * scenario.pair.contact_modulus * curvature
+        half_length = np.sqrt(4.0 * line_load / stiffness)
         dissipation = friction_slip * line_load * speed
         sliding = ContactSolution(
             y=np.zeros_like(line_load),
@@ -404,8 +409,8 @@ class Setup:
             longitudinal_creepage=0.0,
             iterations=0,
         )
-        depth = law.depth_per_pass("cylinder", sliding, speed)
-        depth = depth + share * law.depth_per_pass("roller", sliding, speed)
+        of_roller = share * law.depth_per_pass("roller", sliding, speed)
+        depth = law.depth_per_pass("cylinder", sliding, speed) + of_roller
         return float((depth / line_load).max())
 
 
@@ -436,8 +441,7 @@ def _patch_of_form(gap: AxialGap, along: float, load: float, modulus: float) -> 
     level = max(gap.depth_at(half), approach)
     greatest = line_load * level / (level - gap.mean_drop(half))
     half_length = math.sqrt(2.0 * greatest / (math.pi * modulus * along))
-    pressure = 2.0 * greatest / (math.pi * half_length)
-    return HertzContact(half_length, half, pressure, approach, load)
+    return HertzContact(half_length, half, 2.0 * greatest / (math.pi * half_length), approach, load)
 
 
 def _half_width(gap: AxialGap, along: float, load: float, modulus: float) -> float:

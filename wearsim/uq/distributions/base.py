@@ -92,9 +92,7 @@ class MaxentDistribution(Distribution):
     def parent(self) -> tuple[float, float] | None:
         """Mean and standard deviation of the normal distribution before truncation, or None."""
         _, l1, l2 = self.multipliers
-        if self.third != "x^2" or l2 <= 0.0:
-            return None
-        return -0.5 * l1 / l2, math.sqrt(0.5 / l2)
+        return None if self.third != "x^2" or l2 <= 0.0 else (-0.5 * l1 / l2, math.sqrt(0.5 / l2))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -199,8 +197,7 @@ class Exponential(MaxentDistribution):
         self.family = "truncated exponential" if math.isfinite(high) else "exponential"
         self.support, self.mean, self.std, self._rate = (low, high), mean, std, rate
         self._fall = rate * (high - low)
-        top = math.log(rate) - math.log(-math.expm1(-self._fall))
-        self._set_exponent(low, top, rate, 0.0)
+        self._set_exponent(low, math.log(rate) - math.log(-math.expm1(-self._fall)), rate, 0.0)
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""

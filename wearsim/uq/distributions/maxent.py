@@ -77,8 +77,8 @@ def gamma_shape(gap: float) -> float:
     """Return the shape k of the gamma distribution with ``log k - digamma(k) = gap`` > 0."""
     from scipy.special import digamma, zeta  # noqa: PLC0415  (slow to import, rarely needed)
 
-    root = math.sqrt((gap - 3.0) ** 2 + 24.0 * gap)
-    shape = (3.0 - gap + root) / (12.0 * gap)  # within 1.5 %: Minka, Estimating a Gamma, 2002
+    # within 1.5 %: Minka, Estimating a Gamma, 2002
+    shape = (3.0 - gap + math.sqrt((gap - 3.0) ** 2 + 24.0 * gap)) / (12.0 * gap)
     for _ in range(5):  # Newton's method for 1/k, in which the function is nearly linear
         if shape > _LARGE:  # asymptotic series, without cancellation
             series = 1.0 / 12.0 - 1.0 / (120.0 * shape**2) + 1.0 / (252.0 * shape**4)

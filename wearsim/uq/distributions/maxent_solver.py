@@ -125,8 +125,7 @@ def graded_quadrature(finest: float) -> tuple[FloatArray, FloatArray, FloatArray
 
     The panels are halved towards both ends, down to far below `finest`.
     """
-    octaves = int(np.ceil(-np.log2(finest))) + 12
-    edges = np.concatenate([[0.0], 0.5 ** np.arange(octaves, 0, -1)])
+    edges = np.append(0.0, 0.5 ** np.arange(int(np.ceil(-np.log2(finest))) + 12, 0, -1))
     half = 0.5 * np.diff(edges)[:, None]
     near, weights = (edges[:-1, None] + half * (1.0 + _GAUSS)).ravel(), (half * _WEIGHTS).ravel()
     return (

@@ -80,7 +80,8 @@ class Mixture(Distribution):
             middle = 0.5 * (low + high)
             short = self._cumulative(middle) < below
             low, high = np.where(short, middle, low), np.where(short, high, middle)
-        values = np.clip(self._restored(high), *self.support)
+        restored = np.exp(high) if self._is_logarithmic else self.mean + (self.std or 1.0) * high
+        values = np.clip(restored, *self.support)
         ends = np.where(
             below <= 0.0, self.support[0], np.where(below >= 1.0, self.support[1], values)
         )
@@ -100,11 +101,6 @@ class Mixture(Distribution):
             with np.errstate(divide="ignore"):
                 return np.asarray(np.log(value))
         return (value - self.mean) / (self.std or 1.0)
-
-    def _restored(self, transformed: FloatArray) -> FloatArray:
-        if self._is_logarithmic:
-            return np.asarray(np.exp(transformed))
-        return self.mean + (self.std or 1.0) * transformed
 
     def _cumulative(self, transformed: FloatArray) -> FloatArray:
         from scipy.special import ndtr  # noqa: PLC0415  (slow to import, and rarely needed)

@@ -164,8 +164,7 @@ class InverseTable:
             correction = correction * centred + coefficient[panel]
         place = place + place * (1.0 - place) * correction
         offset = self._start[panel] + self._width[panel] * place
-        values: FloatArray = self._origin[panel] + self._scale[panel] * offset
-        return values
+        return np.asarray(self._origin[panel] + self._scale[panel] * offset)
 
 
 def _exponential_quantile(
@@ -318,11 +317,9 @@ def cut_normal(
         return Mirrored(cut_normal(-high, -low, -parent_mean, parent_std))
     if has_parent(low, high, parent_mean, parent_std):
         return TruncatedNormal(low, high, parent_mean, parent_std)
-    fall = (low - parent_mean) / parent_std
-    return QuadraticExponent(low, high, parent_std, fall, 0.5)
+    return QuadraticExponent(low, high, parent_std, (low - parent_mean) / parent_std, 0.5)
 
 
 def has_parent(low: float, high: float, parent_mean: float, parent_std: float) -> bool:
     """Return whether closed forms are accurate on a support nearer above the parent's mean."""
-    near = low - parent_mean <= _DEEPEST * parent_std
-    return near and high - low > _NARROWEST * parent_std
+    return low - parent_mean <= _DEEPEST * parent_std and high - low > _NARROWEST * parent_std

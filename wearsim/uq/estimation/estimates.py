@@ -79,8 +79,11 @@ class Estimate:
         """Return the quantile of one of the requested probabilities."""
         quantiles = dict(self.quantiles)
         if probability not in quantiles:
-            kind = "a probability of this estimate, see the argument probabilities"
-            raise unknown_name(f"{probability:g}", kind, (f"{known:g}" for known in quantiles))
+            raise unknown_name(
+                f"{probability:g}",
+                "a probability of this estimate, see the argument probabilities",
+                (f"{known:g}" for known in quantiles),
+            )
         return quantiles[probability]
 
 
@@ -197,8 +200,7 @@ def _mean_and_std(values: FloatArray, errors: PlanErrors) -> tuple[Interval, Int
     deviation = values - centre
     offset = _weighted(errors, deviation)
     if errors.degrees < 1:
-        mean = Interval(centre + offset, -math.inf, math.inf)
-        return mean, Interval(math.nan, 0.0, math.inf)
+        return Interval(centre + offset, -math.inf, math.inf), Interval(math.nan, 0.0, math.inf)
     error = errors.error(deviation)
     square = (deviation - offset) ** 2
     # corrected for the error of the mean; positive for any weights
@@ -236,8 +238,7 @@ def _quantile(
     if not isinstance(errors, Independent):
         below = (values <= value).astype(np.float64)
         error = errors.error(below) * t_quantile(errors.degrees) / t_quantile(math.inf)
-        error = max(error, _STEP / count)
-        count = probability * (1.0 - probability) / error**2
+        count = probability * (1.0 - probability) / max(error, _STEP / count) ** 2
     ranks = fractional_ranks(count, probability)
     low, high = (distribution.at(rank / (count + 1.0)) for rank in ranks)
     return Interval(value, min(low, value), max(high, value))

@@ -98,8 +98,5 @@ def bisect(
     """
     for _ in range(halvings):
         middle = 0.5 * (outer + inner)
-        if outside(middle):
-            outer = middle
-        else:
-            inner = middle
+        outer, inner = (middle, inner) if outside(middle) else (outer, middle)
     return outer, inner

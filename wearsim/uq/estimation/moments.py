@@ -308,9 +308,8 @@ class RowMoments:
         """Return mean and standard deviation of the rows so far, each (columns,); nan for one."""
         waiting = self._waiting[: self._held]
         count, mean, square = _merge(self._merged, waiting) if self._held else self._merged
-        if count < 2:
-            return mean, np.full_like(mean, np.nan)
-        return mean, np.sqrt(square / (count - 1))
+        variance = square / (count - 1) if count > 1 else np.full_like(mean, np.nan)
+        return mean, np.sqrt(variance)
 
 
 def _merge(

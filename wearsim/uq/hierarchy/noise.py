@@ -176,12 +176,11 @@ def noise_models(
     decay, gain, scale, lines = (np.ascontiguousarray(values[..., kept]) for values in arrays)
     freedom = len(y) - forms.shape[1]
     # a variance that is greater by a factor divides the logarithm of the likelihood by it
-    known = np.maximum(1.0, least**2 / variance[kept])
-    exponent = 0.5 * freedom / known
-    log_weight = models.log_weight[kept]
-    log_weight += (exponent - 0.5 * freedom) * np.log(freedom * variance[kept])
-    length, white = models.length[kept], models.white[kept]
-    return NoiseModels(length, white, decay, gain, scale, lines, log_weight, exponent)
+    exponent = 0.5 * freedom / np.maximum(1.0, least**2 / variance[kept])
+    added = (exponent - 0.5 * freedom) * np.log(freedom * variance[kept])
+    log_weight = models.log_weight[kept] + added
+    sizes = models.length[kept], models.white[kept]
+    return NoiseModels(*sizes, decay, gain, scale, lines, log_weight, exponent)
 
 
 def _likely(

@@ -69,10 +69,13 @@ def sample_hierarchy(
 
     random = np.random.default_rng(seed)
     walkers = max(LEAST_WALKERS, 2 * (specimens + 2))
-    start = np.empty((walkers, specimens + 2))
-    start[:, 0] = means.mean() + 0.1 * random.standard_normal(walkers)
-    start[:, 1] = 0.1 + 0.1 * random.random(walkers)
-    start[:, 2:] = 0.5 * random.standard_normal((walkers, specimens))
+    start = np.column_stack(
+        [
+            means.mean() + 0.1 * random.standard_normal(walkers),
+            0.1 + 0.1 * random.random(walkers),
+            0.5 * random.standard_normal((walkers, specimens)),
+        ]
+    )
     sampler = emcee.EnsembleSampler(walkers, specimens + 2, log_probability, vectorize=True)
     sampler.random_state = np.random.RandomState(seed).get_state()
     last = sampler.run_mcmc(start, BURN_IN)

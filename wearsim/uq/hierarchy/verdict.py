@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
@@ -12,8 +12,6 @@ from wearsim.types import BoolArray, FloatArray
 from wearsim.uq.hierarchy.kernels import LikelihoodMixture
 from wearsim.uq.hierarchy.pooled import Hierarchy, ratios, scatters, upper_limits
 from wearsim.uq.sampling.sobol import Stream
-
-Word: TypeAlias = Literal["explained", "random", "undecided"]
 
 NEGLIGIBLE = 0.2  # scatter of ln K
 ALPHA = 0.05
@@ -98,8 +96,9 @@ class Design:
 
     def simulated(self, t: float, name: str) -> FloatArray:
         """Return apparent ln K of simulated sets with the scatter t, shape (sets, tests)."""
-        stream = f"identify {name} {self.tests}"
-        return simulated_centres(self.kernels, self.tests, self.sets, t, self.seed, stream)
+        return simulated_centres(
+            self.kernels, self.tests, self.sets, t, self.seed, f"identify {name} {self.tests}"
+        )
 
     def ratio(self, centres: FloatArray) -> float:
         """Return the likelihood ratio statistic of one set of tests, shape (tests,)."""
@@ -108,8 +107,7 @@ class Design:
     def decide(self, centres: FloatArray) -> Decision:
         """Return the verdicts of sets of tests, shape (sets, tests)."""
         log_likelihood = self.hierarchy.integrated(centres)
-        upper = upper_limits(log_likelihood, self.hierarchy.t, 1.0 - ALPHA)
-        explained = upper < self.negligible
+        explained = upper_limits(log_likelihood, self.hierarchy.t, 1.0 - ALPHA) < self.negligible
         return Decision((ratios(log_likelihood) > self.quantile) & ~explained, explained)
 
     def rates(self, t: float) -> tuple[float, float]:
@@ -118,7 +116,9 @@ class Design:
         return float(decision.random.mean()), float(decision.explained.mean())
 
 
-def word(random: bool, upper: float, negligible: float) -> Word:
+def word(
+    random: bool, upper: float, negligible: float
+) -> Literal["explained", "random", "undecided"]:
     """Return the verdict of tests: by a test of equivalence first, then by a test of t = 0.
 
     Parameters

@@ -13,8 +13,6 @@ import numpy.typing as npt
 
 from wearsim.types import FloatArray
 
-Purpose: TypeAlias = Literal["test", "pass", "field", "process", "plan"]
-
 _LANES = 4  # 64-bit words per count of the generator
 _STEP = 2.0**-52  # one bit fewer than a float has, so that (k + 1/2) _STEP is exact and below 1
 Words: TypeAlias = npt.NDArray[np.uint32]
@@ -58,7 +56,7 @@ class Stream:
 
     seed: int
     name: str
-    purpose: Purpose = "test"
+    purpose: Literal["test", "pass", "field", "process", "plan"] = "test"
 
     @property
     def _key(self) -> npt.NDArray[np.uint64]:

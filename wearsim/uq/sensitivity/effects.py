@@ -78,11 +78,11 @@ def effects(values: FloatArray, scores: Mapping[str, FloatArray]) -> dict[str, S
     designs = {name: np.column_stack([score, score**2]) for name, score in scores.items()}
     if len(values) >= _PER_TERM * (1 + sum(design.shape[1] for design in designs.values())):
         return _fitted(values, designs)
-    by_input: dict[str, SignedEffect] = {}
-    for name, design in designs.items():
-        if len(values) >= _PER_TERM * (1 + design.shape[1]):
-            by_input |= _fitted(values, {name: design})
-    return by_input
+    return {
+        name: _fitted(values, {name: design})[name]
+        for name, design in designs.items()
+        if len(values) >= _PER_TERM * (1 + design.shape[1])
+    }
 
 
 def exact_effect(low: float, high: float) -> SignedEffect:

@@ -103,8 +103,7 @@ def _share(values: FloatArray, numbers: FloatArray, name: str) -> Interval:
     variance = float((deviation**2).sum()) / (count - 1)
     left = float((deviation * left_out).sum()) / (count - 1) / variance
     influence = (residual * left_out - left * deviation**2) / variance
-    noise = 2.0 * (terms - 1) * (left / count) ** 2
-    error = math.sqrt(float(influence.var()) / count + noise)
+    error = math.sqrt(float(influence.var()) / count + 2.0 * (terms - 1) * (left / count) ** 2)
     return t_interval(1.0 - left, error, math.inf).within(0.0, 1.0)
 
 
@@ -157,9 +156,8 @@ def saltelli_indices(
     for name, values in zip(names, mixed, strict=True):
         saltelli = other * (values - base)
         jansen = square - 0.5 * (other - values) ** 2
-        total = 0.5 * (base - values) ** 2
         first = _combined(saltelli, jansen, square)
-        indices[name] = (_ratio(first, square), _ratio(total, square))
+        indices[name] = (_ratio(first, square), _ratio(0.5 * (base - values) ** 2, square))
     return indices
 
 
@@ -219,9 +217,8 @@ def _best_fit(
     for rows, design in _designs(scores, powers, family):
         gram += design.T @ design
         moment += design.T @ values[rows]
-    lower = np.linalg.cholesky(gram + _RIDGE * count * np.eye(len(powers)))
     # columns orthonormalised successively: the first k of them span the first k terms
-    transform = np.linalg.inv(lower).T
+    transform = np.linalg.inv(np.linalg.cholesky(gram + _RIDGE * count * np.eye(len(powers)))).T
     slopes = transform.T @ moment
     residual, left_out = np.empty((2, count, len(ends)))
     for rows, design in _designs(scores, powers, family):

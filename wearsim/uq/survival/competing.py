@@ -197,8 +197,7 @@ class CompetingRisks:
         """Return the probabilities of realisations at a life, with their own factors."""
         factors = np.ones((len(self.end), 1))
         ended = self.worn.astype(np.bool_) & (self.end <= life)
-        passes = np.minimum(life, self.end)[:, None]
-        alive = self._no_pit(passes, factors)[:, 0]
+        alive = self._no_pit(np.minimum(life, self.end)[:, None], factors)[:, 0]
         survival, wear = alive * ~ended, alive * ended
         return Incidence(survival, 1.0 - survival - wear, wear)
 

@@ -161,8 +161,7 @@ def _curves(lives: LifeDistribution) -> tuple[FloatArray, FloatArray]:
         high = float(log.max() - lives.score.log_quantile(-reach))
     else:
         low, high = (float(at.min()) - 1.0, float(at.max()) + 1.0) if len(at) else (0.0, 1.0)
-    nodes = [np.linspace(low, high, _POINTS), at - _STEP, at + _STEP]
-    logs = np.unique(np.concatenate(nodes))
+    logs = np.unique(np.concatenate([np.linspace(low, high, _POINTS), at - _STEP, at + _STEP]))
     return logs, lives.failed(np.exp(logs))
 
 

@@ -54,8 +54,7 @@ def design_points(scores: FloatArray, response: FloatArray, needed: Needed) -> l
     """
     from scipy.optimize import minimize  # noqa: PLC0415  (slow to load)
 
-    fit, slope = _fit(scores, response)
-    dimension = scores.shape[1]
+    (fit, slope), dimension = _fit(scores, response), scores.shape[1]
 
     def distance(points: FloatArray) -> FloatArray:
         fitted = fit(points)
@@ -118,8 +117,8 @@ def _terms(scores: FloatArray, powers: Sequence[int]) -> FloatArray:
 def influence(scores: FloatArray, response: FloatArray) -> FloatArray:
     """Return the effect of each input on a response, linear and by its square, (dimension,)."""
     deviation = response - response.mean()
-    square = scores**2 - 1.0
-    return np.asarray(np.hypot(deviation @ scores, deviation @ square / math.sqrt(2.0)))
+    curved = deviation @ (scores**2 - 1.0) / math.sqrt(2.0)
+    return np.asarray(np.hypot(deviation @ scores, curved))
 
 
 def mixture_log_weights(

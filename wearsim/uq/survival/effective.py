@@ -17,7 +17,7 @@ from wearsim.types import FloatArray
 
 LEAST_NUMBER = 20.0  # effective number below which no probability is stated
 _CONFIDENCE = 0.9  # of the upper limit of the spread, by which a probability is refused
-_WIDENED = 0.05, 0.01  # probabilities from which and to which the spread is widened for intervals
+_WIDENED = 0.01, 0.05  # probabilities to which and from which the spread is widened for intervals
 _FEWEST = 8  # finite values for a fit with a quadratic term
 _SCORES = np.linspace(-9.0, 9.0, 721)
 _DENSITY = np.exp(-0.5 * _SCORES**2) / np.exp(-0.5 * _SCORES**2).sum()
@@ -39,8 +39,7 @@ def effective_number(count: int, mean: float, variance: float) -> float:
     >>> print(f"{effective_number(400, 1e-4, 1e-8):.0f}")
     400
     """
-    least = min(mean, 1.0 - mean)
-    return math.inf if variance <= 0.0 else count * least**2 / variance
+    return math.inf if variance <= 0.0 else count * min(mean, 1.0 - mean) ** 2 / variance
 
 
 class Fits(NamedTuple):
@@ -100,9 +99,8 @@ def caution(probability: float) -> float:
     A small probability is stated where the spread of the sample is small, also by chance; that of a
     probability in the bulk of the sample is shown by the sample itself.
     """
-    least = min(probability, 1.0 - probability)
-    bulk, small = _WIDENED
-    return float(np.interp(math.log(max(least, 1e-300)), np.log([small, bulk]), [1.0, 0.0]))
+    least = max(min(probability, 1.0 - probability), 1e-300)
+    return float(np.interp(math.log(least), np.log(_WIDENED), [1.0, 0.0]))
 
 
 def predicted_number(
@@ -125,8 +123,7 @@ def predicted_number(
     count : int
         Realisations.
     """
-    sure, fitted = shares
-    numbers = []
+    (sure, fitted), numbers = shares, []
     for fit in fits:
         failed = probability(fit)
         mean = sure + fitted * float(_DENSITY @ failed)

@@ -115,7 +115,7 @@ class LifeFit(FittedLives):
     @property
     def covariance(self) -> FloatArray:
         """Covariance of the estimates of mu and ln sigma, from the observed information."""
-        _, _, curvature = self.sample.derivatives(self.mu, math.log(self.sigma), 0.0)
+        curvature = self.sample.derivatives(self.mu, math.log(self.sigma), 0.0)[2]
         return np.asarray(np.linalg.inv(-curvature))
 
     def interval(self, probability: float) -> Interval:
@@ -129,9 +129,9 @@ class LifeFit(FittedLives):
         """
         w = standard_score(self.family, probability)
         best = self.mu + self.sigma * w
-        information = -self.sample.derivatives(best, math.log(self.sigma), w)[2]
-        error = math.sqrt(abs(information[1, 1] / np.linalg.det(information)))
         at = math.log(self.sigma)
+        information = -self.sample.derivatives(best, at, w)[2]
+        error = math.sqrt(abs(information[1, 1] / np.linalg.det(information)))
 
         def excess(distance: float) -> float:
             nonlocal at  # near the maximum at the next distance too

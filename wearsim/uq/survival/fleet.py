@@ -150,11 +150,9 @@ def _exposed(
             failed = fleet.failed[units]
             # a unit found failed at an inspection fails at a random life between both ends
             stop = functions.hazard(m[:, None] + np.where(failed, last[units], first[units]))
-            part = uniform[numbers][:, units]
-            end = start - np.log1p(part * np.expm1(start - stop))
-            limits = functions.hazard(m[:, None] + at)
-            wall = np.zeros((len(m), 1)), np.full((len(m), 1), np.inf)
-            limits = np.hstack([wall[0], limits, wall[1]])
+            end = start - np.log1p(uniform[numbers][:, units] * np.expm1(start - stop))
+            none, all_ = np.zeros((len(m), 1)), np.full((len(m), 1), np.inf)
+            limits = np.hstack([none, functions.hazard(m[:, None] + at), all_])
             for band in range(shape[1]):
                 low, high = limits[:, band, None], limits[:, band + 1, None]
                 hazards[numbers, band] += (np.clip(end, low, high) - low).sum(axis=1)
@@ -229,21 +227,26 @@ def remaining_lives(
         ratio[rows] = np.exp(at - functions.survived(m[rows, None] + np.log(ages))[:, :, None])
     remaining = []
     for place in range(len(ages)):
-        curves, mean = ratio[:, place, :-1], weight @ ratio[:, place, :-1]
-        stated = []
-        for share in shares:
-            crossed = _crossings(curves, 1.0 - share, further)
-            low, high = weighted_quantiles(crossed, weight, ENDS).tolist()
-            value = float(_crossings(mean[None, :], 1.0 - share, further)[0])
-            stated.append(Interval(value, min(low, value), max(high, value)))
-        survival = None
-        if target is not None and target > ages[place]:
-            reached = ratio[:, place, -1]
-            low, high = weighted_quantiles(reached, weight, ENDS).tolist()
-            value = float(weight @ reached)
-            survival = Interval(value, min(low, value), max(high, value))
-        remaining.append(RemainingLife(tuple(stated), survival))
+        curves, reached = ratio[:, place, :-1], ratio[:, place, -1]
+        mean = (weight @ curves)[None, :]
+        stated = tuple(
+            _about(
+                float(_crossings(mean, 1.0 - share, further)[0]),
+                _crossings(curves, 1.0 - share, further),
+                weight,
+            )
+            for share in shares
+        )
+        survives = target is not None and target > ages[place]
+        survival = _about(float(weight @ reached), reached, weight) if survives else None
+        remaining.append(RemainingLife(stated, survival))
     return remaining
+
+
+def _about(value: float, values: FloatArray, weight: FloatArray) -> Interval:
+    """Return a value with the interval of weighted ones, which includes it."""
+    low, high = weighted_quantiles(values, weight, ENDS).tolist()
+    return Interval(value, min(low, value), max(high, value))
 
 
 def _crossings(curves: FloatArray, level: float, life: FloatArray) -> FloatArray:

@@ -57,9 +57,9 @@ def anderson_darling(fit: LifeFit) -> AndersonDarling | None:
     if len(ended) < _FEWEST or (len(censored) and np.ptp(censored) > 0.0):
         return None
     end = math.inf if not len(censored) else float((censored[0] - fit.mu) / fit.sigma)
-    scores = np.sort((ended - fit.mu) / fit.sigma)
-    statistic = _statistic(fit.family, scores, len(sample.logs), end)
-    simulated = _simulated(fit.family, min(len(sample.logs), _MOST), round(end, 1))
+    count, scores = len(sample.logs), np.sort((ended - fit.mu) / fit.sigma)
+    statistic = _statistic(fit.family, scores, count, end)
+    simulated = _simulated(fit.family, min(count, _MOST), round(end, 1))
     return AndersonDarling(statistic, float((simulated >= statistic).mean()))
 
 
@@ -111,10 +111,8 @@ def _fitted(
             [(first * values).sum(axis=1) + failures / slope, -first.sum(axis=1)], axis=1
         )
         across = -(second * values).sum(axis=1)
-        matrix = np.empty((len(values), 2, 2))
-        matrix[:, 0, 0] = (second * values**2).sum(axis=1) - failures / slope**2
-        matrix[:, 0, 1] = matrix[:, 1, 0] = across
-        matrix[:, 1, 1] = second.sum(axis=1)
+        along = (second * values**2).sum(axis=1) - failures / slope**2
+        matrix = np.array([[along, across], [across, second.sum(axis=1)]]).transpose(2, 0, 1)
         step = np.linalg.solve(matrix, -gradient[:, :, None])[:, :, 0]
         # the slope stays above a third of its value
         part = np.minimum(1.0, 0.67 * slope / np.maximum(-step[:, 0], 1e-300))

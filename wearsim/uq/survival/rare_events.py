@@ -240,8 +240,8 @@ def subset_simulation(
     while True:
         trial = random.standard_normal((stage.count, dimension))
         if stage.parents is not None:
-            part = math.sqrt(1.0 - stage.scale**2)
-            trial = part * scores[stage.parents] + stage.scale * trial
+            kept = math.sqrt(1.0 - stage.scale**2) * scores[stage.parents]
+            trial = kept + stage.scale * trial
         scores = np.concatenate([scores, trial])
         try:
             stage = stages.send(response(trial))
@@ -299,15 +299,18 @@ def subset_stages(
         if share == 0.0:
             return _result(0.0, math.inf, done, obstacle="no test of the last level has the event")
         if threshold > 0.0 and share >= 0.5:
-            text = f"{100.0 * share:.0f} % of the tests of a level have the same response, such as"
-            text += " a censored life"
-            return _result(0.0, math.inf, done, obstacle=text)
+            equal = f"{100.0 * share:.0f} % of the tests of a level have the same response"
+            return _result(0.0, math.inf, done, obstacle=f"{equal}, such as a censored life")
         correlation = _correlation(event.reshape(-1, chains), share)
         square += (1.0 - share) / (share * len(values)) * (1.0 + correlation)
         if threshold == 0.0:
             variation = math.sqrt(square)
-            obstacle = "" if variation < 1.0 else "its variation is above 100 %"
-            return _result(probability, variation, done, obstacle=obstacle)
+            return _result(
+                probability,
+                variation,
+                done,
+                obstacle=("" if variation < 1.0 else "its variation is above 100 %"),
+            )
         score = float(ndtri(probability))
         slope = min((threshold - before[1]) / (before[0] - score), -1e-12)
         chance = max(float(ndtr(score + threshold / slope)), LEAST)
@@ -336,5 +339,4 @@ def _correlation(event: BoolArray, share: float) -> float:
     covariance = [
         max(float((event[lag:] & event[:-lag]).mean()) - share**2, 0.0) for lag in range(1, length)
     ]
-    weights = 1.0 - np.arange(1, length) / length
-    return float(2.0 * (weights * covariance).sum() / variance)
+    return float(2.0 * ((1.0 - np.arange(1, length) / length) * covariance).sum() / variance)

@@ -218,8 +218,7 @@ def update(
     the realisations is neglected.
     """
     scatters, owner = _scatters_of(levels)
-    sampling = max(_location_error(lives) for lives in designs)
-    widened = math.hypot(spread, sampling)
+    widened = math.hypot(spread, max(_location_error(lives) for lives in designs))
     weight, moved = _with_factor(levels, widened)
     chances = np.empty_like(moved)
     for number, t in enumerate(scatters):
@@ -372,13 +371,11 @@ def _overlaps(scatters: FloatArray, grid: FloatArray) -> FloatArray:
 
     The weight of a scatter is spread evenly up to the middles between it and its neighbours.
     """
-    middles = 0.5 * (scatters[1:] + scatters[:-1])
-    edges = np.concatenate([scatters[:1], middles, scatters[-1:]])
+    edges = np.concatenate([scatters[:1], 0.5 * (scatters[1:] + scatters[:-1]), scatters[-1:]])
     cells = np.concatenate([[-np.inf], 0.5 * (grid[1:] + grid[:-1]), [np.inf]])
     low = np.maximum(edges[:-1, None], cells[:-1])
     high = np.minimum(edges[1:, None], cells[1:])
-    widths = np.maximum(np.diff(edges), 1e-300)
-    return np.asarray(np.maximum(high - low, 0.0) / widths[:, None])
+    return np.asarray(np.maximum(high - low, 0.0) / np.maximum(np.diff(edges), 1e-300)[:, None])
 
 
 def _gap(m: FloatArray, step: float) -> float:

@@ -107,8 +107,7 @@ def score_function(distribution: Distribution) -> ScoreFunction:
     inner = np.append(False, np.append((logs[1:-1] == logs[:-2]) & (logs[1:-1] == logs[2:]), False))
     logs, scores = logs[~inner], scores[~inner]
     flat = np.flatnonzero(np.diff(logs) == 0.0)
-    is_atom = ndtr(scores[flat + 1]) - ndtr(scores[flat]) > _ATOM
-    atoms = np.exp(logs[flat[is_atom]])
+    atoms = np.exp(logs[flat[ndtr(scores[flat + 1]) - ndtr(scores[flat]) > _ATOM]])
     logs[flat] = np.nextafter(logs[flat], -math.inf)
     return ScoreFunction(logs, scores, atoms)
 

@@ -112,12 +112,12 @@ class UncertainLives:
         value = self._crossings(np.full(len(self.scatters), share))
         if self.mixture.exact:
             return value, value, value
-        ends = []
-        for log, t, failed in zip(
-            value, self.scatters, self._failed(np.minimum(value, _WIDE)), strict=True
-        ):
-            error = self.given(0.0, float(t)).error(math.exp(min(log, _WIDE)), failed)
-            ends.append(logit_interval(share, *error))
+        known = np.minimum(value, _WIDE)
+        errors = (
+            self.given(0.0, float(t)).error(math.exp(log), failed)
+            for log, t, failed in zip(known, self.scatters, self._failed(known), strict=True)
+        )
+        ends = [logit_interval(share, *error) for error in errors]
         low, high = (
             np.array([getattr(interval, end) for interval in ends]) for end in ("low", "high")
         )

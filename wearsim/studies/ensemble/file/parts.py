@@ -45,10 +45,8 @@ from wearsim.types import IntArray
 PART = Schema(f"{ENSEMBLE.format}-part", ENSEMBLE.version, "rows of an ensemble", {}, {})
 NUMBER, STATE, RUN_ID = "number", "state", "run_id"
 
-_DAMAGED = ("is truncated", "is damaged", "is empty")
 _REMOVE = "remove all parts of greater numbers: resume then repeats the tests that are lost"
 ERROR_ROWS = 1 << 16  # of error messages that are read at a time
-_CUT = "…"  # ends a text that is too long
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,9 +135,8 @@ def read_parts(path: Path, data: EnsembleData) -> list[Part]:
     numbers = [number for number in part_numbers(path) if number > data.merged]
     for expected, number in enumerate(numbers, data.merged + 1):
         if number != expected:
-            missing = part_path(path, expected)
-            remedy = f"move it there, or {_REMOVE}"
-            raise ResultsFileError(f"{_without(path, missing)}; {remedy}")
+            missing = _without(path, part_path(path, expected))
+            raise ResultsFileError(f"{missing}; move it there, or {_REMOVE}")
     return [_read_part(part_path(path, number), path, data) for number in numbers]
 
 
@@ -179,7 +176,8 @@ def _read_part(part: Path, path: Path, data: EnsembleData) -> Part:
     try:
         return read_file(part, take)
     except ResultsFileError as error:
-        if not error.message.startswith(tuple(f"{part}: {what}" for what in _DAMAGED)):
+        states = ("is truncated", "is damaged", "is empty")
+        if not error.message.startswith(tuple(f"{part}: {state}" for state in states)):
             raise
         # without this part and the later ones, the ensemble is as it was before they were written
         remedy = f"copy it again, or remove it and {_REMOVE.removeprefix('remove ')}"
@@ -305,8 +303,7 @@ def joined(before: Arrays, added: Arrays) -> Arrays:
     """Return the rows of both; of equal numbers, the added one."""
     rows = {}
     for name in before:
-        numbers = [item[NUMBER][: len(item[name])] for item in (before, added)]
-        keys = np.concatenate(numbers)[::-1]
+        keys = np.concatenate([item[NUMBER][: len(item[name])] for item in (before, added)])[::-1]
         _, last = np.unique(keys, return_index=True)
         rows[name] = np.concatenate([before[name], added[name]])[::-1][last]
     return rows
@@ -318,7 +315,7 @@ def _stored_text(error: str) -> bytes:
     most = ERROR_BYTES - 1
     if len(content) <= most:
         return content
-    end = _CUT.encode()
+    end = "…".encode()
     return content[: most - len(end)].decode("utf-8", "ignore").encode() + end
 
 
@@ -380,9 +377,10 @@ def _merged(path: Path, file: StoredFile) -> tuple[EnsembleData, StoredRows]:
         raise ValueError(f"a realisation has the status {status.max()}")
     errors = _errors_of(file, status)
     # rows are read on access, perhaps after a change of the working directory
-    identity, path = os.fstat(file.handle), path.absolute()
-    read = partial(_read_unchanged, path, identity)
-    stored = StoredRows(read, schema, [], partial(_is_unchanged, path, identity))
+    state = path.absolute(), os.fstat(file.handle)
+    stored = StoredRows(
+        partial(_read_unchanged, *state), schema, [], partial(_is_unchanged, *state)
+    )
     return EnsembleData(**attributes, variables=stored, status=status, errors=errors), stored
 
 

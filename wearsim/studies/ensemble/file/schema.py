@@ -79,9 +79,8 @@ FATIGUE_OBSERVABLES: Mapping[str, Variable] = by_name(
 
 def observables_of(*, cam: bool = True, fatigue: bool = True) -> dict[str, Variable]:
     """Return the observables of tests, of a cam or a cylinder, with or without fatigue."""
-    groups = (cam, CAM_OBSERVABLES), (fatigue, FATIGUE_OBSERVABLES)
-    further = {n: v for given, group in groups if given for n, v in group.items()}
-    return {**OBSERVABLES, **further}
+    groups = (True, OBSERVABLES), (cam, CAM_OBSERVABLES), (fatigue, FATIGUE_OBSERVABLES)
+    return {n: v for given, group in groups if given for n, v in group.items()}
 
 
 ALL_OBSERVABLES: Mapping[str, Variable] = observables_of()
@@ -161,7 +160,6 @@ _OUTCOMES = by_name(
     )
 )
 
-_CONTROL = Variable("control", _DRAW, "1", "control variate, in the unit of its mean", "record")
 
 #: Variables of an ensemble of tests that end at a limit.
 LIFE = by_name(
@@ -236,13 +234,6 @@ def _statistics(
 
 #: Estimates over the realisations; nan until the ensemble is finished.
 STATISTICS: Mapping[str, Variable] = _statistics(OBSERVABLES, [_DEPTH_PROFILE])
-#: Further estimates of an ensemble of cams.
-CAM_STATISTICS: Mapping[str, Variable] = _statistics(CAM_OBSERVABLES, [_LIFT_ERROR])
-#: Further estimates of an ensemble of tests with fatigue, and of cams with it.
-FATIGUE_STATISTICS: Mapping[str, Variable] = _statistics(
-    FATIGUE_OBSERVABLES, list(_DAMAGE_PROFILES.values())
-)
-CAM_FATIGUE_STATISTICS: Mapping[str, Variable] = _statistics({}, [_DAMAGE_CURVE])
 
 #: Schema without the random inputs, which differ between studies, and the control variate.
 ENSEMBLE = Schema(
@@ -262,12 +253,22 @@ ENSEMBLE = Schema(
 
 
 _FURTHER = {
-    "control": by_name([_CONTROL]),
+    "control": by_name(
+        [Variable("control", _DRAW, "1", "control variate, in the unit of its mean", "record")]
+    ),
     "life": LIFE,
-    "cam": {**by_name([ANGLE, _LIFT_ERROR]), **CAM_OBSERVABLES, **CAM_STATISTICS},
-    "fatigue": {**FATIGUE_OBSERVABLES, **_DAMAGE_PROFILES, **FATIGUE_STATISTICS},
+    "cam": {
+        **by_name([ANGLE, _LIFT_ERROR]),
+        **CAM_OBSERVABLES,
+        **_statistics(CAM_OBSERVABLES, [_LIFT_ERROR]),
+    },
+    "fatigue": {
+        **FATIGUE_OBSERVABLES,
+        **_DAMAGE_PROFILES,
+        **_statistics(FATIGUE_OBSERVABLES, list(_DAMAGE_PROFILES.values())),
+    },
     "fatigue life": LIFE_FATIGUE,
-    "cam fatigue": {**by_name([_DAMAGE_CURVE]), **CAM_FATIGUE_STATISTICS},
+    "cam fatigue": {**by_name([_DAMAGE_CURVE]), **_statistics({}, [_DAMAGE_CURVE])},
 }
 
 

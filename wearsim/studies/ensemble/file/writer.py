@@ -36,14 +36,10 @@ from wearsim.studies.ensemble.file.parts import (
 )
 from wearsim.studies.ensemble.file.schema import (
     ANGLE,
-    CAM_FATIGUE_STATISTICS,
-    CAM_STATISTICS,
     ENSEMBLE,
-    FATIGUE_STATISTICS,
     PENDING,
     QUANTILES,
     STATIC,
-    STATISTICS,
     is_row,
 )
 
@@ -232,8 +228,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         ValueError
             If there is no such field, or if it is stored separately.
         """
-        unknown = state.keys() - set(EnsembleData.attribute_names())
-        if unknown:
+        if unknown := state.keys() - set(EnsembleData.attribute_names()):
             raise ValueError(f"an ensemble has no fields {sorted(unknown)}")
         self._add(blank_rows([], self.data), state)
 
@@ -298,9 +293,11 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         """Replace the file by one that contains the rows of all parts."""
         from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
-        schema = self.data.schema.variables
-        static = [name for name, variable in schema.items() if variable.kind == "static"]
-        known = {name: self._stored[name] for name in static}
+        known = {
+            name: self._stored[name]
+            for name, variable in self.data.schema.variables.items()
+            if variable.kind == "static"
+        }
         header = replace(header, **self._state, variables=known, merged=self._number)
         with hdf5_write.new_file(self.path, self._storage) as (file, check):
             hdf5_write.put_variables(file, header.schema, known, header.reserved)
@@ -312,7 +309,13 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
                 merged = replace(header, variables=rows, status=self._status.copy())
                 fields, statistics = complete(merged)
                 for name, array in statistics.items():
-                    _put_statistic(file[name], name, array)
+                    if header.schema.variables[name].kind != "statistic":
+                        raise ValueError(f"{name} is not a statistic of an ensemble")
+                    if np.shape(array) != (shape := file[name].shape):
+                        raise ValueError(
+                            f"{name} has the shape {np.shape(array)}, expected {shape}"
+                        )
+                    hdf5_write.put_rows(file[name], 0, array)
                 header = replace(header, **fields)
             hdf5_write.put_texts(file, ENSEMBLE, header)
         self._load()
@@ -330,14 +333,3 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
             for name, rows in self._stored.block(block, start, stop).items():
                 if len(rows) and (name != "error" or np.any(rows != b"")):
                     hdf5_write.put_rows(file[name], start, rows)
-
-
-def _put_statistic(dataset: h5py.Dataset, name: str, array: Array) -> None:
-    from wearsim.results.io.hdf5_write import put_rows  # noqa: PLC0415
-
-    of_cams = {**CAM_STATISTICS, **CAM_FATIGUE_STATISTICS}
-    if name not in {**STATISTICS, **of_cams, **FATIGUE_STATISTICS}:
-        raise ValueError(f"{name} is not a statistic of an ensemble")
-    if np.shape(array) != dataset.shape:
-        raise ValueError(f"{name} has the shape {np.shape(array)}, expected {dataset.shape}")
-    put_rows(dataset, 0, array)

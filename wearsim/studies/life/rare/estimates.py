@@ -26,14 +26,10 @@ def responses(result: LifeValues) -> FloatArray:
 
 def rare_estimates(result: LifeValues) -> dict[str, RareProbability]:
     """Return the estimates of the methods that are complete, in the order of their use."""
-    estimates: dict[str, RareProbability] = {}
-    if importance := by_importance(result):
-        estimates[IMPORTANCE] = importance
-    if needs_subset(result.settings.rare_method, importance):
-        subset = by_subset(result)
-        if isinstance(subset, RareProbability):
-            estimates[SUBSET] = subset
-    return estimates
+    importance = by_importance(result)
+    needed = needs_subset(result.settings.rare_method, importance)
+    found = {IMPORTANCE: importance, SUBSET: by_subset(result) if needed else None}
+    return {name: item for name, item in found.items() if isinstance(item, RareProbability)}
 
 
 def needs_subset(method: str, importance: RareProbability | None) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -107,8 +108,8 @@ def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:
     event = mixture.failed(np.array([target / settings.per_unit]))[:, 0]
     means, parts = improved_shifts(scores, weights * event, shifts[1:])
     done = sum(stage["count"] for stage in stages)
-    parts = [DEFENSIVE, *((1.0 - DEFENSIVE) * part for part in parts)]
-    sizes = _parts(settings.rare - done, parts)
+    shares = [DEFENSIVE, *((1.0 - DEFENSIVE) * part for part in parts)]
+    sizes = _parts(settings.rare - done, shares)
     further = _stages(settings.plain + done, sizes, names, [np.zeros(len(names)), *means])
     mixed = [(stage["count"] / sum(sizes), stage["shift"]) for stage in further]
     return [{**stage, "mixture": mixed} for stage in further]
@@ -122,8 +123,7 @@ def _points(
     if len(log) < 2:
         chosen = np.arange(min(len(names), MOST_INPUTS))
         return [names[place] for place in chosen], [np.zeros(len(chosen))]
-    effects = influence(scores[known], log)
-    chosen = np.sort(np.argsort(-effects, kind="stable")[:MOST_INPUTS])
+    chosen = np.sort(np.argsort(-influence(scores[known], log), kind="stable")[:MOST_INPUTS])
     points = design_points(
         scores[known][:, chosen], log, lambda scores_found: mixture.needed_score(scores_found, life)
     )
@@ -149,9 +149,10 @@ def _parts(total: int, shares: Sequence[float]) -> list[int]:
 def _stages(
     first: int, sizes: Sequence[int], names: list[str], shifts: Sequence[FloatArray]
 ) -> list[dict[str, Any]]:
-    stages = []
-    for size, shift in zip(sizes, shifts, strict=True):
-        moved = dict(zip(names, map(float, shift), strict=True))
-        stages.append({"first": first, "count": size, "shift": moved})
-        first += size
-    return [stage for stage in stages if stage["count"]]
+    starts = itertools.accumulate(sizes[:-1], initial=first)
+    moved = [dict(zip(names, map(float, shift), strict=True)) for shift in shifts]
+    return [
+        {"first": start, "count": size, "shift": shift}
+        for start, size, shift in zip(starts, sizes, moved, strict=True)
+        if size
+    ]
