@@ -46,5 +46,5 @@ def page_of(results: Sequence[Any], measured: Sequence[Measured] = ()) -> str:
 
 def plots_of(result: Any, measured: Sequence[Measured] = ()) -> dict[str, Any]:
     """Return the figures of a page on a result by their titles."""
-    panels, _ = plots.plots_of(result.view.panels(measured))
-    return {panel.title: figure for panel, figure in panels}
+    panels, _ = plots.panels_of(result.view.panels(measured))
+    return {panel.title: plots.draw(panel) for panel in panels.values()}

@@ -11,7 +11,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 import tomlkit
-from bokeh.models import ColumnDataSource, NoOverlap, Plot
+from bokeh.models import ColumnDataSource, HoverTool, NoOverlap, Plot
 from made_up_ensembles import made_up
 
 import wearsim
@@ -19,6 +19,8 @@ from tests.report.drawn import page_of, plots_of
 from wearsim.cli.app import app
 from wearsim.errors import WearsimError
 from wearsim.levelling import Measured
+from wearsim.report.page.plots import draw
+from wearsim.report.panels import Axis, Bars, Image, Panel
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.comparison.compare import compare
 from wearsim.studies.identify.measurements import Measurement
@@ -329,3 +331,13 @@ def test_page_of_an_identification_without_its_measurements_claims_no_repetition
     page = unescape(page_of([replace(found, raw=replace(found.raw, measured=[]))]))
     assert "add the options of the study" in page
     assert "gives the same numbers" not in page
+
+
+@pytest.mark.parametrize(("unit", "ending"), [("1", ""), ("mm", " mm")])
+def test_values_under_the_pointer_have_their_unit_and_plain_numbers_none(unit, ending):
+    axis, ends = Axis("quantity", unit), np.arange(2.0)
+    marks = [Bars(ends[:1], ends[1:], ends[1:]), Image(ends, ends, np.ones((2, 2)), axis)]
+    tools = draw(Panel("numbers", axis, axis, marks)).select(HoverTool)
+    values = ["@value{%.5g}", "@low{%.5g} to @high{%.5g}", "@image{%.5g}", "$x{0.00}", "$y{0.00}"]
+    shown = [text for tool in tools for _, text in tool.tooltips]
+    assert sorted(shown) == sorted(f"{value}{ending}" for value in values)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wearsim.report.text import brief, count, lapse, shown
+from wearsim.report.text import brief, by_roller, count, lapse, shown
 from wearsim.studies.contact.outline import patch_edges
 
 
@@ -60,3 +60,17 @@ def test_no_contact_has_no_edges() -> None:
 )
 def test_short_times_have_a_suitable_unit(seconds, text):
     assert brief(seconds) == text
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "text"),
+    [
+        ([0.25, 0.5], "1", "0.2500 / 0.5000"),
+        ([0.25, 0.25], "1", "0.2500"),
+        ([2.5e-4, 5e-4], "um", "250.0 / 500.0 um"),
+        ([2.5e-4, 2.5e-4], "um", "250.0 um"),
+        ([np.nan, 5e-4], "um", "- / 500.0 um"),
+    ],
+)
+def test_values_of_rollers_have_one_unit_and_plain_numbers_none(values, unit, text):
+    assert by_roller(values, unit) == text

@@ -52,8 +52,12 @@ def show_view(
         _write_tables(view, files or {}, stored, brief)
         if not stored and (line := view.line()):
             typer.echo(printable(line))
-        said = (view.notes, view.warnings)
-        write_notes(*([text for text in texts if text not in known] for texts in said))
+        write_notes(
+            *(
+                [text for text in texts if text not in known]
+                for texts in (view.notes, view.warnings)
+            )
+        )
     if view.failures:
         note(f"warning: {view.failures}")
 

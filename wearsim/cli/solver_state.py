@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.report.text import PER_SI
+from wearsim.report.text import PER_SI, with_unit
 
 # name and unit of the quantities in the state of a solver
 _STATE = {
@@ -44,5 +44,5 @@ def solver_state(state: Mapping[str, Any]) -> str:
         words, unit = _STATE.get(name, (name.replace("_", " "), "1"))
         ends = [f"{float(end) * PER_SI[unit]:.6g}" for end in (np.min(value), np.max(value))]
         size = " to ".join(dict.fromkeys(ends))
-        parts.append(f"{words} {size}" if unit == "1" else f"{words} {size} {unit}")
+        parts.append(with_unit(f"{words} {size}", unit))
     return ", ".join(parts)

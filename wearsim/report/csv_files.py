@@ -66,8 +66,7 @@ def _csv(rows: Iterable[Sequence[str]], decimal: str) -> str:
     text = io.StringIO()
     if decimal == ",":
         rows = ([c.replace(".", ",") if _NUMBER.fullmatch(c) else c for c in row] for row in rows)
-    delimiter = ";" if decimal == "," else ","
-    csv.writer(text, delimiter=delimiter, lineterminator="\n").writerows(rows)
+    csv.writer(text, delimiter=";" if decimal == "," else ",", lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 

@@ -164,8 +164,7 @@ def draw(axes: Axes, panel: Panel) -> None:
         write_message(axes, panel.title, [panel.message])
         return
     name_axes(axes, panel.title, _label(panel.x), _label(panel.y))
-    logarithmic = {"xscale": panel.x.log, "yscale": panel.y.log}
-    axes.set(**{scale: "log" for scale, is_log in logarithmic.items() if is_log})
+    axes.set(**{f"{along}scale": "log" for along in "xy" if getattr(panel, along).log})
     sides = {False: (axes, panel.y)}
     if panel.right is not None:
         other = axes.twinx()
@@ -182,8 +181,9 @@ def draw(axes: Axes, panel: Panel) -> None:
     for drawn_on, y in sides.values():
         _set_axis(drawn_on, "y", y)
     if panel.legend and axes.get_legend_handles_labels()[0]:
-        place = _BELOW if panel.legend == "below" else {"loc": panel.legend}
-        axes.legend(**place, ncols=panel.columns)
+        axes.legend(
+            **_BELOW if panel.legend == "below" else {"loc": panel.legend}, ncols=panel.columns
+        )
 
 
 def _set_axis(axes: Axes, along: str, axis: Axis) -> None:
@@ -275,11 +275,11 @@ def _draw(mark: Mark, x: Axis, axes: Axes, y: Axis) -> None:
         case Span():
             along, scale = ("v", x.scale) if mark.across == "x" else ("h", y.scale)
             if mark.high is not None:
-                span = getattr(axes, f"ax{along}span")
-                span(mark.low * scale, mark.high * scale, lw=0, **named)
+                getattr(axes, f"ax{along}span")(mark.low * scale, mark.high * scale, lw=0, **named)
             else:
-                line = getattr(axes, f"ax{along}line")
-                line(mark.low * scale, 0.0, mark.reach, ls=mark.dash, lw=mark.width, **named)
+                getattr(axes, f"ax{along}line")(
+                    mark.low * scale, 0.0, mark.reach, ls=mark.dash, lw=mark.width, **named
+                )
         case Image():
             grid = mark.x * x.scale, mark.y * y.scale, mark.value * mark.axis.scale
             mesh = axes.pcolormesh(

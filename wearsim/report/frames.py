@@ -66,8 +66,13 @@ def concatenated(
     """
     library = _library("xarray")
     coordinate = library.IndexVariable(name, list(values), {"units": unit} if unit else {})
-    options = {"join": "outer", "data_vars": "all", "combine_attrs": "drop_conflicts"}
-    return cast("xarray.Dataset", library.concat(list(datasets), coordinate, **options))
+    return cast(
+        "xarray.Dataset",
+        library.concat(
+            list(datasets), coordinate, join="outer", data_vars="all",
+            combine_attrs="drop_conflicts",
+        ),
+    )  # fmt: skip
 
 
 def as_frame(
@@ -93,8 +98,9 @@ def as_frame(
         arrays |= parts
         units |= dict.fromkeys(parts, unit)
     library = _library("pandas")
-    index = library.Index(list(numbers), name=axis)
-    frame: pandas.DataFrame = library.DataFrame(arrays, index=index)
+    frame: pandas.DataFrame = library.DataFrame(
+        arrays, index=library.Index(list(numbers), name=axis)
+    )
     frame.attrs["units"] = units
     return frame
 

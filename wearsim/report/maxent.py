@@ -47,15 +47,16 @@ class MaxentView(View):
 
     def rows(self) -> Rows:
         """Return family, support, multipliers, moments and quantiles."""
-        distribution, parent = self.distribution, "none"
-        if self.parent:
-            parent = f"mean {self.parent[0]:.7g}, standard deviation {self.parent[1]:.7g}"
+        distribution, parent = self.distribution, self.parent
         return [
             Row("family", distribution.family),
             Row("support", " to ".join(f"{end:g}" for end in distribution.support)),
             Row("density", f"exp(-l0 - l1 x - l2 {distribution.third})"),
             *(Row(f"l{number}", f"{item:.7g}") for number, item in enumerate(self.multipliers)),
-            Row("parent normal distribution", parent),
+            Row(
+                "parent normal distribution",
+                f"mean {parent[0]:.7g}, standard deviation {parent[1]:.7g}" if parent else "none",
+            ),
             Row("mean", f"{self.mean:.7g}"),
             Row("standard deviation", f"{distribution.std:.7g}"),
             *(Row(f"{100.0 * p:g} % quantile", f"{x:.7g}") for p, x in self.quantiles.items()),

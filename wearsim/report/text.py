@@ -51,7 +51,11 @@ ROUNDING = 1e-9  # relative error that is not printed
 
 def shown(value: float | None, unit: str, digits: int = 4) -> str:
     """Return an SI value in an engineering unit, with that unit; parameters as of `in_unit`."""
-    text = in_unit(value, unit, digits)
+    return with_unit(in_unit(value, unit, digits), unit)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Return a number in an engineering unit with that unit, which plain numbers do not have."""
     return text if unit == "1" or text == NOTHING else f"{text} {unit}"
 
 
@@ -229,8 +233,9 @@ def cells(estimate: Interval, unit: str) -> tuple[str, str]:
     value, low, high = (end * PER_SI[unit] for end in (estimate.value, estimate.low, estimate.high))
     sizes = [abs(end) for end in (value, low, high) if end]
     if min(sizes) < _WITHOUT_EXPONENT[0] or max(sizes) >= _WITHOUT_EXPONENT[1]:
-        ends = (in_unit(end, unit) for end in (estimate.low, estimate.high))
-        return in_unit(estimate.value, unit), "..".join(ends)
+        return in_unit(estimate.value, unit), "..".join(
+            in_unit(end, unit) for end in (estimate.low, estimate.high)
+        )
     place = math.floor(math.log10(abs(value))) if value else 0
     decimals = _HALF_WIDTH_DIGITS - 1 - math.floor(math.log10(0.5 * (high - low)))
     decimals = max(min(max(decimals, _MIN_DIGITS - 1 - place), _MAX_DIGITS - 1 - place), 0)
@@ -240,7 +245,7 @@ def cells(estimate: Interval, unit: str) -> tuple[str, str]:
 def with_interval(estimate: Interval, unit: str) -> str:
     """Return "22.10 um [21.90, 22.31]"; parameters as of `cells`."""
     value, interval = cells(estimate, unit)
-    named = value if unit == "1" or value == NOTHING else f"{value} {unit}"
+    named = with_unit(value, unit)
     if interval in {"", TOO_FEW}:
         return named + (interval and f" ({interval} for an interval)")
     return f"{named} [{interval.replace('..', ', ')}]"
@@ -329,10 +334,8 @@ def plain(value: Any) -> Any:
 
 def by_roller(values: Any, unit: str) -> str:
     """Return one value per roller, or one value if all are equal."""
-    texts = [shown(float(value), unit) for value in np.ravel(values)]
-    if len(set(texts)) == 1:
-        return texts[0]
-    return " / ".join(text.removesuffix(f" {unit}") for text in texts) + f" {unit}"
+    texts = [in_unit(float(value), unit) for value in np.ravel(values)]
+    return with_unit(" / ".join(texts if len(set(texts)) > 1 else texts[:1]), unit)
 
 
 def with_error(values: FloatArray, error: float | None, unit: str) -> str:
@@ -351,8 +354,7 @@ def with_error(values: FloatArray, error: float | None, unit: str) -> str:
     if error is None or not math.isfinite(error) or error <= ROUNDING * size:
         return by_roller(values, unit)
     # the last digit is that below the first digit of the error
-    digits = 2 + math.floor(math.log10(size / error)) if size > 0.0 else 1
-    digits = min(max(digits, 1), 4)
+    digits = min(max(2 + math.floor(math.log10(size / error)), 1), 4) if size > 0.0 else 1
     last = 10.0 ** (math.floor(math.log10(error)) - 1)  # second digit of the error
     # smaller values than the error are rounded to that digit
     known = (

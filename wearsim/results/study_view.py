@@ -78,11 +78,13 @@ class StudyView(View, Generic[Shown]):
     def _sources(self) -> Rows:
         """Return rows on scenario, input files, plugins and software."""
         raw = self.result.raw
-        plugins = "{kind} {name} ({distribution} {version})"
         return [
             Row("scenario", raw.scenario_file),
             Row("input files", ", ".join(raw.files) or "none"),
-            Row("plugins", "\n".join(plugins.format_map(item) for item in raw.plugins)),
+            Row(
+                "plugins",
+                "\n".join(map("{kind} {name} ({distribution} {version})".format_map, raw.plugins)),
+            ),
             Row("software", ", ".join(map(" ".join, raw.software.items()))),
             Row("written", raw.created),
         ]
@@ -159,8 +161,10 @@ class DesignsView(View):
 
 def columns_of(name: str, ends: Iterable[FloatArray], unit: str = "1") -> list[Column]:
     """Return values and lower and upper ends of their intervals as columns of a CSV file."""
-    titles = (name, f"{name} low", f"{name} high")
-    return [Column(*column, unit) for column in zip(titles, ends, strict=True)]
+    return [
+        Column(*column, unit)
+        for column in zip((name, f"{name} low", f"{name} high"), ends, strict=True)
+    ]
 
 
 def drawn_rows(result: StudyResult[Any]) -> Rows:

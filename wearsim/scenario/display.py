@@ -28,8 +28,11 @@ def scenario_html(scenario: Scenario) -> str:
     """
     random = {key: item.describe() for item in scenario.random for key in item.keys}
     inner = tuple(f"{key}." for key in random)
-    given = flat(tomllib.loads(scenario.text))
-    texts = {key: _value(value) for key, value in given if not key.startswith(inner)} | random
+    texts = {
+        key: _value(value)
+        for key, value in flat(tomllib.loads(scenario.text))
+        if not key.startswith(inner)
+    } | random
     rows = [Row(key, text) for key, text in texts.items() if key != "title"]
     return table_html(scenario.title, rows, None if scenario.cam else _bodies(scenario))
 
@@ -48,8 +51,8 @@ def _bodies(scenario: Scenario) -> Panel:
     """Return the surfaces of cylinder and roller across the track before wear."""
     gap, width = scenario.axial_gap, scenario.roller.width
     profile = scenario.cylinder.profile
-    half = float(gap.half_width(50e-6))  # where the bodies are 50 um apart
-    half = min(half, 0.5 * width) if width else half
+    # where the bodies are 50 um apart, or the roller ends
+    half = min(float(gap.half_width(50e-6)), 0.5 * width if width else np.inf)
     y = np.linspace(-half, half, 201)
     height = 0.0 if profile is None else np.interp(y, profile.y, profile.height)
     return Panel(

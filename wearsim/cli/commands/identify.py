@@ -193,11 +193,17 @@ def identify(
         _plan(loaded, numbers, measured, draws, negligible, figure, json, quiet)
         return
     refuse_options({"-n": numbers, "--measured": measured}, "is for --plan")
-    text = "give the profiles of the tests, or --tests with a file of them; not both"
-    refuse((tests is None) == (not profiles), text, "T1.csv T2.csv...")
+    refuse(
+        (tests is None) == (not profiles),
+        "give the profiles of the tests, or --tests with a file of them; not both",
+        "T1.csv T2.csv...",
+    )
     choice = profile_choice(columns, units, row, mean_rows, None)
-    text, both = "give before and shoulders in the tests file", "--before or --shoulders"
-    refuse(tests is not None and (before or shoulders), text, both)
+    refuse(
+        tests is not None and (before or shoulders),
+        "give before and shoulders in the tests file",
+        "--before or --shoulders",
+    )
     inputs = [*loaded.paths, *(profiles or []), *([tests] if tests else [])]
     levels = None if posterior is None else posterior.with_suffix(".csv")
     for path in (posterior, levels):
@@ -290,10 +296,11 @@ def _sizes(numbers: str | None) -> list[int]:
     first, colon, last = str(numbers).partition(":")
     counts: list[int] = []
     with suppress(ValueError, OverflowError):
-        if colon:
-            counts = sizes(int(first), int(last))
-        else:
-            counts = sorted(set(map(int, str(numbers).split(","))))
+        counts = (
+            sizes(int(first), int(last))
+            if colon
+            else sorted(set(map(int, str(numbers).split(","))))
+        )
     refuse(
         not counts or counts[0] < 2 or counts[-1] > 1000 or (colon and int(first) > int(last)),
         f"'{numbers}' is no range of 2 to 1000 tests, expected 3:60 or 3,8,20",

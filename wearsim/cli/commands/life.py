@@ -447,5 +447,6 @@ def _going_on(
             *(f"`{shlex.join(words)}` with the other options" for words in missing),
             f"`{shlex.join(['wearsim', 'life', *map(str, paths)])}`",
         ]
-        text = f"{error.at_shell}; the comparison is finished by {', then '.join(steps)}"
-        raise type(error)(text) from error
+        raise type(error)(
+            f"{error.at_shell}; the comparison is finished by {', then '.join(steps)}"
+        ) from error

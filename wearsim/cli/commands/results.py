@@ -261,8 +261,7 @@ def export(
 
     if running_in is not None:
         written = wearsim.export_running_in(wearsim.open_results(file), running_in, force=force)
-        for path in written.paths:
-            typer.echo(str(path))
+        typer.echo("\n".join(map(str, written.paths)))
         write_notes(written.notes)
     if surface is not None and sampling is not None:
         refuse_inputs(surface, [file], "the surface", option="--surface")
@@ -272,8 +271,7 @@ def export(
     if output is not None or (running_in is None and surface is None):
         sign: Literal[".", ","] = "," if decimal == "," else "."
         result, folder = wearsim.open_results(file), output or Path(file.stem)
-        for path in export_csv(result, folder, force=force, decimal=sign):
-            typer.echo(str(path))
+        typer.echo("\n".join(map(str, export_csv(result, folder, force=force, decimal=sign))))
 
 
 def report(
@@ -307,12 +305,12 @@ def report(
 ) -> None:
     """Write one page on results for a browser: answers, interactive figures, inputs."""
     path = output if output is not None else Path(f"{files[0].stem}.html")
-    from wearsim.studies.opening import save_report
-
     refuse_inputs(path, files, "the page")
     refuse_inputs(path, measured or [], "a measured profile")
     results = [wearsim.open_results(file) for file in files]
     check_ending(path, force, "-o", (".html", ".htm"), "format of a page")
     choice, views = profile_choice(columns, units, row, mean_rows, at), [r.view for r in results]
-    save_report(results, path, measured_profiles(measured or [], choice, views, level, angle))
+    wearsim.save_report(
+        results, path, measured_profiles(measured or [], choice, views, level, angle)
+    )
     note(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")

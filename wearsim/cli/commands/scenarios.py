@@ -96,8 +96,7 @@ def new_plugin(
         ) from error
     except OSError as error:
         raise _unwritable(error, directory, "--directory") from error
-    for path in written:
-        typer.echo(path)
+    typer.echo("\n".join(map(str, written)))
     note(f"next: cd {directory / f'wearsim-{name}'} && pip install -e '.[dev]' && pytest")
 
 
@@ -158,8 +157,10 @@ def plugins(json: Json = False) -> None:
         for item in installed.all()
     ]
     if json:
-        keys = ("entry_point", "distribution", "version", "cause")
-        broken = [{key: getattr(item, key) for key in keys} for item in installed.broken]
+        broken = [
+            {key: getattr(item, key) for key in ("entry_point", "distribution", "version", "cause")}
+            for item in installed.broken
+        ]
         write_json({"plugins": entries, "broken": broken})
         return
     for entry in entries:

@@ -28,17 +28,17 @@ def first_of(views: Sequence[View]) -> dict[str, Any]:
     overviews = [views[0].overview()]
     if not overviews[0].alone:
         overviews += [view.overview() for view in views[1:]]
-    groups: dict[str, list[Row]] = {}
-    for overview in overviews:
-        groups = {**overview.groups, **groups}
+    # of groups with one title, that of the first view is shown
+    groups = {
+        title: rows for overview in reversed(overviews) for title, rows in overview.groups.items()
+    }
     # what one of the results contains is included
     lists = [overview.excluded for overview in overviews if overview.excluded]
     excluded = [text for text in lists[0] if all(text in texts for texts in lists)] if lists else []
     first: dict[str, Any] = {"groups": groups, "excluded": excluded}
     if panel := next((item.picture for item in overviews if item.picture is not None), None):
-        picture = png_of_panel(panel, 130, 5.4 if panel.equal else 3.8)
         first |= {
-            "picture": b64encode(picture).decode(),
+            "picture": b64encode(png_of_panel(panel, 130, 5.4 if panel.equal else 3.8)).decode(),
             "caption": f"{panel.title}. {panel.caption}",
         }
     return first
@@ -84,8 +84,9 @@ def page_of(views: Sequence[View], measured: Sequence[Measured] = ()) -> str:
         for figure in drawn.values():
             document.add_root(figure)
     script, divisions = components(drawn) if drawn else ("", {})
-    templates = PackageLoader("wearsim.report.page", ".")
-    environment = Environment(loader=templates, autoescape=True, trim_blocks=True)
+    environment = Environment(
+        loader=PackageLoader("wearsim.report.page", "."), autoescape=True, trim_blocks=True
+    )
     return environment.get_template("page.html.jinja").render(
         title=views[0].title,
         first=first_of(views),
@@ -111,7 +112,7 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> dict[str, Any]:
         "remarks", failures, warnings and notes; "panels", each with its figure; "steps", the texts
         of the slider.
     """
-    from wearsim.report.page.plots import plots_of  # noqa: PLC0415  (imports bokeh)
+    from wearsim.report.page.plots import draw, panels_of  # noqa: PLC0415  (imports bokeh)
 
     tables, computed = view.tables(), view.profile()
     if measured and computed is not None:
@@ -120,12 +121,12 @@ def part_of(view: View, measured: Sequence[Measured] = ()) -> dict[str, Any]:
             for profile in measured
         ]
         tables.insert(-1, Table("Measured profiles", residuals))
-    panels, steps = plots_of(view.panels(measured))
+    panels, steps = panels_of(view.panels(measured))
     return {
         "view": view,
         "rows": view.rows(),
         "tables": tables,
         "remarks": [*filter(None, [view.failures]), *view.warnings, *view.notes],
-        "panels": panels,
+        "panels": [(panel, draw(panel)) for panel in panels.values()],
         "steps": steps,
     }

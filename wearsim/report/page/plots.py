@@ -37,6 +37,7 @@ from wearsim.report.panels import (
     Whiskers,
     evenly_spaced,
 )
+from wearsim.report.text import with_unit
 
 MOST_RECORDS, MOST_CURVES, MOST_POINTS = 60, 20, 2000
 RECORD = "record"  # start of the names of the sources that the slider of the page changes
@@ -46,7 +47,11 @@ _MARKERS: dict[str, Any] = {
     "v": "inverted_triangle", "+": "cross", "|": "dash",
 }  # fmt: skip
 _PALETTES = {"magma": Magma256, "magma_r": Magma256[::-1], "viridis": Viridis256}
-_TEXT = dict.fromkeys(("axis_label_text_color", "major_label_text_color"), "#222222")
+_LABELS: dict[str, Any] = {
+    "axis_label_text_font_style": "normal", "axis_label_text_font_size": "14px",
+    "major_label_text_font_size": "13px", "axis_label_text_color": "#222222",
+    "major_label_text_color": "#222222",
+}  # fmt: skip
 _LEGEND: dict[str, Any] = {
     "ncols": 2, "orientation": "horizontal", "border_line_alpha": 0.0, "click_policy": "hide",
     "padding": 4, "label_text_font_size": "13px", "label_text_color": "#222222",
@@ -66,12 +71,6 @@ def panels_of(sheet: Sheet) -> tuple[dict[str, Panel], list[str]]:
         {name: panel for name, panel in sheet.panels.items() if not panel.figure_only},
         [sheet.steps[number] for number in kept],
     )
-
-
-def plots_of(sheet: Sheet) -> tuple[list[tuple[Panel, Any]], list[str]]:
-    """Return the panels of a page with their figures, and the texts of the slider."""
-    shown, steps = panels_of(sheet)
-    return [(panel, draw(panel)) for panel in shown.values()], steps
 
 
 def draw(panel: Panel) -> Any:
@@ -98,8 +97,7 @@ def draw(panel: Panel) -> Any:
             LinearAxis(y_range_name="right", axis_label=plain_label(panel.right.label)), "right"
         )
     for axis in (*plot.xaxis, *plot.yaxis):
-        axis.update(axis_label_text_font_style="normal", axis_label_text_font_size="14px")
-        axis.update(major_label_text_font_size="13px", major_label_policy=NoOverlap(), **_TEXT)
+        axis.update(major_label_policy=NoOverlap(), **_LABELS)
     plot.grid.grid_line_color = "#e4e4e4"
     draw_marks(plot, panel)
     for legend in plot.legend:
@@ -162,11 +160,11 @@ def _set_axis(plot: Any, along: str, axis: Axis) -> None:
             ticks.major_label_overrides = dict(
                 zip(places, map(plain_label, axis.names), strict=True)
             )
-    elif axis.log:
-        ticks.formatter = NumeralTickFormatter(format="0,0.[00000]")
     else:
-        ticks.formatter = BasicTickFormatter(
-            power_limit_low=-4, power_limit_high=8, precision="auto"
+        ticks.formatter = (
+            NumeralTickFormatter(format="0,0.[00000]")
+            if axis.log
+            else BasicTickFormatter(power_limit_low=-4, power_limit_high=8, precision="auto")
         )
 
 
@@ -245,17 +243,18 @@ def _hover(plot: Any, renderers: Sequence[Any], *tips: tuple[str, str], line: bo
     if None in renderers:  # recorded without a figure
         return
     columns = [text.partition("{")[0] for _, text in tips if text[0] == "@" and "{" in text]
-    form: Any = {
-        "mode": "vline" if line else "mouse",
-        "formatters": dict.fromkeys(columns, "printf"),
-    }
-    plot.add_tools(HoverTool(renderers=list(renderers), tooltips=list(tips), **form))
+    plot.add_tools(
+        HoverTool(
+            renderers=list(renderers), tooltips=list(tips), mode="vline" if line else "mouse",
+            formatters=dict.fromkeys(columns, "printf"),
+        )
+    )  # fmt: skip
 
 
 def _tip(axis: Axis, column: str, name: str = "") -> tuple[str, str]:
     """Return the name of an axis, and the text of a column in its unit."""
-    unit = "" if axis.unit == "1" else f" {plain_label(axis.unit)}"
-    return plain_label(name or axis.name or "value"), f"@{column}{{%.5g}}{unit}"
+    text = with_unit(f"@{column}{{%.5g}}", plain_label(axis.unit))
+    return plain_label(name or axis.name or "value"), text
 
 
 def _more(mark: Line | Bars) -> tuple[dict[str, Any], list[tuple[str, str]]]:
@@ -301,8 +300,8 @@ def _draw_line(
         }
         points = plot.scatter("x", "y", source=source, **look, **style, **named)
         pointed = pointed if mark.dash else points
-    of_y = _tip(y, "y", mark.label.split("\n")[0])
-    _hover(plot, [pointed], _tip(x, "x"), of_y, *more_tips, line=bool(mark.dash))
+    tips = [_tip(x, "x"), _tip(y, "y", mark.label.split("\n")[0]), *more_tips]
+    _hover(plot, [pointed], *tips, line=bool(mark.dash))
 
 
 def _draw_records(plot: Any, mark: Records, x: Axis, y: Axis, named: dict[str, Any]) -> None:
@@ -315,8 +314,10 @@ def _draw_records(plot: Any, mark: Records, x: Axis, y: Axis, named: dict[str, A
         "shown": values[chosen[-1]],
     }
     source = _source(plot, _single(columns), f"{RECORD} {mark.label or y.name}")
-    style = {"color": _colour(mark.colour), "line_dash": _DASHES[mark.dash], "line_width": 2}
-    line = plot.line("x", "shown", source=source, **style, **named)
+    line = plot.line(
+        "x", "shown", source=source,
+        color=_colour(mark.colour), line_dash=_DASHES[mark.dash], line_width=2, **named,
+    )  # fmt: skip
     _hover(plot, [line], _tip(x, "x"), _tip(y, "shown", mark.label), line=True)
 
 
@@ -360,7 +361,7 @@ def _draw_bars(
         columns["name"] = [names[round(at)] for at in middle] if names else [""] * len(middle)
         tips.insert(0, ("", "@name"))
     elif place.names is None:
-        tips.insert(0, (place.name, f"@low{{%.5g}} to @high{{%.5g}} {plain_label(place.unit)}"))
+        tips.insert(0, (place.name, f"@low{{%.5g}} to {_tip(place, 'high')[1]}"))
     bars = plot.quad(**ends, source=_source(plot, _single(columns)), **style, **named)
     _hover(plot, [bars], *tips, *more_tips)
 
@@ -411,21 +412,25 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
     }
     source = _source(plot, drawn)
     picture = plot.image(source=source, color_mapper=mapper, **{name: name for name in drawn})
-    title: Any = {"title": plain_label(mark.axis.label), "title_text_font_style": "normal"}
-    plot.add_layout(ColorBar(color_mapper=mapper, width=12, **title), "right")
+    plot.add_layout(
+        ColorBar(
+            color_mapper=mapper, width=12, title=plain_label(mark.axis.label),
+            title_text_font_style="normal",
+        ),
+        "right",
+    )  # fmt: skip
     _hover(
         plot,
         [picture],
-        (plain_label(x.name), f"$x{{0.00}} {x.unit}"),
-        (plain_label(y.name), f"$y{{0.00}} {y.unit}"),
-        (mark.axis.name, f"@image{{%.5g}} {mark.axis.unit}"),
+        (plain_label(x.name), with_unit("$x{0.00}", x.unit)),
+        (plain_label(y.name), with_unit("$y{0.00}", y.unit)),
+        (mark.axis.name, with_unit("@image{%.5g}", mark.axis.unit)),
     )
 
 
 def _regular(places: Any) -> Any:
     """Return evenly spaced places over the range of given ones."""
-    number = min(np.shape(places)[-1] * 4, _CELLS)
-    return np.linspace(np.nanmin(places), np.nanmax(places), number)
+    return np.linspace(np.nanmin(places), np.nanmax(places), min(np.shape(places)[-1] * 4, _CELLS))
 
 
 def _draw_text(plot: Any, mark: Text, x: Axis, y: Axis) -> None:

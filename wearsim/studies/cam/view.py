@@ -253,18 +253,8 @@ class CamView(View):
 
     def data(self) -> dict[str, Any]:
         """Return the study in SI units."""
-        study, motion = self.result, self.result.turn.cam.motion
-        smoothing: dict[str, Any] = {}
-        if measured := study.turn.cam.measured:
-            smoothing["smoothing"] = {
-                "file": measured.file,
-                "quantity": measured.quantity,
-                f"noise_{measured.unit}": measured.noise,
-                "scatter_of_acceleration_per_rad2": measured.scatter,
-                "error_of_acceleration_per_rad2": measured.error,
-                "angle_rad": measured.angle,
-                f"residual_{measured.unit}": measured.residual,
-            }
+        study, cam = self.result, self.result.turn.cam
+        motion, measured = cam.motion, cam.measured
         return {
             "title": self.title,
             "perimeter_m": study.perimeter,
@@ -290,7 +280,21 @@ class CamView(View):
                 {"start_rad": skid.start, "stop_rad": skid.stop, "energy_J": skid.energy}
                 for skid in study.skids
             ],
-            **smoothing,
+            **(
+                {
+                    "smoothing": {
+                        "file": measured.file,
+                        "quantity": measured.quantity,
+                        f"noise_{measured.unit}": measured.noise,
+                        "scatter_of_acceleration_per_rad2": measured.scatter,
+                        "error_of_acceleration_per_rad2": measured.error,
+                        "angle_rad": measured.angle,
+                        f"residual_{measured.unit}": measured.residual,
+                    }
+                }
+                if measured
+                else {}
+            ),
             "stations": {name: values for name, (_, values) in self._columns().items()},
             "warnings": study.warnings,
             "notes": study.notes,

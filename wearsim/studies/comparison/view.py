@@ -73,8 +73,10 @@ class ComparisonView(View):
         self.comparison, self.results, self.key = comparison, comparison.results, key
         *labels, last = (row.label for row in comparison.rows)
         self.title = f"{', '.join(labels)} and {last}"
-        words = OBSERVABLES[comparison.observable].words
-        self.question = f"How do the {words}s at the end of these tests differ?"
+        self.question = (
+            f"How do the {OBSERVABLES[comparison.observable].words}s at the end of these tests"
+            " differ?"
+        )
         self._views: list[View] = [result.view for result in self.results]
         self.files = [str(result.path) for result in self.results]
         self.warnings = list(_warnings(comparison))
@@ -109,10 +111,12 @@ class ComparisonView(View):
     def _side_by_side(self) -> Table:
         """Return all answers of the results, one column for each of them."""
         answers = [{row.label: row.text for row in view.rows()} for view in self._views]
-        labels = dict.fromkeys(label for texts in answers for label in texts)
         return Table(
             "",
-            [[label, *(texts.get(label, NOTHING) for texts in answers)] for label in labels],
+            [
+                [label, *(texts.get(label, NOTHING) for texts in answers)]
+                for label in dict.fromkeys(label for texts in answers for label in texts)
+            ],
             ["at the end", *(row.label for row in self.comparison.rows)],
         )
 
@@ -202,8 +206,10 @@ def _lines(row: Compared, unit: str, columns: int) -> list[list[str]]:
     items = [row.value, *(item for item in further if item is not None)]
     values, intervals = zip(*(cells(item, unit) for item in items), strict=True)
     more, name = columns - 1 - len(items), "  error estimate" if row.kind == "run" else INTERVAL
-    below = [[name, *intervals, *[""] * more]] if any(intervals) else []
-    return [[row.label, *values, *[NOTHING] * more], *below]
+    return [
+        [row.label, *values, *[NOTHING] * more],
+        *([[name, *intervals, *[""] * more]] if any(intervals) else []),
+    ]
 
 
 def _data(row: Compared, file: str) -> dict[str, Any]:
@@ -450,10 +456,9 @@ def _interval(
 
 def _labels(comparison: Comparison, row: Compared, place: int, colour: str) -> list[Mark]:
     """Return the name of a row, and under it its comparison with the first row."""
-    pairs = against(comparison, row)[:1] if place else []
     lines = [
         f"{name.removeprefix(f'{row.label} ')} {text}" if text.startswith("in ") else text
-        for name, text in pairs
+        for name, text in (against(comparison, row)[:1] if place else [])
     ]
     under = [part for line in lines for part in fill(line, _LINE_LENGTH).splitlines()]
     size = "run" if row.kind == "run" else f"ensemble of {realisations(row)}"

@@ -214,14 +214,16 @@ class ContactView(View):
         """Return the fields, if there are any, line load and dissipated power per length."""
         study = self.result
         fields = {} if study.fields is None else _fields(study.fields, study.solution)
-        rows = [["pressure", "traction"], ["areas", "power"]] if fields else []
         return Sheet(
             f"{study.title}\n{study.described_model}\n"
             f"normal force {shown(study.point.normal_force, 'N')},"
             f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
             f" dissipated power {shown(study.solution.power, 'W')}",
             fields | _strips(study),
-            [*rows, ["line load", "dissipation"]],
+            [
+                *([["pressure", "traction"], ["areas", "power"]] if fields else []),
+                ["line load", "dissipation"],
+            ],
             (10.0, 8.2 if fields else 3.4),
         )
 

@@ -114,9 +114,9 @@ class DissipationView(StudyView[DissipationResult]):
     def study(self) -> Rows:
         """Return rows on realisations, method and effort."""
         result, raw = self.result, self.result.raw
-        requested, unfinished = f" of {count(raw.requested)}", ", unfinished"
-        if result.finished:
-            requested = unfinished = ""
+        requested, unfinished = (
+            ("", "") if result.finished else (f" of {count(raw.requested)}", ", unfinished")
+        )
         return [
             Row(
                 "realisations",

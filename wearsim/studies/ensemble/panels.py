@@ -95,9 +95,9 @@ def ensemble_sheet(result: EnsembleResult, measured: Sequence[Measured] = ()) ->
 
 
 def _caption(result: EnsembleResult) -> str:
-    requested, unfinished = f" of {count(result.requested)}", ", unfinished"
-    if result.finished:
-        requested = unfinished = ""
+    requested, unfinished = (
+        ("", "") if result.finished else (f" of {count(result.requested)}", ", unfinished")
+    )
     text = (
         f"{number_of_realisations(result.count)}{requested}"
         f"{f' ({count(result.failed)} failed)' if result.failed else ''}, {result.raw.plan},"
@@ -166,8 +166,9 @@ def _spread(
 def _curves(x: FloatArray, curves: FloatArray, mean: FloatArray) -> list[Mark]:
     """Return the curves of some realisations, and of all their 90 % range and mean."""
     low, high = np.quantile(curves, NINETY_PERCENT, axis=0)
-    line = Line(x, mean, colour=BLACK, label="mean")
-    return _spread(x, curves[:LINES], low, high, [line], len(curves))
+    return _spread(
+        x, curves[:LINES], low, high, [Line(x, mean, colour=BLACK, label="mean")], len(curves)
+    )
 
 
 def _density(result: EnsembleResult) -> Panel:
@@ -177,11 +178,14 @@ def _density(result: EnsembleResult) -> Panel:
         return message(title, f"{shown(float(depth.mean()), 'um')} in {where}: no density to draw")
     estimate = result.estimate("depth", -1, (0.05, 0.5, 0.95))
     low, median, high = (estimate.quantile(p).value for p in (0.05, 0.5, 0.95))
-    ends = [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", "")]
     lines: list[tuple[float, str, str, str]] = [
         (estimate.mean.value, BLACK, "--", f"mean {shown(estimate.mean.value, 'um')}"),
         (median, BLUE, "-", f"median {shown(median, 'um')}"),
-        *(ends if sufficient_for(result.count, NINETY_PERCENT[0]) else []),
+        *(
+            [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", "")]
+            if sufficient_for(result.count, NINETY_PERCENT[0])
+            else []
+        ),
     ]
     extremes = f"from {shown(float(depth.min()), 'um')} to {shown(float(depth.max()), 'um')}"
     return Panel(

@@ -193,10 +193,10 @@ class EnsembleView(RealisationsView[EnsembleResult]):
                 Row("standard deviation", depth.std, "um"),
             ]
         others = ("width", "worn_volume", "roller_depth", "dissipated_energy", "peak_pressure")
-        named = {name: OBSERVABLES[name] for name in others if result.at_end(name).any()}
         return rows + [
             Row(f"mean {words}", result.estimate(name, -1, ()).mean, unit)
-            for name, (words, unit) in named.items()
+            for name, (words, unit) in ((name, OBSERVABLES[name]) for name in others)
+            if result.at_end(name).any()
         ]
 
     def study(self) -> Rows:
@@ -332,8 +332,9 @@ class EnsembleView(RealisationsView[EnsembleResult]):
 
 def observed(result: EnsembleResult) -> list[str]:
     """Return the names of the observables that are not zero in all realisations."""
-    names = result.observables if result.count else ()
-    return [name for name in names if result.at_end(name).any()]
+    return [
+        name for name in (result.observables if result.count else ()) if result.at_end(name).any()
+    ]
 
 
 def _lines(result: EnsembleResult, name: str) -> list[tuple[str, ...]]:
@@ -419,8 +420,7 @@ def _block(raw: EnsembleData, start: int, stop: int) -> Iterator[Column]:
     for item in raw.inputs:
         key, values = item["key"], raw.rows(item["key"], start, stop)
         for number, column in enumerate(np.atleast_2d(values.T), 1):
-            title = key if values.ndim == 1 else f"{key} roller {number}"
-            yield drawn(title, column, item["unit"])
+            yield drawn(key if values.ndim == 1 else f"{key} roller {number}", column, item["unit"])
     for name in (*ALL_OBSERVABLES, *_SCALARS, *LIFE):
         if name in raw.schema.variables:
             values = raw.rows(name, start, stop)

@@ -107,8 +107,7 @@ def incidence_panel(designs: Sequence[tuple[LifeValues, str, str]], axis: Axis) 
         if risks is None:
             continue
         level, other = risks.at(math.inf), other_end(result.scenario)
-        ended = 1.0 - level.survival
-        low, high = (risks.life(share * ended, "both").value for share in _ENDS)
+        low, high = (risks.life(share * (1.0 - level.survival), "both").value for share in _ENDS)
         if not 0.0 < low < high < math.inf:
             continue
         passes = np.geomspace(low, high, _POINTS)

@@ -89,10 +89,6 @@ class IdentificationView(StudyView[IdentificationResult]):
             f"{row['prior_scale']:g}: {row['bayes_factor']:.2f}, t {row['scatter_of_k']:.2f}"
             for row in summary["sensitivity"]
         )
-        likelihood = []
-        if ratio is not None:
-            limit = f"95 % of such tests stay below {summary['likelihood_ratio_95']:.2f}"
-            likelihood = [Row("likelihood ratio of t = 0", f"{ratio:.2f}; {limit}")]
         return [
             Row("verdict", result.verdict_words),
             Row("scatter of ln K/H seen", NOTHING if seen is None else f"{seen:.3f}"),
@@ -109,7 +105,17 @@ class IdentificationView(StudyView[IdentificationResult]):
                 answers={"bayes_factor": (bayes, "1")},
             ),
             Row("by the scale of the prior", sensitivity),
-            *likelihood,
+            *(
+                []
+                if ratio is None
+                else [
+                    Row(
+                        "likelihood ratio of t = 0",
+                        f"{ratio:.2f}; 95 % of such tests stay below"
+                        f" {summary['likelihood_ratio_95']:.2f}",
+                    )
+                ]
+            ),
             Row(
                 "K/H, median of specimens",
                 _wear_factor(middle, ("value", "low", "high")),
@@ -176,7 +182,6 @@ class IdentificationView(StudyView[IdentificationResult]):
         traces = [self.result.values(f"trace_{name}") for name in names]
         known = np.isfinite(traces[0])
         numbers = np.broadcast_to(np.arange(1.0, len(known) + 1.0)[:, None], known.shape)
-        units = (("mm", 1e-3), *[("um", 1e-6)] * 4)
         return {
             "tests.csv": [
                 [
@@ -201,7 +206,9 @@ class IdentificationView(StudyView[IdentificationResult]):
                     Column("test", numbers[known]),
                     *(
                         Column(name, trace[known], *unit)
-                        for name, trace, unit in zip(names, traces, units, strict=True)
+                        for name, trace, unit in zip(
+                            names, traces, (("mm", 1e-3), *[("um", 1e-6)] * 4), strict=True
+                        )
                     ),
                 ]
             ],
@@ -215,8 +222,11 @@ class IdentificationView(StudyView[IdentificationResult]):
             name: np.array([np.nan if test[name] is None else test[name] for test in tests])
             for name in (*units, "energy_J")
         }
-        columns = [(name, units.get(name, "J"), column) for name, column in values.items()]
-        return Frame(columns, "groove", range(1, len(tests) + 1))
+        return Frame(
+            [(name, units.get(name, "J"), column) for name, column in values.items()],
+            "groove",
+            range(1, len(tests) + 1),
+        )
 
     def _tests(self) -> list[dict[str, Any]]:
         """Return the tests with one entry for each end of an interval."""
@@ -308,12 +318,14 @@ def _cells(test: Mapping[str, Any]) -> tuple[str, ...]:
     measured, area, k = (
         test[name] for name in ("depth_interval_m", "area_interval_m2", "k_over_h_per_Pa")
     )
-    residuals = NOTHING
-    if test["residual_ratio"] is not None:
-        residuals = (
+    residuals = (
+        NOTHING
+        if test["residual_ratio"] is None
+        else (
             f"tilt {1e3 * test['inclination_rad']:.2g} mrad, {test['residual_ratio']:.2f}"
             f" (p {test['residual_probability']:.2f}), r1 {test['residual_autocorrelation']:.2f}"
         )
+    )
     return (
         _name(test["file"]),
         test["levelled_on"],

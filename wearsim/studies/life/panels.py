@@ -101,21 +101,20 @@ def lives_sheet(results: Sequence[LifeResult], labels: Sequence[str]) -> Sheet:
         _Design(*triple, several)
         for triple in zip(results, labels, several_colours(len(results)), strict=True)
     ]
+    variable = swept_variable(results)
+    wide = {} if variable is None else {"against": _against(results, variable)}
+    if any(result.raw.fatigue for result in results):
+        wide["wear or pitting"] = incidence_panel(
+            [(design.result, design.named, design.colour) for design in designs], axis
+        )
     panels: dict[str, Panel] = {
         "survival": _survival(designs, axis),
         **{family: _probabilities(designs, family, axis) for family in FAMILIES},
         "tornado": _tornado(designs),
         "incidence": _incidence(designs, axis),
         "limits": _limits(designs),
+        **wide,
     }
-    wide = {}
-    if (variable := swept_variable(results)) is not None:
-        wide["against"] = _against(results, variable)
-    if any(result.raw.fatigue for result in results):
-        wide["wear or pitting"] = incidence_panel(
-            [(design.result, design.named, design.colour) for design in designs], axis
-        )
-    panels |= wide
     rows = [["survival", *FAMILIES, *wide], ["tornado", "incidence", "limits", *wide]]
     result = results[0]
     if not (several or result.are_equal or result.settings.alone):

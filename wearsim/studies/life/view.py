@@ -22,6 +22,7 @@ from wearsim.report.text import (
     shown,
     too_few,
     with_ends,
+    with_unit,
 )
 from wearsim.report.view import Overview, Row, Rows, Table
 from wearsim.results.study_view import SAMPLING
@@ -68,10 +69,11 @@ class LifeView(RealisationsView[LifeResult]):
         result = self.result
         if result.count == 0:
             return [Row("life", "no test is completed")]
-        survived = f"at least {shown(least_survival(result.count), '%', 3)} survive"
-        bound = f"{survived} {count(result.most)} {result.unit}, with 95 % confidence"
+        bound = (
+            f"at least {shown(least_survival(result.count), '%', 3)} survive {count(result.most)}"
+            f" {result.unit}, with 95 % confidence"
+        )
         is_refused = result.rare is not None and not result.rare.is_reliable
-        no_end = not (result.observed.any() or result.is_exact)
         return [
             *(
                 Row(
@@ -88,7 +90,7 @@ class LifeView(RealisationsView[LifeResult]):
                 if is_refused
                 else []
             ),
-            *([Row("no life ended", bound)] if no_end else []),
+            *([] if result.observed.any() or result.is_exact else [Row("no life ended", bound)]),
         ]
 
     def _target_rows(self) -> Rows:
@@ -306,11 +308,14 @@ class LifeView(RealisationsView[LifeResult]):
     def options(self) -> Sequence[str]:
         """Return the options of the command that repeats the study."""
         settings, until = self.result.settings, self.result.raw.until
-        rare = ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
         return [
             *study_options(self.result),
             *(["--precision", until] if until else []),
-            *(rare if settings.rare else []),
+            *(
+                ["--rare", str(settings.rare), "--rare-method", settings.rare_method]
+                if settings.rare
+                else []
+            ),
         ]
 
 
@@ -335,8 +340,10 @@ def _uncertain_cells(life: UncertainLife) -> list[str]:
     cells, total = [predictive, plug_in, f"{low}..{high}"], life.by_tests + life.by_realisations
     if not (math.isfinite(life.low) and math.isfinite(life.high)):
         return [*cells, NOTHING, NOTHING, NOTHING]
-    parts = (life.by_tests, life.by_realisations)
-    of_total = (shown(part / total, "%", 2) if total else NOTHING for part in parts)
+    of_total = (
+        shown(part / total, "%", 2) if total else NOTHING
+        for part in (life.by_tests, life.by_realisations)
+    )
     return [*cells, f"{math.sqrt(total):.2g}", *of_total]
 
 
@@ -425,9 +432,9 @@ def _change(factor: Interval) -> str:
 
 def study_options(result: LifeResult) -> list[str]:
     """Return the options of a study of lives but for precision and rare events."""
-    shares = ",".join(f"{share:g}" for share in result.settings.shares)
     return [
-        *("-n", str(result.settings.plain), "--seed", str(result.raw.seed), "--b", shares),
+        *("-n", str(result.settings.plain), "--seed", str(result.raw.seed)),
+        *("--b", ",".join(f"{share:g}" for share in result.settings.shares)),
         *("--max", f"{result.most:.17g}"),
         *(["--target", f"{result.target:.17g}"] if result.target is not None else []),
     ]
@@ -449,8 +456,7 @@ def rare_command(result: LifeResult) -> str:
 def _limit_options(limits: Mapping[str, float]) -> Iterator[str]:
     """Yield the options of limits of a life in SI, "--limit" and "depth=5e-05 m"."""
     for name, limit in limits.items():
-        unit = kind_of(limit_unit(name)).unit
-        yield from ("--limit", f"{name}={limit:.12g}" + ("" if unit == "1" else f" {unit}"))
+        yield from ("--limit", with_unit(f"{name}={limit:.12g}", kind_of(limit_unit(name)).unit))
 
 
 def target_text(result: LifeResult) -> str:

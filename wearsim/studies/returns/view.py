@@ -133,8 +133,7 @@ class FieldReturnsView(DesignsView):
         ]
 
     def _tests(self) -> str:
-        levels = self.result.posterior.before
-        return f"{levels.specimens or 'the'} specimens"
+        return f"{self.result.posterior.before.specimens or 'the'} specimens"
 
     def _lives(self) -> Table:
         """Return lives of shares before and after the returns."""
@@ -177,11 +176,14 @@ class FieldReturnsView(DesignsView):
         medians, scatters = zip(
             *map(result.wear_factor, (posterior.before, posterior.after)), strict=True
         )
-        factors = {"life factor": (result.factor_before, result.factor)}
         known = {
             "median of K/H over the life factor [1/Pa]": medians,
             "scatter t of ln K/H": scatters,
-            **(factors if result.life_factor > 1.0 else {}),
+            **(
+                {"life factor": (result.factor_before, result.factor)}
+                if result.life_factor > 1.0
+                else {}
+            ),
         }
         return Table(
             "",
@@ -198,20 +200,29 @@ class FieldReturnsView(DesignsView):
         units = sorted(result.running, key=lambda unit: unit.remaining.lives[0].value)[:_MOST]
         columns = {
             "running unit": [unit.name for unit in units],
-            "design": [result.labels[unit.design] for unit in units],
+            **(
+                {"design": [result.labels[unit.design] for unit in units]}
+                if len(result.labels) > 1
+                else {}
+            ),
             f"age [{result.unit}]": [count(float(f"{unit.age:.4g}")) for unit in units],
             **{
                 f"further life, B{share:g}": [_life(unit.remaining.lives[place]) for unit in units]
                 for place, share in enumerate(SHARES)
             },
+            **(
+                {}
+                if target is None
+                else {
+                    f"reaches {count(target)}": [
+                        part_with_interval(unit.remaining.survival)
+                        if unit.remaining.survival
+                        else "reached"
+                        for unit in units
+                    ]
+                }
+            ),
         }
-        if len(result.labels) == 1:
-            del columns["design"]
-        if target is not None:
-            chances = [unit.remaining.survival for unit in units]
-            columns[f"reaches {count(target)}"] = [
-                "reached" if part is None else part_with_interval(part) for part in chances
-            ]
         lines = [list(line) for line in zip(*columns.values(), strict=True)]
         if (more := len(result.running) - _MOST) > 0:
             lines.append([f"and {count(more)} more", *[""] * (len(columns) - 1)])
@@ -269,7 +280,8 @@ class FieldReturnsView(DesignsView):
     def _design_data(self, number: int) -> dict[str, Any]:
         """Return lives and probability of a design before and after the returns for JSON."""
         result, design = self.result, self.result.designs[number]
-        data = {
+        before, after = result.lives_before[number], result.lives_after[number]
+        return {
             "label": result.labels[number],
             "b": {
                 f"{share:g}": {
@@ -279,18 +291,21 @@ class FieldReturnsView(DesignsView):
                 for share in design.settings.shares
             },
             "target": design.target,
+            **(
+                {}
+                if design.target is None
+                else {
+                    "probability_before_target": {
+                        "before": asdict(before.probability_before(design.target)),
+                        "after": asdict(after.probability_before(design.target)),
+                    }
+                }
+            ),
         }
-        if design.target is not None:
-            data["probability_before_target"] = {
-                "before": asdict(result.lives_before[number].probability_before(design.target)),
-                "after": asdict(result.lives_after[number].probability_before(design.target)),
-            }
-        return data
 
     def table(self) -> list[Column]:
         """Return the running units as columns."""
         result, running = self.result, self.result.running
-        has_target = result.designs[0].target is not None
         return [
             Column("unit", [unit.name for unit in running]),
             Column("design", [result.labels[unit.design] for unit in running]),
@@ -309,7 +324,7 @@ class FieldReturnsView(DesignsView):
                     "reaches target",
                     arrays_of(unit.remaining.survival or _REACHED for unit in running),
                 )
-                if has_target
+                if result.designs[0].target is not None
                 else []
             ),
         ]

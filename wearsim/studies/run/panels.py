@@ -222,8 +222,7 @@ def _force_axis(name: str, unit: str, values: FloatArray) -> Axis:
 def _by_roller(values: FloatArray) -> FloatArray:
     """Return a history by roller, or one column if it is the same on all."""
     columns = np.asarray(values).reshape(len(values), -1)
-    equal = np.ptp(columns, axis=1).max() < 1e-6 * columns.max()
-    return columns[:, :1] if equal else columns
+    return columns[:, :1] if np.ptp(columns, axis=1).max() < 1e-6 * columns.max() else columns
 
 
 def _first_and_last(values: FloatArray, unit: str) -> str:

@@ -21,6 +21,7 @@ from wearsim.report.text import (
     shown,
     simulated,
     with_error,
+    with_unit,
     within,
 )
 from wearsim.report.view import Column, Columns, Frame, Overview, Row, Rows, width_row
@@ -72,9 +73,10 @@ class RunView(StudyView[Result]):
     def __init__(self, result: Result) -> None:
         super().__init__(result)
         raw = result.raw
-        time = simulated(raw.total_passes / raw.kinematics["pass_rate"])
-        length = f"{count(raw.total_passes / self.per_unit)} {self.unit} ({time})"
-        self.question = f"How deep does the {self.body} wear in {length}?"
+        self.question = (
+            f"How deep does the {self.body} wear in {count(raw.total_passes / self.per_unit)}"
+            f" {self.unit} ({simulated(raw.total_passes / raw.kinematics['pass_rate'])})?"
+        )
         self.heading = "end state" if result.finished else "current state"
         if result.failure:
             self.heading = "state before the failure"
@@ -163,10 +165,13 @@ class RunView(StudyView[Result]):
         result, raw = self.result, self.result.raw
         first, last = (count(float(result.record_passes[place])) for place in (0, -1))
         in_full = f", {count(_last(result.full_solves))} roller passes solved in full"
-        failure = [Row("failure", result.failure), Row("failed at", raw.failed_at)]
         return [
             Row("test", self.standing()),
-            *(failure if result.failure else []),
+            *(
+                [Row("failure", result.failure), Row("failed at", raw.failed_at)]
+                if result.failure
+                else []
+            ),
             Row("contact model", result.described_model),
             Row("stepper", f"{result.stepper}, tolerance {raw.tolerance:g}"),
             Row("seed", str(raw.seed)),
@@ -184,7 +189,7 @@ class RunView(StudyView[Result]):
         for key, item in drawn.items():
             unit, size = engineers_unit(item["unit"])
             text = " / ".join(f"{value / size:.6g}" for value in item["values"])
-            rows.append(Row(f"drawn {key}", text if unit == "1" else f"{text} {unit}"))
+            rows.append(Row(f"drawn {key}", with_unit(text, unit)))
         return [*rows, *varying_rows(varying_inputs(self.result, drawn))]
 
     def data(self) -> dict[str, Any]:
@@ -289,13 +294,13 @@ class RunView(StudyView[Result]):
             if variable.kind == "history"
             for column in _columns(name, raw.history[name], variable.dims, name, self.angles())
         )
-        given = {file: name for file, name in _RECORDS.items() if name in raw.records}
         return {
             "history.csv": [with_sources(history, scenario)],
             **{
                 file: [with_sources(self._records(name), scenario)]
-                for file, name in given.items()
-                if not name.startswith("roller") or raw.records[name].any()
+                for file, name in _RECORDS.items()
+                if name in raw.records
+                and (not name.startswith("roller") or raw.records[name].any())
             },
         }
 
