@@ -32,6 +32,19 @@ ADHESION: dict[str, object] = {
     "operation.rollers": 1,
     "operation.duration": "3000 min",
 }
+#: nearly unworn, so that volumes on strips of twice the width may be equal by chance
+FRESH: dict[str, object] = {
+    "evolution.tolerance": 0.01,
+    "roller.radius": "5.409 mm",
+    "roller.crown_radius": "263.6 mm",
+    "cylinder.radius": "33.66 mm",
+    "load.normal_force": "1978 N",
+    "friction.coefficient": 0.05414,
+    "creepage": {"tilt": "-0.3666 mrad", "drive": "free", "bearing_torque": "4.216 N mm"},
+    "operation.passes": 417_800,
+    "wear.cylinder.k_over_h": "1e-13 1/Pa",
+    "wear.roller.k_over_h": "3.068e-13 1/Pa",
+}
 
 
 def run(changes: dict[str, object]) -> wearsim.Result:
@@ -57,6 +70,12 @@ def test_stated_error_covers_that_of_the_strips(changes: dict[str, object]) -> N
     error = abs(result.depth[-1] - true.depth[-1])
     assert error <= result.depth_error[-1] <= 100.0 * error + 1e-3 * result.depth[-1]
     assert abs(result.worn_volume[-1] - true.worn_volume[-1]) <= result.volume_error[-1]
+
+
+def test_volume_of_a_nearly_unworn_free_roller_is_within_its_stated_error() -> None:
+    result = run(FRESH)
+    error = abs(result.worn_volume[-1] - fine(FRESH, result).worn_volume[-1])
+    assert error <= result.volume_error[-1] <= 10.0 * error
 
 
 def test_parts_of_the_stated_error_add_up() -> None:

@@ -47,6 +47,8 @@ COVER, PARTIAL_COVER, FRESH_COVER = (
     np.array(factors)[:, None] for factors in ((0.3, 0.5, 0.9), (0.8, 1.1, 1.3), (1.6, 1.8, 1.8))
 )
 OF_PROFILE = 0.1  # least relative errors of depth and volume over that of the profile
+# the same of the volume worn in a contact that adheres, before wear has changed it
+OF_FRESH_PROFILE = 0.3
 # difference of the mean over a strip from the depth in its middle, over that of a parabola, at the
 # edge of a groove within a strip: from 1 to 4 by the angle at which the depth begins
 IN_MIDDLE = 2.0
@@ -74,6 +76,8 @@ class Course:
         Strips at the end.
     approach : float
         Greatest elastic approach of the contacts at the end [m].
+    adhesion : float
+        Greatest part of a contact that adheres at the end.
     observed : dict of str to sequence of ndarray
         Observables by name, at the start and after each step, if they are asked for.
     """
@@ -83,6 +87,7 @@ class Course:
     profiles: FloatArray | None = None
     grid: Grid | None = None
     approach: float = 0.0
+    adhesion: float = 0.0
     observed: dict[str, Any] = field(default_factory=dict)
 
 
@@ -209,19 +214,22 @@ def coarse_courses(
             done = (end.passes >= needed[numbers]).nonzero()[0]
             if done.size:
                 approaches = elastic_approaches(advance.problem, end).max(axis=(0, 1))
+                parts = end.contacts.adhesion_fraction.reshape(advance.problem.shape)
                 for place in done.tolist():
-                    courses[numbers[place]].approach = float(approaches[place])
+                    course = courses[numbers[place]]
+                    course.approach = float(approaches[place])
+                    course.adhesion = float(parts[..., place].max())
                 tests.end(numbers[done].tolist())
         add_steps(courses, steps, between=True)
     except Exception:  # a test fails for its own reasons, and the others are repeated without it
         if len(needed) == 1:
             return [None]
         single_tests = (np.array([number]) for number in range(len(needed)))
-        parts = (
+        singly = (
             coarse_courses(problem.at(n), stepper, stop, needed[n], max_steps, observe)
             for n in single_tests
         )
-        return [course for part in parts for course in part]
+        return [course for part in singly for course in part]
     return [None if n in tests.failures else course for n, course in enumerate(courses)]
 
 
@@ -279,7 +287,8 @@ def strip_errors(
     errors[2] = np.maximum(errors[2], errors[0] / np.where(deepest > 0.0, deepest, np.inf))
     # the differences of depth and volume may be small by chance, that of the depth of a single
     # strip more often
-    least = OF_PROFILE * np.array([deepest, partial_slip * sizes[2]])
+    of_volume = np.maximum(OF_PROFILE * partial_slip, OF_FRESH_PROFILE * coarse.adhesion * fresh)
+    least = np.array([OF_PROFILE * deepest, of_volume * sizes[2]])
     errors[:2] = np.maximum(errors[:2], least * errors[2])
     if end.profiles is not None and end.profiles.any():
         top = greatest_between(end.profiles).max() + _means_below_points(end.profiles)
