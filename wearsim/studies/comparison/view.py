@@ -465,10 +465,7 @@ def _labels(comparison: Comparison, row: Compared, place: int, colour: str) -> l
     head = fill(f"{row.label} ({size})", _LINE_LENGTH).splitlines()
     return [
         Text(
-            0.0,
-            place,
-            text,
-            parts="x",
+            *(0.0, place, text, "x"),
             offset=(3.0, _ABOVE + _LINE_HEIGHT * number),
             colour=colour if number >= len(under) else BLACK,
             bold=number >= len(under),

@@ -89,6 +89,11 @@ class IdentificationView(StudyView[IdentificationResult]):
             f"{row['prior_scale']:g}: {row['bayes_factor']:.2f}, t {row['scatter_of_k']:.2f}"
             for row in summary["sensitivity"]
         )
+        likelihood = (
+            ""
+            if ratio is None
+            else f"{ratio:.2f}; 95 % of such tests stay below {summary['likelihood_ratio_95']:.2f}"
+        )
         return [
             Row("verdict", result.verdict_words),
             Row("scatter of ln K/H seen", NOTHING if seen is None else f"{seen:.3f}"),
@@ -105,17 +110,7 @@ class IdentificationView(StudyView[IdentificationResult]):
                 answers={"bayes_factor": (bayes, "1")},
             ),
             Row("by the scale of the prior", sensitivity),
-            *(
-                []
-                if ratio is None
-                else [
-                    Row(
-                        "likelihood ratio of t = 0",
-                        f"{ratio:.2f}; 95 % of such tests stay below"
-                        f" {summary['likelihood_ratio_95']:.2f}",
-                    )
-                ]
-            ),
+            *([Row("likelihood ratio of t = 0", likelihood)] if likelihood else []),
             Row(
                 "K/H, median of specimens",
                 _wear_factor(middle, ("value", "low", "high")),
@@ -222,11 +217,8 @@ class IdentificationView(StudyView[IdentificationResult]):
             name: np.array([np.nan if test[name] is None else test[name] for test in tests])
             for name in (*units, "energy_J")
         }
-        return Frame(
-            [(name, units.get(name, "J"), column) for name, column in values.items()],
-            "groove",
-            range(1, len(tests) + 1),
-        )
+        columns = [(name, units.get(name, "J"), column) for name, column in values.items()]
+        return Frame(columns, "groove", range(1, len(tests) + 1))
 
     def _tests(self) -> list[dict[str, Any]]:
         """Return the tests with one entry for each end of an interval."""
@@ -273,12 +265,8 @@ class IdentificationView(StudyView[IdentificationResult]):
         if not raw.measured:
             return [_name(test["file"]) for test in self.result.tests]
         return [
-            *(
-                "--tests",
-                self._tests_file,
-                "--negligible",
-                f"{self.result.summary['negligible']!r}",
-            ),
+            *("--tests", self._tests_file),
+            *("--negligible", f"{self.result.summary['negligible']!r}"),
             *(["--draws", str(raw.draws)] if raw.draws is not None else []),
             *(["--share", "k=cylinder,roller"] if raw.shared else []),
         ]
