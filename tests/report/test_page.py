@@ -335,9 +335,10 @@ def test_page_of_an_identification_without_its_measurements_claims_no_repetition
 
 @pytest.mark.parametrize(("unit", "ending"), [("1", ""), ("mm", " mm")])
 def test_values_under_the_pointer_have_their_unit_and_plain_numbers_none(unit, ending):
-    axis, ends = Axis("quantity", unit), np.arange(2.0)
+    axis, ends = Axis("power $P_d$", unit), np.arange(2.0)
     marks = [Bars(ends[:1], ends[1:], ends[1:]), Image(ends, ends, np.ones((2, 2)), axis)]
     tools = draw(Panel("numbers", axis, axis, marks)).select(HoverTool)
     values = ["@value{%.5g}", "@low{%.5g} to @high{%.5g}", "@image{%.5g}", "$x{0.00}", "$y{0.00}"]
     shown = [text for tool in tools for _, text in tool.tooltips]
     assert sorted(shown) == sorted(f"{value}{ending}" for value in values)
+    assert {name for tool in tools for name, _ in tool.tooltips} == {"power P"}

@@ -361,7 +361,7 @@ def _draw_bars(
         columns["name"] = [names[round(at)] for at in middle] if names else [""] * len(middle)
         tips.insert(0, ("", "@name"))
     elif place.names is None:
-        tips.insert(0, (place.name, f"@low{{%.5g}} to {_tip(place, 'high')[1]}"))
+        tips.insert(0, (plain_label(place.name), f"@low{{%.5g}} to {_tip(place, 'high')[1]}"))
     bars = plot.quad(**ends, source=_source(plot, _single(columns)), **style, **named)
     _hover(plot, [bars], *tips, *more_tips)
 
@@ -424,7 +424,7 @@ def _draw_image(plot: Any, mark: Image, x: Axis, y: Axis) -> None:
         [picture],
         (plain_label(x.name), with_unit("$x{0.00}", x.unit)),
         (plain_label(y.name), with_unit("$y{0.00}", y.unit)),
-        (mark.axis.name, with_unit("@image{%.5g}", mark.axis.unit)),
+        (plain_label(mark.axis.name), with_unit("@image{%.5g}", mark.axis.unit)),
     )
 
 
