@@ -64,8 +64,9 @@ class AxialGap:
         half = 0.5 * self._cylinder.length
         if math.isinf(half):
             return self._cylinder.drop(y)
-        drop = self._cylinder.drop(np.clip(y, -half, half))
-        return np.where(np.abs(y) > half, self._greatest, drop)
+        return np.where(
+            np.abs(y) > half, self._greatest, self._cylinder.drop(np.clip(y, -half, half))
+        )
 
     @cached_property
     def has_crowned_cylinder(self) -> bool:

@@ -228,8 +228,9 @@ def _choices(table: str, random: RandomInputs) -> list[Model]:
             model = _model(f"{table} {spec.name}", spec.summary, fields)
             terms[spec.name] = model, Field(None, description=spec.summary)
         else:
-            default = spec.name if spec.name == named.default else ...
-            described = Field(default, description=named.description)
+            described = Field(
+                spec.name if spec.name == named.default else ..., description=named.description
+            )
             options[spec.name] = {**fields, **_fields(base), key: (Literal[spec.name], described)}
     models = [
         _model(f"{table} {spec.name}", spec.summary, {**terms, **options[spec.name]})
@@ -259,8 +260,9 @@ def _fields(
             kind = Union[field.rebuild_annotation(), friction if name == FRICTION else number]  # noqa: UP007
             described = Field(field.get_default(), description=field.description)
         elif inner and can_be_random(name):
-            within = _fields(inner, table, random)
-            kind = _model(f"{inner.__name__} of {key}", inner.__doc__, within)
+            kind = _model(
+                f"{inner.__name__} of {key}", inner.__doc__, _fields(inner, table, random)
+            )
         if kind:
             fields[key] = kind, described
     return fields

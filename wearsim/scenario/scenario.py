@@ -171,8 +171,9 @@ class Scenario:
         >>> wearsim.Scenario.from_toml(text, {"operation.rollers": 1}).total_passes
         450000
         """
-        read = reader_in(Path(folder), confined=confined)
-        return parse_scenario(text, str(Path(folder) / name), read, overrides)
+        return parse_scenario(
+            text, str(Path(folder) / name), reader_in(Path(folder), confined=confined), overrides
+        )
 
     @classmethod
     def from_dict(
@@ -382,8 +383,9 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
             " Scenario.from_dict makes one from tables"
         )
     if "\n" in str(path):
-        what = "is a text, not the name of a file; Scenario.from_toml reads it"
-        raise mistake_in("scenario", what)
+        raise mistake_in(
+            "scenario", "is a text, not the name of a file; Scenario.from_toml reads it"
+        )
     path = Path(path)
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -393,8 +395,9 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
             what = "is a results file, not a scenario"
             shell = f"show it with: wearsim show {path}"
             python = f'open it with wearsim.open_results("{path}")'
-        mistakes = [Mistake("", "", what)]
-        raise ScenarioError(str(path), mistakes, python=python, shell=shell) from error
+        raise ScenarioError(
+            str(path), [Mistake("", "", what)], python=python, shell=shell
+        ) from error
     except OSError as error:
         raise mistake_in(str(path), f"the file cannot be read ({error.strerror})") from error
     return parse_scenario(text, str(path), reader_in(path.parent), overrides)

@@ -155,8 +155,9 @@ def _with(
     assert isinstance(auto, AutoTable)
     note = f"contact.model = 'auto' has taken '{model.label}': {why}"
     chosen = ChosenTable(model=model.model, options=model.options, why=note, warning=warning)
-    written = chosen.model_dump(exclude_defaults=True)
-    text = apply_overrides(scenario.text, scenario.file, {"contact.chosen": written})
+    text = apply_overrides(
+        scenario.text, scenario.file, {"contact.chosen": chosen.model_dump(exclude_defaults=True)}
+    )
     auto = auto.model_copy(update={"chosen": chosen})
     return replace(
         scenario, contact=replace(choice, auto=auto), text=text, notes=(*scenario.notes, note)

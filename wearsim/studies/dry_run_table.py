@@ -136,14 +136,15 @@ def _load_text(load: Data) -> str:
     low, high = load.get("least_N", 0.0), load.get("greatest_N", 0.0)
     force = f"{low:.4g} N" if low == high else f"{low:.4g} to {high:.4g} N"
     stiffness, feedback = load["stiffness_N_per_m"] / 1e3, load["feedback"]
-    parts = [
-        load["kind"],
-        *([force] if "least_N" in load else []),
-        *([f"less {stiffness:.4g} N/mm of descent"] if stiffness > 0.0 else []),
-        *([f"feedback {feedback}"] if feedback is not None else []),
-        *(f"plus {term}" for term in load["terms"]),
-    ]
-    return ", ".join(parts)
+    return ", ".join(
+        [
+            load["kind"],
+            *([force] if "least_N" in load else []),
+            *([f"less {stiffness:.4g} N/mm of descent"] if stiffness > 0.0 else []),
+            *([f"feedback {feedback}"] if feedback is not None else []),
+            *(f"plus {term}" for term in load["terms"]),
+        ]
+    )
 
 
 def _log_rows(log: Data | None) -> TableRows:
@@ -233,10 +234,9 @@ def _pitting_rows(pitting: Data | None, track: _Track) -> TableRows:
     if pitting is None:
         return []
     names = {"cylinder": track.name, "roller": "rollers"}
-    sources = pitting["sources"].items()
     return [
         ("pitting without wear", unworn_text(pitting, track.name, track.unit, track.per_unit)),
-        *((f"fatigue of the {names[body]}", source) for body, source in sources),
+        *((f"fatigue of the {names[body]}", source) for body, source in pitting["sources"].items()),
     ]
 
 

@@ -89,8 +89,9 @@ class WearForecast:
         # a parabola does not approximate a groove that fits the roller; exact theory takes long
         if choice.model in PARABOLA or choice.spec.reference:
             options = registry().get(ContactModelSpec, "slender").options()
-            slender = replace(choice, model="slender", options=options, auto=None)
-            self._scout = replace(self._scout, contact=slender)
+            self._scout = replace(
+                self._scout, contact=replace(choice, model="slender", options=options, auto=None)
+            )
         if choice.spec.reference:
             problem = replace(problem, model=prepared_model(self._scout, problem.grid))
         self.problem = problem
@@ -254,8 +255,9 @@ class WearForecast:
         if scenario is not self.scenario:
             problem = replace(problem, model=prepared_model(scenario, grid))
         worn = np.maximum(depth - problem.nominal_gap + problem.nominal_least_gap[..., None], 0.0)
-        numbers = range(problem.rollers)
-        rollers = np.array([[worn[:, problem.roller == k].max(axis=(0, 1)) for k in numbers]])
+        rollers = np.array(
+            [[worn[:, problem.roller == k].max(axis=(0, 1)) for k in range(problem.rollers)]]
+        )
         cylinder = np.repeat(worn.max(axis=(0, 1), keepdims=True), len(worn), axis=0)
         share = last["cylinder"] / np.maximum(last["cylinder"] + last["roller"], TINY)
         # a spring needs a first guess of the load on these strips
@@ -276,8 +278,9 @@ class WearForecast:
             return with_feedback(here, force, displacement, state.terms)
 
         fresh = fresh_approach(here, state, force)
-        solve = partial(solve_present, cold=True)
-        contacts, _, _ = solve_loaded(here, state, loads_at, fresh, None, solve)
+        contacts, _, _ = solve_loaded(
+            here, state, loads_at, fresh, None, partial(solve_present, cold=True)
+        )
         spacing, rise = here.grid.spacing, here.nominal_gap - here.nominal_least_gap[..., None]
         parts = here.wear_parts(contacts, 1.0).sum(axis=-1) * spacing
         cylinder, roller = (values[..., 0].sum(axis=1) for values in parts)

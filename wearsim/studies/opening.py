@@ -177,8 +177,9 @@ def save_report(
     from wearsim.report.page.page import save_page  # noqa: PLC0415  (only of pages)
 
     if not isinstance(results, Sequence) or isinstance(results, str):
-        kind = type(results).__name__
-        raise TypeError(f"results must be a list of results, such as [result], got a {kind}")
+        raise TypeError(
+            f"results must be a list of results, such as [result], got a {type(results).__name__}"
+        )
     if not results:
         raise ValueError("no result is given for the page")
     if others := [item for item in results if not isinstance(item, Viewed)]:

@@ -92,8 +92,7 @@ def _of_pressure(setup: Setup, load: float, friction: float) -> Iterator[str]:
     scenario, (patch, force) = setup.scenario, setup.hardest_patch(load)
     pressure = patch.peak_pressure
     text = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
-    bodies = ("roller", scenario.roller), (scenario.cylinder.name, scenario.cylinder)
-    for name, body in bodies:
+    for name, body in ("roller", scenario.roller), (scenario.cylinder.name, scenario.cylinder):
         strength, limit, what = body.material.yield_stress, body.material.hardness, "its hardness"
         if strength is not None:
             factor = min(SHAKEDOWN, 1.0 / friction if friction > 0.0 else SHAKEDOWN)

@@ -138,10 +138,9 @@ def due_records(
     advance: Advance, schedule: RecordSchedule, stop: float, pass_by_pass: bool
 ) -> list[Due]:
     """Return the records of a step in order; `stop` is the end of the tests [passes]."""
-    ends = pairwise(state.passes.tolist() for state in advance.path)
     return sorted(
         (source + at_end, place, passes)
-        for source, steps in enumerate(ends)
+        for source, steps in enumerate(pairwise(state.passes.tolist() for state in advance.path))
         for place, (first, last) in enumerate(zip(*steps, strict=True))
         for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
     )
@@ -164,8 +163,9 @@ def states_at(
     plain = {"coarse_step_solution": None, "half_quadrature_solution": None}
     states = [advance.path[k].replaced(**plain).at(np.array(of)) for k, of in groups.items()]
     problem = advance.problem.at(np.concatenate([*groups.values()]))
-    state = joined_states(states)
-    return problem, state_at(stepper, problem, state, np.array([record[2] for record in due]))
+    return problem, state_at(
+        stepper, problem, joined_states(states), np.array([record[2] for record in due])
+    )
 
 
 def state_at(

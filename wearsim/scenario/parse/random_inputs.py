@@ -176,8 +176,9 @@ def _fits(
         mistakes.add(table, key, "has no finite mean", item.describe())
         return False
     if what and low == high:
-        got = amount(low, target.quantity)
-        mistakes.add(table, key, f"must be {allowed}", got, f"a value {allowed}")
+        mistakes.add(
+            table, key, f"must be {allowed}", amount(low, target.quantity), f"a value {allowed}"
+        )
     elif what:
         mistakes.add(
             table,

@@ -305,11 +305,13 @@ def parse_fields(
 ) -> dict[str, Any]:
     """Return the fields of a `Scenario`; parameters and errors as in `parse_scenario`."""
     if not isinstance(text, str):
-        kind = type(text).__name__
-        raise TypeError(f"text must be TOML in a str, got a {kind}; load_scenario reads a file")
+        raise TypeError(
+            f"text must be TOML in a str, got a {type(text).__name__}; load_scenario reads a file"
+        )
     if not isinstance(overrides, Mapping | None):
-        kind = type(overrides).__name__
-        raise TypeError(f"overrides must be a mapping of values by dotted key, got a {kind}")
+        raise TypeError(
+            f"overrides must be a mapping of values by dotted key, got a {type(overrides).__name__}"
+        )
     if others := [key for key in overrides or () if not isinstance(key, str)]:
         raise TypeError(f"a dotted key of overrides must be a text, got {others[0]!r}")
     data = parse_toml(text, name)

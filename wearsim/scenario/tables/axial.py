@@ -64,8 +64,9 @@ class AxialChoice:
 def crown(radius: float) -> AxialChoice:
     """Return a circular crown."""
     options: Any = registry().get(AxialProfileSpec, "crown").options
-    written = {"radius": in_engineers_unit(radius, "m")}
-    return AxialChoice("crown", options.model_construct(radius=radius), written)
+    return AxialChoice(
+        "crown", options.model_construct(radius=radius), {"radius": in_engineers_unit(radius, "m")}
+    )
 
 
 def straight() -> AxialChoice:
@@ -97,8 +98,9 @@ def read_axial(mistakes: Mistakes, key: AxialKey | None, table: str) -> AxialCho
 
 def pair_of(roller: Roller, cylinder: Cylinder, elastic: ElasticPair) -> AxialPair:
     """Return the pair for which axial profiles are designed."""
-    curvature = 1.0 / cylinder.radius + 1.0 / roller.radius
-    return AxialPair(roller.width, elastic.contact_modulus, curvature)
+    return AxialPair(
+        roller.width, elastic.contact_modulus, 1.0 / cylinder.radius + 1.0 / roller.radius
+    )
 
 
 def combine_bodies(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str, Any]:
@@ -132,8 +134,9 @@ def combine_bodies(mistakes: Mistakes, sections: Mapping[str, Any]) -> dict[str,
                 f"{1e3 * width:.6g} mm",
                 f"at most {1e3 * length:.6g} mm, the length of roller.axial_profile",
             )
-    pair = pair_of(roller, cylinder, elastic)
-    other = _built(mistakes, cylinder.name, cylinder.axial_profile, pair)
+    other = _built(
+        mistakes, cylinder.name, cylinder.axial_profile, pair_of(roller, cylinder, elastic)
+    )
     if profile is None or other is None:
         return {}
     gap = AxialGap(profile, other, roller.width, roller.radius)

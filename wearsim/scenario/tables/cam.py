@@ -233,8 +233,9 @@ def read_cam(
     table, follower, roller
         The tables that have been read; None after mistakes.
     """
-    ways = ("motion", "lift", "profile", "shape")
-    given = [key for key in ways if getattr(table, key) is not None]
+    given = [
+        key for key in ("motion", "lift", "profile", "shape") if getattr(table, key) is not None
+    ]
     if len(given) != 1:
         mistakes.add(
             "cam",

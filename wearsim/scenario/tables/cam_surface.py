@@ -140,8 +140,9 @@ def _spline_through(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArra
     # along the length of the surface, which a spline follows at any spacing of the points
     length = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
     length = np.append(length, length[-1] + math.hypot(x[0] - x[-1], y[0] - y[-1]))
-    points = np.stack([np.append(x, x[0]), np.append(y, y[0])], axis=1)
-    spline = make_interp_spline(length, points, k=5, bc_type="periodic")
+    spline = make_interp_spline(
+        length, np.stack([np.append(x, x[0]), np.append(y, y[0])], axis=1), k=5, bc_type="periodic"
+    )
     along = np.linspace(0.0, length[-1], 4 * POINTS, endpoint=False)
     first, second, third = (spline(along, order).T for order in range(3))
     return first, second, third
@@ -247,8 +248,9 @@ def _parts(
 
     def arc(low: float, high: float, points: int) -> tuple[FloatArray, FloatArray]:
         polar = np.linspace(low, high, points)
-        surface = _of_polar(polar + start, curve(polar, coefficients))
-        return lift_of_surface(path, *surface, follower)
+        return lift_of_surface(
+            path, *_of_polar(polar + start, curve(polar, coefficients)), follower
+        )
 
     if not curve.dwells:
         theta, lift = arc(0.0, math.tau, POINTS + 1)
@@ -258,13 +260,13 @@ def _parts(
     splines, ends = [], []
     for low, high in curve.arcs:
         theta, lift = arc(low, high, max(32, round((high - low) / math.tau * POINTS)))
-        spline = LiftSpline(theta - theta[0], lift)
-        splines.append((float(theta[0]), float(theta[-1] - theta[0]), spline))
+        splines.append(
+            (float(theta[0]), float(theta[-1] - theta[0]), LiftSpline(theta - theta[0], lift))
+        )
         ends.append((float(theta[-1]), float(lift[-1])))
-    following = [*splines[1:], splines[0]]
     dwells = tuple(
         (stop % math.tau, (after[0] - stop) % math.tau, level)
-        for (stop, level), after in zip(ends, following, strict=True)
+        for (stop, level), after in zip(ends, [*splines[1:], splines[0]], strict=True)
     )
     return _Parts(tuple(splines), dwells), tuple((low, low + size) for low, size, _ in dwells)
 

@@ -147,12 +147,11 @@ def _read_body(mistakes: Mistakes, place: str, raw: Any) -> FatigueLawChoice | N
         return None
     valid = table.valid_pressure
     if valid is not None and valid[0] >= valid[1]:
-        got = as_written([in_engineers_unit(value, "Pa") for value in valid])
         mistakes.add(
             place,
             "valid_pressure",
             "is not a range of pressures",
-            got,
+            as_written([in_engineers_unit(value, "Pa") for value in valid]),
             "the least and then the greatest pressure",
         )
     return FatigueLawChoice(table.law, options, table.source, valid)

@@ -144,8 +144,9 @@ class TermChoice:
     @cached_property
     def built(self) -> LoadTerm:
         """The term."""
-        spec = registry().get(LoadSpec, self.name)
-        return built_plugin(spec, LoadTerm, CheckedLoadTerm, self.options)
+        return built_plugin(
+            registry().get(LoadSpec, self.name), LoadTerm, CheckedLoadTerm, self.options
+        )
 
 
 @dataclass(frozen=True)
@@ -169,8 +170,7 @@ class LoadChoice:
     @cached_property
     def built(self) -> Load:
         """The load, without its terms."""
-        spec = registry().get(LoadSpec, self.kind)
-        return built_plugin(spec, Load, CheckedLoad, self.options)
+        return built_plugin(registry().get(LoadSpec, self.kind), Load, CheckedLoad, self.options)
 
 
 @dataclass(frozen=True)

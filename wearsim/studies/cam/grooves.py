@@ -65,9 +65,10 @@ def with_angles(dataset: xarray.Dataset, result: Result) -> xarray.Dataset:
     if follower.swings:
         angle = lift_error / follower.lever
         texts["arm_error_along_angle"] = angle, "rad", "change of the angle of the arm by wear"
-    coordinate = ("angle", CURVE_ANGLES, {"units": "rad", "long_name": "angle of the cam"})
     return (
-        dataset.assign_coords(angle=coordinate)
+        dataset.assign_coords(
+            angle=("angle", CURVE_ANGLES, {"units": "rad", "long_name": "angle of the cam"})
+        )
         .assign(
             {
                 name: (("record", "angle"), values.T, {"units": unit, "long_name": text})

@@ -38,8 +38,9 @@ class RollerPath:
         key = segment, inner, theta.tobytes()
         kinematics = self._known.get(key)
         if kinematics is None:
-            lift = self._cam.motion.lift_in(segment, theta)
-            kinematics = self._cam.follower.kinematics(lift, inner)
+            kinematics = self._cam.follower.kinematics(
+                self._cam.motion.lift_in(segment, theta), inner
+            )
             if len(self._known) < MOST_KNOWN:
                 self._known[key] = kinematics
         return kinematics

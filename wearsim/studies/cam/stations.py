@@ -192,5 +192,6 @@ def _inertia(turn: CamTurn, point: Point, weight: FloatArray) -> FloatArray:
     lever = turn.cam.follower.lever * np.cos(point.kinematics.pressure_angle)
     side = np.where(point.inner, -1.0, 1.0)
     curvature = (basis * squares) @ fit  # second derivative of the lift by the lift
-    scale = turn.cam.inertia * turn.speed**2
-    return np.asarray(scale * (side / lever)[:, None] * curvature * (side / lever))
+    return np.asarray(
+        turn.cam.inertia * turn.speed**2 * (side / lever)[:, None] * curvature * (side / lever)
+    )

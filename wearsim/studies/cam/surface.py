@@ -115,8 +115,9 @@ class _Outlines:
                 values = self.depth[begin : begin + count] * touched
 
             def points(theta: FloatArray, panel=panel, values=values) -> FloatArray:  # type: ignore[no-untyped-def]
-                lift = turn.cam.motion.lift_in(panel.segment, theta)
-                kinematics = turn.cam.follower.kinematics(lift, np.full(len(theta), inner))
+                kinematics = turn.cam.follower.kinematics(
+                    turn.cam.motion.lift_in(panel.segment, theta), np.full(len(theta), inner)
+                )
                 depths: list[FloatArray | float] = [0.0]
                 if values is not None:
                     place = np.clip((theta - panel.start) / (panel.stop - panel.start), 0.0, 1.0)

@@ -249,8 +249,9 @@ class CamTurn:
             for low, high in itertools.pairwise(sorted({panel.start, panel.stop, *ends})):
                 if high - low > 1e-9:
                     rolls = np.isnan(self.slip(np.array([0.5 * (low + high)]))[0])
-                    dwell = panel.dwell and bool(rolls)
-                    parts.append(panel._replace(start=low, stop=high, dwell=dwell))
+                    parts.append(
+                        panel._replace(start=low, stop=high, dwell=panel.dwell and bool(rolls))
+                    )
         return tuple(parts)
 
     def slip(self, theta: FloatArray, within: FloatArray | None = None) -> FloatArray:
@@ -476,8 +477,9 @@ class CamTurn:
     def _undercut(self, panel: Panel, theta: FloatArray) -> FloatArray:
         """Return the curvature of the pitch curve times the roller's radius, 1 at a cusp."""
         side = -1.0 if self.is_inner(panel) else 1.0
-        curvature = self.rolling(panel, theta).pitch_curvature
-        return np.asarray(side * curvature * self.scenario.roller.radius)
+        return np.asarray(
+            side * self.rolling(panel, theta).pitch_curvature * self.scenario.roller.radius
+        )
 
     def place(self, theta: float) -> str:
         """Return an angle and its segment in words."""

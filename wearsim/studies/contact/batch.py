@@ -364,8 +364,7 @@ def _acts(scenario: Scenario, item: RandomInput) -> bool:
         return False
     values = {*item.extremes, *item.scalar.quantile(_BETWEEN).tolist()}
     loads = (realise(scenario, {item.name: value}).load.built for value in values)
-    forces = {float(load.force(np.zeros(1))[0]) for load in loads}
-    if len(forces) == 1:
+    if len({float(load.force(np.zeros(1))[0]) for load in loads}) == 1:
         return False
     table, key = item.name.split(".", 1)
     mean = item.mean[0]

@@ -86,8 +86,9 @@ class Calibration:
         """Return the first indicator outside the calibrated contacts with its value, or nothing."""
         margin = _BEYOND * (self.greatest - self.least)
         low, high = self.least - margin, self.greatest + margin
-        values = self._limited(indicators)
-        for name, value, least, most in zip(INDICATORS, values, low, high, strict=True):
+        for name, value, least, most in zip(
+            INDICATORS, self._limited(indicators), low, high, strict=True
+        ):
             if not least <= value <= most:
                 return f"{name} {value:.2g}, calibrated from {least:.2g} to {most:.2g}"
         return ""

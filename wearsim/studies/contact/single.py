@@ -278,8 +278,9 @@ def _grid_errors(
     power = pressure = 0.0
     try:
         for coarser, divisor in _coarser(scenario):
-            strips = (grid.strips + divisor - 1) // divisor
-            model, gap, curvature, point = _contact(coarser, Grid.spanning(*grid.edges, strips))
+            model, gap, curvature, point = _contact(
+                coarser, Grid.spanning(*grid.edges, (grid.strips + divisor - 1) // divisor)
+            )
             other = model.solve_one(gap, curvature, point)
             power += abs(other.power / solution.power - 1.0) if solution.power else 0.0
             pressure += abs(other.peak_pressure / solution.peak_pressure - 1.0)

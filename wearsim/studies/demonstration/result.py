@@ -292,14 +292,15 @@ class Demonstration(Viewed):
     def plans(self) -> list[list[Plan]]:
         """Tests of all conditions, for each duration and number of failures."""
         need = self.requirement
-        factors = [1.0, *(self.acceleration(k).value for k in range(1, len(self.designs)))]
         return [
             [
                 self.plan(need.life * ratio / factor, failures, design)
                 for ratio in DURATIONS
                 for failures in range(need.failures + 1)
             ]
-            for design, factor in enumerate(factors)
+            for design, factor in enumerate(
+                [1.0, *(self.acceleration(k).value for k in range(1, len(self.designs)))]
+            )
         ]
 
 

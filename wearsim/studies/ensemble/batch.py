@@ -310,8 +310,9 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         curves = curves_at_end(advance.problem.at(over), end.at(over), scenarios) if numbers else []
         for place, number, curve in zip(over.tolist(), numbers, curves, strict=True):
             chosen, grid = np.array([place]), advance.problem.grid
-            scalars = scalars_of(advance.problem.at(chosen), end.at(chosen))
-            results[number] = RunObservations(rows[number], scalars, curve, grid)
+            results[number] = RunObservations(
+                rows[number], scalars_of(advance.problem.at(chosen), end.at(chosen)), curve, grid
+            )
     add_strip_errors(runs, problem, courses, results)
     results |= tests.failures
     return [results[number] for number in range(len(runs))]
@@ -408,8 +409,9 @@ def _record(
     """Append the observables at records to the rows of their tests; return errors by test."""
 
     def observed(chosen: IntArray) -> list[Observables]:
-        some = states_at(stepper, advance, [due[number] for number in chosen])
-        return observables_of(stepper, *some, threshold)
+        return observables_of(
+            stepper, *states_at(stepper, advance, [due[number] for number in chosen]), threshold
+        )
 
     done, failed = bisect_failures(observed, np.arange(len(due))) if due else ([], {})
     numbers = [int(advance.numbers[place]) for _, place, _ in due]

@@ -96,8 +96,9 @@ def closed_form_depths(
     rollers, speed = scenario.operation.rollers, scenario.rolling_speed
 
     def value(key: str, mean: float | tuple[float, ...]) -> FloatArray:
-        constant = np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
-        drawn = columns.get(key, constant)
+        drawn = columns.get(
+            key, np.broadcast_to(np.array(scenario.per_roller(mean)), (count, rollers))
+        )
         return drawn[:, None] if drawn.ndim == 1 else drawn
 
     creepage, load = scenario.creepage, scenario.load.built

@@ -60,8 +60,9 @@ class EnsembleResult(EnsembleValues):
             if not sufficient_for(band.kept, _BAND):
                 low, high = self.profiles.min(axis=0), self.profiles.max(axis=0)
                 label = "least to greatest"
-        ends = start - high, start - low
-        return ComputedProfile(band.y, start - band.mean, *ends, start, label, band.kept)
+        return ComputedProfile(
+            band.y, start - band.mean, start - high, start - low, start, label, band.kept
+        )
 
     def _start_height(self) -> FloatArray:
         """Return the height at the start of the tests, which the scenario gives [m]."""
@@ -127,8 +128,9 @@ class EnsembleResult(EnsembleValues):
         if self.design != "control-variate":
             return None
         known = self.raw.control
-        mean_error = known["std"] / np.sqrt(known["draws"])
-        return Control(self.values("control"), known["mean"], mean_error)
+        return Control(
+            self.values("control"), known["mean"], known["std"] / np.sqrt(known["draws"])
+        )
 
     def estimate_for(self, target: Target) -> Estimate:
         """Return the estimate to which a target applies.
@@ -167,8 +169,9 @@ class EnsembleResult(EnsembleValues):
         >>> intervals[-1] == tests.estimate("depth").mean
         True
         """
-        spaced = np.geomspace(1, self.count, min(points, self.count))
-        counts = np.unique(spaced.round().astype(np.int64))
+        counts = np.unique(
+            np.geomspace(1, self.count, min(points, self.count)).round().astype(np.int64)
+        )
         raw, name = self.raw, target.observable
         # kept in memory, since a file's arrays are read again at every access
         held = {
@@ -363,8 +366,9 @@ class EnsembleResult(EnsembleValues):
             statistics |= {f"{name}_{part}": values for part, values in parts.items()}
         for name in [name for name in KEPT if name in self.raw.schema.variables]:
             band = self.band(name)
-            ends = ("mean", "std", "low", "high")
-            statistics |= {f"{name}_{end}": getattr(band, end) for end in ends}
+            statistics |= {
+                f"{name}_{end}": getattr(band, end) for end in ("mean", "std", "low", "high")
+            }
         return statistics
 
     def is_constant(self, name: str) -> bool:

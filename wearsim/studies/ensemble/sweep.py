@@ -155,8 +155,9 @@ def sweep(
     names, scenarios = scenarios_of(scenario, key, values)
     if realisations is not None and output is None:
         raise TypeError("ensembles are written to files: name one with output")
-    results = run_sweep(scenarios, names, realisations, output, on_value=on_value, **options)
-    return Sweep(results, key, names)
+    return Sweep(
+        run_sweep(scenarios, names, realisations, output, on_value=on_value, **options), key, names
+    )
 
 
 def scenarios_of(

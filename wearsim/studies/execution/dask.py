@@ -236,8 +236,9 @@ def cluster(
             log = logging.getLogger(name)  # repeats with tracebacks what is raised as an error here
             stack.callback(log.setLevel, log.level)
             log.setLevel(logging.CRITICAL + 1)
-        client = stack.enter_context(_connected(address))
-        cluster_of_client = Cluster(client, address, on_notice, stop_requested)
+        cluster_of_client = Cluster(
+            stack.enter_context(_connected(address)), address, on_notice, stop_requested
+        )
         cluster_of_client.check_versions()
         yield cluster_of_client
 

@@ -246,8 +246,9 @@ def _fit(model: TraceLikelihood, likelihood: DrawLikelihood, trace: Trace) -> Fi
     bound = np.cumsum(weight[order]) / weight[order].sum()
     draws = order[np.searchsorted(bound, (np.arange(_BAND) + 0.5) / _BAND)]
     spread = np.sqrt(2.0) * np.sin(2.4 * np.arange(_BAND))  # unit variance, no pattern
-    ln_k = likelihood.mean[draws] + spread * likelihood.std[draws]
-    worn = model.worn(draws, ln_k, likelihood.shift[draws])
+    worn = model.worn(
+        draws, likelihood.mean[draws] + spread * likelihood.std[draws], likelihood.shift[draws]
+    )
     best = np.array([int(order[0])])
     at_best = likelihood.mean[best], likelihood.shift[best]
     worn = np.column_stack([model.worn(best, *at_best), worn])

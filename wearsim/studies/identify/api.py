@@ -211,8 +211,9 @@ class _Study:
         self._by_inputs: dict[str, list[_Ready]] = {}
         for item in items:
             if ready := self._ready(item):
-                known = sorted(item.values.items()), sorted(item.errors.items())
-                self._by_inputs.setdefault(repr(known), []).append(ready)
+                self._by_inputs.setdefault(
+                    repr((sorted(item.values.items()), sorted(item.errors.items()))), []
+                ).append(ready)
         if not self._by_inputs:
             raise mistake_in(
                 items[0].file or items[0].name, f"no groove can be used: {'; '.join(self.left_out)}"
@@ -299,8 +300,9 @@ class _Study:
         }
         grower = Grower(group[0].scenario, draws, self.shared, report, angles)
         wanted = [Wanted(test.item.surface, test.passes, *test.depths) for test in group]
-        on_cam = self.scenario.cam is not None
-        trajectories = grower.grow_on_cam(wanted) if on_cam else grower.grow(wanted)
+        trajectories = (
+            grower.grow_on_cam(wanted) if self.scenario.cam is not None else grower.grow(wanted)
+        )
         rows = [
             identified(
                 *(ready.item, ready.trace, trajectories, ready.passes),
@@ -320,8 +322,7 @@ def shares(row: Identified, trajectories: Trajectories) -> dict[str, float]:
     trajectories : Trajectories
         Those of its draws.
     """
-    weight = np.exp(row.likelihood.log_evidence - row.likelihood.log_evidence.max())
-    used = weight > 1e-3
+    used = np.exp(row.likelihood.log_evidence - row.likelihood.log_evidence.max()) > 1e-3
     if used.sum() < 16:
         return {}
     mean = row.likelihood.mean[used].argsort().argsort()
@@ -343,12 +344,11 @@ def _passes(scenario: Scenario, item: Measurement) -> float:
         number = float(text.removesuffix(unit)) if unit else quantity(text, "s")
         passes = number * units.get(unit, scenario.pass_rate)
     except ValueError as error:
-        what = error.what if isinstance(error, QuantityError) else "is no number of passes"
         raise item.refused(
             Mistake(
                 "",
                 "at",
-                what,
+                error.what if isinstance(error, QuantityError) else "is no number of passes",
                 as_written(item.at),
                 'a time such as "100 min", or "2e5 passes", of a cam also "1e5 turns"',
             )

@@ -99,8 +99,9 @@ def _changed(
         for mistake in error.mistakes:
             place = ".".join(filter(None, (mistake.table, mistake.key)))
             key = next((key for key in values if f"{place}.".startswith(f"{key}.")), None)
-            named = replace(mistake, key=f"{table}.{key}")
-            mistakes.append(named if key else Mistake("", table, str(mistake)))
+            mistakes.append(
+                replace(mistake, key=f"{table}.{key}") if key else Mistake("", table, str(mistake))
+            )
         raise test.refused(*mistakes) from error
 
 
@@ -198,12 +199,11 @@ def with_measured(scenario: Scenario, stds: Mapping[str, float]) -> Scenario:
     for key, std in stds.items():
         if key not in names or random[names.index(key)].role == "joint":
             single = [item.name for item in random if item.role != "joint"]
-            expected = ", ".join(single) or "a random input"
             raise mistake_in(
                 scenario.file,
                 "is not a random number of the scenario, so measuring it changes nothing",
                 None,
-                expected,
+                ", ".join(single) or "a random input",
                 key=key,
             )
         place = names.index(key)

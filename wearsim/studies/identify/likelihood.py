@@ -73,8 +73,9 @@ class TraceLikelihood:
     def _centroid(self) -> FloatArray:
         """Centroid of each worn profile, shape (draws, records) [m]."""
         depth = np.maximum(self.grown.depth[self.body], 0.0)
-        total = np.maximum(depth.sum(axis=2), 1e-300)
-        return np.asarray((depth * self.grown.y).sum(axis=2) / total)
+        return np.asarray(
+            (depth * self.grown.y).sum(axis=2) / np.maximum(depth.sum(axis=2), 1e-300)
+        )
 
     @cached_property
     def forms(self) -> FloatArray:
@@ -117,8 +118,9 @@ class TraceLikelihood:
             stretch = np.exp((ln_k - grown.ln_k[draw, place]) / 3.0)
             centre = self._centroid[draw, place]
             position = (self.y[:, None] - shift - centre) / stretch + centre
-            depth = self.grown.depth[self.body][draw, place]
-            total += (weight * stretch**2) * _interpolated(position, grown.y, depth)
+            total += (weight * stretch**2) * _interpolated(
+                position, grown.y, self.grown.depth[self.body][draw, place]
+            )
         if self.start and grown.start.any():
             total -= np.interp(self.y[:, None] - shift, grown.y, grown.start)
         return total
@@ -132,16 +134,16 @@ class TraceLikelihood:
         """Return the sum of squared residuals, shape (columns,)."""
 
         def squares(some: slice) -> FloatArray:
-            residual = self.residual(draw[some], ln_k[some], shift[some])
-            return np.asarray((residual**2).sum(axis=0))
+            return np.asarray((self.residual(draw[some], ln_k[some], shift[some]) ** 2).sum(axis=0))
 
         return self._by_blocks(len(draw), squares)
 
     def _by_blocks(self, count: int, values: Callable[[slice], FloatArray]) -> FloatArray:
         """Return the values of columns, computed for as many at once as memory is meant to hold."""
         block = max(_VALUES // len(self.y), 1)
-        starts = range(0, count, block)
-        return np.concatenate([values(slice(start, start + block)) for start in starts])
+        return np.concatenate(
+            [values(slice(start, start + block)) for start in range(0, count, block)]
+        )
 
     def deviance(
         self, models: NoiseModels, draw: IntArray, ln_k: FloatArray, shift: FloatArray

@@ -105,8 +105,9 @@ class Measurement:
 
     def refused(self, *mistakes: Mistake) -> ScenarioError:
         """Return the error of mistakes in the test, which names the tests file and the test."""
-        placed = [replace(mistake, table=self.place) for mistake in mistakes]
-        return ScenarioError(self.file or self.name, placed)
+        return ScenarioError(
+            self.file or self.name, [replace(mistake, table=self.place) for mistake in mistakes]
+        )
 
 
 def key_of(name: str) -> str:

@@ -122,8 +122,9 @@ def plan_tests(
 
 def sizes(first: int, last: int) -> list[int]:
     """Return at most nine numbers of tests from the first to the last, about equal in ratio."""
-    spaced = np.geomspace(first, last, _MOST_SIZES).round().astype(int)
-    return sorted({first, last, *spaced.tolist()})
+    return sorted(
+        {first, last, *np.geomspace(first, last, _MOST_SIZES).round().astype(int).tolist()}
+    )
 
 
 def _kernel(

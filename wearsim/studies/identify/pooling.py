@@ -121,8 +121,9 @@ def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> tuple[Likelihoo
     best = [float(log_density(k, k.centre).max()) for k in kernels]
     apart = max(2.0 * (sum(best) - float(score.max())), 0.0)
     agreement = min(agreement, float(chdtrc(len(kernels) - 1, apart)))
-    step = np.full_like(grid, grid[1] - grid[0])
-    kernel = LikelihoodMixture.of(np.maximum(score - score.max(), -700.0), grid, step)
+    kernel = LikelihoodMixture.of(
+        np.maximum(score - score.max(), -700.0), grid, np.full_like(grid, grid[1] - grid[0])
+    )
     precision = [1.0 / k.variance for k in kernels]
     of_inputs = np.average([k.variance_of_inputs / k.variance for k in kernels], weights=precision)
     return replace(kernel, variance_of_inputs=float(of_inputs) * kernel.variance), agreement

@@ -174,8 +174,7 @@ def _without_spikes(profile: Profile) -> BoolArray:
 def _in_runs(height: FloatArray) -> BoolArray:
     """Return which points belong to runs of equal readings at either end of the range."""
     inside = np.zeros(len(height), dtype=np.bool_)
-    change = np.flatnonzero(np.diff(height) != 0.0) + 1
-    for part in np.split(np.arange(len(height)), change):
+    for part in np.split(np.arange(len(height)), np.flatnonzero(np.diff(height) != 0.0) + 1):
         extreme = height[part[0]] in {height.min(), height.max()}
         if len(part) >= _RUN and extreme and len(part) < len(height):
             inside[part] = True
@@ -338,8 +337,9 @@ def measured_depth(
     used = bottom | trace.unworn
     y, height = trace.y[used], trace.height[used]
     inside = bottom[used][:, None] * np.vander((y - trace.middle) / reach, 3, True)
-    line = np.vander((y - trace.middle) / np.ptp(y), 3 if curvature else 2, True)
-    forms = np.hstack([inside, line])
+    forms = np.hstack(
+        [inside, np.vander((y - trace.middle) / np.ptp(y), 3 if curvature else 2, True)]
+    )
     models = noise_models(y, height, forms, trace.spread)
     white = models.whitened(np.column_stack([height, forms])).transpose(1, 0, 2)
     z, lines = white[:, :, :1], white[:, :, 1:]

@@ -102,7 +102,6 @@ def time_dependence(scenario: Scenario, shared: bool) -> tuple[str, ...]:
     """
     processes = [item.name for item in scenario.random if item.role == "process"]
     worn = factors(scenario)[1]
-    random = any(item.name == ROLLER for item in scenario.random)
     reasons = (
         (bool(processes), f"a random process in time sets {' and '.join(processes)}"),
         (not scenario.load.built.constant, f"the load '{scenario.load.kind}' depends on time"),
@@ -111,7 +110,7 @@ def time_dependence(scenario: Scenario, shared: bool) -> tuple[str, ...]:
             f"the load has terms ({', '.join(term.name for term in scenario.load.terms)})",
         ),
         (
-            (worn > 0.0 or random) and not shared,
+            (worn > 0.0 or any(item.name == ROLLER for item in scenario.random)) and not shared,
             (
                 "the roller's wear factor is that of the scenario (--share k=cylinder,roller gives"
                 " both bodies one unknown factor)"
@@ -268,8 +267,9 @@ class Grower:
         cylinder, roller = factors(self.scenario)
         columns = self.drawer.columns(0, self.count)
         share = {ROLLER: np.full(self.count, roller)} if self.shared else {}
-        known = {**columns, CYLINDER: np.full(self.count, cylinder), **share}
-        expected = closed_form_depths(self.scenario, known, self.count)
+        expected = closed_form_depths(
+            self.scenario, {**columns, CYLINDER: np.full(self.count, cylinder), **share}, self.count
+        )
         usual = expected / expected[0] if expected[0] > 0.0 else np.full(self.count, np.nan)
         usual = np.where(np.isfinite(usual) & (usual > 0.0), usual, 1.0)
         start = high.max() * np.clip(usual, 0.1, 10.0) ** -1.5
@@ -331,8 +331,9 @@ class Grower:
         count = int(np.ceil(np.log(span) / np.log(ratio))) + 1
         scale = span ** (np.arange(count) / (count - 1) - 1.0)  # up to 1
         if self.reasons:
-            tests = [(d, start[d] * s) for d in range(self.count) for s in scale]
-            kept, states = self._run(tests, times)
+            kept, states = self._run(
+                [(d, start[d] * s) for d in range(self.count) for s in scale], times
+            )
             ln_k = np.log(start[kept])[:, None] + np.log(scale)
             by_passes = {
                 item: self._grown(ln_k, [state[place] for state in states])
@@ -364,8 +365,9 @@ class Grower:
         factor, before = np.full(self.count, cylinder), np.full(self.count, np.inf)
         for _ in range(8):  # a mounting spring slows the wear as the groove deepens, or ends it
             share = {ROLLER: factor * (roller / cylinder)} if self.shared else {}
-            known = {**columns, CYLINDER: factor, **share}
-            reached = closed_form_depths(scenario, known, self.count)
+            reached = closed_form_depths(
+                scenario, {**columns, CYLINDER: factor, **share}, self.count
+            )
             ended = (before < depth) & (reached < np.minimum(_GAIN * before, depth))
             worn, before = (reached > 0.0) & ~ended, reached
             ratio = np.where(worn, depth / np.where(worn, reached, 1.0), 1.0)
@@ -374,8 +376,9 @@ class Grower:
 
     def _operation(self, passes: float) -> Any:
         """Return the operation of the scenario up to some passes."""
-        update = {"passes": max(1, round(passes)), "duration": None, "turns": None}
-        return self.scenario.operation.model_copy(update=update)
+        return self.scenario.operation.model_copy(
+            update={"passes": max(1, round(passes)), "duration": None, "turns": None}
+        )
 
     def _grown(self, ln_k: FloatArray, states: Sequence[tuple[Any, ...]]) -> Grown:
         assert self._grid is not None

@@ -175,8 +175,9 @@ def _prepared(
     first = with_length(scenario, base)
     # a single test has the groove of the wear factor with which it is run
     grid = profile_axis(realise(first, fixed) if settings.alone else first)
-    request = checked_request(first, settings.plain, "monte-carlo", None)
-    header, static = ensemble_content(first, request, grid)
+    header, static = ensemble_content(
+        first, checked_request(first, settings.plain, "monte-carlo", None), grid
+    )
     header = replace(
         header,
         scenario_text=scenario.text,

@@ -68,8 +68,9 @@ class LifeRun(RunObservations):
     @property
     def reached(self) -> bool:
         """Whether a limit was reached, and its numerical bounds are known."""
-        known = ("life", "life_high")
-        return self.failure is None and all(math.isfinite(self.scalars[name]) for name in known)
+        return self.failure is None and all(
+            math.isfinite(self.scalars[name]) for name in ("life", "life_high")
+        )
 
 
 @dataclass
@@ -142,8 +143,9 @@ class _Group:
         def observe(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
             return self._by_limit(self._ratios(problem, state))
 
-        added = add_strip_errors(self.runs, self.problem, courses, reached, observe)
-        for number, (errors, observed) in added.items():
+        for number, (errors, observed) in add_strip_errors(
+            self.runs, self.problem, courses, reached, observe
+        ).items():
             cylinder, roller, volume = courses[number].sizes[-1].tolist()
             of_sizes = {"depth": errors[0] / max(cylinder, roller), "volume": errors[1] / volume}
             self._widen(number, observed | of_sizes)
@@ -258,8 +260,9 @@ class _Group:
         for place, number in enumerate(numbers):
             observed = {name: row[name][None, ..., place] for name in ("width", *OF_EDGES)}
             radius = None if crown is None else crown[:, place]
-            peaks = edge_peaks(observed, radius, problem.grid.spacing, width)
-            self.tests[number].edge_peak = float(peaks.max())
+            self.tests[number].edge_peak = float(
+                edge_peaks(observed, radius, problem.grid.spacing, width).max()
+            )
 
     def _widen(self, number: int, errors: Mapping[str, FloatArray]) -> None:
         """Add errors of quantities over their limits, by quantity, to the bounds of a life."""
@@ -343,8 +346,9 @@ class _Group:
         if problem.fatigue:
             first, end = self.first_damage[number], float(state.passes[0])
             scalars |= {"damage_per_pass": first, "course_end": end}
-            of_end = end, float(damage_of(problem, state)[0])
-            curves["damage_course"] = course_of(test.damage, of_end, first)
+            curves["damage_course"] = course_of(
+                test.damage, (end, float(damage_of(problem, state)[0])), first
+            )
         test.outcome = LifeRun(rows, scalars, curves, problem.grid, failure)
 
     def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:

@@ -37,6 +37,7 @@ def effects_on_life(result: LifeValues) -> dict[str, SignedEffect]:
         for random_input in result.scenario.random
         if random_input.role == "scalar"
     }
-    scores = {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
-    by_input |= effects(logs, scores)
+    by_input |= effects(
+        logs, {name: normal_scores(numbers, laws.get(name)) for name, numbers in drawn.items()}
+    )
     return dict(sorted(by_input.items(), key=lambda item: -item[1].size))

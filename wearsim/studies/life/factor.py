@@ -59,8 +59,9 @@ class ExactFactor:
         from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
 
         uniforms = drawer.uniforms(realisation, 1)
-        scores = np.array([float(ndtri(uniforms[name][0, 0])) for name in self.others])
-        return float(self.slopes @ scores)
+        return float(
+            self.slopes @ np.array([float(ndtri(uniforms[name][0, 0])) for name in self.others])
+        )
 
 
 def exact_factor(scenario: Scenario) -> tuple[ExactFactor | None, str]:

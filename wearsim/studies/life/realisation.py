@@ -84,8 +84,7 @@ class LevelRunner(RealisationRunner):
 
     def log_weight(self, realisation: int) -> float:
         """Return the logarithm of the weight of a realisation; 0 without a shift."""
-        shifted = self.drawer, self.shift, realisation, self.mixture
-        return log_weight(*shifted) if self.shift else 0.0
+        return log_weight(self.drawer, self.shift, realisation, self.mixture) if self.shift else 0.0
 
     @cached_property
     def drawer(self) -> Drawer:
@@ -196,8 +195,9 @@ class LifeRunner(RealisationRunner):
         not depend on other realisations.
         """
         outcomes: dict[int, Outcome] = {}
-        ends = [stage["first"] for stage in self.settings.stages]
-        stages = np.searchsorted(ends, numbers, side="right")
+        stages = np.searchsorted(
+            [stage["first"] for stage in self.settings.stages], numbers, side="right"
+        )
         for stage in np.unique(stages).tolist():
             level = 0
             left = [

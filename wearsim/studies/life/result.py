@@ -119,8 +119,9 @@ class LifeResult(LifeValues):
                 f"the distribution of the wear factor cannot be replaced: {settings.factor} takes"
                 f" the value {atoms[0]:g} with a probability; run the study with the other one"
             )
-        changed = self.scenario.changed({settings.factor: table})
-        inputs = {item.name: item for item in changed.random}
+        inputs = {
+            item.name: item for item in self.scenario.changed({settings.factor: table}).random
+        }
         return replace(self, law=inputs[settings.factor].scalar)
 
     def with_posterior(self, file: str | Path) -> LifeResult:

@@ -174,8 +174,7 @@ class LifeValues(EnsembleResult):
         """Distribution of the wear factor in the scenario."""
         if not self.settings.factor:
             raise AttributeError("no wear factor is integrated exactly in these lives")
-        inputs = {item.name: item for item in self.scenario.random}
-        return inputs[self.settings.factor].scalar
+        return {item.name: item for item in self.scenario.random}[self.settings.factor].scalar
 
     @property
     def factor_law(self) -> Distribution:

@@ -76,8 +76,9 @@ class _Reader:
         """Check names and units of the columns."""
         for name in self.units:
             if name not in COLUMNS:
-                what = f"unknown column '{name}'{_hint(name, COLUMNS)}"
-                self.add(line, what, None, ", ".join(COLUMNS))
+                self.add(
+                    line, f"unknown column '{name}'{_hint(name, COLUMNS)}", None, ", ".join(COLUMNS)
+                )
         if "state" not in self.units:
             self.add(line, "column 'state' is missing", None, " or ".join(_STATES))
         if not {"life", "low"} & set(self.units):

@@ -86,11 +86,10 @@ def _check_spring(setup: Setup) -> None:
         return
     half = setup.half_width(load, full_slip=False)
     if half**2 / (2.0 * scenario.axial_gap.radius_at(half)) * stiffness / load > UNLOADED:
-        got = in_engineers_unit(stiffness, "N/m")
         raise mistake_in(
             scenario.file,
             f"unloads the roller, whose load cannot be followed by contact.model = '{model}'",
-            got,
+            in_engineers_unit(stiffness, "N/m"),
             "contact.model = 'slender', a softer spring or a shorter test",
             table="load",
             key="stiffness",
@@ -358,7 +357,6 @@ def build_problem(
     )
     at = kinematics.track.angles
     unworn = surfaces(scenario, rollers, values.pop("offset"), grid, at)
-    tolerance = np.clip(ITERATION_FRACTION * scenario.evolution.tolerance, *ITERATION_RANGE)
     return WearProblem(
         grid=grid,
         model=model,
@@ -378,7 +376,9 @@ def build_problem(
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
         slip_profile=unworn.slip_profile,
-        iteration_tolerance=float(tolerance),
+        iteration_tolerance=float(
+            np.clip(ITERATION_FRACTION * scenario.evolution.tolerance, *ITERATION_RANGE)
+        ),
     )
 
 

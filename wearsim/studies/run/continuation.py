@@ -92,8 +92,7 @@ def written_value(limit: Limit, value: float) -> str:
         return f"{value:.0f} passes"
     if limit.quantity in OF_FATIGUE:
         return f"{limit.quantity} {value:.6g}"
-    length = f"{value * 1e6:.6g} um"
-    text = length if limit.unit == "m" else in_engineers_unit(value, limit.unit, 6)
+    text = f"{value * 1e6:.6g} um" if limit.unit == "m" else in_engineers_unit(value, limit.unit, 6)
     return text if limit.quantity == "time" else f"{limit.quantity} {text}"
 
 

@@ -120,18 +120,17 @@ class Drawer:
             else [f"{item.name}@{number}" for number in range(scenario.operation.rollers)]
             for item in self.items
         }
-        correlations = [
-            (first_name, other, rank)
-            for first, second, rank in scenario.sampling.correlation
-            if first in self._names and second in self._names
-            for first_name, other in zip(self._names[first], self._names[second], strict=True)
-        ]
         self._sampler = Sampler(
             scenario.seed,
             [(name, item.dimension) for item in self.items for name in self._names[item.name]],
             plan,
             total,
-            correlations=correlations,
+            correlations=[
+                (first_name, other, rank)
+                for first, second, rank in scenario.sampling.correlation
+                if first in self._names and second in self._names
+                for first_name, other in zip(self._names[first], self._names[second], strict=True)
+            ],
             replicates=replicates,
         )
         self._total = total or math.inf

@@ -91,8 +91,9 @@ def profile_grid(start: float, stop: float, half_width: float, strips: int | Non
         Number of strips; by default sufficient to resolve the patch, at most `MOST_STRIPS`.
     """
     resolving = np.ceil(PROFILE_STRIPS_PER_HALF_WIDTH * (stop - start) / half_width)
-    chosen = strips or int(np.clip(resolving, FEWEST_PROFILE_STRIPS, MOST_STRIPS))
-    return Grid.spanning(start, stop, chosen)
+    return Grid.spanning(
+        start, stop, strips or int(np.clip(resolving, FEWEST_PROFILE_STRIPS, MOST_STRIPS))
+    )
 
 
 def wider_grid(setup: Setup, grid: Grid, load: float, shift: float = 0.0) -> Grid | None:
@@ -213,14 +214,16 @@ def strips_of_run(setup: Setup) -> Grid:
             least = max(least, STRIPS_OF_FORM)
         inside = not ends_roller(scenario, centre - fresh, centre + fresh)
         if choice.strips or not inside or least < STRIPS_AT_START:
-            strips = strips_of_roller(scenario, least, setup.greatest_load)
-            return roller_grid(scenario, choice.strips or strips)
+            return roller_grid(
+                scenario, choice.strips or strips_of_roller(scenario, least, setup.greatest_load)
+            )
     width = choice.width if choice.width is not None else 2.0 * half
     many, resolved = setup.turn.varies, 0.0
     if many:
         resolved = setup.half_width(setup.greatest_load, full_slip=False)
-        depth = scenario.limit.depth or math.inf
-        resolved = min(resolved, float(scenario.axial_gap.half_width(depth)))
+        resolved = min(
+            resolved, float(scenario.axial_gap.half_width(scenario.limit.depth or math.inf))
+        )
     if choice.width is None:  # strips grow from here
         per_half_width = strips_per_half_width(size, tolerance, resolved)
         at_start = STRIPS_OF_MANY_CONTACTS if many else STRIPS_AT_START
@@ -245,8 +248,9 @@ def shared_strips(scenario: Scenario) -> Grid:
 
     They are those with every input that is drawn for a test at its mean, wider by its scatter.
     """
-    redrawn = tuple(item for item in scenario.random if item.is_redrawn)
-    grid = strips_of_run(Setup(scenario, passes=redrawn))
+    grid = strips_of_run(
+        Setup(scenario, passes=tuple(item for item in scenario.random if item.is_redrawn))
+    )
     fixed = scenario.contact.width is not None or scenario.contact.strips is not None
     if fixed or not scenario.random or ends_roller(scenario, *grid.edges):
         return grid

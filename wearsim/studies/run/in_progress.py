@@ -239,15 +239,15 @@ class RunInProgress:
         sizes = {"depth": depth, "volume": last["worn_volume"] + rollers}
         beyond: dict[str, list[tuple[str, str]]] = {}  # names and errors by remedy
         for kind, (name, size) in enumerate(sizes.items()):
-            parts = [
-                last[f"{name}_error"],
-                state.quadrature[kind],
-                SIGMAS * np.sqrt(state.scatter[kind]),
-                np.nan_to_num(last[f"{name}_error_by_strips"]),
-                last.get(f"{name}_error_by_stations", np.zeros(1)),
-            ]
             relative, quadrature, scatter, strips, stations = (
-                float((part / np.where(size > 0.0, size, np.inf)).max()) for part in parts
+                float((part / np.where(size > 0.0, size, np.inf)).max())
+                for part in [
+                    last[f"{name}_error"],
+                    state.quadrature[kind],
+                    SIGMAS * np.sqrt(state.scatter[kind]),
+                    np.nan_to_num(last[f"{name}_error_by_strips"]),
+                    last.get(f"{name}_error_by_stations", np.zeros(1)),
+                ]
             )
             if relative <= tolerance:
                 continue

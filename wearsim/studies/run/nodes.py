@@ -43,8 +43,9 @@ def _with_values(
 
 def _copula(scenario: Scenario, items: Sequence[RandomInput]) -> GaussianCopula:
     dimensions = {item.name: item.dimension for item in items}
-    rows = [row for row in scenario.sampling.correlation if row[0] in dimensions]
-    return GaussianCopula(rows, dimensions)
+    return GaussianCopula(
+        [row for row in scenario.sampling.correlation if row[0] in dimensions], dimensions
+    )
 
 
 def redrawing(scenario: Scenario, items: Sequence[RandomInput]) -> Redraw:
@@ -88,8 +89,9 @@ class PassQuadrature:
 
     def __init__(self, problem: WearProblem, setup: Setup) -> None:
         self.problem, self.setup, items = problem, setup, setup.passes
-        names = [(item.name, item.dimension) for item in items]
-        self._sampler = Sampler(setup.scenario.seed, names, "sobol")
+        self._sampler = Sampler(
+            setup.scenario.seed, [(item.name, item.dimension) for item in items], "sobol"
+        )
         self._copula = _copula(setup.scenario, items)
         (load,) = problem.loads
         # the load is 0 in a pause

@@ -196,8 +196,9 @@ class History:
         return computed[0] if computed else {}
 
     def _observed(self, problem: WearProblem, state: WearState, step: FloatArray) -> Variables:
-        row = history_row(self._stepper, problem, state, self._threshold)
-        return _with_tests_first(row | {"step_passes": step})
+        return _with_tests_first(
+            history_row(self._stepper, problem, state, self._threshold) | {"step_passes": step}
+        )
 
     def shorten(self, count: int) -> None:
         """Keep the first rows only."""
@@ -416,8 +417,9 @@ class Recorder:
         for name, part in zip(ERRORS, by_strips, strict=True):
             by_steps = columns[f"{name}_by_steps"]
             columns[f"{name}_by_strips"] = np.broadcast_to(part[:, None], by_steps.shape).copy()
-            known = by_steps + np.nan_to_num(part)[:, None]
-            columns[name] = known + columns.get(f"{name}_by_stations", 0.0)
+            columns[name] = (
+                by_steps + np.nan_to_num(part)[:, None] + columns.get(f"{name}_by_stations", 0.0)
+            )
         of_turn = np.zeros(len(self._history))
         if "volume_error_by_stations" in columns:
             of_turn = self._of_volume(columns, "volume_error_by_stations")
@@ -431,8 +433,9 @@ class Recorder:
             error = known + by_stations + columns.get(f"{name}_error_by_steps", 0.0)
             columns[f"{name}_error"] = np.minimum(error, np.pi) if name.endswith("angle") else error
         if self._by_energy and self.observed_errors:  # the volume is proportional to the energy
-            relative = self._of_volume(columns, "volume_error")[:, None]
-            columns["dissipated_energy_error"] = columns["dissipated_energy"] * relative
+            columns["dissipated_energy_error"] = (
+                columns["dissipated_energy"] * self._of_volume(columns, "volume_error")[:, None]
+            )
         return columns
 
     def _of_volume(self, columns: Mapping[str, FloatArray], name: str) -> FloatArray:

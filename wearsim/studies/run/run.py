@@ -221,8 +221,9 @@ def _run_to_limit(run: RunInProgress) -> Result:
             except ScenarioError as error:
                 reason = "it cannot be extended: " + "; ".join(map(str, error.mistakes))
         if reason:
-            value = written_value(run.limit, last)
-            return run.end_before_limit(f"{value} at the end of the test; {reason}")
+            return run.end_before_limit(
+                f"{written_value(run.limit, last)} at the end of the test; {reason}"
+            )
         run, extensions = longer, extensions + 1
         result = run.finish()
     return result

@@ -41,8 +41,9 @@ class CylinderTurn:
     def __init__(self, scenario: Scenario) -> None:
         self.mean_radius = scenario.cylinder.radius
         self.curvatures = (1.0 / self.mean_radius + 1.0 / scenario.roller.radius,)
-        speed = scenario.operation.speed * self.mean_radius
-        self.track = OneStation(*self.curvatures, speed, self.mean_radius)
+        self.track = OneStation(
+            *self.curvatures, scenario.operation.speed * self.mean_radius, self.mean_radius
+        )
 
     def loads_and_curvatures(self, load: float) -> list[tuple[float, float]]:
         """Return the load of a roller [N] and the relative curvature [1/m], of the one station."""
@@ -182,8 +183,9 @@ class Setup:
         ScenarioError
             If the load is not defined for the whole test, or not positive.
         """
-        load = self.load_range(self.scenario.total_time)[1]
-        return load + self.range_of("normal_force_offset")[1]
+        return (
+            self.load_range(self.scenario.total_time)[1] + self.range_of("normal_force_offset")[1]
+        )
 
     def load_range(self, stop: float) -> tuple[float, float]:
         """Return the least and greatest load up to `stop` [s], before any feedback [N].

@@ -36,12 +36,11 @@ def start_extent(scenario: Scenario, offsets: Iterable[float]) -> StartExtent | 
     ends += [(profile.y, offset) for profile, offset in rollers if profile is not None]
     if not ends:
         return None
-    reliefs = (float(np.ptp(profile.height)) for profile in scenario.roller.profiles)
     return StartExtent(
         min(float(y[0]) + offset for y, offset in ends),
         max(float(y[-1]) + offset for y, offset in ends),
         sum(float(np.ptp(body.height, axis=-1).max()) for body in bodies)
-        + max(reliefs, default=0.0),
+        + max((float(np.ptp(profile.height)) for profile in scenario.roller.profiles), default=0.0),
     )
 
 
@@ -101,5 +100,4 @@ def excess_between_strips(values: FloatArray) -> float:
     strip.
     """
     *row, strip = np.unravel_index(values.argmax(), values.shape)
-    near = values[tuple(row)][max(strip - 1, 0) : strip + 2]
-    return 0.5 * float(np.ptp(near))
+    return 0.5 * float(np.ptp(values[tuple(row)][max(strip - 1, 0) : strip + 2]))

@@ -59,8 +59,9 @@ class Gamma(MaxentDistribution):
             return k * (y - np.expm1(y)), -k * np.expm1(y), -k * np.exp(y)
 
         ends = (-math.inf, math.inf)
-        pieces = [Piece(0.0, 1.0, log_density, end, lambda y: 0.5 + 0.1 * abs(y)) for end in ends]
-        return InverseTable(pieces)
+        return InverseTable(
+            [Piece(0.0, 1.0, log_density, end, lambda y: 0.5 + 0.1 * abs(y)) for end in ends]
+        )
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
@@ -183,12 +184,11 @@ def _require(condition: bool, text: str) -> None:
 def _check_sizes(low: float, high: float, mean: float | None, std: float | None) -> None:
     """Raise if a square or its inverse would overflow."""
     nearer = None if mean is None else min(mean - low, high - mean)
-    sizes = {
+    for name, size in {
         "std": std,
         "the width of the support": high - low,
         "the distance from the mean to the nearer end": nearer,
-    }
-    for name, size in sizes.items():
+    }.items():
         if size is not None and 0.0 < size < _SMALLEST:
             raise Infeasible(f"{name} {size:g} is too small to be squared; {_OTHER_UNIT}")
     for name, place in {"low": low, "high": high, "mean": mean, "std": std}.items():

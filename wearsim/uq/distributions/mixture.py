@@ -61,8 +61,9 @@ class Mixture(Distribution):
     @cached_property
     def std(self) -> float:
         """Standard deviation, exact if the components have exact ones."""
-        squares = (w * (item.std**2 + (item.mean - self.mean) ** 2) for w, item in self._pairs)
-        return math.sqrt(math.fsum(squares))
+        return math.sqrt(
+            math.fsum(w * (item.std**2 + (item.mean - self.mean) ** 2) for w, item in self._pairs)
+        )
 
     def cumulative(self, value: FloatArray) -> FloatArray:
         """Return the probability of a number that is not above each value, shape as `value`."""
@@ -82,10 +83,9 @@ class Mixture(Distribution):
             low, high = np.where(short, middle, low), np.where(short, high, middle)
         restored = np.exp(high) if self._is_logarithmic else self.mean + (self.std or 1.0) * high
         values = np.clip(restored, *self.support)
-        ends = np.where(
+        return np.where(
             below <= 0.0, self.support[0], np.where(below >= 1.0, self.support[1], values)
-        )
-        return ends.reshape(probability.shape)
+        ).reshape(probability.shape)
 
     @property
     def _pairs(self) -> list[tuple[float, Distribution]]:
@@ -107,8 +107,9 @@ class Mixture(Distribution):
 
         chance = np.zeros_like(transformed)
         for weight, score in zip(self.weights, self._scores, strict=True):
-            at = np.interp(transformed, score.logs, score.scores, left=-math.inf, right=math.inf)
-            chance += weight * ndtr(at)
+            chance += weight * ndtr(
+                np.interp(transformed, score.logs, score.scores, left=-math.inf, right=math.inf)
+            )
         return chance
 
     @cached_property

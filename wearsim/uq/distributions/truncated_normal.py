@@ -273,11 +273,12 @@ class QuadraticExponent(MaxentDistribution):
 
         stop = -0.5 * fall / bend if from_above > 0.0 else (high - low) / scale
         above = exponent(-from_above, top)
-        pieces = [
-            Piece(low, scale, exponent(fall, 0.0), stop),
-            *([Piece(high, scale, above, 0.5 * from_above / bend)] if from_above > 0.0 else []),
-        ]
-        self._table = table = InverseTable(pieces)
+        self._table = table = InverseTable(
+            [
+                Piece(low, scale, exponent(fall, 0.0), stop),
+                *([Piece(high, scale, above, 0.5 * from_above / bend)] if from_above > 0.0 else []),
+            ]
+        )
         self.mean, self.std = table.mean, table.std
         log_total = math.log(scale) + table.log_total
         self._set_exponent(low, -log_total, fall / scale, bend / scale**2)

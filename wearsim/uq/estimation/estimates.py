@@ -239,8 +239,9 @@ def _quantile(
         below = (values <= value).astype(np.float64)
         error = errors.error(below) * t_quantile(errors.degrees) / t_quantile(math.inf)
         count = probability * (1.0 - probability) / max(error, _STEP / count) ** 2
-    ranks = fractional_ranks(count, probability)
-    low, high = (distribution.at(rank / (count + 1.0)) for rank in ranks)
+    low, high = (
+        distribution.at(rank / (count + 1.0)) for rank in fractional_ranks(count, probability)
+    )
     return Interval(value, min(low, value), max(high, value))
 
 
@@ -271,9 +272,10 @@ class WeightedDistribution:
         self.ordered = values[order]
         self._middle = (np.arange(count) + 0.5) / count - 0.5
         if weights is not None:
-            middle = np.cumsum(weights[order]) - 0.5 * weights[order] - 0.5
             # negative weights must not decrease the distribution function
-            self._middle = np.maximum.accumulate(middle)
+            self._middle = np.maximum.accumulate(
+                np.cumsum(weights[order]) - 0.5 * weights[order] - 0.5
+            )
 
     def quantile(self, probability: float) -> float:
         """Return the quantile of this probability, interpolated linearly between values."""

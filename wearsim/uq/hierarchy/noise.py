@@ -179,8 +179,9 @@ def noise_models(
     exponent = 0.5 * freedom / np.maximum(1.0, least**2 / variance[kept])
     added = (exponent - 0.5 * freedom) * np.log(freedom * variance[kept])
     log_weight = models.log_weight[kept] + added
-    sizes = models.length[kept], models.white[kept]
-    return NoiseModels(*sizes, decay, gain, scale, lines, log_weight, exponent)
+    return NoiseModels(
+        models.length[kept], models.white[kept], decay, gain, scale, lines, log_weight, exponent
+    )
 
 
 def _likely(
@@ -215,10 +216,11 @@ def _likely(
         log_weight += np.log(length**2 * white * (1.0 - white))
         score = log_weight - 0.5 * freedom * np.log(variance)
         likely = (score > score.max() - _COVERED).reshape(sizes)
-        places = (np.flatnonzero(likely.any(axis=other)) for other in (1, 0))
         ends = tuple(  # type: ignore[assignment]
             (axis[max(place[0] - 1, 0)], axis[min(place[-1] + 1, len(axis) - 1)])
-            for axis, place in zip(axes, places, strict=True)
+            for axis, place in zip(
+                axes, (np.flatnonzero(likely.any(axis=other)) for other in (1, 0)), strict=True
+            )
         )
     exponent = np.full(len(length), 0.5 * freedom)
     models = NoiseModels(length, white, *filters, lines.transpose(2, 1, 0), log_weight, exponent)

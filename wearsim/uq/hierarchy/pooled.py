@@ -116,8 +116,9 @@ class Hierarchy:
             for row in range(len(self.t)):
                 m, total = self.on_grid(some, row, _MEANS_OF_MANY)
                 top = total.max(axis=1)
-                sums = np.exp(total - top[:, None]).sum(axis=1) * (m[:, 1] - m[:, 0])
-                log_likelihood[start : start + block, row] = top + np.log(sums)
+                log_likelihood[start : start + block, row] = top + np.log(
+                    np.exp(total - top[:, None]).sum(axis=1) * (m[:, 1] - m[:, 0])
+                )
         return log_likelihood
 
 

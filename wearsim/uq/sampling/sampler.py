@@ -92,8 +92,9 @@ def latin_hypercube(
 @lru_cache(maxsize=64)
 def _strata(seed: int, total: int, name: str, component: int) -> IntArray:
     """Return a random order of the strata; sorting makes it independent of numpy's version."""
-    words = Stream(seed, name, "plan").words(0, total, block=component)
-    order = np.argsort(words, kind="stable").astype(np.int64)
+    order = np.argsort(
+        Stream(seed, name, "plan").words(0, total, block=component), kind="stable"
+    ).astype(np.int64)
     order.flags.writeable = False
     return order
 

@@ -60,8 +60,9 @@ class Stream:
 
     @property
     def _key(self) -> npt.NDArray[np.uint64]:
-        text = f"{self.seed}\n{self.purpose}\n{self.name}"
-        return np.frombuffer(sha256(text.encode()).digest()[:16], dtype="<u8").astype(np.uint64)
+        return np.frombuffer(
+            sha256(f"{self.seed}\n{self.purpose}\n{self.name}".encode()).digest()[:16], dtype="<u8"
+        ).astype(np.uint64)
 
     def words(
         self, first: int, count: int, realisation: int = 0, block: int = 0

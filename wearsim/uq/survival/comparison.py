@@ -201,8 +201,9 @@ def _common_grid(designs: tuple[LifeDistribution, ...], most: float) -> FloatArr
     grid = np.exp(np.linspace(math.log(min(*finite, 0.5 * last)), math.log(last), _GRID))
     steps = np.concatenate([item.steps for item in designs])
     about = (steps[:, None] * (1.0 + _ROUNDING * np.array([-1.0, 1.0]))).ravel()
-    inner = np.concatenate([grid[:-1], about[(about > 0.0) & (about < last)]])
-    return np.append(np.unique(inner), last)
+    return np.append(
+        np.unique(np.concatenate([grid[:-1], about[(about > 0.0) & (about < last)]])), last
+    )
 
 
 def _ends(design: LifeDistribution) -> list[float]:

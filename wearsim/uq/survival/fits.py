@@ -188,8 +188,9 @@ class _Sample:
         observed = self.logs[self.observed]
         weight = np.broadcast_to(np.asarray(self.weight), self.logs.shape)
         middle = float(np.average(self.logs, weights=weight))
-        start = np.array([middle, math.log(max(float(observed.std()), 1e-12))])
-        return self._maximised(start, w, [0, 1])
+        return self._maximised(
+            np.array([middle, math.log(max(float(observed.std()), 1e-12))]), w, [0, 1]
+        )
 
     def _maximised(self, at: FloatArray, w: float, free: list[int]) -> tuple[FloatArray, float]:
         """Maximise the log-likelihood over some of its arguments by Newton's method."""

@@ -170,8 +170,9 @@ def _bands(designs: Sequence[FactorMixture], levels: TwoLevels, fleet: Fleet) ->
         for design, lives in enumerate(designs):
             functions = LifeFunctions(lives, t, _NODES)
             passed = functions.hazard(m + np.log(grid))
-            whole = functions.hazard(m + np.log(ages[fleet.design == design]))
-            total += np.minimum(passed[:, None], whole).sum(axis=1)
+            total += np.minimum(
+                passed[:, None], functions.hazard(m + np.log(ages[fleet.design == design]))
+            ).sum(axis=1)
     bands = int(np.clip(total[-1] // _PER_BAND, 1, _MOST_BANDS))
     inner = np.interp(np.arange(1, bands) * total[-1] / bands, total, grid)
     return np.unique(np.concatenate([[0.0], inner, grid[-1:]]))

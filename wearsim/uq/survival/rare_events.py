@@ -135,8 +135,9 @@ def design_point(scores: FloatArray, response: FloatArray) -> FloatArray:
     ndarray, shape (dimension,)
         At most 6.5 from the origin; 0 without an effect.
     """
-    design = np.column_stack([np.ones(len(scores)), scores])
-    constant, *slopes = np.linalg.lstsq(design, response, rcond=None)[0]
+    constant, *slopes = np.linalg.lstsq(
+        np.column_stack([np.ones(len(scores)), scores]), response, rcond=None
+    )[0]
     slope = np.array(slopes)
     square = float(slope @ slope)
     if constant <= 0.0 or square <= (_NO_SLOPE * constant) ** 2:
@@ -240,8 +241,7 @@ def subset_simulation(
     while True:
         trial = random.standard_normal((stage.count, dimension))
         if stage.parents is not None:
-            kept = math.sqrt(1.0 - stage.scale**2) * scores[stage.parents]
-            trial = kept + stage.scale * trial
+            trial = math.sqrt(1.0 - stage.scale**2) * scores[stage.parents] + stage.scale * trial
         scores = np.concatenate([scores, trial])
         try:
             stage = stages.send(response(trial))

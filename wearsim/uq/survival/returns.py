@@ -143,8 +143,9 @@ class LifeFunctions:
 def _log_mean(log: FloatArray) -> FloatArray:
     """Return the logarithm of the mean over the second axis, at least -1e9."""
     top = np.maximum(log.max(axis=1), -1e9)
-    mean = top + np.log(np.exp(log - top[:, None]).mean(axis=1) + 1e-300)
-    return np.asarray(np.maximum(mean, -1e9))
+    return np.asarray(
+        np.maximum(top + np.log(np.exp(log - top[:, None]).mean(axis=1) + 1e-300), -1e9)
+    )
 
 
 def _log_between(functions: LifeFunctions, first: FloatArray, last: FloatArray) -> FloatArray:
@@ -231,8 +232,9 @@ def update(
     posterior = np.exp(chances - chances.max())
     m_grid = _covering(moved.ravel(), posterior.ravel(), _MEANS)
     total = np.bincount(owner, posterior.sum(axis=1))
-    t_grid = _scatter_grid(scatters, total / total.sum())
-    after, factors = _refined(designs, levels, fleet, widened, m_grid, t_grid)
+    after, factors = _refined(
+        designs, levels, fleet, widened, m_grid, _scatter_grid(scatters, total / total.sum())
+    )
     # the part of the life factor itself
     part = (spread / widened) ** 2 if widened else 0.0
     return FieldPosterior(_before(levels, spread), after, part * factors[0], factors[1])
@@ -254,8 +256,7 @@ def _scatters_of(levels: TwoLevels) -> tuple[FloatArray, IntArray]:
             starts.append(place)
     group = np.searchsorted(starts, np.arange(len(scatters)), side="right") - 1
     weight = np.bincount(owner, levels.weight)
-    middle = np.bincount(group, weight * scatters) / np.bincount(group, weight)
-    return middle, group[owner]
+    return np.bincount(group, weight * scatters) / np.bincount(group, weight), group[owner]
 
 
 def _total(
@@ -266,8 +267,9 @@ def _total(
     for number, lives in enumerate(designs):
         chosen = fleet.design == number
         if chosen.any():
-            units = Fleet(fleet.low[chosen], fleet.high[chosen], fleet.design[chosen])
-            total += LifeFunctions(lives, t, nodes).likelihood(units, m)
+            total += LifeFunctions(lives, t, nodes).likelihood(
+                Fleet(fleet.low[chosen], fleet.high[chosen], fleet.design[chosen]), m
+            )
     return total
 
 

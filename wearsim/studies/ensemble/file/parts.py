@@ -135,8 +135,9 @@ def read_parts(path: Path, data: EnsembleData) -> list[Part]:
     numbers = [number for number in part_numbers(path) if number > data.merged]
     for expected, number in enumerate(numbers, data.merged + 1):
         if number != expected:
-            missing = _without(path, part_path(path, expected))
-            raise ResultsFileError(f"{missing}; move it there, or {_REMOVE}")
+            raise ResultsFileError(
+                f"{_without(path, part_path(path, expected))}; move it there, or {_REMOVE}"
+            )
     return [_read_part(part_path(path, number), path, data) for number in numbers]
 
 

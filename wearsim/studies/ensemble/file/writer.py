@@ -281,8 +281,9 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
     def _add(self, rows: Arrays, state: Mapping[str, Any] | None = None) -> None:
         """Write the last part with further rows and changed fields."""
         joint, changed = joined(self._rows, rows), {**self._state, **(state or {})}
-        path = part_path(self.path, self._number)
-        part = write_part(path, self.data.run_id, joint, changed, self._storage)
+        part = write_part(
+            part_path(self.path, self._number), self.data.run_id, joint, changed, self._storage
+        )
         self._stored.parts[self._closed :] = [part]
         self._status[rows[NUMBER]] = rows["status"]
         self._rows, self._state = joint, changed
@@ -306,8 +307,9 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
                 check()
             if complete is not None:
                 rows = StoredRows(lambda take: take(StoredFile(file)), header.schema, [])
-                merged = replace(header, variables=rows, status=self._status.copy())
-                fields, statistics = complete(merged)
+                fields, statistics = complete(
+                    replace(header, variables=rows, status=self._status.copy())
+                )
                 for name, array in statistics.items():
                     if header.schema.variables[name].kind != "statistic":
                         raise ValueError(f"{name} is not a statistic of an ensemble")

@@ -108,8 +108,7 @@ def integrated_stages(result: LifeResult) -> list[dict[str, Any]]:
     event = mixture.failed(np.array([target / settings.per_unit]))[:, 0]
     means, parts = improved_shifts(scores, weights * event, shifts[1:])
     done = sum(stage["count"] for stage in stages)
-    shares = [DEFENSIVE, *((1.0 - DEFENSIVE) * part for part in parts)]
-    sizes = _parts(settings.rare - done, shares)
+    sizes = _parts(settings.rare - done, [DEFENSIVE, *((1.0 - DEFENSIVE) * part for part in parts)])
     further = _stages(settings.plain + done, sizes, names, [np.zeros(len(names)), *means])
     mixed = [(stage["count"] / sum(sizes), stage["shift"]) for stage in further]
     return [{**stage, "mixture": mixed} for stage in further]
