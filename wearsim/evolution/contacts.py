@@ -23,12 +23,10 @@ def computed_once(compute: Callable[[WearProblem], T], problem: WearProblem) -> 
 
     It is computed at the first call, and kept with the problem.
     """
-    try:
-        value: T = problem.__dict__["constants"][compute]
-    except KeyError:
-        value = compute(problem)
-        problem.__dict__.setdefault("constants", {})[compute] = value
-    return value
+    constants: dict[Callable[[WearProblem], T], T] = problem.__dict__.setdefault("constants", {})
+    if compute not in constants:
+        constants[compute] = compute(problem)
+    return constants[compute]
 
 
 def with_contacts(problem: WearProblem, chosen: IntArray) -> WearProblem:

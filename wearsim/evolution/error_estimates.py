@@ -122,11 +122,10 @@ def variation_bias(
     deviations = [item for item in deviations if np.count_nonzero(item[2])]
     if not deviations:
         return None
-    if follows_trends:
+    if follows_trends and deviations[0][0] == "normal_force_offset":
         name, rollers, deviation = deviations[0]
-        if name == "normal_force_offset":
-            deviation = np.where(smooth_loads(problem, first, passes), 0.0, deviation)
-            deviations[0] = name, rollers, deviation
+        smooth = smooth_loads(problem, first, passes)
+        deviations[0] = name, rollers, np.where(smooth, 0.0, deviation)
     averaged = problem.at_time(start, stop)
     loads, least = carried_loads(problem, end.contacts), np.full(len(first), ROUND_OFF)
     if problem.linear_wear:
@@ -157,8 +156,9 @@ def variation_bias(
                 _shifted_wear(*part, {name: change}, length)
                 for change in (-shift[:, places], shift[:, places])
             )
-            columns = zip(less, mean, more, strict=True)
-            cylinder, roller, energy = (0.5 * (low - 2.0 * mid + up) for low, mid, up in columns)
+            cylinder, roller, energy = (
+                0.5 * (low - 2.0 * mid + up) for low, mid, up in zip(less, mean, more, strict=True)
+            )
             cylinders[:, :, places] += cylinder
             all_rollers[:, :, places] += roller
             energies[places] += energy
@@ -261,9 +261,9 @@ def with_pass_errors(
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
     relative = variance / np.square(np.where(volume > 0.0, volume, np.inf))
     greatest = greatest_depth(end.depths)
-    sizes = np.array([greatest, volume, np.ones_like(volume)])
     return end.replaced(
-        quadrature=state_difference(problem, coarse, half) + problem.quadrature_error * sizes,
+        quadrature=state_difference(problem, coarse, half)
+        + problem.quadrature_error * np.array([greatest, volume, np.ones_like(volume)]),
         scatter=np.array([np.square(greatest) * relative, variance, relative]),
         half_quadrature_solution=half,
     )

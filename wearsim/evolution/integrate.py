@@ -167,11 +167,10 @@ class Evolution:
 
     def _grow(self) -> None:
         """Continue on wider strips with tests whose contacts are close to the outer strips."""
-        outgrown: set[int] = set()
-        if self._outgrown:
-            tests = enumerate(self.numbers.tolist())
-            outgrown = {place for place, number in tests if number in self._outgrown}
-            self._outgrown = set()
+        outgrown = {
+            place for place, number in enumerate(self.numbers.tolist()) if number in self._outgrown
+        }
+        self._outgrown.clear()
         grids = next_grids(self.problem, self.state, outgrown)
         if not grids:
             return
@@ -271,8 +270,9 @@ class Evolution:
         numbers, lengths = self.numbers.tolist(), []
         if not self._trials.keys() >= set(numbers):
             self._scheme = self.stepper.scheme(self.problem, self.state)
-            proposed = self.stepper.proposed(self.problem, self.state).tolist()
-            for number, length in zip(numbers, proposed, strict=True):
+            for number, length in zip(
+                numbers, self.stepper.proposed(self.problem, self.state).tolist(), strict=True
+            ):
                 self._trials.setdefault(number, self.stepper.trial(length))
         failures: dict[int, Exception] = {}
         done, count = self.state.passes.tolist(), len(numbers)
@@ -282,8 +282,9 @@ class Evolution:
         elif self.problem.pauses:
             stops = np.minimum(self.stop, next_boundaries(self.problem, self.state.passes)).tolist()
             resting = at_rest(self.problem, self.state.passes).tolist()
-        tests = zip(numbers, done, self.state.steps.tolist(), stops, resting, strict=True)
-        for place, (number, passes, steps, stop, rests) in enumerate(tests):
+        for place, (number, passes, steps, stop, rests) in enumerate(
+            zip(numbers, done, self.state.steps.tolist(), stops, resting, strict=True)
+        ):
             try:
                 if steps >= self.max_steps and not self.stepper.pass_by_pass:
                     raise StepError(

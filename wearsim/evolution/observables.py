@@ -91,8 +91,9 @@ def extremes(problem: WearProblem, state: WearState) -> dict[str, Extreme]:
 
 def depth_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the error of the greatest depth between the stations of a cam, (realisations,) [m]."""
-    depths = state.cylinder_depth[:, 0].max(axis=-1)
-    return np.nan_to_num(problem.kinematics.track.greatest(depths).error)
+    return np.nan_to_num(
+        problem.kinematics.track.greatest(state.cylinder_depth[:, 0].max(axis=-1)).error
+    )
 
 
 def volume_error_by_stations(problem: WearProblem, state: WearState) -> FloatArray:
@@ -140,8 +141,9 @@ def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
 
     It is 0 for a cylinder.
     """
-    errors = peak_to_peak(problem.kinematics.track, lift_errors(problem, state))
-    return np.asarray(errors.max(axis=0))
+    return np.asarray(
+        peak_to_peak(problem.kinematics.track, lift_errors(problem, state)).max(axis=0)
+    )
 
 
 def worn_descents(problem: WearProblem, state: WearState) -> FloatArray:
@@ -150,8 +152,9 @@ def worn_descents(problem: WearProblem, state: WearState) -> FloatArray:
     The least gaps are those between strips, where a roller that is tilted or beside its groove
     touches first.
     """
-    worn = least_gaps(problem, problem.gap(*state.depths))
-    return np.asarray(worn - least_gaps(problem, problem.nominal_gap))
+    return np.asarray(
+        least_gaps(problem, problem.gap(*state.depths)) - least_gaps(problem, problem.nominal_gap)
+    )
 
 
 def least_gaps(problem: WearProblem, gaps: FloatArray) -> FloatArray:

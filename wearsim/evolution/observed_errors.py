@@ -149,8 +149,9 @@ def observed_errors(
         widths.append(fine_values.shape[1])
     greatest = _greatest_of_last(common, np.concatenate(differences, axis=1))
     part = np.column_stack([np.interp(at_passes, at_common, column) for column in greatest.T])
-    columns = np.split(COVER * part, np.cumsum(widths)[:-1], axis=1)
-    estimates = dict(zip(observed, columns, strict=True))
+    estimates = dict(
+        zip(observed, np.split(COVER * part, np.cumsum(widths)[:-1], axis=1), strict=True)
+    )
     worn = np.array([np.maximum(sizes[0], sizes[1]), sizes[2]])
     least = by_strips[:2] / np.where(worn > 0.0, worn, np.inf)
     errors, has_edges = {}, observed.keys() >= {"width", *OF_EDGES}

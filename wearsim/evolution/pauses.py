@@ -62,12 +62,10 @@ def next_boundaries(problem: WearProblem, passes: FloatArray) -> FloatArray:
     ndarray, shape (realisations,)
         Roller passes; infinite where no pause follows.
     """
-    boundaries = []
-    for pauses, done in zip(_long(problem), passes.tolist(), strict=True):
-        starts_and_ends = np.append(pauses, np.inf)
-        following = np.searchsorted(starts_and_ends, done + _margin(done), side="right")
-        boundaries.append(starts_and_ends[following])
-    return np.array(boundaries)
+    tests = zip(_long(problem), passes.tolist(), strict=True)
+    return np.array(
+        [pauses[pauses > done + _margin(done)].min(initial=np.inf) for pauses, done in tests]
+    )
 
 
 def _long(problem: WearProblem) -> list[FloatArray]:
@@ -115,8 +113,9 @@ def step_or_rest(
     for chosen, action in ((resting, partial(rest, stop=np.inf)), (~resting, step)):
         places: IntArray = np.flatnonzero(chosen)
         if places.size:
-            end = action(problem.at(places), state.at(places), passes[places])
-            state = state.with_others(places, end)
+            state = state.with_others(
+                places, action(problem.at(places), state.at(places), passes[places])
+            )
     return state
 
 
@@ -147,7 +146,6 @@ def opened(
         return contacts, loads
     numbers: IntArray = np.flatnonzero(np.broadcast_to(unloaded, loads.shape))
     affected = contacts.at(numbers)
-    columns = {n: column for n, column in vars(affected).items() if n != "y" and column is not None}
-    zeros = {n: np.zeros_like(column) for n, column in columns.items()}
+    zeros = {n: np.zeros_like(a) for n, a in vars(affected).items() if n != "y" and a is not None}
     empty = ContactBatchSolution(affected.y, **zeros)
     return contacts.with_others(numbers, empty), np.where(unloaded, 0.0, loads)

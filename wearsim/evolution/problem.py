@@ -490,8 +490,7 @@ class WearProblem:
     def power_weights(self) -> FloatArray:
         """Part of the power of each contact in that of all physical rollers, shape (S * C,)."""
         of_stations = self.mean_over_turn(np.eye(self.shape[0]))[0]
-        of_rollers = self.cylinder_share * self.kinematics.physical_rollers
-        return np.outer(of_stations, of_rollers).ravel()
+        return np.outer(of_stations, self.cylinder_share * self.kinematics.physical_rollers).ravel()
 
     @cached_property
     def mean_over_turn(self) -> Callable[[FloatArray], FloatArray]:

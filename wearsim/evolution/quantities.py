@@ -295,16 +295,14 @@ class CamStations:
         """Return values of the stations, first axis, interpolated to an angle [rad]."""
         if self.panels is None:
             return np.asarray(values[np.abs(self.angle.ravel() - angle).argmin()])
-        at = self.panels.values_at_angles(values[self.places], np.array([angle]))
-        return np.asarray(at[0])
+        return np.asarray(self.panels.values_at_angles(values[self.places], np.array([angle]))[0])
 
     def at(self, realisations: IntArray) -> CamStations:
         """Return the stations of some realisations, by number and in that order."""
-        arrays = {item.name: getattr(self, item.name) for item in fields(self)}
         drawn: dict[str, Any] = {
-            name: array[:, :, realisations]
-            for name, array in arrays.items()
-            if isinstance(array, np.ndarray) and array.shape[2:] > (1,)
+            item.name: array[:, :, realisations]
+            for item in fields(self)
+            if isinstance(array := getattr(self, item.name), np.ndarray) and array.shape[2:] > (1,)
         }
         return replace(self, **drawn)
 
@@ -341,9 +339,9 @@ class CamStations:
 
     def matches(self, other: Track) -> bool:
         """Return whether tests can be joined: at equal, fixed stations without inertia."""
-        fixed = self.relocated is None and other.relocated is None
         return (
-            fixed
+            self.relocated is None
+            and other.relocated is None
             and self.inertia.size == other.inertia.size == 0
             and all(
                 np.array_equal(getattr(first, name), getattr(second, name, ()))

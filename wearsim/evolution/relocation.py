@@ -82,8 +82,9 @@ def _changes(problem: WearProblem, state: WearState, cam: CamStations) -> FloatA
 
     They are the mean over the rollers, shape (stations, 1).
     """
-    recovered = recovery_at(problem, state)[1]
-    feedback = problem.feedback(displacement_at(problem, [state.depths], recovered))
+    feedback = problem.feedback(
+        displacement_at(problem, [state.depths], recovery_at(problem, state)[1])
+    )
     return -cam.at_unworn(problem.per_roller(feedback).mean(axis=1))
 
 

@@ -236,10 +236,6 @@ class WearState:
             len(self.contacts),
         )
         rows, _, realisations = sums.shape
-        of_edges = (
-            np.empty((contacts, 0)) if field is None else field.reshape(contacts, -1)
-            for field in (self.separation, self.part, self.whole_steps)
-        )
         return Past(
             np.asarray(self.past_wear),
             sums[..., None],
@@ -247,7 +243,10 @@ class WearState:
             if feedback is None
             else feedback.reshape(rows, -1, realisations, 1),
             np.asarray(self.past_spans),
-            *of_edges,
+            *(
+                np.empty((contacts, 0)) if field is None else field.reshape(contacts, -1)
+                for field in (self.separation, self.part, self.whole_steps)
+            ),
         )
 
     @property
@@ -275,21 +274,21 @@ class WearState:
         past : Past
             Of the fields in `others`.
         """
-        stations = self.cylinder_depth.shape[0]
-        cylinder, roller = depths[:stations, None], depths[None, stations:]
+        cylinder, roller = separated(depths, len(self.cylinder_depth))
         state = self.replaced(cylinder_depth=cylinder, roller_depth=roller, **others)
         state.__dict__.update(stacked=depths, past=past)
         return state
 
     def with_added(self, depths: Depths) -> WearState:
         """Return the state with depths added to those of cylinder and rollers [m]."""
-        cylinder, roller = self.cylinder_depth + depths[0], self.roller_depth + depths[1]
-        return self.replaced(cylinder_depth=cylinder, roller_depth=roller)
+        return self.replaced(
+            cylinder_depth=self.cylinder_depth + depths[0],
+            roller_depth=self.roller_depth + depths[1],
+        )
 
     def contacts_of(self, realisations: IntArray) -> IntArray:
         """Return the numbers of the contacts of some realisations, in the state's order."""
-        every = np.arange(len(self.contacts)).reshape(-1, len(self.passes))
-        return every[:, realisations].ravel()
+        return np.arange(len(self.contacts)).reshape(-1, len(self.passes))[:, realisations].ravel()
 
     def at(self, realisations: IntArray) -> WearState:
         """Return the state of some realisations, by number and in that order."""
@@ -304,8 +303,7 @@ class WearState:
 
     def with_others(self, places: IntArray, others: WearState) -> WearState:
         """Return the state with that of some realisations, by increasing place, replaced."""
-        realisations = self.passes.size
-        if places.size == realisations:
+        if places.size == self.passes.size:
             return others
         arrays = {n: getattr(self, n).copy() for n in _AXES if getattr(self, n) is not None}
         for name, values in arrays.items():
@@ -333,9 +331,8 @@ class WearState:
         arrays: dict[str, npt.NDArray[np.generic]] = {
             name: getattr(self, name) for name in _AXES if getattr(self, name) is not None
         }
-        for name, column in vars(self.contacts).items():
-            if column is not None:
-                arrays[_CONTACT + name] = np.array(column)
+        columns = vars(self.contacts).items()
+        arrays |= {_CONTACT + n: np.array(column) for n, column in columns if column is not None}
         arrays[_CONTACT + "y"] = np.tile(self.contacts.y, (len(self.contacts), 1))
         for name, state in self.auxiliary.items():
             arrays.update({f"{name}_{key}": a for key, a in state.to_arrays().items()})
@@ -346,8 +343,7 @@ class WearState:
         """Return the state stored in the result of `to_arrays`."""
         values: dict[str, Any] = {n: np.array(a) for n, a in arrays.items() if n in _AXES}
         for name in _AUXILIARY:
-            part = _with_prefix(arrays, f"{name}_")
-            if part:
+            if part := _with_prefix(arrays, f"{name}_"):
                 values[name] = cls.from_arrays(part)
         columns = _with_prefix(arrays, _CONTACT)
         values["contacts"] = ContactBatchSolution(**columns | {"y": columns["y"][0]})

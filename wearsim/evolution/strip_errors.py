@@ -154,8 +154,9 @@ def add_steps(courses: Sequence[Course], steps: Sequence[Worn], between: bool = 
                 courses[number].passes.append(done)
                 courses[number].sizes.append(next(sizes))
         stations = problem.shape[0]
-        cylinder = problem.kinematics.track.at_unworn(last[:stations])
-        profiles = np.concatenate([cylinder, last[stations:]])
+        profiles = np.concatenate(
+            [problem.kinematics.track.at_unworn(last[:stations]), last[stations:]]
+        )
         for place, number in enumerate(numbers):
             courses[number].profiles, courses[number].grid = profiles[:, place], problem.grid
 
@@ -224,10 +225,9 @@ def coarse_courses(
     except Exception:  # a test fails for its own reasons, and the others are repeated without it
         if len(needed) == 1:
             return [None]
-        single_tests = (np.array([number]) for number in range(len(needed)))
         singly = (
             coarse_courses(problem.at(n), stepper, stop, needed[n], max_steps, observe)
-            for n in single_tests
+            for n in np.arange(len(needed))[:, None]
         )
         return [course for part in singly for course in part]
     return [None if n in tests.failures else course for n, course in enumerate(courses)]

@@ -218,8 +218,9 @@ def averaged(values: FloatArray, old: Grid, new: Grid) -> FloatArray:
     """
     weights = shares(old, new) * (old.spacing / new.spacing)
     # row by row, so that the round-off does not depend on the number of rows
-    averages = [(weights * row).sum(axis=-1) for row in values.reshape(-1, old.strips)]
-    return np.array(averages).reshape(*values.shape[:-1], new.strips)
+    return np.array(
+        [(weights * row).sum(axis=-1) for row in values.reshape(-1, old.strips)]
+    ).reshape(*values.shape[:-1], new.strips)
 
 
 def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearState:
@@ -234,13 +235,12 @@ def state_on_grid(problem: WearProblem, state: WearState, old: Grid) -> WearStat
         Strips of the state.
     """
     new, contacts = problem.grid, state.contacts
-    names = (
-        *("past_wear", "stepping_error", "wear_exponents", "cylinder_depth", "roller_depth"),
-        "damage",
-    )
     arrays = {
         name: averaged(values, old, new)
-        for name in names
+        for name in (
+            *("past_wear", "stepping_error", "wear_exponents", "cylinder_depth", "roller_depth"),
+            "damage",
+        )
         if (values := getattr(state, name)) is not None
     }
     if "wear_exponents" in arrays:  # zero on strips without wear so far

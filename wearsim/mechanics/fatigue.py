@@ -137,7 +137,6 @@ def greatest_von_mises(poisson_ratio: float) -> tuple[float, float]:
     root = np.sqrt(1.0 + depth**2)
     along, normal = 2.0 * depth - (1.0 + 2.0 * depth**2) / root, -1.0 / root
     across = poisson_ratio * (along + normal)
-    differences = (along - normal) ** 2 + (normal - across) ** 2 + (across - along) ** 2
-    stress = np.sqrt(0.5 * differences)
+    stress = np.sqrt(0.5 * ((along - normal) ** 2 + (normal - across) ** 2 + (across - along) ** 2))
     place = int(stress.argmax())
     return float(stress[place]), float(depth[place])

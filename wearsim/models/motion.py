@@ -253,8 +253,7 @@ class Table(MotionLaw):
         if abs(angles[0]) > 1e-9 or abs(angles[-1] - angle) > 1e-9:
             got = f"{math.degrees(angles[0]):.6g} to {math.degrees(angles[-1]):.6g} deg"
             expected = f"0 to {math.degrees(angle):.6g} deg, the segment's angle"
-            what = "the angles do not span the segment"
-            raise mistake_in(options.file.path, what, got, expected)
+            raise mistake_in(options.file.path, "the angles do not span the segment", got, expected)
         angles[-1] = angle
         refuse_kinks(options.file.path, angles, lift)
         self._spline = LiftSpline(angles, lift - lift[0])
@@ -379,13 +378,12 @@ def refuse_kinks(
 def _spec(
     name: str, factory: Callable[..., MotionLaw], summary: str, options: type[Options] = Options
 ) -> MotionLawSpec:
-    rise = {"dwell": "none", "table": "own"}.get(name, "required")
     return MotionLawSpec(
         name=name,
         factory=factory,
         options=options,
         summary=summary,
-        rise=rise,  # type: ignore[arg-type]
+        rise={"dwell": "none", "table": "own"}.get(name, "required"),  # type: ignore[arg-type]
         references=_NORTON,
         protocol=2,
     )

@@ -78,6 +78,20 @@ class Checked:
         state = {**inputs, what.split(maxsplit=1)[0]: value}
         raise SolverError(f"{self._subject} returned {text}; {self._remedy}", state)
 
+    def _called(
+        self,
+        what: str,
+        method: Callable[..., T],
+        shape: tuple[int, ...] = (),
+        unit: str = "",
+        *,
+        signed: bool = False,
+        **inputs: Any,
+    ) -> T:
+        """Return what a method of the plugin returns for the inputs; checks as of `_checked`."""
+        value = method(*inputs.values())  # a plugin may have other names of its parameters
+        return self._checked(what, value, shape, unit, signed=signed, **inputs)
+
     def _texts(self, what: str, expected: str) -> tuple[str, ...]:
         """Return texts of the plugin after checking them."""
         texts: Any = getattr(self._plugin, what)

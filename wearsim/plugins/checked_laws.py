@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -28,15 +27,16 @@ class CheckedWearLaw(Checked, WearLaw):
         self, body: Body, solution: ContactSolution, rolling_speed: float
     ) -> FloatArray:
         """Return the depth worn off `body` in one pass, shape (strips,) [m]."""
-        depth: FloatArray = self._plugin.depth_per_pass(body, solution, rolling_speed)
-        contact: dict[str, Any] = {
-            "half_length": solution.half_length,
-            "line_load": solution.line_load,
-            "dissipation": solution.dissipation,
-            "rolling_speed": rolling_speed,
-        }
-        what, shape = f"depth_per_pass of the {body}", np.shape(solution.dissipation)
-        return self._checked(what, depth, shape, "m", **contact)
+        return self._checked(
+            f"depth_per_pass of the {body}",
+            self._plugin.depth_per_pass(body, solution, rolling_speed),
+            np.shape(solution.dissipation),
+            "m",
+            half_length=solution.half_length,
+            line_load=solution.line_load,
+            dissipation=solution.dissipation,
+            rolling_speed=rolling_speed,
+        )
 
     def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float | None:
         """Return depth per pass over dissipation [m/(W/m)], or None."""
@@ -54,8 +54,9 @@ class CheckedFatigueLaw(Checked, FatigueLaw):
 
     def damage_per_pass(self, pressure: FloatArray) -> FloatArray:
         """Return the damage that an overrolling adds, shape as `pressure`."""
-        damage: FloatArray = self._plugin.damage_per_pass(pressure)
-        return self._checked("damage_per_pass", damage, np.shape(pressure), pressure=pressure)
+        return self._called(
+            "damage_per_pass", self._plugin.damage_per_pass, np.shape(pressure), pressure=pressure
+        )
 
 
 class CheckedMotionLaw(Checked, MotionLaw):
@@ -82,8 +83,7 @@ class CheckedMotionLaw(Checked, MotionLaw):
 
     def lift(self, angle: FloatArray) -> FloatArray:
         """Return lift and derivatives, shape (3, points)."""
-        lift: FloatArray = self._plugin.lift(angle)
-        return self._checked("lift", lift, (3, len(angle)), signed=True, angle=angle)
+        return self._called("lift", self._plugin.lift, (3, len(angle)), signed=True, angle=angle)
 
 
 class CheckedAxialProfile(Checked, AxialProfile):
@@ -100,4 +100,4 @@ class CheckedAxialProfile(Checked, AxialProfile):
 
     def drop(self, s: FloatArray) -> FloatArray:
         """Return the distance of the surface below its highest line, shape as `s` [m]."""
-        return self._checked("drop", self._plugin.drop(s), np.shape(s), signed=True, s=s)
+        return self._called("drop", self._plugin.drop, np.shape(s), signed=True, s=s)

@@ -43,8 +43,7 @@ class CheckedLoad(_CheckedPairs, Load):
 
     def force(self, time: FloatArray) -> FloatArray:
         """Return the load at each `time` [s], shape as `time` [N]."""
-        force: FloatArray = self._plugin.force(time)
-        return self._checked("force", force, np.shape(time), signed=True, time=time)
+        return self._called("force", self._plugin.force, np.shape(time), signed=True, time=time)
 
     def mean(self, start: float, stop: float) -> float:
         """Return the mean of the load between two times [s] [N]."""
@@ -81,18 +80,15 @@ class CheckedLoadTerm(_CheckedPairs, LoadTerm):
 
     def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the state after `duration` [s] at constant `power` [W]."""
-        return self._of_rollers("advance", state, power, duration)
+        inputs: dict[str, Any] = {"state": state, "power": power, "duration": duration}
+        return self._called("advance", self._plugin.advance, np.shape(state), signed=True, **inputs)
 
     def mean_force(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the mean of the term over `duration` [s], shape as `state` [N]."""
-        return self._of_rollers("mean_force", state, power, duration)
-
-    def _of_rollers(
-        self, what: str, state: FloatArray, power: FloatArray, duration: float
-    ) -> FloatArray:
-        values: FloatArray = getattr(self._plugin, what)(state, power, duration)
         inputs: dict[str, Any] = {"state": state, "power": power, "duration": duration}
-        return self._checked(what, values, np.shape(state), signed=True, **inputs)
+        return self._called(
+            "mean_force", self._plugin.mean_force, np.shape(state), signed=True, **inputs
+        )
 
     def lag(self) -> tuple[float, float] | None:
         """Return gain [N/W] and time constant [s] of a first-order lag, else None."""

@@ -104,8 +104,7 @@ class CheckedJointDistribution(Checked, JointDistribution):
     def values(self, uniform: FloatArray) -> FloatArray:
         """Return the components, shape (draws, components), from uniforms (draws, dimension)."""
         shape = len(uniform), len(self.components)
-        values: FloatArray = self._plugin.values(uniform)
-        return self._checked("values", values, shape, signed=True, uniform=uniform)
+        return self._called("values", self._plugin.values, shape, signed=True, uniform=uniform)
 
     @property
     def mean(self) -> tuple[float, ...]:
@@ -138,8 +137,9 @@ class CheckedFrictionField(_CheckedRandomInput, FrictionField):
 
     def values(self, x: FloatArray, y: FloatArray, uniforms: Uniforms) -> FloatArray:
         """Return one realisation of the friction at given points, shape (points, strips)."""
-        values: FloatArray = self._plugin.values(x, y, uniforms)
-        return self._checked("values", values, np.shape(x), signed=True, x=x, y=y)
+        return self._checked(
+            "values", self._plugin.values(x, y, uniforms), np.shape(x), signed=True, x=x, y=y
+        )
 
     def unresolved(self, along: float, across: float) -> str | None:
         """Return why a grid of these spacings [m] does not resolve the field, or None."""
@@ -162,8 +162,9 @@ class CheckedProcess(_CheckedRandomInput, Process):
 
     def path(self, points: int, uniforms: Uniforms) -> FloatArray:
         """Return one realisation at the times 0, spacing, 2 spacing, ..., shape (points,)."""
-        path: FloatArray = self._plugin.path(points, uniforms)
-        return self._checked("path", path, (points,), signed=True, points=points)
+        return self._checked(
+            "path", self._plugin.path(points, uniforms), (points,), signed=True, points=points
+        )
 
 
 _BY_ROLE: dict[str, tuple[type[Any], type[Any]]] = {

@@ -199,10 +199,9 @@ class Registry:
             return item.spec
         known = self.names(kind)
         text = f"no {kind.kind} is named '{name}'; known: {', '.join(known) or 'none'}"
-        near = difflib.get_close_matches(name, known, n=1)
         parts = [
             text,
-            *(f"did you mean '{other}'?" for other in near),
+            *(f"did you mean '{other}'?" for other in difflib.get_close_matches(name, known, n=1)),
             *(
                 f"plugin '{broken.entry_point}' of {broken.distribution} {broken.version}"
                 f" failed to load ({broken.cause})"

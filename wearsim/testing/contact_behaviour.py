@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from functools import partial
 
 import numpy as np
 
@@ -241,10 +242,11 @@ def repeated_solves_identical(fixture: ContactFixture) -> None:
     for gap in fixture.gaps.values():  # other solves in between
         model.solve_one(gap, curvature, fixture.point())
     _require_identical(first, copy, "later calls change these fields of an earlier solution:")
-    repeated = model.solve_one(fixture.gap, curvature, point)
-    _require_identical(first, repeated, "a second solve by the same model differs in")
-    repeated = fixture.fresh().solve_one(fixture.gap, curvature, point)
-    _require_identical(first, repeated, "the solution of a new model differs in")
+    for solver, message in (
+        (model, "a second solve by the same model differs in"),
+        (fixture.fresh(), "the solution of a new model differs in"),
+    ):
+        _require_identical(first, solver.solve_one(fixture.gap, curvature, point), message)
 
 
 @BEHAVIOUR.specified_in(_SOLVE)
@@ -308,23 +310,28 @@ def _require_contact_error(case: str, solve: Callable[[], ContactSolution]) -> C
 @BEHAVIOUR.specified_in(_SOLVE)
 def invalid_input_raises_contact_error(fixture: ContactFixture) -> None:
     """A load, gap, creepage or friction without a solution raises a ContactError, never NaN."""
-    for load in (0.0, -fixture.case.normal_force, np.nan, np.inf):
-        _require_contact_error(
-            f"a load of {load:g} N",
-            lambda load=load: fixture.solve(fixture.point(normal_force=load)),  # type: ignore[misc]
-        )
-    for point in (fixture.point(Creepage(np.nan)), fixture.point(friction=np.nan)):
-        _require_contact_error(
-            f"creepage {point.creepage.longitudinal:g} and friction {point.friction:g}",
-            lambda point=point: fixture.solve(point),  # type: ignore[misc]
-        )
-    for value in (np.nan, np.inf, -np.inf):
-        for strip in (fixture.grid.strips // 2, 0):
-            gap = np.where(np.arange(fixture.grid.strips) == strip, value, fixture.gap)
-            _require_contact_error(
+    strips = np.arange(fixture.grid.strips)
+    cases = [
+        *(
+            (f"a load of {load:g} N", fixture.point(normal_force=load), fixture.gap)
+            for load in (0.0, -fixture.case.normal_force, np.nan, np.inf)
+        ),
+        *(
+            (f"creepage {at.creepage.longitudinal:g} and friction {at.friction:g}", at, fixture.gap)
+            for at in (fixture.point(Creepage(np.nan)), fixture.point(friction=np.nan))
+        ),
+        *(
+            (
                 f"a gap of {value:g} m in strip {strip}",
-                lambda gap=gap: fixture.solve(gap=gap),  # type: ignore[misc]
+                fixture.point(),
+                np.where(strips == strip, value, fixture.gap),
             )
+            for value in (np.nan, np.inf, -np.inf)
+            for strip in (len(strips) // 2, 0)
+        ),
+    ]
+    for case, point, gap in cases:
+        _require_contact_error(case, partial(fixture.solve, point, gap))
 
 
 @BEHAVIOUR.specified_in(_SOLVE)

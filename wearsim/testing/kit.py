@@ -158,14 +158,18 @@ def random_input_tests(
             ' value as marginal=("uniform", {"low": 0.08, "high": 0.12})'
         )
 
-    def build() -> RandomInputFixture:
-        configured = ConfiguredSpec(resolved, options, kind, files)
-        spec = None
-        if marginal is not None:
-            spec = ConfiguredSpec(resolve(RandomInputSpec, marginal[0]), marginal[1], kind, files)
-        return RandomInputFixture(configured, spec)
+    def configured(
+        spec: RandomInputSpec | str, options: Mapping[str, object]
+    ) -> ConfiguredSpec[RandomInputSpec]:
+        return ConfiguredSpec(resolve(RandomInputSpec, spec), options, kind, files)
 
-    return build_tests(random_inputs.BY_ROLE[resolved.role], build, without)
+    return build_tests(
+        random_inputs.BY_ROLE[resolved.role],
+        lambda: RandomInputFixture(
+            configured(resolved, options), configured(*marginal) if marginal else None
+        ),
+        without,
+    )
 
 
 def wear_law_tests(

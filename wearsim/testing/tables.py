@@ -55,10 +55,6 @@ def other_studies_are_unchanged(fixture: TableFixture) -> None:
     differ = [
         item.name
         for item in fields(plain)
-        if item.repr and _as_text(with_plugin, item) != _as_text(plain, item)
+        if item.repr and repr(getattr(with_plugin, item.name)) != repr(getattr(plain, item.name))
     ]
     require(not differ, f"{', '.join(differ)} of the scenario are others")
-
-
-def _as_text(scenario: Scenario, item: Any) -> str:
-    return repr(getattr(scenario, item.name))

@@ -228,8 +228,12 @@ class Stepper(ABC):
             excess = np.maximum(excess, damage_excess(effective, self.tolerance))
         with np.errstate(divide="ignore"):  # the error of the integral grows as the step cubed
             ratio = np.minimum(GROW, SAFETY * excess ** (-1.0 / 3.0))
-        most, least = np.maximum(tried.excess, excess), np.minimum(tried.ratio, ratio)
-        return Attempt(tuple(path[1:]), most, least, tried.warning)
+        return Attempt(
+            tuple(path[1:]),
+            np.maximum(tried.excess, excess),
+            np.minimum(tried.ratio, ratio),
+            tried.warning,
+        )
 
     def side_step(self, problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
         """Return the state `passes` passes later in one step, for a record between two steps.

@@ -119,8 +119,9 @@ def _of_varying_load(
             continue
         loads = mean + problem.kinematics.track.load_factor * offset
         loads = np.maximum(loads, _LEAST * np.abs(mean))
-        batch = contact_batch(here, here.gap(*state.depths), loads, *state.depths)
-        contacts = here.model.solve(batch, warm=state.contacts)
+        contacts = here.model.solve(
+            contact_batch(here, here.gap(*state.depths), loads, *state.depths), warm=state.contacts
+        )
         damage += weight[:, None] * damage_per_pass(here, contacts)
     return damage
 
@@ -144,8 +145,9 @@ def _load_nodes(
         but within the extremes; a load of two levels has these two.
     """
     steps = zip(problem.loads, start.tolist(), stop.tolist(), strict=True)
-    values = [(load.mean(*t), load.deviation(*t), *load.extremes(*t)) for load, *t in steps]
-    mean, deviation, low, high = np.array(values).T
+    mean, deviation, low, high = np.array(
+        [(load.mean(*t), load.deviation(*t), *load.extremes(*t)) for load, *t in steps]
+    ).T
     variance, below, above = np.square(deviation), mean - low, high - mean
     for item in problem.varying:
         if item.name == "normal_force_offset":

@@ -68,8 +68,9 @@ def without_edges(problem: WearProblem, state: WearState) -> WearState:
     fields = dict.fromkeys(FIELDS, np.full((*problem.shape, problem.grid.strips), np.nan))
     sums = state.past.sums[..., 0]
     if state.part is None:
-        bodies = np.full((len(sums), len(state.stacked), len(state.passes)), np.nan)
-        sums = np.concatenate([bodies, sums], axis=1)
+        sums = np.concatenate(
+            [np.full((len(sums), len(state.stacked), len(state.passes)), np.nan), sums], axis=1
+        )
     return state.replaced(**fields, past_sums=sums)
 
 
@@ -116,8 +117,11 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
         return state
     order = np.asarray(state.order)
     if not problem.has_crowned_gap:
-        fields, sums = dict.fromkeys(FIELDS), kernel_input(state.past.sums[:, -1:, :, 0])
-        return state.replaced(**fields, past_sums=sums, order=np.ones_like(order))
+        return state.replaced(
+            **dict.fromkeys(FIELDS),
+            past_sums=kernel_input(state.past.sums[:, -1:, :, 0]),
+            order=np.ones_like(order),
+        )
     whole, ceases = unresolved(state), _adhesion(problem, state) > CEASING_ADHESION
     if problem.has_spring and problem.shape[0] == 1:
         free = with_feedback(problem, problem.force(problem.time(state.passes)), np.zeros(()), ())
@@ -144,8 +148,9 @@ def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
 
 def _adhesion(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest part of a contact of each test that adheres, shape (realisations,)."""
-    adhesion = state.contacts.adhesion_fraction.reshape(problem.shape)
-    return np.asarray(np.maximum.reduce(adhesion, axis=(0, 1)))
+    return np.asarray(
+        np.maximum.reduce(state.contacts.adhesion_fraction.reshape(problem.shape), axis=(0, 1))
+    )
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:

@@ -154,8 +154,6 @@ class ImplicitStepper(StepDoublingStepper):
         if problem.has_spring:
             order = np.where(of_loads[1] < ratio, their_order, order)
             over, ratio = np.maximum(over, of_loads[0] * left), np.minimum(ratio, of_loads[1])
-        changed = {"order": order, "passes": passes}
-        others = {name: solution.replaced(**changed) for name, solution in end.auxiliary.items()}
         end = end.replaced(
             passes=passes,
             steps=state.steps + 1,
@@ -164,7 +162,10 @@ class ImplicitStepper(StepDoublingStepper):
             depth_error=estimates[0],
             volume_error=estimates[1],
             profile_error=estimates[2],
-            **others,
+            **{
+                name: solution.replaced(order=order, passes=passes)
+                for name, solution in end.auxiliary.items()
+            },
         )
         return Attempt((end,), over, ratio)
 
@@ -222,9 +223,16 @@ class ImplicitStepper(StepDoublingStepper):
         fixed : ndarray, shape (3, realisations)
             `irreducible` of the state.
         """
-        errors = state.volume_error, state.profile_error, fixed
-        bodies = state.stacked, problem.volume_weights
-        return parts_of_aim(self.tolerance, state.passes / stop, *cover, *errors, *bodies)
+        return parts_of_aim(
+            self.tolerance,
+            state.passes / stop,
+            *cover,
+            state.volume_error,
+            state.profile_error,
+            fixed,
+            state.stacked,
+            problem.volume_weights,
+        )
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
@@ -302,8 +310,7 @@ def implicit_step(
         # the past points may lead beyond the depth at which a spring is unloaded, or to a profile
         # on which the contact is not found; strips that are not cut are the simpler problem
         whole = state.separation is None or bool(edges.unresolved(state).all())
-        last = order[0] == 1 and whole
-        if len(order) > 1 or last or getattr(error, "cause", "") == "edge":
+        if len(order) > 1 or (order[0] == 1 and whole) or getattr(error, "cause", "") == "edge":
             raise
         start = state if whole else edges.without_edges(here, state)
         return step_by_formula(here, start, passes, conditions, np.ones_like(order))[0]

@@ -52,8 +52,7 @@ def next_steps_of_loads(
     springs = np.broadcast_to(problem.stiffness, scale.shape)
     displaced = np.divide(errors, springs, out=np.zeros_like(errors), where=springs > 0.0)
     # after the first step the differences hang on the estimated slope of the loads at its start
-    known = spans[1] > spans[0]
-    return steps, order, np.where(known, displaced.max(axis=(0, 1)), 0.0)
+    return steps, order, np.where(spans[1] > spans[0], displaced.max(axis=(0, 1)), 0.0)
 
 
 def next_steps_of_energy(
@@ -83,8 +82,7 @@ def next_steps_of_energy(
     """
     past, orders = end.past, np.asarray(end.order)
     order, about = np.empty_like(orders), (start.passes, end.passes, start.energy, end.energy)
-    steps = energy_steps(past.sums, past.spans, *about, orders, tolerance, keep, most, order)
-    return steps, order
+    return energy_steps(past.sums, past.spans, *about, orders, tolerance, keep, most, order), order
 
 
 def unloading(here: WearProblem, state: WearState, exposure: FloatArray) -> FloatArray:

@@ -106,8 +106,9 @@ def elastic_approaches(problem: WearProblem, state: WearState) -> FloatArray:
     It is the approach of the bodies from first contact of their present profiles. The processes of
     `problem` are at the values with which the contacts were solved.
     """
-    least_gap = problem.gap(*state.depths).min(axis=-1)
-    return np.asarray(problem.values_of(state.contacts, "approach") - least_gap)
+    return np.asarray(
+        problem.values_of(state.contacts, "approach") - problem.gap(*state.depths).min(axis=-1)
+    )
 
 
 def fresh_approach(problem: WearProblem, state: WearState, force: FloatArray) -> FloatArray:
@@ -139,8 +140,7 @@ def mean_force(problem: WearProblem, state: WearState, passes: FloatArray) -> Fl
     """Return the exact mean over a step of the load before feedback, shape (N,) [N]."""
     if problem.constant_load is not None:
         return problem.constant_load
-    start, stop = problem.time(state.passes), problem.time(state.passes + passes)
-    return problem.mean_force(start, stop)
+    return problem.mean_force(problem.time(state.passes), problem.time(state.passes + passes))
 
 
 def load_deviation(problem: WearProblem, start: FloatArray, stop: FloatArray) -> FloatArray:

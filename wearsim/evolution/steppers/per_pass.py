@@ -146,8 +146,9 @@ def _fresh_approaches(state: WearState, force: FloatArray, passes: WearProblem) 
     """Return the elastic approach of unworn bodies in each pass, shape (stations, passes) [m]."""
     if state.approach_factor is None:
         return np.zeros((passes.shape[0], len(force)))
-    factor = state.approach_factor[:, passes.roller, 0]
-    return np.asarray(factor * np.maximum(force.T, 0.0) ** HERTZ)
+    return np.asarray(
+        state.approach_factor[:, passes.roller, 0] * np.maximum(force.T, 0.0) ** HERTZ
+    )
 
 
 def _term_rates(problem: WearProblem) -> FloatArray:
@@ -158,8 +159,9 @@ def _term_rates(problem: WearProblem) -> FloatArray:
     kinematics = problem.kinematics
     own_pass = kinematics.physical_rollers / kinematics.multiplicity / kinematics.pass_rate
     lags = [term.lag() or (0.0, np.inf) for term in problem.terms.values()]
-    rates = [[gain, *-np.expm1(-own_pass / time_constant)] for gain, time_constant in lags]
-    return np.array(rates).reshape(len(lags), 1 + len(own_pass))
+    return np.array(
+        [[gain, *-np.expm1(-own_pass / time_constant)] for gain, time_constant in lags]
+    ).reshape(len(lags), 1 + len(own_pass))
 
 
 def _slip_base(problem: WearProblem) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -168,11 +170,10 @@ def _slip_base(problem: WearProblem) -> tuple[FloatArray, FloatArray, FloatArray
     zeros = np.zeros_like(from_apex)
     if problem.slip_profile is None:
         return zeros, np.repeat(problem.grid.y[None], len(zeros), axis=0), np.zeros(2)
-    rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
     return (
         np.array(problem.slip_profile[0, :, 0]),
         zeros if problem.tilt_shifts else from_apex,
-        rates,
+        np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius]),
     )
 
 
@@ -343,8 +344,9 @@ def _solve_pass(
     load = free - stiffness * (warm.approach - zero)
     load = load if load > 0.0 else 0.1 * most
     for _ in range(MAX_LOAD_ITERATIONS):
-        now = replace(point, normal_force=load)
-        solution = problem.model.solve_one(gap, curvature, now, None, solution)
+        solution = problem.model.solve_one(
+            gap, curvature, replace(point, normal_force=load), None, solution
+        )
         if not stiffness:
             return solution
         change = free - stiffness * (solution.approach - zero) - load

@@ -165,8 +165,7 @@ def solve_at_record(
     cold : bool
         Whether the solver starts without the contacts of the state.
     """
-    constant = on_profile and not problem.varies
-    if constant and problem.has_spring and state.past_spans is not None:
+    if on_profile and not problem.varies and problem.has_spring and state.past_spans is not None:
         # an implicit step has found contacts and loads in equilibrium
         return state.contacts, carried_loads(problem, state.contacts)
     solve = contacts_at if on_profile else partial(solve_present, cold=cold)
@@ -188,8 +187,9 @@ def solve_at_present_loads(
     loads_at = partial(with_feedback, present, force, terms=state.terms)
     if problem.varying and solve is contacts_at:
         solve = solve_present  # the contacts were solved with other values of the processes
-    fresh = fresh_approach(present, state, force)
-    return solve_loaded(present, state, loads_at, fresh, elastic, solve)
+    return solve_loaded(
+        present, state, loads_at, fresh_approach(present, state, force), elastic, solve
+    )
 
 
 def recovery_at(problem: WearProblem, state: WearState) -> tuple[FloatArray, FloatArray]:
@@ -218,8 +218,7 @@ def explicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     mean = mean_loads(here, state, passes, displacement, state.contacts)
     solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, checked_loads(state, mean))
-    begun = state.replaced(contacts=contacts)
-    ends = begun.with_added(worn_depths(here, contacts, passes))
+    ends = state.replaced(contacts=contacts).with_added(worn_depths(here, contacts, passes))
     worn = worn_state(here, ends, passes, here.values_of(contacts, "power"))
     ended, _, solves = solve_at_present_loads(problem, worn, elastic)
     solves = problem.contacts_each * (solves + (contacts is not state.contacts))
@@ -246,8 +245,9 @@ def worn_state(
     """
     terms, stop = state.terms, state.passes + passes
     if problem.terms:
-        mean = problem.mean_over_turn(problem.per_roller(power))[0]
-        terms = advanced_terms(problem, state, stop, mean)
+        terms = advanced_terms(
+            problem, state, stop, problem.mean_over_turn(problem.per_roller(power))[0]
+        )
     return state.replaced(
         passes=stop,
         terms=terms,
@@ -284,5 +284,4 @@ def wear_of_contacts(problem: WearProblem, contacts: ContactBatchSolution) -> Fl
 
 def volumes_of(problem: WearProblem, depths: FloatArray) -> FloatArray:
     """Return the volume of depths of all bodies, as `WearState.stacked`, (realisations,) [m^3]."""
-    sums = np.add.reduce(depths, axis=-1)
-    return sum_in_order(problem.volume_weights[1][:, None] * sums, axis=0)
+    return sum_in_order(problem.volume_weights[1][:, None] * np.add.reduce(depths, axis=-1), axis=0)

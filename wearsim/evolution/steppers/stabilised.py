@@ -158,17 +158,18 @@ def stabilised_step(
     contacts, first, elastic, solves = _rate(here, state, passes, before, elastic, solve)
     change = _sum((stages[0][3], first))
     for weights in stages[1:]:
-        stage = state.replaced(contacts=contacts)
-        contacts, rate, elastic, more = _rate(here, stage, passes, change, elastic)
+        contacts, rate, elastic, more = _rate(
+            here, state.replaced(contacts=contacts), passes, change, elastic
+        )
         solves += more
-        changes = change, before, rate, first
-        before, change = change, _sum(*zip(weights, changes, strict=True))
+        before, change = change, _sum(*zip(weights, (change, before, rate, first), strict=True))
     begun = state.replaced(contacts=contacts, decay=decay)
     depths = _never_negative(change[0]), _never_negative(change[1])
     worn = worn_state(here, begun.with_added(depths), passes, change[2])
     contacts, _, more = solve_at_present_loads(problem, worn, elastic)
-    done = state.solves + (solves + more) * problem.contacts_each
-    return worn.replaced(contacts=contacts, solves=done)
+    return worn.replaced(
+        contacts=contacts, solves=state.solves + (solves + more) * problem.contacts_each
+    )
 
 
 def _rate(

@@ -110,10 +110,9 @@ def integral_error(stations: Stations, values: FloatArray) -> FloatArray:
         What is integrated over the angle [rad].
     """
     error = np.zeros(values.shape[1:])
-    panels = zip(
+    for panel, number, first, unknown in zip(
         stations.panels, stations.numbers, stations.first, _with_few(stations, 2), strict=True
-    )
-    for panel, number, first, unknown in panels:
+    ):
         rows = values[first : first + number]
         part = np.abs(rows).max(axis=0) if unknown else np.zeros_like(error)
         if number > 2:

@@ -186,10 +186,9 @@ class Follower:
             "spin": side * speed / self.roller_radius - 1.0,
             "spin_per_rad": side * speed_rate / self.roller_radius,
         }
-        whole = {
-            n: a if a.shape == shape else np.broadcast_to(a, shape) for n, a in columns.items()
-        }
-        return RollerKinematics(**whole)
+        return RollerKinematics(
+            **{n: a if a.shape == shape else np.broadcast_to(a, shape) for n, a in columns.items()}
+        )
 
     def _slide(self, lift: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return g, kappa_p, alpha and g' of a translating follower."""

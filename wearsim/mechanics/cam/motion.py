@@ -101,12 +101,12 @@ class Motion:
     @cached_property
     def panels(self) -> tuple[Panel, ...]:
         """Smooth parts, in the order of the angle."""
-        panels = []
-        for number, part in enumerate(self.segments):
-            start, stop = self.starts[number : number + 2].tolist()
-            edges = [start, *(start + inner for inner in part.breaks), stop]
-            panels += [Panel(number, *pair, part.dwell) for pair in itertools.pairwise(edges)]
-        return tuple(panels)
+        spans = itertools.pairwise(self.starts.tolist())
+        return tuple(
+            Panel(number, *edges, part.dwell)
+            for number, (part, (start, stop)) in enumerate(zip(self.segments, spans, strict=True))
+            for edges in itertools.pairwise([start, *(start + at for at in part.breaks), stop])
+        )
 
     def segment_label(self, number: int) -> str:
         """Return the number and the name of a segment, "segment 2 (cycloidal)"."""
@@ -122,9 +122,8 @@ class Motion:
 
     def segment_at(self, theta: FloatArray) -> FloatArray:
         """Return the number of the segment at each angle; at a boundary the one that follows."""
-        turned = np.mod(theta, math.tau)
         # an angle written in degrees is at the boundary to a few roundings
-        places = np.searchsorted(self.starts, turned + 1e-13, side="right") - 1
+        places = np.searchsorted(self.starts, np.mod(theta, math.tau) + 1e-13, side="right") - 1
         return np.asarray(np.where(places == len(self.segments), 0, places))
 
     def lift(self, theta: FloatArray) -> FloatArray:

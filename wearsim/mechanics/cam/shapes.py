@@ -158,7 +158,7 @@ def _motion(
 ) -> Motion:
     """Return the motion over parts of a cam, each with its start and its span."""
     lifts = [_Lift(part, follower, start) for part, start, _ in pieces]
-    segments = (
+    segments = tuple(
         Segment(
             name or part.name,
             span,
@@ -167,7 +167,7 @@ def _motion(
         )
         for lift, (part, _, span) in zip(lifts, pieces, strict=True)
     )
-    return Motion(tuple(segments), lifts[0].base)
+    return Motion(segments, lifts[0].base)
 
 
 class _Lift:

@@ -123,68 +123,65 @@ def skid_arcs(
             if number > 0:
                 slip += jumps[k]
             part = slice(low, high + 1)
-            trace = _Trace(grids[k][part], Rolling(*(a[part] for a in values[k])))
-            slip, arcs = trace.follow(slip)
+            slip, arcs = _followed(grids[k][part], Rolling(*(a[part] for a in values[k])), slip)
             skids += [SkidArc(k, *arc) for arc in arcs]
         if abs(slip - before) <= 1e-9 * size:
             return sorted(skids, key=lambda arc: float(arc.theta[0]))
     raise ValueError("the roller skids on through whole turns")
 
 
-class _Trace:
-    """Slip along a part of a panel, on points of which every second one is a middle."""
+def _followed(
+    theta: FloatArray, values: Rolling, slip: float
+) -> tuple[float, list[tuple[FloatArray, ...]]]:
+    """Return the slip at the end of a part of a panel, from that at its start, and its arcs.
 
-    def __init__(self, theta: FloatArray, values: Rolling) -> None:
-        # Python floats, which are faster than arrays one at a time
-        self.theta, self.demand = theta.tolist(), values.demand().tolist()
-        self.spin, self.spin_per_rad, self.drag, self.reach = (a.tolist() for a in values)
+    Every second point is the middle of an interval.
+    """
+    # Python floats, which are faster than arrays one at a time
+    angle, demand = theta.tolist(), values.demand().tolist()
+    spin, rise, drag, reach = (column.tolist() for column in values)
+    arcs: list[list[tuple[float, float, float]]] = []
 
-    def _rate(self, place: int, sign: float, slip: float) -> float:
-        drag = math.copysign(1.0, self.spin[place] - slip) * self.drag[place]
-        return float(self.spin_per_rad[place] + drag - sign * self.reach[place])
+    def rate_from_rest(place: int) -> float:
+        braking = math.copysign(1.0, spin[place]) * drag[place]
+        return float(rise[place] + braking - math.copysign(1.0, demand[place]) * reach[place])
 
-    def follow(self, slip: float) -> tuple[float, list[tuple[FloatArray, ...]]]:
-        """Return the slip at the end, from that at the start, and the arcs between."""
-        arcs: list[list[tuple[float, float, float]]] = []
-        spin, rise, drag, reach = self.spin, self.spin_per_rad, self.drag, self.reach
-        for place in range(0, len(self.theta) - 1, 2):
-            low, high = self.theta[place], self.theta[place + 2]
-            if slip == 0.0:
-                if abs(self.demand[place + 2]) <= 1.0:
-                    continue
-                sign = math.copysign(1.0, self.demand[place + 2])
-                start = low
-                if abs(self.demand[place]) < 1.0:  # rolling ends within the interval
-                    near, far = abs(self.demand[place]), abs(self.demand[place + 2])
-                    start = low + (1.0 - near) / (far - near) * (high - low)
-                rate = self._rate(place + 2, sign, 0.0)
-                slip = 0.5 * rate * (high - start) if start > low else rate * (high - start)
-                arcs.append([(start, 0.0, 0.0 if start > low else rate), (high, slip, rate)])
+    for place in range(0, len(angle) - 1, 2):
+        low, high = angle[place], angle[place + 2]
+        if slip == 0.0:
+            if abs(demand[place + 2]) <= 1.0:
                 continue
-            sign = math.copysign(1.0, slip)
-            first, middle, last = (
-                # as of _rate, without calls: this takes most of the time of a turn
-                (rise[k] + (drag[k] if spin[k] >= slip else -drag[k]) - sign * reach[k])
-                for k in (place, place + 1, place + 2)
-            )
-            if not arcs:
-                arcs.append([(low, slip, first)])
-            after = slip + (high - low) / 6.0 * (first + 4.0 * middle + last)
-            if after * sign > 0.0:
-                slip = after
-                arcs[-1].append((high, slip, last))
-                continue
-            # the roller catches up within the interval
-            part = slip / (slip - after)
-            stop = low + part * (high - low)
-            arcs[-1].append((stop, 0.0, first + part * (last - first)))
-            slip = 0.0
-            if abs(self.demand[place]) > 1.0 >= abs(self.demand[place + 2]):
-                # rolling begins somewhere in the rest of the interval
-                arcs[-1].append((high, 0.0, 0.0))
-            elif abs(self.demand[place + 2]) > 1.0:
-                turned = math.copysign(1.0, self.demand[place + 2])
-                rate = self._rate(place + 2, turned, 0.0)
-                slip = rate * (high - stop)
-                arcs.append([(stop, 0.0, rate), (high, slip, rate)])
-        return slip, [tuple(np.array(arc).T) for arc in arcs if arc[-1][0] > arc[0][0]]
+            start = low
+            if abs(demand[place]) < 1.0:  # rolling ends within the interval
+                near, far = abs(demand[place]), abs(demand[place + 2])
+                start = low + (1.0 - near) / (far - near) * (high - low)
+            rate = rate_from_rest(place + 2)
+            slip = 0.5 * rate * (high - start) if start > low else rate * (high - start)
+            arcs.append([(start, 0.0, 0.0 if start > low else rate), (high, slip, rate)])
+            continue
+        sign = math.copysign(1.0, slip)
+        first, middle, last = (
+            # as of rate_from_rest, without calls: this takes most of the time of a turn
+            (rise[k] + (drag[k] if spin[k] >= slip else -drag[k]) - sign * reach[k])
+            for k in (place, place + 1, place + 2)
+        )
+        if not arcs:
+            arcs.append([(low, slip, first)])
+        after = slip + (high - low) / 6.0 * (first + 4.0 * middle + last)
+        if after * sign > 0.0:
+            slip = after
+            arcs[-1].append((high, slip, last))
+            continue
+        # the roller catches up within the interval
+        part = slip / (slip - after)
+        stop = low + part * (high - low)
+        arcs[-1].append((stop, 0.0, first + part * (last - first)))
+        slip = 0.0
+        if abs(demand[place]) > 1.0 >= abs(demand[place + 2]):
+            # rolling begins somewhere in the rest of the interval
+            arcs[-1].append((high, 0.0, 0.0))
+        elif abs(demand[place + 2]) > 1.0:
+            rate = rate_from_rest(place + 2)
+            slip = rate * (high - stop)
+            arcs.append([(stop, 0.0, rate), (high, slip, rate)])
+    return slip, [tuple(np.array(arc).T) for arc in arcs if arc[-1][0] > arc[0][0]]

@@ -220,19 +220,19 @@ def _fitted(
     squares = np.maximum(centred @ centred - (moment**2 / diagonal).sum(axis=1), 1e-300)
     curved = np.count_nonzero(part)
     spread = np.log(diagonal).sum(axis=1) - curved * _LN_LAMBDA
-    if noise is None:
-        score = (len(centred) - len(part) + curved) * np.log(squares) + spread
-    else:
-        score = squares / noise**2 + spread
-    best = int(score.argmin())
+    misfit = (
+        (len(centred) - len(part) + curved) * np.log(squares)
+        if noise is None
+        else squares / noise**2
+    )
+    best = int((misfit + spread).argmin())
     free = moment / diagonal[best]
     freedom = float(((1.0 - part) / diagonal[best]).sum())
     residual = centred - design @ (vectors @ free)
     deviation = float(np.sqrt(residual @ residual / max(len(centred) - freedom, 1.0)))
     factor = deviation * (tied @ (vectors / np.sqrt(diagonal[best])))
     coefficients = tied @ (vectors @ free) + middle
-    rows = _basis(knots, _around(), 2) @ factor
-    error = float(np.sqrt((rows**2).sum(axis=1).mean()))
+    error = float(np.sqrt(((_basis(knots, _around(), 2) @ factor) ** 2).sum(axis=1).mean()))
     curve = SmoothedCurve(
         knots, coefficients, deviation, angle, residual, error, tuple(dwells), factor
     )

@@ -34,8 +34,7 @@ def lobatto(number: int) -> tuple[FloatArray, FloatArray]:
     points = 0.5 - 0.5 * np.cos(np.pi * np.arange(number) / n)
     even = np.arange(2, n + 1, 2)
     factor = np.where(even == n, 1.0, 2.0) / (even**2 - 1.0)
-    angles = np.pi * np.outer(np.arange(number), even) / n
-    weights = (1.0 - np.cos(angles) @ factor) / n
+    weights = (1.0 - np.cos(np.pi * np.outer(np.arange(number), even) / n) @ factor) / n
     weights[[0, -1]] *= 0.5
     return points, weights
 
@@ -145,12 +144,12 @@ class Stations:
 
     def values_between(self, values: FloatArray, places: FloatArray) -> FloatArray:
         """Return values at positions of every panel, from 0 to 1, (points, ...)."""
-        panels = zip(self.numbers, self.first, strict=True)
-        parts = [
-            np.tensordot(interpolation(number, places), values[first : first + number], axes=1)
-            for number, first in panels
-        ]
-        return np.concatenate(parts)
+        return np.concatenate(
+            [
+                np.tensordot(interpolation(number, places), values[first : first + number], axes=1)
+                for number, first in zip(self.numbers, self.first, strict=True)
+            ]
+        )
 
 
 def moved_stations(old: Stations, new: Stations) -> tuple[FloatArray, IntArray, IntArray]:

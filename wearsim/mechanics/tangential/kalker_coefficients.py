@@ -132,10 +132,12 @@ def spline(which: int) -> Spline:
     which : int
         0 to 3 for C11, C22, C23 and C33.
     """
-    short = np.array(_SHORT.split(), dtype=np.float64).reshape(-1, 4, 3)[:, which]
-    long = np.array(_LONG.split(), dtype=np.float64).reshape(-1, 4, 3)[::-1, which]
+    short, long = (
+        np.array(table.split(), dtype=np.float64).reshape(-1, 4, 3)[:, which]
+        for table in (_SHORT, _LONG)
+    )
     ratios = [*_RATIOS, *(1.0 / ratio for ratio in _RATIOS[-2::-1])]
-    known = np.vstack([short, long])
+    known = np.vstack([short, long[::-1]])
     if which == 3:
         ratios.append(20.0)
         known = np.vstack([known, _C33_AT_20])
@@ -242,9 +244,9 @@ def creepage_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoeffic
     in nu a parabola of 1/C11, 1/C22, 1/C23 and (1 - nu) C33, which are nearly linear.
     """
     _check(ratio, poisson_ratio)
-    at = float(ratio), float(poisson_ratio)
-    c11, c22, c23, c33 = (coefficient(which, *at, spline(which)) for which in range(4))
-    return CreepageCoefficients(c11, c22, c23, c33)
+    return CreepageCoefficients(
+        *(coefficient(k, float(ratio), float(poisson_ratio), spline(k)) for k in range(4))
+    )
 
 
 def line_limit_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoefficients:

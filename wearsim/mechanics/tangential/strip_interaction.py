@@ -65,8 +65,7 @@ def strip_elasticity(contact_modulus: float, shear_modulus: float) -> StripElast
     """
     nu = min(max(1.0 - shear_modulus / contact_modulus, 0.0), 0.5)
     ratios = np.exp(np.arange(_LOWEST, _HIGHEST + _STEP, _STEP))
-    limit_x, limit_y, *_ = short_limit(float(ratios[0]), nu)
-    limits = (limit_x, limit_y)  # of C11 and C22
+    limits = short_limit(float(ratios[0]), nu)  # of C11, C22 and the others
     widening = [
         [coefficient(which, ratio, nu, spline(which)) / limits[which] for which in range(2)]
         for ratio in ratios.tolist()

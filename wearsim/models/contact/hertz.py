@@ -190,9 +190,8 @@ class HertzModel(SingleContactModel):
         self, gap: FloatArray, longitudinal_curvature: float, normal_force: float
     ) -> tuple[HertzContact, float, float, int]:
         """Return the converged patch, its centre, the fitted gap there and the iterations."""
-        y = self._grid.y
         curvature, b, centre, height, iterations, status = parabola_fit.hertz_on_profile(
-            y,
+            self._grid.y,
             gap,
             0.5 * longitudinal_curvature,
             float(normal_force),

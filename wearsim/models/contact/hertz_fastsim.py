@@ -200,8 +200,9 @@ class HertzFastsim(HertzModel):
             _column(batch.rolling_speed),
             np.zeros((0, strips)) if radius is None else _column(radius),
         )
-        bodies = self._bodies(batch)
-        first_failed = solve_contacts(bodies, self._compiled, gaps, row, inputs, patches, results)
+        first_failed = solve_contacts(
+            self._bodies(batch), self._compiled, gaps, row, inputs, patches, results
+        )
         if first_failed < contacts:
             raise self._error_of(first_failed, batch)
         return patches, results
@@ -267,8 +268,7 @@ class HertzFastsim(HertzModel):
 def _usable_loads(batch: ContactBatch) -> FloatArray:
     """Return the loads, NaN where the curvature along rolling is not positive and finite."""
     curvature = batch.longitudinal_curvature
-    usable = (curvature > 0.0) & np.isfinite(curvature)
-    return np.where(usable, batch.normal_force, math.nan)
+    return np.where((curvature > 0.0) & np.isfinite(curvature), batch.normal_force, math.nan)
 
 
 def _column(values: FloatArray) -> FloatArray:

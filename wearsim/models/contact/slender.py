@@ -133,8 +133,9 @@ class Slender(StripModel):
         dissipation, sums, _ = strip_tractions(*solved, batch, *tangential)
         if not np.isfinite(np.add.reduce(sums, axis=None)):
             number = int((~np.isfinite(sums)).nonzero()[1].min())
-            error = power_not_finite(batch.point(number), line_load=line_load[number])
-            raise naming_contact(error, number, batch)
+            raise naming_contact(
+                power_not_finite(batch.point(number), line_load=line_load[number]), number, batch
+            )
         return ContactBatchSolution.of_columns(
             {
                 "y": self._grid.y,

@@ -127,7 +127,6 @@ class StripModel(ContactModel):
         iterations: int,
     ) -> Strips:
         loaded = line_load > 0.0
-        peak = 2.0 * (line_load[loaded] / (np.pi * half_length[loaded])).max()
         return Strips(
             y=self._grid.y,
             half_length=half_length,
@@ -135,7 +134,7 @@ class StripModel(ContactModel):
             spacing=self._grid.spacing,
             longitudinal_curvature=longitudinal_curvature,
             approach=float(approach),
-            peak_pressure=float(peak),
+            peak_pressure=float(2.0 * (line_load[loaded] / (np.pi * half_length[loaded])).max()),
             iterations=iterations,
         )
 

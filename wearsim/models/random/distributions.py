@@ -99,8 +99,7 @@ class TableDistribution(Distribution):
     @cached_property
     def mean(self) -> float:
         """Exact mean."""
-        middle = 0.5 * (self._value[1:] + self._value[:-1])
-        return float(np.dot(np.diff(self._probability), middle))
+        return float(np.dot(np.diff(self._probability), 0.5 * (self._value[1:] + self._value[:-1])))
 
     @cached_property
     def std(self) -> float:

@@ -52,24 +52,22 @@ def read_levels(file: InputFile, unit: str, over: float) -> TwoLevels:
     """Return the distribution that a file holds; raise a ScenarioError for mistakes."""
     columns = {"median": unit, "scatter": "1", "weight": "1"}
     read = read_columns(file.text, file.path, columns)
-    mistakes = []
-    for name in columns:
-        wrong = np.flatnonzero(~(read[name] > 0.0))
-        if len(wrong):
-            got = f"{read[name][wrong[0]]:g} in row {wrong[0] + 1}"
-            mistakes.append(Mistake("", "", f"column '{name}' must be above 0", got))
+    mistakes = [
+        Mistake("", "", f"column '{name}' must be above 0", f"{read[name][row]:g} in row {row + 1}")
+        for name in columns
+        for row in np.flatnonzero(~(read[name] > 0.0))[:1]
+    ]
     if mistakes:
         raise ScenarioError(file.path, mistakes)
     matches = (_REMARK.fullmatch(line.strip()) for line in file.text.splitlines())
     remarks = {match["name"].strip(): match["value"].strip() for match in matches if match}
     count = remarks.get(SPECIMENS, "0")
-    contained = [key.strip() for key in remarks.get(CONTAINED, "").split(",") if key.strip()]
     levels = TwoLevels(
         np.log(read["median"] / over),
         read["scatter"],
         read["weight"],
         int(count) if count.isdecimal() else 0,
-        contained,
+        [key.strip() for key in remarks.get(CONTAINED, "").split(",") if key.strip()],
     )
     levels.quantile(np.array([0.5]))  # computes the table that copies share
     return levels

@@ -63,11 +63,13 @@ class White(FrictionField):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about the validity, for the user."""
-        grid = (
-            "white friction has no continuum limit: the dissipation depends on the grid, and"
-            " decreases as it is refined; use gaussian-field"
+        return (
+            *self.marginal.warnings,
+            (
+                "white friction has no continuum limit: the dissipation depends on the grid, and"
+                " decreases as it is refined; use gaussian-field"
+            ),
         )
-        return (*self.marginal.warnings, grid)
 
 
 class GaussianField(FrictionField):

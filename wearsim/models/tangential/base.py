@@ -230,7 +230,6 @@ def complete(
     if not math.isfinite(power):
         raise power_not_finite(point, line_load=strips.line_load)
     arm = strips.y - load_weighted_mean(strips, strips.y)
-    length = 2.0 * strips.half_length.sum()
     return ContactSolution(
         y=strips.y,
         half_length=strips.half_length,
@@ -241,7 +240,7 @@ def complete(
         spin_moment=float((tractions.moment - arm * tractions.force_x).sum()) * strips.spacing,
         approach=strips.approach,
         peak_pressure=strips.peak_pressure,
-        adhesion_fraction=float(tractions.adhesion_length.sum() / length),
+        adhesion_fraction=float(tractions.adhesion_length.sum() / (2.0 * strips.half_length.sum())),
         power=power,
         longitudinal_creepage=longitudinal,
         iterations=strips.iterations,

@@ -86,8 +86,7 @@ def _partly_adhering(
     taken_back = np.sqrt(np.maximum(0.0, -beyond))
     opening = np.where(s < t, np.sqrt(np.maximum(0.0, beyond)), 0.0)
     place = (1.0 + s) / max(t, 1e-300)
-    turning = (1.5 - place) * shape + (place - 0.5) * taken_back
-    turned = turning if u != e else np.zeros_like(s)
+    turned = (1.5 - place) * shape + (place - 0.5) * taken_back if u != e else np.zeros_like(s)
     traction = e * shape - (e - psi) * taken_back + (u - e) * turned
     return traction, ((e - psi) - (u - e) * np.where(opening > 0.0, place - 0.5, 0.0)) * opening
 

@@ -113,10 +113,11 @@ def with_balanced_creepage(
     guesses = np.zeros(len(batch)) if guess is None else guess.longitudinal_creepage
     friction = batch.friction.reshape(len(batch), -1).max(axis=1)
     full_slip = friction * half_length.max(axis=1) * batch.longitudinal_curvature
-    if batch.variation is not None:
-        variation = np.abs(batch.variation).max(axis=1)
-    else:
-        variation = np.abs(batch.spin) * np.abs(grid.y).max()
+    variation = (
+        np.abs(batch.spin) * np.abs(grid.y).max()
+        if batch.variation is None
+        else np.abs(batch.variation).max(axis=1)
+    )
     creepage = balanced_creepage(
         lambda creepage: torque_of(batch.replaced(longitudinal=creepage)),
         batch.bearing_torque,
