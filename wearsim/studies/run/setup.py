@@ -411,9 +411,8 @@ class Setup:
             longitudinal_creepage=0.0,
             iterations=0,
         )
-        of_roller = share * law.depth_per_pass("roller", sliding, speed)
-        depth = law.depth_per_pass("cylinder", sliding, speed) + of_roller
-        return float((depth / line_load).max())
+        cylinder, roller = (law.depth_per_pass(body, sliding, speed) for body in BODIES)
+        return float(((cylinder + share * roller) / line_load).max())
 
 
 def _patch(scenario: Scenario, load: float, curvature: float) -> HertzContact:
