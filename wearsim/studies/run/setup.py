@@ -411,8 +411,8 @@ class Setup:
             longitudinal_creepage=0.0,
             iterations=0,
         )
-        cylinder, roller = (law.depth_per_pass(body, sliding, speed) for body in BODIES)
-        return float(((cylinder + share * roller) / line_load).max())
+        of_cylinder, of_roller = (law.depth_per_pass(body, sliding, speed) for body in BODIES)
+        return float(((of_cylinder + share * of_roller) / line_load).max())
 
 
 def _patch(scenario: Scenario, load: float, curvature: float) -> HertzContact:
