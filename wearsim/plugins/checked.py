@@ -88,7 +88,7 @@ class Checked:
         signed: bool = False,
         **inputs: Any,
     ) -> T:
-        """Return what a method of the plugin returns for the inputs; checks as of `_checked`."""
+        """Call a method of the plugin with the inputs, and return its value after `_checked`."""
         value = method(*inputs.values())  # a plugin may have other names of its parameters
         return self._checked(what, value, shape, unit, signed=signed, **inputs)
 

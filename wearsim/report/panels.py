@@ -93,7 +93,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class _Placed(Mark):
-    """What is drawn at places on both axes."""
+    """A mark with coordinates on both axes."""
 
     x: Any
     y: Any

@@ -106,7 +106,7 @@ class StudyView(View, Generic[Shown]):
     def ending(self) -> dict[str, Any]:
         """Return file, notes and warnings for JSON."""
         return {
-            "output": self.result.path and str(self.result.path),
+            "output": None if self.result.path is None else str(self.result.path),
             "notes": list(self.notes),
             "warnings": list(self.warnings),
         }

@@ -242,7 +242,9 @@ def restarts_of(problem: WearProblem, depth: float) -> float:
 
 
 def effort_of(scenario: Scenario, forecast: WearForecast, stepper: str) -> dict[str, float]:
-    """Return what a run takes, within a factor of three: steps, contacts, time, memory and file.
+    """Return a forecast of steps, contacts, time, memory and size of the results file of a run.
+
+    The computing time is accurate to a factor of about three.
 
     Parameters
     ----------

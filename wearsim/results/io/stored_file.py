@@ -143,11 +143,12 @@ class StoredFile:
         numbers = math.prod([*lengths, *shape[len(lengths) :]])
         # a chunk is read as a whole
         least = math.prod(chunks) if chunks and numbers else 0
-        self._claim(name, max(numbers, least) * dataset.dtype.itemsize, SPARE)
+        dtype = dataset.dtype  # asks the file each time
+        self._claim(name, max(numbers, least) * dtype.itemsize, SPARE)
         if chosen:
             values = np.asarray(dataset[chosen])
         else:
-            values = np.empty(shape, dataset.dtype)
+            values = np.empty(shape, dtype)
             dataset.id.read(h5s.ALL, h5s.ALL, values)
         if chunks and numbers and not h5a.exists(dataset.id, ZEROS.encode()):
             _check_zeros(name, dataset, chosen, values)

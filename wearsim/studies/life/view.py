@@ -333,7 +333,7 @@ def _three_digits(result: LifeResult, share: float) -> str:
 
 
 def _uncertain_cells(life: UncertainLife) -> list[str]:
-    """Return the cells of a life with its credible interval, and what its uncertainty is due to."""
+    """Return a life, its credible interval and the sources of its uncertainty as cells."""
     low, predictive, plug_in, high = rounded_lives(
         life.low, life.predictive, life.plug_in, life.high
     )

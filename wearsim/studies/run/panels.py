@@ -63,7 +63,7 @@ def run_sheet(result: Result, measured: Sequence[Measured] = ()) -> Sheet:
 
 
 def track_axis(y: FloatArray, worn: FloatArray, *others: FloatArray) -> Axis:
-    """Return the axis across the track, over what is worn; parameters as of `worn_limits`."""
+    """Return the axial axis, limited to the worn part; parameters as of `worn_limits`."""
     return Axis(Y, "mm", limits=worn_limits(y, worn, *others))
 
 

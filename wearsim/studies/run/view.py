@@ -54,7 +54,7 @@ _RECORDS = {
 
 
 def excluded_effects(has_fatigue: bool) -> list[str]:
-    """Return what wear tests do not contain; fatigue unless it is computed."""
+    """Return the effects that are not modelled; fatigue is one unless it is computed."""
     effects = ["heating", "plastic flow", "load carried by a lubricant film"]
     return effects if has_fatigue else ["fatigue (pitting)", *effects]
 

@@ -179,7 +179,7 @@ def _surface_text(scenario: Scenario, data: RunData) -> str:
 
 
 def _notes(scenario: Scenario, data: RunData) -> list[str]:
-    """Return what differs between the new test and the continuation of the old one."""
+    """Return the differences between the new test and a continuation of the old one."""
     load, passes = scenario.load.built, float(data.records["record_passes"][-1])
     has_feedback = load.stiffness or getattr(load, "feedback", "none") != "none"
     notes = (
