@@ -167,10 +167,11 @@ class Evolution:
 
     def _grow(self) -> None:
         """Continue on wider strips with tests whose contacts are close to the outer strips."""
-        outgrown = {
-            place for place, number in enumerate(self.numbers.tolist()) if number in self._outgrown
-        }
-        self._outgrown.clear()
+        outgrown: set[int] = set()
+        if self._outgrown:
+            tests = enumerate(self.numbers.tolist())
+            outgrown = {place for place, number in tests if number in self._outgrown}
+            self._outgrown.clear()
         grids = next_grids(self.problem, self.state, outgrown)
         if not grids:
             return
@@ -200,8 +201,8 @@ class Evolution:
 
     def _end_finished(self) -> None:
         """Leave only the tests that have neither failed nor ended."""
-        under_way = max(self.state.passes.tolist()) < self.stop
-        if not self.numbers.size or (under_way and not (self.failures or self._ended)):
+        some_over = self.failures or self._ended or max(self.state.passes.tolist()) >= self.stop
+        if not (self.numbers.size and some_over):
             return
         tests = enumerate(zip(self.numbers.tolist(), self.state.passes.tolist(), strict=True))
         over = self.failures.keys() | self._ended
@@ -253,7 +254,10 @@ class Evolution:
                 accepted.append((places[chosen], [item.at(chosen) for item in tried.path]))
         warning = done[0][1].warning if done else None
         advance = self._continued(accepted, warning) if accepted else None
-        self.fail(failures)
+        if failures:
+            self.fail(failures)
+        else:
+            self._end_finished()
         return advance
 
     def _relocate(self) -> None:
@@ -275,7 +279,7 @@ class Evolution:
             ):
                 self._trials.setdefault(number, self.stepper.trial(length))
         failures: dict[int, Exception] = {}
-        done, count = self.state.passes.tolist(), len(numbers)
+        done, count = self.state.passes.tolist(), self.numbers.size
         stops, resting = [self.stop] * count, [False] * count
         if self.stepper.pass_by_pass:
             stops = [min(self.stop, self._next_record(passes)) for passes in done]
@@ -296,7 +300,8 @@ class Evolution:
             except SolverError as error:
                 error.state = error.state or self.state.at(np.array([place])).to_arrays()
                 failures[number] = error
-        self.fail(failures)
+        if failures:
+            self.fail(failures)
         return np.array(lengths)
 
     def _rejected(self, failed: dict[int, Exception], lengths: FloatArray) -> dict[int, Exception]:

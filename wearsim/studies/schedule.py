@@ -139,10 +139,14 @@ def due_records(
 ) -> list[Due]:
     """Return the records of a step in order; `stop` is the end of the tests [passes]."""
     return sorted(
-        (source + at_end, place, passes)
-        for source, steps in enumerate(pairwise(state.passes.tolist() for state in advance.path))
-        for place, (first, last) in enumerate(zip(*steps, strict=True))
-        for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
+        [
+            (source + at_end, place, passes)
+            for source, (start, end) in enumerate(pairwise(advance.path))
+            for place, part in enumerate(
+                zip(start.passes.tolist(), end.passes.tolist(), strict=True)
+            )
+            for passes, at_end in schedule.due_between(*part, stop, pass_by_pass)
+        ]
     )
 
 

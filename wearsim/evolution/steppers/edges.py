@@ -101,7 +101,9 @@ def beyond_edges(start: WearState, end: WearState) -> BoolArray:
 
 def unresolved(state: WearState) -> BoolArray:
     """Return which tests do not resolve edges, of a state with `FIELDS`."""
-    return np.asarray(np.isnan(np.asarray(state.part)[0, 0, :, 0]))
+    assert state.part is not None
+    whole: BoolArray = np.isnan(state.part[0, 0, :, 0])
+    return whole
 
 
 def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
@@ -115,7 +117,8 @@ def at_start_of_step(problem: WearProblem, state: WearState) -> WearState:
     """
     if state.separation is None:
         return state
-    order = np.asarray(state.order)
+    order = state.order
+    assert order is not None
     if not problem.has_crowned_gap:
         return state.replaced(
             **dict.fromkeys(FIELDS),
@@ -148,9 +151,9 @@ def have_groove(problem: WearProblem, state: WearState) -> BoolArray:
 
 def _adhesion(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the greatest part of a contact of each test that adheres, shape (realisations,)."""
-    return np.asarray(
-        np.maximum.reduce(state.contacts.adhesion_fraction.reshape(problem.shape), axis=(0, 1))
-    )
+    adhesion = state.contacts.adhesion_fraction.reshape(problem.shape)
+    greatest: FloatArray = np.maximum.reduce(adhesion, axis=(0, 1))
+    return greatest
 
 
 def _with_new_edges(problem: WearProblem, state: WearState, whole: BoolArray) -> WearState:

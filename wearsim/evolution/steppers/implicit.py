@@ -111,6 +111,9 @@ class ImplicitStepper(StepDoublingStepper):
         fixed = state.irreducible
         left = self._left(problem, state, stop, OF_STEPS, fixed)
         scale, contacts, past = (passes / stop) ** PART_EXPONENT / left, end.contacts, end.past
+        assert state.stepping_error is not None
+        assert end.wear_exponents is not None
+        assert end.order is not None
         displaced = np.zeros(step.size)
         if problem.has_spring:
             aim = SHARE * self.tolerance
@@ -129,9 +132,9 @@ class ImplicitStepper(StepDoublingStepper):
             displaced,
             state.volume_error - fixed[1],
             end.irreducible if problem.has_nodes else fixed,
-            np.asarray(state.stepping_error),
+            state.stepping_error,
             end.stacked,
-            np.asarray(end.order),
+            end.order,
             past.spans,
             past.wear,
             past.sums,
@@ -142,7 +145,7 @@ class ImplicitStepper(StepDoublingStepper):
             contacts.approach,
             contacts.line_load,
             wear_of_contacts(problem, contacts),
-            np.asarray(end.wear_exponents).reshape(contacts.line_load.shape),
+            end.wear_exponents.reshape(contacts.line_load.shape),
             problem.contact_stiffness,
             problem.grid.spacing,
             problem.volume_weights,
@@ -162,11 +165,10 @@ class ImplicitStepper(StepDoublingStepper):
             depth_error=estimates[0],
             volume_error=estimates[1],
             profile_error=estimates[2],
-            **{
-                name: solution.replaced(order=order, passes=passes)
-                for name, solution in end.auxiliary.items()
-            },
         )
+        if others := end.auxiliary:
+            changed = {"order": order, "passes": passes}
+            end = end.replaced(**{n: other.replaced(**changed) for n, other in others.items()})
         return Attempt((end,), over, ratio)
 
     def _attempt_doubled(
@@ -299,9 +301,12 @@ def implicit_step(
     if state.past_spans is None:
         state = with_rates(problem, state)
     state = edges.at_start_of_step(problem, state)
-    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+    here = problem
+    if problem.varying:
+        here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = conditions_of(here, problem, state, passes)
-    order = np.asarray(state.order)
+    order = state.order
+    assert order is not None
     if problem.constant_load is None:  # wear per load and pass is not smooth where the load jumps
         order = np.where(abrupt_loads(problem, state.passes, passes), 1, order)
     try:

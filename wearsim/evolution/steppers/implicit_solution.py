@@ -135,7 +135,8 @@ def step_by_formula(
     )
     of_step = bodies, resolved, gap, depths, past.part, of_bodies, of_contacts
     base, guess = of_bodies[3], of_bodies[4]
-    of_strips = np.asarray(state.wear_exponents).copy()
+    assert state.wear_exponents is not None
+    of_strips = state.wear_exponents.copy()
     exponents = of_strips.reshape(shape)
     loads = LoadsOfStep(problem, state, conditions, passes, feedback)
     stations, iterations = problem.shape[0], np.zeros(realisations, dtype=np.int64)

@@ -318,7 +318,10 @@ def kernel_input(array: FloatArray) -> FloatArray:
 
 def kernel_inputs(*arrays: FloatArray) -> list[FloatArray]:
     """Return arrays as of `kernel_input`."""
-    return [kernel_input(array) for array in arrays]
+    for array in arrays:
+        if not (array.flags.carray and array.dtype == np.float64):
+            return [kernel_input(array) for array in arrays]
+    return [*arrays]
 
 
 def _cache_folder() -> Path | None:

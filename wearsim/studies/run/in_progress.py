@@ -294,8 +294,8 @@ class RunInProgress:
                 self.reached = True
                 return
             self.recorder.add(advance, self.stop)
-            start, state = advance.path[0].passes.item(), advance.end
-            passes = state.passes.item()
+            before, *_, state = advance.path
+            start, passes = before.passes.item(), state.passes.item()
             if self.scenario.contact.auto is not None:
                 self._verify_model(start)
             if advance.warning is not None:

@@ -168,7 +168,10 @@ class History:
 
     def __len__(self) -> int:
         computed, waiting = self._parts
-        return len(waiting) + sum(len(columns["passes"]) for columns in computed)
+        count = len(waiting)
+        for columns in computed:
+            count += columns["passes"].shape[0]
+        return count
 
     def add(self, problem: WearProblem, state: WearState, before: WearState) -> None:
         """Add a state after a step from the state `before`, at the start of the test itself."""

@@ -1,0 +1,12 @@
+"""Calls of functions by a step, which are most of the time of a short test."""
+
+import wearsim
+from tests.benchmarks.calls import RIG, SCENARIOS, calls_per_step
+
+MOST, MOST_OWN = 315, 125  # 300 and 119; those in C depend on the versions of Python and numpy
+
+
+def test_a_step_takes_few_calls() -> None:
+    every, own = calls_per_step(lambda: wearsim.run(SCENARIOS / f"{RIG}.toml"))
+    assert every <= MOST
+    assert own <= MOST_OWN
