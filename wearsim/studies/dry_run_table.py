@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wearsim.report.text import PER_SI, lapse, limit_unit, shown
+from wearsim.report.text import PER_SI, lapse, limit_unit, shown, with_unit
 from wearsim.studies.dry_run import Data
 from wearsim.studies.fatigue.unworn import unworn_text
 from wearsim.units import in_engineers_unit
@@ -275,8 +275,7 @@ def _limit_row(item: Data, test: Data, track: _Track) -> tuple[str, str]:
     """Return the row of a limit of [limit], as forecast."""
     unit, passes = limit_unit(item["quantity"]), item["reached_at_passes"]
     size = 1.0 / PER_SI[unit]
-    ratio = f"{_rounded(item['at_end'] / size)} of {item['limit'] / size:.4g}"
-    ratio += "" if unit == "1" else f" {unit}"
+    ratio = with_unit(f"{_rounded(item['at_end'] / size)} of {item['limit'] / size:.4g}", unit)
     text = "not reached"
     if passes is not None:
         seconds = passes / test["passes"] * test["duration_s"]

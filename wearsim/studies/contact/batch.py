@@ -20,6 +20,7 @@ from wearsim.errors import (
 from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
+from wearsim.report.text import with_unit
 from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.scenario.parse.fields import is_axial
 from wearsim.studies.contact.single import study_contact
@@ -308,7 +309,7 @@ class Realisations:
     def _failure(self, number: int, error: SolverError) -> ContactError:
         """Return the error of one realisation, with its random inputs."""
         drawn = ", ".join(
-            f"{key} {values[number]:.6g}" + (f" {unit}" if unit != "1" else "")
+            f"{key} {with_unit(f'{values[number]:.6g}', unit)}"
             for (key, values), unit in zip(self.values.items(), self.units.values(), strict=True)
         )
         return ContactError(
