@@ -163,13 +163,15 @@ def with_random_inputs(schema: Schema, inputs: Sequence[Mapping[str, str]]) -> S
     return replace(schema, variables={**schema.variables, **drawn})
 
 
-def axis_lengths(arrays: Arrays, table: Mapping[str, Variable]) -> dict[str, int]:
+def axis_lengths(
+    shapes: Mapping[str, tuple[int, ...]], table: Mapping[str, Variable]
+) -> dict[str, int]:
     """Return the length of every axis.
 
     Parameters
     ----------
-    arrays : mapping of str to ndarray
-        All variables of the table, by name, or the datasets in which they are stored.
+    shapes : mapping of str to tuple of int
+        Shape of every variable of the table, by name.
     table : mapping of str to Variable
         The variables of the schema.
 
@@ -182,16 +184,16 @@ def axis_lengths(arrays: Arrays, table: Mapping[str, Variable]) -> dict[str, int
     ValueError
         If a variable is missing or unknown, or has another length along an axis than the others.
     """
-    if arrays.keys() != table.keys():
-        missing = [name for name in table if name not in arrays]
-        unknown = [name for name in arrays if name not in table]
+    if shapes.keys() != table.keys():
+        missing = [name for name in table if name not in shapes]
+        unknown = [name for name in shapes if name not in table]
         raise ValueError(f"missing variables {missing}, unknown variables {unknown}")
     lengths: dict[str, int] = {}
-    for name, array in arrays.items():
+    for name, shape in shapes.items():
         dims = table[name].dims
-        if len(array.shape) != len(dims):
-            raise ValueError(f"{name} has {len(array.shape)} axes, expected {', '.join(dims)}")
-        for dim, length in zip(dims, array.shape, strict=True):
+        if len(shape) != len(dims):
+            raise ValueError(f"{name} has {len(shape)} axes, expected {', '.join(dims)}")
+        for dim, length in zip(dims, shape, strict=True):
             if lengths.setdefault(dim, length) != length:
                 raise ValueError(f"{name} has {length} along {dim}, others have {lengths[dim]}")
     return lengths

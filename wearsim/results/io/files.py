@@ -58,7 +58,8 @@ def read_study(path: str | Path, data: type[StudyData]) -> Any:
         attributes = read_attributes(path, file, data.base_schema, data)
         schema = data.schema_of(attributes, file)
         check_complete(path, file, schema.variables)
-        axis_lengths({name: file.dataset(name) for name in schema.variables}, schema.variables)
+        shapes = {name: file.dataset(name).shape for name in schema.variables}
+        axis_lengths(shapes, schema.variables)
         variables = {name: file.array(name) for name in schema.variables}
         checkpoint = {name: file.array(f"{CHECKPOINT}/{name}") for name in file.names(CHECKPOINT)}
         return cast("StudyData", data.from_variables(attributes, variables, checkpoint))

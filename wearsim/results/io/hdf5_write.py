@@ -172,7 +172,7 @@ def put_variables(
         If the variables differ from the schema, or their shapes are inconsistent.
     """
     arrays = variables | (reserved or {})
-    lengths = axis_lengths(arrays, schema.variables)
+    lengths = axis_lengths({n: a.shape for n, a in arrays.items()}, schema.variables)
     scales: dict[str, h5d.DatasetID] = {}
     datasets: dict[str, h5d.DatasetID] = {}
     for axis in schema.axes.values():

@@ -8,7 +8,7 @@ which nothing is stored. Files of wearsim hold none of them.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,31 @@ if TYPE_CHECKING:
 SPARE = 1 << 28
 _LONGEST = 1 << 16  # bytes of an attribute
 _ZEROED = "{} has a block of zeros, which was not written"
+
+
+class StoredArray(NamedTuple):
+    """A stored array of which nothing is read: the open object, and what the file says of it.
+
+    An `h5py.Dataset` asks the file for its shape, type and chunks each time.
+    """
+
+    id: Any
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+    chunks: tuple[int, ...] | None
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the array [bytes]."""
+        return math.prod(self.shape) * self.dtype.itemsize
+
+    def read(self) -> Array:
+        """Read the whole array."""
+        from h5py import h5s  # noqa: PLC0415  (takes 0.2 s to import)
+
+        values = np.empty(self.shape, self.dtype)
+        self.id.read(h5s.ALL, h5s.ALL, values)
+        return values
 
 
 class StoredFile:
@@ -39,7 +64,7 @@ class StoredFile:
         self._size: int = file.id.get_filesize()
         self._read = 0  # [bytes]
         self._folders: dict[tuple[bytes, ...], Any] = {}
-        self._checked: dict[str, h5py.Dataset] = {}  # arrays that have not been read yet
+        self._checked: dict[str, StoredArray] = {}  # those that have not been read yet
 
     @property
     def handle(self) -> int:
@@ -81,7 +106,7 @@ class StoredFile:
         """Return the names in a folder of the file."""
         return [name.decode("utf-8", ERRORS) for name in self._folder(f"{folder}/*")[0]]
 
-    def dataset(self, name: str) -> h5py.Dataset:
+    def dataset(self, name: str) -> StoredArray:
         """Return a stored array, of which shape and type are known and nothing is read.
 
         Raises
@@ -92,26 +117,26 @@ class StoredFile:
             If it is in another place or another file, compressed, or holds neither numbers nor
             texts of fixed length.
         """
-        import h5py  # noqa: PLC0415  (takes 0.2 s to import)
-        from h5py import h5d, h5z  # noqa: PLC0415
+        from h5py import h5d, h5z  # noqa: PLC0415  (takes 0.2 s to import)
 
         if name in self._checked:
             return self._checked[name]
         folder, last = self._folder(name)
         _check_link(folder, last, name)
         stored = h5d.open(folder, last)
-        made = stored.get_create_plist()
+        made, kind = stored.get_create_plist(), stored.get_type()
         filters = {made.get_filter(number)[0] for number in range(made.get_nfilters())}
-        elsewhere = made.get_layout() == h5d.VIRTUAL or made.get_external_count()
+        elsewhere = (layout := made.get_layout()) == h5d.VIRTUAL or made.get_external_count()
         mistakes = {
             "is stored in another file": elsewhere,
             "is compressed or changed by a filter": filters - {h5z.FILTER_FLETCHER32},
-            "holds neither numbers nor texts of fixed length": not _is_plain(stored.get_type()),
+            "holds neither numbers nor texts of fixed length": not _is_plain(kind),
         }
         for what, found in mistakes.items():
             if found:
                 raise ValueError(f"{name} {what}")
-        self._checked[name] = h5py.Dataset(stored, readonly=True)  # keeps its shape
+        chunks = made.get_chunk() if layout == h5d.CHUNKED else None
+        self._checked[name] = StoredArray(stored, stored.shape, kind.dtype, chunks)
         return self._checked[name]
 
     def array(self, name: str, chosen: tuple[slice, ...] | int = ()) -> Array:
@@ -131,27 +156,22 @@ class StoredFile:
         ValueError
             As `dataset`; or if it is too long.
         """
-        from h5py import h5a, h5s  # noqa: PLC0415  (takes 0.2 s to import)
+        import h5py  # noqa: PLC0415  (takes 0.2 s to import)
 
-        dataset = self.dataset(name)
+        stored = self.dataset(name)
         del self._checked[name]  # an open array keeps what was read in a buffer
         chosen = (slice(chosen, chosen + 1),) if isinstance(chosen, int) else chosen
-        shape, chunks = dataset.shape, dataset.chunks
+        shape, chunks = stored.shape, stored.chunks
         lengths = [
             len(range(*part.indices(length))) for part, length in zip(chosen, shape, strict=False)
         ]
         numbers = math.prod([*lengths, *shape[len(lengths) :]])
         # a chunk is read as a whole
         least = math.prod(chunks) if chunks and numbers else 0
-        dtype = dataset.dtype  # asks the file each time
-        self._claim(name, max(numbers, least) * dtype.itemsize, SPARE)
-        if chosen:
-            values = np.asarray(dataset[chosen])
-        else:
-            values = np.empty(shape, dtype)
-            dataset.id.read(h5s.ALL, h5s.ALL, values)
-        if chunks and numbers and not h5a.exists(dataset.id, ZEROS.encode()):
-            _check_zeros(name, dataset, chosen, values)
+        self._claim(name, max(numbers, least) * stored.dtype.itemsize, SPARE)
+        values = np.asarray(h5py.Dataset(stored.id)[chosen]) if chosen else stored.read()
+        if chunks and numbers and not h5py.h5a.exists(stored.id, ZEROS.encode()):
+            _check_zeros(name, stored, chosen, values)
         return values
 
     def text(self, name: str) -> str:
@@ -164,11 +184,11 @@ class StoredFile:
         ValueError
             As `dataset`; or if it is longer than the file.
         """
-        dataset = self.dataset(name)
-        if dataset.shape != (1,) or dataset.dtype.kind != "S":
+        stored = self.dataset(name)
+        if stored.shape != (1,) or stored.dtype.kind != "S":
             raise ValueError(f"{name} is no text")
-        self._claim(name, dataset.dtype.itemsize, 0)
-        content: bytes = dataset[:].tobytes()  # a single element would lose zeros at its end
+        self._claim(name, stored.dtype.itemsize, 0)
+        content: bytes = stored.read().tobytes()  # a single element would lose zeros at its end
         if len(content) > 1 and not content.strip(b"\0"):
             raise ValueError(_ZEROED.format(name))
         return content[:-1].decode("utf-8", ERRORS)
@@ -206,15 +226,16 @@ def _check_link(folder: Any, last: bytes, name: str) -> None:
         raise ValueError(f"{name} is a link to another place")
 
 
-def _check_zeros(
-    name: str, dataset: h5py.Dataset, chosen: tuple[slice, ...], values: Array
-) -> None:
+def _check_zeros(name: str, stored: StoredArray, chosen: tuple[slice, ...], values: Array) -> None:
     """Raise a ValueError if a stored chunk of an array that should have none has zeros only."""
-    shape, lengths = dataset.shape, dataset.chunks
+    import h5py  # noqa: PLC0415  (takes 0.2 s to import)
+
+    shape, lengths = stored.shape, stored.chunks or stored.shape
     region = [slice(*part.indices(length)) for part, length in zip(chosen, shape, strict=False)]
     region += [slice(0, length) for length in shape[len(region) :]]
     if lengths == shape == values.shape and not only_zeros(values):
         return  # a single chunk
+    dataset = h5py.Dataset(stored.id)
     starts = [part.start for part in region]
     for block in dataset.iter_chunks(tuple(region)):
         part = tuple(slice(b.start - s, b.stop - s) for b, s in zip(block, starts, strict=True))

@@ -367,7 +367,7 @@ def _merged(path: Path, file: StoredFile) -> tuple[EnsembleData, StoredRows]:
     )
     check_complete(path, file, schema.variables)
     datasets = {name: file.dataset(name) for name in schema.variables}
-    rows = axis_lengths(datasets, schema.variables)["realisation"]
+    rows = axis_lengths({n: d.shape for n, d in datasets.items()}, schema.variables)["realisation"]
     if rows != attributes["requested"]:
         raise ValueError(f"{rows} rows for {attributes['requested']} realisations")
     for name, variable in schema.variables.items():
