@@ -21,7 +21,7 @@ def test_samples_have_the_quantiles_of_the_quadrature():
         LikelihoodMixture(np.ones(1), np.array([centre]), np.array([STD])) for centre in CENTRES
     ]
     posterior = Posterior.of(kernels)
-    m, t, ln_k = sample_hierarchy(GRID, DENSITIES, 400, 1)
+    m, t, ln_k = sample_hierarchy(GRID, DENSITIES, 250, 1)
     shares = (0.05, 0.5, 0.95)
     assert np.quantile(t, shares) == pytest.approx(posterior.scatter(shares), abs=0.03)
     assert np.quantile(m, shares) == pytest.approx(posterior.mean(shares), abs=0.04)

@@ -103,7 +103,7 @@ def designs(count, seed=0):
 
 
 def test_comparison_by_mixture_agrees_with_closed_form():
-    first, second, factor = designs(4000)
+    first, second, factor = designs(2000)
     score = score_function(LogNormal(1.0, 0.405))
     pair = FactorMixture(second, score), FactorMixture(first, score)
     spreads = math.sqrt(0.405**2 + 0.045), math.hypot(0.405, 0.2)
