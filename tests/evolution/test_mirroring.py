@@ -16,7 +16,7 @@ CASES = {
         [-1.386, -0.269, 0.390],
         [0.978, 0.927, 0.976],
         {
-            "operation__duration": "45 min",
+            "operation__duration": "450 min",
             "wear__roller__k_over_h": "3e-12 1/Pa",
             "contact__tangential": "fastsim",
             **SPRING,

@@ -114,8 +114,8 @@ def test_no_step_skips_a_peak_of_the_load(tmp_path):
     path.write_text(SPIKE)
     common = {
         "load": {"kind": "recorded", "file": str(path)},
-        "operation__passes": 15_000,
-        "contact__strips": 61,
+        "operation__passes": 45_000,
+        "contact__strips": 71,
     }
     problem, stepper, stop = built(evolution__stepper="per-pass", **common)
     reference, _ = stepped(problem, stepper, stop)
