@@ -140,24 +140,15 @@ def run(code: str, **environment: object) -> Any:
 
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
-    """Return the folder of a copy of the package without compiled kernels.
-
-    It has the bytecode, which would take as long to compile as the tests themselves.
-    """
-
-    def ignore(folder: str, names: list[str]) -> list[str]:
-        others = [name for name in names if not name.endswith(".pyc")]
-        return others if Path(folder).name == "__pycache__" else []
-
+    """Return the folder of a copy of the package without compiled kernels."""
+    ignore = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "wearsim", tmp_path / "site" / "wearsim", ignore=ignore)
     return tmp_path / "site"
 
 
 def make_read_only(site: Path) -> None:
     """Replace the cache folder next to the kernels by a file, which also blocks root."""
-    cache = site / "wearsim" / "mechanics" / "__pycache__"
-    shutil.rmtree(cache)
-    cache.write_text("not a folder")
+    (site / "wearsim" / "mechanics" / "__pycache__").write_text("not a folder")
 
 
 @pytest.mark.slow
