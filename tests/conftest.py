@@ -131,14 +131,13 @@ def few_repetitions() -> Iterator[None]:
 def pytest_collection() -> Generator[None, object, object]:
     """Leave the objects of the collection of tests, which remain, out of all garbage collections.
 
-    A garbage collection would go through a million of them. Later ones are fewer than by default,
-    as most objects of a test are released without them.
+    A garbage collection would go through a million of them, and so would one at this place. Later
+    ones are fewer than by default, as most objects of a test are released without them.
     """
     gc.disable()
     try:
         return (yield)
     finally:
-        gc.collect()
         gc.freeze()
         gc.set_threshold(20_000, 20, 20)
         gc.enable()

@@ -309,7 +309,7 @@ def test_progress_is_shown_on_request(
     wearsim.resume(tmp_path / "a.h5", progress=True)
     wearsim.resume_ensemble(tmp_path / "b.h5", progress=True, **SERIAL)
     with pytest.raises(wearsim.Interrupted):
-        wearsim.ensemble(random, 9, tmp_path / "c.h5", stop_requested=lambda: True, **SERIAL)
+        wearsim.ensemble(random, 3, tmp_path / "c.h5", stop_requested=lambda: True, **SERIAL)
     capsys.readouterr()
     wearsim.resume_ensemble(tmp_path / "c.h5", progress=True, **SERIAL)
 

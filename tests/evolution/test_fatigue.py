@@ -23,8 +23,12 @@ LAW = {
     "exponent": EXPONENT,
 }
 UNWORN = {"wear__cylinder__k_over_h": "0 1/Pa", "contact__strips": 41, "contact__width": "4 mm"}
-#: the wear of the rig in a hundredth of the passes
-QUICK = {"operation__duration": "4.5 min", "wear__cylinder__k_over_h": "1.1e-9 1/Pa"}
+#: the wear of the rig in a three hundredth of the passes
+QUICK = {
+    "operation__duration": "1.5 min",
+    "wear__cylinder__k_over_h": "3.3e-9 1/Pa",
+    "contact__strips": 81,
+}
 
 
 def fatigue(**changes):
@@ -176,8 +180,8 @@ def test_worn_off_material_takes_its_damage_with_it(every_pass):
 
 
 def test_test_without_fatigue_has_no_damage_and_the_same_wear():
-    plain = worn(**QUICK, evolution__step=500)[1]
-    damaged = worn(**QUICK, **fatigue(), evolution__step=500)[1]
+    plain = worn(**QUICK, evolution__step=200)[1]
+    damaged = worn(**QUICK, **fatigue(), evolution__step=200)[1]
     assert plain.damage is None
     assert np.array_equal(plain.cylinder_depth, damaged.cylinder_depth)
 

@@ -86,7 +86,7 @@ def test_record_between_steps_is_one_step_or_a_pause(pausing, rig):
 
 
 def test_every_part_of_a_step_adds_its_damage():
-    problem, _, _ = built(contact__strips=41, **QUICK, **fatigue())
+    problem, _, _ = built(**{**QUICK, "contact__strips": 41}, **fatigue())
     state, stepper = fresh_state(problem), ExplicitStepper(1e-3)
     half = explicit_step(problem, state, np.array([10.0]))
     end = explicit_step(problem, half, np.array([10.0]))

@@ -15,7 +15,7 @@ from wearsim.studies.ensemble.batch import can_step_together, compatible, joined
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import draw
 
-PASSES = 45_000
+PASSES = 20_000
 LOG = "time [min], load [N]\n0, 300\n5, 340\n6, 280\n15.5, 320\n"
 EACH = [
     {"wear__cylinder__k_over_h": "1.1e-11 1/Pa"},

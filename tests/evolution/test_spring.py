@@ -16,7 +16,8 @@ SOFT, STIFF = "690 N/mm", "40 kN/mm"
 def sprung(stiffness, stepper="implicit", **changes):
     """Return the problem, and its end state with contacts at the present loads."""
     common = {"operation__passes": PASSES, "load__kind": "spring", "load__stiffness": stiffness}
-    problem, chosen, stop = built(evolution__stepper=stepper, **common, **changes)
+    common |= {"contact__strips": 61, "evolution__stepper": stepper}
+    problem, chosen, stop = built(**common, **changes)
     state, _ = stepped(problem, chosen, stop)
     contacts, loads = solve_at_record(problem, state, on_profile=not chosen.pass_by_pass)
     return problem, state.replaced(contacts=contacts), loads
@@ -50,7 +51,7 @@ def test_load_and_displacement_are_in_equilibrium(every_pass, stiffness):
 def test_all_steppers_converge_to_the_per_pass_run(every_pass, stepper, stiffness):
     _, expected, load = every_pass[stiffness]
     errors = []
-    for tolerance in (1e-3, 1e-4):
+    for tolerance in (1e-3, 4e-4 if stepper == "explicit" else 1e-4):
         _, state, found = sprung(stiffness, stepper, evolution__tolerance=tolerance)
         difference = cylinder_depth_of(state) / cylinder_depth_of(expected) - 1.0
         errors.append(abs(difference[0]))

@@ -31,6 +31,7 @@ ADHESION: dict[str, object] = {
     "wear.cylinder.k_over_h": "1e-9 1/Pa",
     "operation.rollers": 1,
     "operation.duration": "3000 min",
+    "contact.strips": 101,
 }
 #: nearly unworn, so that volumes on strips of twice the width may be equal by chance
 FRESH: dict[str, object] = {

@@ -50,7 +50,12 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def uniforms() -> FloatArray:
-    return np.random.default_rng(11).random(1_000_000)
+    """Return a random number in each of 100,000 equal intervals, in random order.
+
+    Their mean and std are as accurate as those of many more independent numbers.
+    """
+    rng, count = np.random.default_rng(11), 100_000
+    return rng.permutation((np.arange(count) + rng.random(count)) / count)
 
 
 @pytest.fixture(params=CASES)
@@ -65,11 +70,10 @@ def test_distributions_are_registered_with_their_roles() -> None:
     assert roles == dict.fromkeys(NAMES, "scalar") | {"disc": "joint"}
 
 
-def test_million_samples_have_the_mean_and_std(
-    distribution: Distribution, uniforms: FloatArray
-) -> None:
+def test_samples_have_the_mean_and_std(distribution: Distribution, uniforms: FloatArray) -> None:
     draws = distribution.quantile(uniforms)
     centred = draws - distribution.mean
+    # each within 4 standard errors of a million independent samples
     assert abs(centred.mean()) <= 4.0 * distribution.std / 1e3
     if distribution.std > 0.0:
         fourth = np.sqrt((centred**4).mean() / distribution.std**4 - 1.0)

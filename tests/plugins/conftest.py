@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 import pytest
 from plugin_examples import DATA, Point
@@ -13,17 +13,22 @@ from wearsim.plugins import manager
 Install = Callable[..., None]
 
 
-@pytest.fixture
-def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Return a function that installs made-up entry points next to those of wearsim only."""
-    real = [
+@pytest.fixture(scope="session")
+def built_in() -> list[EntryPoint]:
+    """Return the entry points of wearsim: to find them takes as long as a short test."""
+    return [
         point
         for point in entry_points(group=manager.PROJECT)
         if point.dist is not None and point.dist.name == "wearsim"
     ]
 
+
+@pytest.fixture
+def install(built_in: list[EntryPoint], monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
+    """Return a function that installs made-up entry points next to those of wearsim only."""
+
     def install(*points: Point) -> None:
-        monkeypatch.setattr(manager, "entry_points", lambda group: [*real, *points])
+        monkeypatch.setattr(manager, "entry_points", lambda group: [*built_in, *points])
         manager.registry.cache_clear()
 
     yield install

@@ -128,10 +128,24 @@ def test_fault_is_named_with_the_model(faulty, fault, kind, message, batched):
             assert type(caught.value) is kind
 
 
-@pytest.mark.parametrize("batched", [False, True], ids=["single", "batched"])
-@pytest.mark.parametrize("overrides", [{}, PER_PASS], ids=["steps", "passes"])
-@pytest.mark.parametrize(("fault", "kind", "message"), FAULTS.values(), ids=FAULTS)
-def test_fault_during_a_run_is_named(faulty, fault, kind, message, overrides, batched, tmp_path):
+#: all pairs of a fault, a form of the model and a way of stepping are tested, others are slow
+RUNS = [
+    pytest.param(
+        fault,
+        batched,
+        by_passes,
+        marks=[pytest.mark.slow] * ((number + batched + by_passes) % 2),
+        id=f"{fault}-{'passes' if by_passes else 'steps'}-{'batched' if batched else 'single'}",
+    )
+    for number, fault in enumerate(FAULTS)
+    for by_passes in (False, True)
+    for batched in (False, True)
+]
+
+
+@pytest.mark.parametrize(("name", "batched", "by_passes"), RUNS)
+def test_fault_during_a_run_is_named(faulty, name, batched, by_passes, tmp_path):
+    (fault, kind, message), overrides = FAULTS[name], PER_PASS if by_passes else {}
     scenario = faulty(fault, batched, 8, overrides)
     with pytest.raises(kind, match=f"contact model 'faulty' {message}"):
         wearsim.run(scenario, tmp_path / "rig.h5")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ DEGREES = np.arange(0.0, 360.0)
 FINE = np.linspace(0.0, math.tau, 2000, endpoint=False)
 
 
+@cache
 def exact(text: str = CYCLOIDAL) -> Scenario:
     return read(text)
 
@@ -48,7 +50,10 @@ def error_of_acceleration(scenario: Scenario) -> float:
     return float(np.sqrt((away**2).mean()) / np.abs(true).max())
 
 
-@pytest.mark.parametrize("seed", range(20))
+SEEDS = [*range(10), *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(10, 20))]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_acceleration_of_a_noisy_lift_is_within_2_percent(tmp_path, seed):
     found = measured(tmp_path, lift_rows(2e-3, seed))
     assert error_of_acceleration(found) < 0.02

@@ -130,8 +130,10 @@ def _random() -> str:
     return bodies.replace("[roller]", f"[roller]\n{offset}") + RANDOM
 
 
-def test_schema_accepts_random_inputs_like_the_parser() -> None:
-    schema = scenario_schema()  # with the installed plugins
+def test_schema_accepts_random_inputs_like_the_parser(
+    schema_with_installed_plugins: Schema,
+) -> None:
+    schema = schema_with_installed_plugins
     assert _fits(tomllib.loads(_random()), schema, schema["$defs"])
     scenario = parse_scenario(_random(), "rig.toml", {}.__getitem__)
     assert len(scenario.random) == 7
@@ -154,18 +156,20 @@ def test_schema_accepts_random_inputs_like_the_parser() -> None:
         ),
     ],
 )
-def test_schema_rejects_random_inputs_like_the_parser(good: str, bad: str) -> None:
+def test_schema_rejects_random_inputs_like_the_parser(
+    schema_with_installed_plugins: Schema, good: str, bad: str
+) -> None:
     text = _random()
     assert good in text
     text = text.replace(good, bad, 1)
-    schema = scenario_schema()  # with the installed plugins
+    schema = schema_with_installed_plugins
     assert not _fits(tomllib.loads(text), schema, schema["$defs"])
     with pytest.raises(ScenarioError):
         parse_scenario(text, "rig.toml", {}.__getitem__)
 
 
-def test_every_key_has_a_description() -> None:
-    schema = scenario_schema()  # with the installed plugins
+def test_every_key_has_a_description(schema_with_installed_plugins: Schema) -> None:
+    schema = schema_with_installed_plugins
     for node in _nodes(schema):
         if node.get("type") == "object":
             for key, field in node.get("properties", {}).items():  # a map has none

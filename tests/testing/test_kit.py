@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -36,7 +37,10 @@ test_heavy = load_tests(SPEC, without={"extremes-bound-force": "sampled only"})
 
 def collected(path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *arguments, str(path)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=path.parent, check=False)
+    environment = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # to load takes a second
+    return subprocess.run(
+        command, capture_output=True, text=True, cwd=path.parent, check=False, env=environment
+    )
 
 
 def test_each_requirement_is_a_pytest_item(tmp_path):

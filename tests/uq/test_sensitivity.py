@@ -121,11 +121,11 @@ def without_influence(rng):
 
 @pytest.mark.parametrize("draw", [second_of_line, second_of_ishigami, misalignment])
 def test_first_order_intervals_have_their_coverage(draw):
-    assert 0.90 <= intervals_hold(draw, 200, 2) <= 0.99
+    assert 0.90 <= intervals_hold(draw, 100, 2) <= 0.99
 
 
 def test_missing_effect_is_rarely_significant():
-    assert intervals_hold(without_influence, 200, 3) >= 0.95
+    assert intervals_hold(without_influence, 100, 3) >= 0.95
     rng = np.random.default_rng(4)
     x = rng.standard_normal((2000, 3))
     found = first_order(np.exp(0.3 * x[:, 0]), by_column(x))
@@ -208,7 +208,7 @@ def test_saltelli_indices_agree_with_closed_forms(case):
     known = np.stack(indices(), axis=1)
     names = [str(k) for k in range(len(known))]
     rng, held = np.random.default_rng(13), np.zeros(known.shape)
-    for _ in range(200):
+    for _ in range(100):
         blocks = saltelli_blocks(function, len(known), 300, rng)
         found = saltelli_indices(blocks, names)
         for k, name in enumerate(names):
@@ -216,7 +216,7 @@ def test_saltelli_indices_agree_with_closed_forms(case):
                 part.low - 1e-12 <= exact <= part.high + 1e-12
                 for part, exact in zip(found[name], known[k], strict=True)
             ]
-    assert (held >= 0.89 * 200).all(), held
+    assert (held >= 0.89 * 100).all(), held
     large = saltelli_blocks(function, len(known), 20_000, rng)
     for name, (first, total) in zip(names, known, strict=True):
         found = saltelli_indices(large, names)[name]

@@ -70,9 +70,9 @@ def test_infinite_strip_has_curvature_coefficient_four():
 
 
 def direct(tau, count, function=mean_asinh):
-    """Return F_k (or C_k) at ln(a/dy) = tau without the table."""
-    t = (np.arange(count + 1) - 0.5) * np.exp(-tau)
-    return np.diff(np.sign(t) * function(np.abs(t))[0])
+    """Return F_k (or C_k) at one or several ln(a/dy) = tau without the table."""
+    t = (np.arange(count + 1) - 0.5) * np.exp(-np.asarray(tau))[..., None]
+    return np.diff(np.sign(t) * function(np.abs(t).ravel())[0].reshape(t.shape))
 
 
 @pytest.mark.parametrize(

@@ -92,8 +92,9 @@ def surface(grid, gaps, line_load, wear, lengths):
     for k in range(count):
         loaded = np.flatnonzero(line_load[k])
         s = factors(line_load[k], grid.spacing) if lengths == "coupled" else np.ones(len(loaded))
-        for j, a in zip(loaded, np.sqrt(s * BY_LOAD * line_load[k, loaded]), strict=True):
-            shape = direct(np.log(a / grid.spacing), n)
+        a = np.sqrt(s * BY_LOAD * line_load[k, loaded])
+        shapes = direct(np.log(a / grid.spacing), n)
+        for j, shape in zip(loaded, shapes, strict=True):
             total[k] += line_load[k, j] / (np.pi * MODULUS) * shape[np.abs(np.arange(n) - j)]
     return total
 

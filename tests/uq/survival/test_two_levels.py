@@ -87,7 +87,7 @@ def test_probability_of_a_life_has_the_interval_of_both_levels():
 
 def test_error_by_realisations_is_the_scatter_of_repeated_studies():
     levels = TwoLevels(np.array([-25.0]), np.array([0.4]), np.ones(1))
-    studies = [uncertain(drawn(60, seed), levels).quantile(0.1) for seed in range(100)]
+    studies = [uncertain(drawn(60, seed), levels).quantile(0.1) for seed in range(60)]
     scatter = np.log([one.predictive for one in studies]).std()
     stated = np.sqrt(np.mean([one.by_realisations for one in studies]))
     assert stated == pytest.approx(scatter, rel=0.2)

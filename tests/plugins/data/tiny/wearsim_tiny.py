@@ -1,7 +1,6 @@
 """Third-party plugin: an elastic foundation, a wear law by line load and a drifting load."""
 
 import numpy as np
-from scipy.optimize import brentq
 
 from wearsim.plugins import (
     ContactModelSpec,
@@ -27,15 +26,25 @@ class Foundation(SingleContactModel):
         half_length = np.sqrt(2.0 * depth / curvature)
         return 4.0 / 3.0 * self.modulus * depth * half_length, half_length
 
+    def _approach(self, gap, curvature, force):
+        """Return the approach by Newton's method: as the load is convex, it converges from above.
+
+        A second increase is due to round-off.
+        """
+        approach, last = gap.min() + 5e-6, np.inf
+        while True:
+            load, half_length = self._line_load(gap, curvature, approach)
+            stiffness = 2.0 * self.modulus * half_length.sum() * self.grid.spacing
+            change = (force - load.sum() * self.grid.spacing) / stiffness
+            if last < 0.0 <= change or abs(change) <= 1e-15 * abs(approach):
+                return approach
+            approach, last = approach + change, change
+
     def solve_contact(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
         if wear_compliance is not None:
             raise ValueError("wear compliance without the capability")
         spacing, force = self.grid.spacing, point.normal_force
-
-        def excess(approach):
-            return self._line_load(gap, longitudinal_curvature, approach)[0].sum() * spacing - force
-
-        approach = brentq(excess, gap.min(), gap.min() + 1e-3, xtol=1e-18)
+        approach = self._approach(gap, longitudinal_curvature, force)
         load, half_length = self._line_load(gap, longitudinal_curvature, approach)
         creepage = point.creepage
         slip = np.hypot(creepage.longitudinal, creepage.lateral)
