@@ -108,8 +108,9 @@ def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
 def test_a_run_of_single_passes_under_a_spring_records_the_expectation():
     drawn = {"creepage__longitudinal": ALL_PER_PASS["creepage__longitudinal"]}
     spring = {"load__kind": "spring", "load__stiffness": "690 N/mm"}
+    strips = {"contact__strips": 61, "evolution__strip_error": False}
     single, expected = (
-        wearsim.run(scenario_of(**spring, **drawn, evolution__stepper=stepper))
+        wearsim.run(scenario_of(2000, **spring, **drawn, evolution__stepper=stepper, **strips))
         for stepper in ("per-pass", "auto")
     )
     # one roller's creepage is drawn from pass to pass, and the loads are those of its passes
@@ -121,9 +122,9 @@ def test_expectation_is_insensitive_to_the_step():
     inputs = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
     depths = [
         depth_of(end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))[1])
-        for step in (250, 1000, 3000)
+        for step in (250, 3000)
     ]
-    assert depths == pytest.approx([depths[0]] * 3, rel=3e-3)
+    assert depths[1] == pytest.approx(depths[0], rel=3e-3)
 
 
 def test_long_explicit_step_is_unstable():
@@ -172,8 +173,9 @@ def test_per_pass_draws_do_not_depend_on_records():
 @pytest.mark.parametrize("stepper", ["implicit", "per-pass"])
 def test_resumed_random_run_equals_unbroken_run(tmp_path, stepper):
     scenario = scenario_of(
-        passes=1500,
+        passes=900,
         evolution__stepper=stepper,
+        **({"evolution__nodes": 16} if stepper == "implicit" else {}),
         contact__strips=61,
         outputs__records=5,
         load__normal_force={**WANDERING, "marginal": LOAD},
