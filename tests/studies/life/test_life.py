@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import LOGNORMAL, differences, small
 from tests.studies.random_examples import WANDERING
 from wearsim.errors import Interrupted, ResultsFileError, ScenarioError
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.life import settings
 from wearsim.studies.life.api import life, sweep_life
 from wearsim.studies.life.comparison import swept_variable as against
 from wearsim.studies.life.comparison_view import LivesView
@@ -238,7 +240,10 @@ def test_quantity_that_hardly_grows_gives_an_interval_of_life(tmp_path: Path) ->
     assert (value > low).all()
 
 
-def test_stopped_study_continues_bit_for_bit(tmp_path: Path, exact: LifeResult) -> None:
+def test_stopped_study_continues_bit_for_bit(
+    tmp_path: Path, exact: LifeResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(4))
     path, calls = tmp_path / "stopped.h5", []
 
     def stop() -> bool:
@@ -252,7 +257,10 @@ def test_stopped_study_continues_bit_for_bit(tmp_path: Path, exact: LifeResult) 
     assert differences(result, exact) == []
 
 
-def test_lives_do_not_depend_on_workers(tmp_path: Path, exact: LifeResult) -> None:
+def test_lives_do_not_depend_on_workers(
+    tmp_path: Path, exact: LifeResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(4))
     result = life(design(), 12, tmp_path / "two.h5", target=4000, workers=2)
     assert differences(result, exact) == []
 
@@ -393,12 +401,16 @@ def test_rare_end_of_life_agrees_with_the_exact_factor(tmp_path: Path, exact: Li
     assert rare.variation < 0.25
 
 
-def test_stopped_rare_events_continue_bit_for_bit(tmp_path: Path) -> None:
+def test_stopped_rare_events_continue_bit_for_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(20))
+    monkeypatch.setattr(settings, "LEAST_TESTS", 60)
     factor = {**LOGNORMAL, "median": "1e-20 1/Pa"}
     quick = {"evolution__tolerance": 5e-2, "evolution__strip_error": False}
     scenario = design(wear__roller__k_over_h=factor, **quick)
     # subset simulation is stopped in test_rare_lives.py, without tests
-    options: dict[str, Any] = {"target": 250, "rare": 200, "rare_method": "importance"}
+    options: dict[str, Any] = {"target": 1200, "rare": 60, "rare_method": "importance"}
     whole = lives(tmp_path / "whole.h5", scenario, 20, **options)
     path, calls = tmp_path / "stopped.h5", []
 
