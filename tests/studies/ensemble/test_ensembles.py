@@ -69,7 +69,7 @@ def test_maxima_of_profiles_are_the_depths(twelve):
 @pytest.mark.parametrize(
     "options",
     [
-        pytest.param({"scheduler": "processes", "workers": 1}, marks=pytest.mark.slow),
+        {"scheduler": "processes", "workers": 1},
         {"scheduler": "processes", "workers": 2},
         {"scheduler": "threads", "workers": 2},
     ],
@@ -159,7 +159,7 @@ def test_resumed_ensemble_equals_unbroken_ensemble(twelve, tmp_path, monkeypatch
             12,
             path,
             scheduler=scheduler,
-            workers=1,
+            workers=1 if scheduler == "serial" else 2,
             stop_requested=lambda: next(answers, True),
         )
     part = open_ensemble(path)
