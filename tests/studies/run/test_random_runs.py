@@ -94,10 +94,10 @@ def test_rollers_have_separate_misalignments():
 @pytest.mark.parametrize("drawn", [("creepage__misalignment",), tuple(ALL_PER_PASS)])
 def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
     inputs = {name: ALL_PER_PASS[name] for name in drawn}
-    _, reference = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=91, **inputs))
-    fresh, _, _ = assemble_problem(draw(scenario_of(contact__strips=91, **inputs)))
+    _, reference = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=61, **inputs))
+    fresh, _, _ = assemble_problem(draw(scenario_of(contact__strips=61, **inputs)))
     step = round(10.0 * stability_limit(fresh, fresh_state(fresh))[0])
-    problem, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
+    problem, state = end_of(scenario_of(evolution__step=step, contact__strips=61, **inputs))
     assert state.steps < 20
     assert abs(depth_of(state) - depth_of(reference)) <= state.depth_error[0]
     volumes = volume_of(problem, state.depths), volume_of(problem, reference.depths)
@@ -121,7 +121,7 @@ def test_a_run_of_single_passes_under_a_spring_records_the_expectation():
 def test_expectation_is_insensitive_to_the_step():
     inputs = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
     depths = [
-        depth_of(end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))[1])
+        depth_of(end_of(scenario_of(evolution__step=step, contact__strips=61, **inputs))[1])
         for step in (250, 3000)
     ]
     assert depths[1] == pytest.approx(depths[0], rel=3e-3)
@@ -243,7 +243,7 @@ def test_run_with_random_load_is_within_its_error_estimate(rollers):
 
 def test_records_are_comparable_between_steppers():
     slack = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
-    inputs = {**slack, "passes": 3000, "contact__strips": 91}
+    inputs = {**slack, "passes": 3000, "contact__strips": 61}
     expected = wearsim.run(scenario_of(**inputs))
     drawn = wearsim.run(scenario_of(evolution__stepper="per-pass", **inputs))
     power = drawn.dissipated_energy[-1] / drawn.time[-1]
