@@ -110,7 +110,7 @@ def test_a_run_of_single_passes_under_a_spring_records_the_expectation():
     spring = {"load__kind": "spring", "load__stiffness": "690 N/mm"}
     strips = {"contact__strips": 61, "evolution__strip_error": False}
     single, expected = (
-        wearsim.run(scenario_of(2000, **spring, **drawn, evolution__stepper=stepper, **strips))
+        wearsim.run(scenario_of(4000, **spring, **drawn, evolution__stepper=stepper, **strips))
         for stepper in ("per-pass", "auto")
     )
     # one roller's creepage is drawn from pass to pass, and the loads are those of its passes
