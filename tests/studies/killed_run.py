@@ -126,7 +126,7 @@ def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
     whole = studies.run(scenario)
     stages = stages_of(lambda storage: go(scenario, folder / "whole.h5", storage))
     write_line(stages=stages)
-    for turn, number in enumerate([*chosen_of(stages, extent), len(stages) - 1]):
+    for turn, number in enumerate(sorted({*chosen_of(stages, extent), len(stages) - 1})):
         path = folder / f"{number}.h5"
         again = [7 * number % 50] if turn % 5 == 0 else []
         killed = []
