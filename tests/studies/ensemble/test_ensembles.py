@@ -70,7 +70,8 @@ def test_maxima_of_profiles_are_the_depths(twelve):
     "options",
     [
         {"scheduler": "processes", "workers": 1},
-        {"scheduler": "processes", "workers": 2},
+        # a study of lives is run by two processes in a quick test, and an ensemble stopped in them
+        pytest.param({"scheduler": "processes", "workers": 2}, marks=pytest.mark.slow),
         {"scheduler": "threads", "workers": 2},
     ],
 )
