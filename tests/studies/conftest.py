@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.fixed_batches import batches_of
 from wearsim.evolution.steppers import per_pass
 from wearsim.studies.run import in_progress
 
@@ -22,6 +24,17 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the duration of writing not limit the checkpoints."""
     monkeypatch.setattr(in_progress, "WRITING", math.inf)
+
+
+@pytest.fixture(scope="module")
+def large_batches() -> Iterator[None]:
+    """Run 64 realisations in a batch, which costs as much as many realisations.
+
+    The first batches are small otherwise, since they show how long a realisation takes.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(64))
+        yield
 
 
 @pytest.fixture

@@ -44,8 +44,9 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) ->
     """Kill an ensemble at every sixth write stage, or one of each kind, of each of its writers.
 
     No kill comes after a write, since one comes before the next operation; with one of each kind
-    this holds for all operations. The names of all stages are printed first. Every fifth is killed
-    again when it is resumed.
+    this holds for all operations, and the two parts, which are written in the same way, have every
+    second kind each. The names of all stages are printed first. Every fifth is killed again when it
+    is resumed.
     """
     whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
     stages = stages_of(lambda storage: go(scenario, count, folder / "whole.h5", storage))
@@ -54,10 +55,12 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) ->
     third = (len(stages) - created) // 3
     bounds = [0, created, created + third, created + 2 * third, len(stages)]
     numbers = []
-    for start, stop in itertools.pairwise(bounds):
-        numbers += [start + number for number in chosen_of(stages[start:stop], extent)]
-    left_out = "after" if extent == "each stage" else "after write"
-    chosen = [number for number in numbers if not stages[number].startswith(left_out)]
+    for place, (start, stop) in enumerate(itertools.pairwise(bounds)):
+        found = [start + number for number in chosen_of(stages[start:stop], extent)]
+        if extent == "each stage" and place in {1, 2}:
+            found = found[place - 1 :: 2]
+        numbers += found
+    chosen = [number for number in numbers if stages[number] != "after write"]
     for turn, number in enumerate(chosen):
         path = folder / f"{number}.h5"
         again = [7 * number % 30] if turn % 5 == 0 else []
@@ -91,8 +94,9 @@ if __name__ == "__main__":
     driver.BatchSizes = batches_of(1)
     realisation.AXIS_REALISATIONS = 3  # drawn again after every kill
     mode, where = sys.argv[1], Path(sys.argv[2])
-    tests = small(passes=400, contact__strips=31)
     if mode == "stages":
-        kill_at_stages(tests, 2, where, sys.argv[3])
+        quick = {"evolution__strip_error": False, "evolution__tolerance": 0.1}
+        kill_at_stages(small(passes=100, contact__strips=31, **quick), 2, where, sys.argv[3])
     else:
+        tests = small(passes=400, contact__strips=31)
         kill_at_moments(tests, 8, where, int(sys.argv[3]))

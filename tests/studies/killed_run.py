@@ -97,10 +97,13 @@ def stages_of(work: Callable[[Storage], object]) -> list[str]:
 
 
 def chosen_of(stages: list[str], extent: str) -> list[int]:
-    """Return the numbers of the write stages at which to kill."""
+    """Return the numbers of the write stages at which to kill.
+
+    With one of each stage there is no kill after an operation, since one comes before the next.
+    """
     each = one_of_each(stages)
     if extent == "each stage":
-        return each
+        return [number for number in each if stages[number].startswith("before")]
     return sorted({*range(0, len(stages), 6), *each})
 
 
@@ -123,7 +126,7 @@ def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
     whole = studies.run(scenario)
     stages = stages_of(lambda storage: go(scenario, folder / "whole.h5", storage))
     write_line(stages=stages)
-    for turn, number in enumerate(chosen_of(stages, extent)):
+    for turn, number in enumerate(sorted({*chosen_of(stages, extent), len(stages) - 1})):
         path = folder / f"{number}.h5"
         again = [7 * number % 50] if turn % 5 == 0 else []
         killed = []

@@ -8,6 +8,7 @@ from pathlib import Path
 from tests.results_compared import differences
 from tests.rig_text import BODIES, RUBBING
 from wearsim.errors import Interrupted
+from wearsim.evolution.steppers import per_pass
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.result import Result, RunData
@@ -98,6 +99,7 @@ OTHERS: dict[str, dict[str, object]] = {
     "forced steps": {"evolution.step": 700},
     "fatigue": {"fatigue": {"slope": 1.125, "cylinder": PITTING, "roller": PITTING}},
     "fatigue under a log, removed by wear": {
+        "operation.passes": 3000,
         "fatigue": {"slope": 1.125, "remove": True, "cylinder": PITTING},
         "load": {"kind": "recorded", "file": "load.csv"},
     },
@@ -108,6 +110,17 @@ def short(**overrides: object) -> Scenario:
     """Return the rig's scenario with overrides; `__` in a name is the dot of a key."""
     dotted = {key.replace("__", "."): value for key, value in overrides.items()}
     return parse_scenario(RIG, "rig.toml", {"load.csv": LOG}.__getitem__, dotted)
+
+
+def run_once(scenario: Scenario) -> Result:
+    """Return the run of a scenario in memory, computed once; it is not to be changed."""
+    key = scenario.sha256, per_pass.CHUNK, per_pass.SLOW_CHUNK
+    if key not in _RUNS:
+        _RUNS[key] = studies.run(scenario)
+    return _RUNS[key]
+
+
+_RUNS: dict[tuple[str, int, int], Result] = {}
 
 
 def run_differences(one: Result | RunData, other: Result | RunData) -> list[str]:

@@ -15,6 +15,7 @@ import pytest
 
 import wearsim
 from tests.stable_names import json_keys, stored
+from wearsim.plugins import StudyKind
 from wearsim.results.viewed import study_kinds
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.identify.measurements import Measurement
@@ -114,6 +115,12 @@ def made(name: str, number: int) -> Any:
     return SAMPLES[name][number](FOLDER[0])
 
 
+@cache
+def fixture_of(kind: StudyKind, number: int) -> StudyKindFixture:
+    """Return a sample with its view and panels, computed once."""
+    return StudyKindFixture(kind, made(kind.name, number))
+
+
 CASES = [
     (kind, number)
     for kind in study_kinds()
@@ -127,7 +134,7 @@ CASES = [
 def test_every_kind_in_every_display(case: Any, check: Any) -> None:
     kind, number = case
     assert kind.name in SAMPLES, f"add a small result of the kind '{kind.name}' to SAMPLES"
-    check(StudyKindFixture(kind, made(kind.name, number)))
+    check(fixture_of(kind, number))
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0].name}-{case[1]}")

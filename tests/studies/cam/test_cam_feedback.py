@@ -54,7 +54,7 @@ def test_single_turns_refuse_the_feedback_of_inertia():
 def test_inertia_changes_the_load_by_the_curvature_of_the_lift_error():
     # this stepper takes equal steps in the three tests: their differences are below the tolerance
     stepper = {"stepper": "stabilised"}
-    changes = {"contact": {"strips": 61}, "cam__stations": 25, "operation__turns": 200_000}
+    changes = {"contact": {"strips": 41}, "cam__stations": 25, "operation__turns": 200_000}
     changes["evolution"] = stepper
     runs = [wearsim.run(cam("eccentric", load__feedback=kind, **changes)) for kind in FEEDBACKS]
     depths = [run.values("station_depth")[-1] for run in runs]

@@ -112,7 +112,7 @@ def test_resumed_run_with_moved_skids_is_bit_for_bit(tmp_path, whole, moves):
 
     def stop() -> bool:
         count[0] += 1
-        return count[0] % 9 == 0
+        return count[0] % 20 == 0
 
     with pytest.raises(Interrupted):
         wearsim.run(scenario(), tmp_path / "parts.h5", stop_requested=stop)

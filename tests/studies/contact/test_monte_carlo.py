@@ -375,7 +375,7 @@ def test_memory_per_realisation_is_estimated(monkeypatch):
         return found
 
     peak(100)  # compiles kernels and imports modules
-    each = (peak(90_000) - peak(30_000)) / 60_000
+    each = (peak(40_000) - peak(10_000)) / 30_000
     assert 0.5 * bytes_per_realisation(scenario) < each < 1.25 * bytes_per_realisation(scenario)
 
 

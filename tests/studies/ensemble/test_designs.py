@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import wearsim
+from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import small
 from wearsim.errors import Interrupted
 from wearsim.studies.comparison.compare import compare, have_same_draws
@@ -91,7 +92,8 @@ def test_sweep_refuses_existing_file_before_it_runs(swept, tmp_path):
     assert not (tmp_path / "creep-1.h5").exists()
 
 
-def test_sweep_continues_where_it_was_stopped(tmp_path):
+def test_sweep_continues_where_it_was_stopped(tmp_path, monkeypatch):
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(2))
     values, path = ["8e-4", "1e-3", "1.2e-3"], tmp_path / "creep.h5"
     scenarios, second = creepages(values), tmp_path / "creep-1e-3.h5"
     with pytest.raises(Interrupted, match=r"not started: 1.2e-3; call sweep again"):

@@ -76,7 +76,6 @@ def test_only_failed_realisations_run_again(tmp_path, monkeypatch):
 def test_kill_during_repetition_of_failed_loses_nothing(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
-    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
     whole = ensemble(small(), 6, tmp_path / "whole.h5", **SERIAL)
     run = RealisationRunner.prepare
 
@@ -88,6 +87,7 @@ def test_kill_during_repetition_of_failed_loses_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(RealisationRunner, "prepare", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 6, path, **SERIAL)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(1))
 
     def killed(self, number, *rest):
         if number == 4:
@@ -106,6 +106,7 @@ def test_repeated_realisations_count_for_the_target(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
     monkeypatch.setattr("wearsim.studies.ensemble.designs.FIRST_ANALYSIS", 16)
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(8))
     options = {"precision": "depth.mean 16%", **SERIAL}
     whole = ensemble(small(), 40, tmp_path / "whole.h5", **options)
     run = RealisationRunner.prepare

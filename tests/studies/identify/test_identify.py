@@ -99,7 +99,7 @@ def test_known_and_measured_inputs_narrow_the_wear_factor():
     known = {"friction.coefficient": 0.1, "creepage.longitudinal": 1e-3}
     error = {"creepage.longitudinal": 1e-4}
     tests = [depth(48.0), depth(48.0, values=known, errors=error), depth(48.0, values=known)]
-    found = wearsim.identify(rig(random=True), tests, draws=64)
+    found = wearsim.identify(rig(random=True), tests, draws=32)
     widths = [
         np.log(t["k_over_h_per_Pa"]["high"] / t["k_over_h_per_Pa"]["low"]) / 3.92
         for t in found.tests
@@ -122,7 +122,7 @@ def test_measured_value_out_of_the_distribution_is_refused():
 def test_traces_of_one_test_share_its_inputs():
     late = depth(48.1, group="A")
     early = depth(48.1 * (100.0 / 450.0) ** (2.0 / 3.0), group="A", at="100 min")
-    found = wearsim.identify(rig(random=True), [early, late, depth(48.1)], draws=64)
+    found = wearsim.identify(rig(random=True), [early, late, depth(48.1)], draws=32)
     assert found.raw.specimens == ["A", "48.1 um"]
     slope = found.summary["exponents"]["A"]
     assert slope["low"] < 2.0 / 3.0 < slope["high"]
@@ -138,8 +138,8 @@ def test_traces_of_one_test_share_its_inputs():
 
 
 def test_paper_depths_are_undecided_and_reproducible():
-    one = wearsim.identify(rig(random=True), [depth(d) for d in (28.0, 48.0, 62.0)], draws=64)
-    two = wearsim.identify(rig(random=True), [depth(d) for d in (28.0, 48.0, 62.0)], draws=64)
+    one = wearsim.identify(rig(random=True), [depth(d) for d in (28.0, 48.0, 62.0)], draws=32)
+    two = wearsim.identify(rig(random=True), [depth(d) for d in (28.0, 48.0, 62.0)], draws=32)
     assert one.summary == two.summary
     assert one.summary["scatter_seen"] == pytest.approx(0.609, abs=0.02)
     alone = one.summary["scatter_from_inputs"]
@@ -243,11 +243,11 @@ def test_shallow_groove_is_left_out_with_a_warning(tmp_path: Path):
 
 def test_power_is_that_of_a_plan_of_the_same_tests(monkeypatch: pytest.MonkeyPatch):
     scenario = rig(random=True)
-    (plan,) = plan_tests(scenario, [3], draws=64)
+    (plan,) = plan_tests(scenario, [3], draws=32)
     reached = float(closed_form_depths(scenario, {}, 1)[0])
     error = DEPTH_ERROR * reached
     tests = [Measurement(f"test {n}", depth=reached, depth_std=error) for n in range(3)]
-    found = wearsim.identify(scenario, tests, draws=64).summary["to_decide"]
+    found = wearsim.identify(scenario, tests, draws=32).summary["to_decide"]
     assert found["power"] == plan.random[0.4][0]
     assert found["tests"] == plan.needed[0.4]
 
@@ -297,9 +297,9 @@ def test_more_draws_are_taken_where_few_describe_a_groove(monkeypatch: pytest.Mo
 
 
 def test_repeated_tests_of_a_specimen_share_the_wear_factor():
-    alone = wearsim.identify(rig(random=True), [depth(48.0)], draws=64)
+    alone = wearsim.identify(rig(random=True), [depth(48.0)], draws=32)
     tests = [depth(48.0, group="A"), depth(48.5, group="A"), depth(47.5, group="A")]
-    found = wearsim.identify(rig(random=True), tests, draws=64)
+    found = wearsim.identify(rig(random=True), tests, draws=32)
     assert found.raw.specimens == ["A"]
     assert found.summary["exponents"] == {}
     widths = [r.summary["scatter_from_inputs"] for r in (alone, found)]

@@ -45,6 +45,16 @@ def study(path: Path, probability: float = 1e-6, **options: Any) -> LifeResult:
     return life(scenario, 40, path, **{"scheduler": "serial", **given})
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[LifeResult, int]:
+    """Return a study with tests for rare ends of life, and the number of its stages of writing."""
+    stages: list[str] = []
+    with pytest.MonkeyPatch.context() as patch:
+        use_closed_form(patch)
+        path = tmp_path_factory.mktemp("whole") / "whole.h5"
+        return study(path, rare=200, storage=counted(stages)), len(stages)
+
+
 @pytest.mark.parametrize("probability", [1e-2, 1e-4, 1e-6])
 def test_200_further_tests_give_a_variation_below_10_percent(
     tmp_path: Path, probability: float
@@ -119,8 +129,10 @@ def test_factor_alone_takes_no_further_tests(tmp_path: Path) -> None:
         lives(tmp_path / "alone.h5", scenario, 1, target=1000, rare=200)
 
 
-def test_tests_of_an_integrated_factor_do_not_depend_on_workers(tmp_path: Path) -> None:
-    one = study(tmp_path / "one.h5", rare=200)
+def test_tests_of_an_integrated_factor_do_not_depend_on_workers(
+    tmp_path: Path, whole: tuple[LifeResult, int]
+) -> None:
+    one, _ = whole
     two = study(tmp_path / "two.h5", rare=200, scheduler="threads", workers=2)
     assert differences(two, one) == []
     assert two.rare_estimates == one.rare_estimates
@@ -130,18 +142,17 @@ def test_tests_of_an_integrated_factor_do_not_depend_on_workers(tmp_path: Path) 
     "part", [0.6, *(pytest.param(k / 8.0, marks=pytest.mark.slow) for k in (3, 6, 7.5))]
 )
 def test_killed_study_of_an_integrated_factor_continues_bit_for_bit(
-    tmp_path: Path, part: float
+    tmp_path: Path, part: float, whole: tuple[LifeResult, int]
 ) -> None:
-    stages: list[str] = []
-    whole = study(tmp_path / "whole.h5", rare=200, storage=counted(stages))
+    complete, stages = whole
     path, done = tmp_path / "killed.h5", list[str]()
     with pytest.raises(Killed):
-        study(path, rare=200, storage=counted(done, int(part * len(stages))))
+        study(path, rare=200, storage=counted(done, int(part * stages)))
     assert not read_ensemble(path).finished
     result = resume_ensemble(path, scheduler="serial")
-    assert differences(result, whole) == []
-    assert result.rare_estimates == whole.rare_estimates
-    assert result.settings == whole.settings
+    assert differences(result, complete) == []
+    assert result.rare_estimates == complete.rare_estimates
+    assert result.settings == complete.settings
 
 
 def test_effects_are_not_stated_where_lives_are_censored(

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
+from tests.fixed_batches import batches_of
 from tests.studies.ensemble_cases import LOGNORMAL, differences, small
 from tests.studies.random_examples import WANDERING
 from wearsim.errors import Interrupted, ResultsFileError, ScenarioError
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import resume_ensemble
 from wearsim.studies.ensemble.file.parts import read_ensemble
+from wearsim.studies.life import settings
 from wearsim.studies.life.api import life, sweep_life
 from wearsim.studies.life.comparison import swept_variable as against
 from wearsim.studies.life.comparison_view import LivesView
@@ -63,6 +65,22 @@ def lives(
 @pytest.fixture(scope="module")
 def exact(tmp_path_factory: pytest.TempPathFactory) -> LifeResult:
     return lives(tmp_path_factory.mktemp("life") / "exact.h5", target=4000)
+
+
+@pytest.fixture(scope="module")
+def censored(tmp_path_factory: pytest.TempPathFactory) -> LifeResult:
+    return lives(tmp_path_factory.mktemp("life") / "censored.h5", most=2000)
+
+
+RADII = ["600 mm", "500 mm"]
+OPTIONS: dict[str, Any] = {"target": 4000, "scheduler": "serial"}
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[LifeResult]]:
+    """Return the path of a sweep of the crown radius, and its studies."""
+    path = tmp_path_factory.mktemp("life") / "a.h5"
+    return path, list(sweep_life(design(), "roller.crown_radius", RADII, path, 12, **OPTIONS))
 
 
 @pytest.mark.parametrize(
@@ -208,9 +226,10 @@ def test_limit_that_is_exceeded_when_fresh_gives_life_zero(tmp_path: Path) -> No
     assert result.fits == []
 
 
-def test_lives_beyond_the_maximum_are_censored(tmp_path: Path) -> None:
-    result = lives(tmp_path / "censored.h5", most=2000, count=12)
-    full = lives(tmp_path / "full.h5", count=12)
+def test_lives_beyond_the_maximum_are_censored(
+    tmp_path: Path, exact: LifeResult, censored: LifeResult
+) -> None:
+    result, full = censored, exact
     assert result.censored == int((full.lives > 2000).sum()) > 0
     assert np.allclose(result.lives[result.observed], full.lives[full.lives <= 2000], rtol=5e-3)
     assert result.b(10).value == pytest.approx(full.b(10).value, rel=5e-3)
@@ -238,7 +257,10 @@ def test_quantity_that_hardly_grows_gives_an_interval_of_life(tmp_path: Path) ->
     assert (value > low).all()
 
 
-def test_stopped_study_continues_bit_for_bit(tmp_path: Path, exact: LifeResult) -> None:
+def test_stopped_study_continues_bit_for_bit(
+    tmp_path: Path, exact: LifeResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(4))
     path, calls = tmp_path / "stopped.h5", []
 
     def stop() -> bool:
@@ -252,7 +274,10 @@ def test_stopped_study_continues_bit_for_bit(tmp_path: Path, exact: LifeResult) 
     assert differences(result, exact) == []
 
 
-def test_lives_do_not_depend_on_workers(tmp_path: Path, exact: LifeResult) -> None:
+def test_lives_do_not_depend_on_workers(
+    tmp_path: Path, exact: LifeResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(4))
     result = life(design(), 12, tmp_path / "two.h5", target=4000, workers=2)
     assert differences(result, exact) == []
 
@@ -288,8 +313,13 @@ def test_study_of_lives_is_opened_as_such(exact: LifeResult) -> None:
     assert resume_ensemble(exact.path).raw.life == exact.raw.life  # nothing is left to be run
 
 
-def test_designs_are_compared_with_common_draws(exact: LifeResult, tmp_path: Path) -> None:
-    wider = lives(tmp_path / "wider.h5", design(roller__crown_radius="600 mm"))
+def test_designs_are_compared_with_common_draws(
+    exact: LifeResult,
+    censored: LifeResult,
+    swept: tuple[Path, list[LifeResult]],
+    tmp_path: Path,
+) -> None:
+    wider = swept[1][0]
     found = wider.compare(exact)
     ratio = math.sqrt(600.0 / 500.0)  # of the closed form
     assert found.b10_ratio.value == pytest.approx(ratio, rel=0.02)
@@ -297,7 +327,7 @@ def test_designs_are_compared_with_common_draws(exact: LifeResult, tmp_path: Pat
     assert found.same_machine.value == 1.0
     assert 0.5 < found.two_specimens.value < 0.7
     assert found.count == 12
-    short = lives(tmp_path / "short.h5", most=2000).compare(exact)
+    short = censored.compare(exact)
     assert 0.0 < short.two_specimens.low < short.two_specimens.high < 1.0
     assert short.b10_ratio.value == pytest.approx(1.0, rel=5e-3)
     low, high = found.b10_ratio_bounds
@@ -310,17 +340,17 @@ def test_designs_are_compared_with_common_draws(exact: LifeResult, tmp_path: Pat
     assert other.compare(exact).same_machine is None
 
 
-def test_sweep_has_the_lives_of_each_value(tmp_path: Path, exact: LifeResult) -> None:
-    radii = ["600 mm", "500 mm"]
-    options: dict[str, Any] = {"target": 4000, "scheduler": "serial"}
-    found = sweep_life(design(), "roller.crown_radius", radii, tmp_path / "a.h5", 12, **options)
+def test_sweep_has_the_lives_of_each_value(
+    swept: tuple[Path, list[LifeResult]], exact: LifeResult
+) -> None:
+    path, found = swept
     assert [one.variable.value for one in found if one.variable] == [0.6, 0.5]
     assert differences(found[1], exact) == []
     assert against(found) == found[0].variable
     assert against([found[0], found[0]]) is None
     assert against([found[0], exact]) is None
     with pytest.raises(ResultsFileError, match="exists"):
-        sweep_life(design(), "roller.crown_radius", radii, tmp_path / "a.h5", 12, **options)
+        sweep_life(design(), "roller.crown_radius", RADII, path, 12, **OPTIONS)
 
 
 @pytest.mark.parametrize(
@@ -393,12 +423,16 @@ def test_rare_end_of_life_agrees_with_the_exact_factor(tmp_path: Path, exact: Li
     assert rare.variation < 0.25
 
 
-def test_stopped_rare_events_continue_bit_for_bit(tmp_path: Path) -> None:
+def test_stopped_rare_events_continue_bit_for_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wearsim.studies.ensemble.driver.BatchSizes", batches_of(20))
+    monkeypatch.setattr(settings, "LEAST_TESTS", 60)
     factor = {**LOGNORMAL, "median": "1e-20 1/Pa"}
     quick = {"evolution__tolerance": 5e-2, "evolution__strip_error": False}
     scenario = design(wear__roller__k_over_h=factor, **quick)
     # subset simulation is stopped in test_rare_lives.py, without tests
-    options: dict[str, Any] = {"target": 250, "rare": 200, "rare_method": "importance"}
+    options: dict[str, Any] = {"target": 1200, "rare": 60, "rare_method": "importance"}
     whole = lives(tmp_path / "whole.h5", scenario, 20, **options)
     path, calls = tmp_path / "stopped.h5", []
 

@@ -39,7 +39,7 @@ def lives(limit: dict[str, str], factor: str, **changes: object) -> LifeResult:
 )
 def test_bounds_of_a_life_include_that_on_fine_strips(limit: dict[str, str], factor: str) -> None:
     found = lives(limit, factor)
-    fine = lives(limit, factor, contact__strips=401, evolution__tolerance=1e-5)
+    fine = lives(limit, factor, contact__strips=301, evolution__tolerance=1e-4)
     low, high = found.values("life_low"), found.values("life_high")
     true = fine.values("life")
     assert np.isfinite(high).all()

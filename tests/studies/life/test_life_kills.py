@@ -16,7 +16,7 @@ from wearsim.studies.life.api import life
 from wearsim.studies.life.result import LifeResult
 
 COUNT = 4
-RARE = 60  # fewer than in use, to save time
+RARE = 40  # fewer than in use, to save time
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -148,7 +148,8 @@ def test_subset_simulation_holds_the_probability_in_repeats(probability: float, 
 @pytest.mark.parametrize(
     ("probability", "tests", "seed"),
     [
-        (1e-3, 1000, 1),
+        (1e-2, 600, 1),
+        pytest.param(1e-3, 1000, 1, marks=pytest.mark.slow),
         pytest.param(1e-4, 2000, 1, marks=pytest.mark.slow),
         pytest.param(1e-6, 5000, 2, marks=pytest.mark.slow),
     ],
@@ -168,7 +169,7 @@ def test_study_has_the_subset_simulation_of_its_draws(
 @pytest.mark.parametrize(
     ("probability", "tests", "seeds"),
     [
-        (1e-4, 2000, range(1)),
+        (1e-4, 800, range(1)),
         pytest.param(1e-6, 5000, range(1), marks=pytest.mark.slow),
     ],
 )

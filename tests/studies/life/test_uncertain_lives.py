@@ -29,7 +29,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (found / "rig.toml").write_text(TEXT + '\n[limit]\ndepth = "50 um"\n')
     random = wearsim.load_scenario(found / "rig.toml", {"friction.coefficient": FRICTION})
     depths = [Measurement(f"test {d}", depth=d * 1e-6, depth_std=1e-6) for d in (41, 46, 50, 56)]
-    tests = wearsim.identify(random, depths, found / "K.h5", fix={"load": "300 N"}, draws=64)
+    tests = wearsim.identify(random, depths, found / "K.h5", fix={"load": "300 N"}, draws=32)
     (found / "K.csv").write_text(tests.posterior_csv())
     (found / "K.toml").write_text(tests.posterior_toml())
     return found

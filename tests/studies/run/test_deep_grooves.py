@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_examples import run_differences, short
+from study_examples import after, run_differences, short
 
 from wearsim.errors import Interrupted, ScenarioError, StepError
 from wearsim.scenario import Scenario
@@ -91,7 +91,7 @@ def test_records_of_a_prolonged_run_are_thinned_and_resumed(
     while not open_results(other).finished or left == 0:
         left += 1
         try:
-            studies.resume(other, until=1000.0, stop_requested=lambda: True)
+            studies.resume(other, until=1000.0, stop_requested=after(3))
         except Interrupted:
             continue
     assert left > 3

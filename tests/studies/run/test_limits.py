@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_examples import LOADS, ROLLERS, STEPPERS, after, run_differences, short
+from study_examples import LOADS, ROLLERS, STEPPERS, after, run_differences, run_once, short
 
 from tests.evolution import SCENARIOS
 from wearsim.errors import Interrupted, ResultsFileError
@@ -86,7 +86,7 @@ STEPS = ("implicit", "stabilised", "explicit", "compiled passes")
 @pytest.mark.parametrize("text", ["depth 0.6 um", "volume 0.05 mm^3", "1.1 min", "3123 passes"])
 def test_run_stops_at_the_limit_and_resumes_to_the_end(stepper: str, text: str, path: Path) -> None:
     scenario = short(**{**STEPPERS[stepper], **LOADS["spring"], **ROLLERS["wearing"]})
-    whole = studies.run(scenario)
+    whole = run_once(scenario)
     limit = Limit.parse(text)
     stopped = studies.run(scenario, path, until=text)
     values = stopped.raw.history[limit.variable].ravel()
@@ -118,7 +118,7 @@ def test_further_limits_do_not_change_the_run(path: Path) -> None:
     assert run_differences(second, studies.run(scenario, until="volume 0.16 mm^3")) == []
     with pytest.raises(ResultsFileError, match=r"already reached depth .* past depth 0\.4 um"):
         studies.resume(path, until="depth 0.4 um")
-    assert run_differences(studies.resume(path), studies.run(scenario)) == []
+    assert run_differences(studies.resume(path), run_once(scenario)) == []
 
 
 def test_interrupted_run_resumes_to_its_limit(path: Path) -> None:

@@ -94,10 +94,10 @@ def test_rollers_have_separate_misalignments():
 @pytest.mark.parametrize("drawn", [("creepage__misalignment",), tuple(ALL_PER_PASS)])
 def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
     inputs = {name: ALL_PER_PASS[name] for name in drawn}
-    _, reference = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=91, **inputs))
-    fresh, _, _ = assemble_problem(draw(scenario_of(contact__strips=91, **inputs)))
+    _, reference = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=61, **inputs))
+    fresh, _, _ = assemble_problem(draw(scenario_of(contact__strips=61, **inputs)))
     step = round(10.0 * stability_limit(fresh, fresh_state(fresh))[0])
-    problem, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
+    problem, state = end_of(scenario_of(evolution__step=step, contact__strips=61, **inputs))
     assert state.steps < 20
     assert abs(depth_of(state) - depth_of(reference)) <= state.depth_error[0]
     volumes = volume_of(problem, state.depths), volume_of(problem, reference.depths)
@@ -108,8 +108,9 @@ def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
 def test_a_run_of_single_passes_under_a_spring_records_the_expectation():
     drawn = {"creepage__longitudinal": ALL_PER_PASS["creepage__longitudinal"]}
     spring = {"load__kind": "spring", "load__stiffness": "690 N/mm"}
+    strips = {"contact__strips": 61, "evolution__strip_error": False}
     single, expected = (
-        wearsim.run(scenario_of(**spring, **drawn, evolution__stepper=stepper))
+        wearsim.run(scenario_of(4000, **spring, **drawn, evolution__stepper=stepper, **strips))
         for stepper in ("per-pass", "auto")
     )
     # one roller's creepage is drawn from pass to pass, and the loads are those of its passes
@@ -120,10 +121,10 @@ def test_a_run_of_single_passes_under_a_spring_records_the_expectation():
 def test_expectation_is_insensitive_to_the_step():
     inputs = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
     depths = [
-        depth_of(end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))[1])
-        for step in (250, 1000, 3000)
+        depth_of(end_of(scenario_of(evolution__step=step, contact__strips=61, **inputs))[1])
+        for step in (250, 3000)
     ]
-    assert depths == pytest.approx([depths[0]] * 3, rel=3e-3)
+    assert depths[1] == pytest.approx(depths[0], rel=3e-3)
 
 
 def test_long_explicit_step_is_unstable():
@@ -172,8 +173,9 @@ def test_per_pass_draws_do_not_depend_on_records():
 @pytest.mark.parametrize("stepper", ["implicit", "per-pass"])
 def test_resumed_random_run_equals_unbroken_run(tmp_path, stepper):
     scenario = scenario_of(
-        passes=1500,
+        passes=900,
         evolution__stepper=stepper,
+        **({"evolution__nodes": 16} if stepper == "implicit" else {}),
         contact__strips=61,
         outputs__records=5,
         load__normal_force={**WANDERING, "marginal": LOAD},
@@ -241,7 +243,7 @@ def test_run_with_random_load_is_within_its_error_estimate(rollers):
 
 def test_records_are_comparable_between_steppers():
     slack = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
-    inputs = {**slack, "passes": 3000, "contact__strips": 91}
+    inputs = {**slack, "passes": 3000, "contact__strips": 61}
     expected = wearsim.run(scenario_of(**inputs))
     drawn = wearsim.run(scenario_of(evolution__stepper="per-pass", **inputs))
     power = drawn.dissipated_energy[-1] / drawn.time[-1]

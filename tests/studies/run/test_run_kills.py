@@ -30,7 +30,8 @@ def test_run_killed_while_writing_resumes_bit_for_bit(tmp_path: Path, extent: st
     assert stages.count("before rename") == stages.count("after rename") == 4
     assert stages.count("before write") > 4
     killed_at = [row["number"] for row in rows]
-    assert {stages[number] for number in killed_at} == set(stages)
+    kinds = {stage for stage in stages if extent == "sixths" or stage.startswith("before")}
+    assert {stages[number] for number in killed_at} == kinds | {stages[-1]}
     assert extent == "each stage" or set(killed_at) >= set(range(0, len(stages), 6))
     for row in rows:
         assert row["killed"][0] == signal.SIGKILL

@@ -49,7 +49,8 @@ def _runs(**overrides: object) -> dict[str, Result]:
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit"])
 def test_records_do_not_change_steps(stepper: str, load: str) -> None:
-    runs = _runs(**{**ROLLERS["wearing"], **LOADS[load], **STEPPERS[stepper]})
+    coarse = {"evolution.tolerance": 1e-3} if stepper == "stabilised" else {}
+    runs = _runs(**{**ROLLERS["wearing"], **LOADS[load], **STEPPERS[stepper], **coarse})
     first = runs["five"]
     for name, run in runs.items():
         changed = [item for item in run_differences(run, first) if not item.startswith("records.")]

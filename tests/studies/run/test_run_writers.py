@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from study_examples import run_differences, short
+from study_examples import run_differences, run_once, short
 
 from wearsim import operating_system
 from wearsim.atomic_write import lock_path, write_lock
@@ -44,7 +44,7 @@ def test_second_writer_is_refused_while_a_run_writes(
                 second(path)
             refused.append(str(caught.value))
 
-    unbroken = studies.run(short())
+    unbroken = run_once(short())
     if first == "resume":
         with pytest.raises(Interrupted):
             studies.run(short(), path, stop_requested=lambda: True)
