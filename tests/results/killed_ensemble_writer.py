@@ -56,6 +56,15 @@ def finish_writing(path: Path, storage: Storage = DISK) -> None:
         finish(file)
 
 
+def complete(path: Path) -> None:
+    """Write what a killed process has left to do at once, and merge the parts."""
+    with EnsembleFile.open(path) as file:
+        missing = [number for number in range(COUNT) if file.status[number] != DONE]
+        file.clear(missing)
+        file.put([outcome(number, fails=False) for number in missing])
+        finish(file)
+
+
 def kill_while(work: Callable[[Storage], None], at: int) -> int:
     """Fork, kill the child at file operation number `at`, and return the signal."""
     child = os.fork()
