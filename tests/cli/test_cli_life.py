@@ -161,7 +161,7 @@ def test_sweep_states_lives_against_the_design(command: Command, slim: Path) -> 
 
 
 def test_sweep_of_words_has_no_lives_against_the_design(command: Command, slim: Path) -> None:
-    found = life_of(command, slim, "-n", 4, "--sweep", "contact.model=slender,winkler")
+    found = life_of(command, slim, "-n", 2, "--sweep", "contact.model=slender,winkler")
     assert "against" not in found
     assert found["designs"][0]["variable"] is None
 
