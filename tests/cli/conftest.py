@@ -24,6 +24,12 @@ def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
+def unwritten_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compose figures without drawing them, for tests of what is printed beside them."""
+    monkeypatch.setattr(figures, "save_figure", lambda figure, path: path.touch())
+
+
+@pytest.fixture
 def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
     """Run `wearsim` with arguments in an empty folder."""
     monkeypatch.chdir(tmp_path)

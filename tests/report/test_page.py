@@ -273,12 +273,12 @@ def test_two_lives_are_compared(life, tmp_path):
 def test_identification_shows_its_verdict_and_traces(tmp_path):
     scenario = shipped_scenario("rig-450min")
     truth = wearsim.run(scenario)
-    y = np.arange(-10e-3, 10e-3, 50e-6)
+    y = np.arange(-10e-3, 10e-3, 100e-6)
     noise = 1e-6 * np.random.default_rng(2).standard_normal(len(y))
     height = noise - np.interp(y, truth.y, truth.profiles[-1])
     rows = [f"{1e3 * place:.4f},{1e6 * value:.4f}" for place, value in zip(y, height, strict=True)]
     (tmp_path / "t1.csv").write_text("\n".join(["y [mm],height [um]", *rows]))
-    found = wearsim.identify(shipped_scenario("rig-identify"), [tmp_path / "t1.csv"], draws=32)
+    found = wearsim.identify(shipped_scenario("rig-identify"), [tmp_path / "t1.csv"], draws=16)
     page = unescape(page_of([found]))
     assert "is K/H random?" in page
     k = found.tests[0]["k_over_h_per_Pa"]["value"]
