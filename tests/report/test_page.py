@@ -264,7 +264,7 @@ def test_command_of_an_ensemble_has_its_precision(tmp_path):
 def test_two_lives_are_compared(life, tmp_path):
     scenario = shipped_scenario("rig-life", {"contact.strips": 61, "friction.coefficient": 0.15})
     other = wearsim.life(scenario, 24, tmp_path / "rough.h5", limits=["depth 5 um"], **SERIAL)
-    page = unescape(texts_of([life, other]))
+    page = unescape(page_of([life, other]))
     assert "Which design lasts more passes?" in page
     assert f"{life.compare(other).b10_ratio.value:.2f}"[:3] in page
     assert " outlives " in page
