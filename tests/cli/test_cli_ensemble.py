@@ -254,7 +254,7 @@ def test_unknown_key_of_a_sweep_is_refused(command: Command, tests: Path) -> Non
 
 
 def test_signal_ends_an_ensemble_that_can_be_resumed(tests: Path, tmp_path: Path) -> None:
-    options = ["-n", "100000", "-o", "a.h5", "--workers", "1"]
+    options = ["-n", "100000", "-o", "a.h5", "--workers", "1", "--set", "operation.passes=100"]
     arguments = interruptible("-m", "wearsim", "ensemble", tests, *options)
     with subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
         assert running.stderr is not None

@@ -49,11 +49,16 @@ def continue_writing(
         file.put([outcome(number, fails=False) for number in again])
 
 
-def finish_writing(path: Path, storage: Storage = DISK) -> None:
-    """Write the pending realisations, and merge the parts."""
-    continue_writing(path, storage=storage)
+def merge(path: Path, storage: Storage = DISK) -> None:
+    """Merge the parts of an ensemble."""
     with EnsembleFile.open(path, storage) as file:
         finish(file)
+
+
+def finish_writing(path: Path) -> None:
+    """Write the pending realisations, and merge the parts."""
+    continue_writing(path)
+    merge(path)
 
 
 def complete(path: Path) -> None:
@@ -118,6 +123,6 @@ if __name__ == "__main__":
     )
     create(written)
     continue_writing(written)
-    kill_at_stages("merge", written, finish_writing, every)
+    kill_at_stages("merge", written, merge, every)
     create(whole)
     finish_writing(whole)

@@ -123,7 +123,7 @@ def test_killed_ensemble_is_continued_bit_for_bit(tmp_path, extent):
     lines = [line.split(",") for line in done.stdout.splitlines()]
     assert {int(killed_by) for _, killed_by, _ in lines} == {signal.SIGKILL}
     assert "before remove" in {stage for _, _, stage in lines}
-    whole = contents(tmp_path / "whole.h5")
+    whole, fresh = (contents(tmp_path / f"{name}.h5") for name in ("whole", "fresh"))
     counts, exists = set(), False
     for name, _, stage in lines:
         path = tmp_path / name
@@ -131,6 +131,10 @@ def test_killed_ensemble_is_continued_bit_for_bit(tmp_path, extent):
         assert path.exists() == exists
         if not exists:
             killed.create(path)  # remains of the killed process do not matter
+            assert differences(path, fresh) == [], name
+            if extent != "all":  # what follows is as from a new ensemble
+                assert list(tmp_path.glob(f"{name}.*")) == [tmp_path / f"{name}.parts"]
+                continue
         if name.startswith("merge"):
             data = read_ensemble(path)
             assert len(data.done) == killed.COUNT  # finished or not, with or without parts
