@@ -227,8 +227,10 @@ def same(found: OptimisationResult, other: OptimisationResult) -> bool:
 
 
 def test_gain_is_stated_with_fresh_draws():
-    quick = {"evolution.tolerance": 1e-2, "evolution.strip_error": False}
-    scenario = shipped_scenario("rig-life", {**CONTACT, **quick, "limit.depth": "20 um"})
+    quick: dict[str, Any] = {"evolution.tolerance": 1e-2, "evolution.strip_error": False}
+    force = {"distribution": "lognormal", "median": "300 N", "factor": 1.1}
+    quick |= {"load": {"kind": "constant", "normal_force": force}, "limit.depth": "20 um"}
+    scenario = shipped_scenario("rig-life", {**CONTACT, **quick})
     found = optimise(
         scenario,
         ["roller.crown_radius=500mm:600mm"],
