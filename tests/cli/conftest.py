@@ -10,12 +10,23 @@ from matplotlib.figure import Figure
 from typer.testing import CliRunner, Result
 
 from wearsim.cli.app import app
+from wearsim.report import figures
 
 
 @pytest.fixture(autouse=True)
 def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let texts of figures overlap, as a layout takes most of the time; see tests/report for it."""
+    """Let texts of coarse figures overlap, as a layout takes most of the time.
+
+    Layouts and full sizes are in tests/report.
+    """
+    monkeypatch.setattr(figures, "DPI", 60)
     monkeypatch.setattr(Figure, "get_layout_engine", lambda figure: None)
+
+
+@pytest.fixture
+def unwritten_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compose figures without drawing them, for tests of what is printed beside them."""
+    monkeypatch.setattr(figures, "save_figure", lambda figure, path: path.touch())
 
 
 @pytest.fixture

@@ -38,7 +38,7 @@ def failing(tmp_path: Path) -> Path:
 
 
 def test_table_has_estimates_and_intervals(command: Command, tests: Path) -> None:
-    result = command("ensemble", tests, "-n", 40, *HERE)
+    result = command("ensemble", tests, "-n", 20, *HERE)
     assert result.exit_code == 0, result.output
     found = open_ensemble("tests-ensemble.h5")
     depth = found.estimate("depth").mean
@@ -49,7 +49,7 @@ def test_table_has_estimates_and_intervals(command: Command, tests: Path) -> Non
     assert float(low) == pytest.approx(depth.low * 1e6, rel=1e-2)
     assert float(high) == pytest.approx(depth.high * 1e6, rel=1e-2)
     for text in (
-        "40 done, 0 failed, of 40",
+        "20 done, 0 failed, of 20",
         "monte-carlo, seed 1",
         "3,000 passes",
         "implicit, tolerance 0.01",
@@ -173,22 +173,22 @@ def test_missed_target_is_reported(command: Command, tests: Path) -> None:
 
 
 def test_failed_realisations_are_reported_and_repeated(command: Command, failing: Path) -> None:
-    result = command("ensemble", failing, "-n", 30, *HERE, "-o", "f.h5")
+    result = command("ensemble", failing, "-n", 12, *HERE, "-o", "f.h5")
     found = open_ensemble("f.h5")
-    assert 0 < found.failed < 30
+    assert 0 < found.failed < 12
     assert result.exit_code == 0
     first = min(found.errors)
     assert (
-        f"warning: {found.failed} of 30 realisations failed; the first is number {first}: "
+        f"warning: {found.failed} of 12 realisations failed; the first is number {first}: "
         f"{found.errors[first]}"
     ) in result.stderr
     assert "the same draws fail again unless the scenario or the software" in result.stderr
     assert "wearsim resume f.h5 --failed" in result.stderr
-    assert f"{found.count} done, {found.failed} failed, of 30" in result.stdout
+    assert f"{found.count} done, {found.failed} failed, of 12" in result.stdout
     again = command("resume", "f.h5", "--failed", "--scheduler", "serial", "--workers", 1, "-q")
     assert again.exit_code == 0
     assert "this process, one realisation at a time" in again.stdout
-    assert f"warning: {found.failed} of 30 realisations failed" in again.stderr
+    assert f"warning: {found.failed} of 12 realisations failed" in again.stderr
 
 
 def test_ensemble_of_failures_only_fails(command: Command, failing: Path) -> None:
@@ -254,7 +254,7 @@ def test_unknown_key_of_a_sweep_is_refused(command: Command, tests: Path) -> Non
 
 
 def test_signal_ends_an_ensemble_that_can_be_resumed(tests: Path, tmp_path: Path) -> None:
-    options = ["-n", "100000", "-o", "a.h5", "--workers", "1"]
+    options = ["-n", "100000", "-o", "a.h5", "--workers", "1", "--set", "operation.passes=100"]
     arguments = interruptible("-m", "wearsim", "ensemble", tests, *options)
     with subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
         assert running.stderr is not None

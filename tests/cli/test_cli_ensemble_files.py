@@ -21,7 +21,7 @@ from wearsim.studies.opening import open_ensemble
 @pytest.fixture(scope="session")
 def done_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("ensemble") / "e.h5"
-    ensemble(small(), 40, path, scheduler="serial")
+    ensemble(small(), 20, path, scheduler="serial")
     return path
 
 
@@ -43,11 +43,11 @@ def done(done_once: Path, tmp_path: Path) -> Path:
 def test_show_prints_the_content_of_the_file(command: Command, done: Path) -> None:
     result = command("show", done)
     assert result.exit_code == 0
-    for text in ("40 done, 0 failed, of 40", "software", "random creepage.misalignment", "disc"):
+    for text in ("20 done, 0 failed, of 20", "software", "random creepage.misalignment", "disc"):
         assert text in result.stdout
     assert max(len(line.rstrip()) for line in result.stdout.splitlines()) <= 110
     data = json.loads(command("show", done, "--json").stdout)
-    assert data["depth_m"]["count"] == 40
+    assert data["depth_m"]["count"] == 20
     assert "[load.normal_force]" in data["scenario"]
 
 
@@ -179,7 +179,7 @@ def test_resume_refuses_options_of_ensembles_for_a_run(
 def test_resume_of_a_run_names_resume_ensemble(done: Path) -> None:
     with pytest.raises(ResultsFileError, match="which resume_ensemble continues"):
         wearsim.resume(done)
-    assert wearsim.resume_ensemble(done).count == wearsim.open_ensemble(done).count == 40
+    assert wearsim.resume_ensemble(done).count == wearsim.open_ensemble(done).count == 20
 
 
 def test_resume_reports_that_there_is_nothing_to_do(command: Command, done: Path) -> None:

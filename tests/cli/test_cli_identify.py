@@ -43,10 +43,10 @@ def rig(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def traces(tmp_path: Path) -> list[Path]:
-    """Grooves of three tests."""
+    """Coarse grooves of three tests."""
     rng = np.random.default_rng(7)
     return [
-        write(tmp_path / f"t{number}.csv", *groove(rng, k))
+        write(tmp_path / f"t{number}.csv", *(values[::3] for values in groove(rng, k)))
         for number, k in enumerate((0.9e-11, 1.1e-11, 1.3e-11), 1)
     ]
 
@@ -54,7 +54,7 @@ def traces(tmp_path: Path) -> list[Path]:
 def test_profiles_give_table_posterior_and_figure(
     command: Command, rig: Path, traces: list[Path], tmp_path: Path
 ):
-    options = ("-o", "o.h5", "--posterior", "K.toml", "--figure", "f.png", "--draws", 64, "-q")
+    options = ("-o", "o.h5", "--posterior", "K.toml", "--figure", "f.png", "--draws", 16, "-q")
     done = command("identify", rig, *traces, *options)
     assert done.exit_code == 0, done.output
     for part in ("t1.csv", "(found)", "verdict", "Bayes factor of t = 0", "what would decide"):
@@ -71,7 +71,7 @@ def test_profiles_give_table_posterior_and_figure(
 
 
 def test_json_has_the_named_keys(command: Command, rig: Path):
-    done = command("identify", rig, "--tests", "depths.toml", "--json", "-q", "--draws", 64)
+    done = command("identify", rig, "--tests", "depths.toml", "--json", "-q", "--draws", 32)
     assert done.exit_code == 0, done.output
     data = json.loads(done.stdout)
     assert [test["depth_m"] for test in data["tests"]] == pytest.approx([28e-6, 48e-6, 62e-6])

@@ -99,6 +99,7 @@ def test_plot_draws_measurements(command: Command, finished: Path) -> None:
     assert "measured: probe" in Path("x.svg").read_text()
 
 
+@pytest.mark.usefixtures("unwritten_figures")
 def test_plot_prints_the_residual_of_measurements(command: Command, finished: Path) -> None:
     found = open_results(finished)
     height = -np.interp([0.0, 0.5e-3], found.y, found.profiles[-1]) * 1e6 + [0.3, -0.4]
@@ -111,6 +112,7 @@ def test_plot_prints_the_residual_of_measurements(command: Command, finished: Pa
     assert "far: no point on the strips, no residual" in result.stderr
 
 
+@pytest.mark.usefixtures("unwritten_figures")
 def test_plot_suggests_and_applies_levelling(command: Command, finished: Path) -> None:
     found = open_results(finished)
     y = found.y * 1.5
@@ -159,7 +161,8 @@ def test_plot_takes_columns_and_units_of_a_measurement(command: Command, finishe
     assert "row is for the rows of a surface, and this is a CSV file" in result.stderr
 
 
-def test_plot_draws_a_row_of_a_surface(command: Command, finished: Path) -> None:
+@pytest.mark.usefixtures("unwritten_figures")
+def test_plot_takes_a_row_of_a_surface(command: Command, finished: Path) -> None:
     sdfio = pytest.importorskip("sdfio")
     heights = 1e-6 * np.array([[-0.1, -0.5, -0.1], [-0.2, -0.6, -0.2]])
     sdfio.write("map.sdf", heights, x_scale=1e-3, y_scale=1e-3)

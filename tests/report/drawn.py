@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import pytest
 from matplotlib.figure import Figure
 
 from wearsim.levelling import Measured
@@ -42,6 +43,13 @@ def comparison_figure(comparison: Comparison, title: str = "") -> Figure:
 def page_of(results: Sequence[Any], measured: Sequence[Measured] = ()) -> str:
     """Return the page on results."""
     return pages.page_of(views_of(results), measured)
+
+
+def texts_of(results: Sequence[Any]) -> str:
+    """Return the page on results without its figures, which take most of the time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plots, "panels_of", lambda sheet: ({}, []))
+        return page_of(results)
 
 
 def plots_of(result: Any, measured: Sequence[Measured] = ()) -> dict[str, Any]:

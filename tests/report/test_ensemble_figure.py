@@ -11,6 +11,7 @@ from matplotlib.colors import to_hex
 
 from tests.report.drawn import ensemble_figure
 from tests.report.made_up_ensembles import INPUTS, made_up
+from wearsim.report import figures
 from wearsim.report.figures import save_figure
 from wearsim.report.panels import GREY
 from wearsim.studies.ensemble.panels import LINES
@@ -146,7 +147,8 @@ def test_total_indices_are_drawn_for_saltelli():
         ({"count": 4, "pending": 4}, "0 realisations of 4"),
     ],
 )
-def test_any_ensemble_can_be_drawn(tmp_path, example, caption):
+def test_any_ensemble_can_be_drawn(tmp_path, monkeypatch, example, caption):
+    monkeypatch.setattr(figures, "DPI", 100)
     figure = ensemble_figure(made_up(**example))
     assert caption in figure.get_suptitle()
     save_figure(figure, tmp_path / "a.png")

@@ -15,7 +15,7 @@ from bokeh.models import ColumnDataSource, HoverTool, NoOverlap, Plot
 from made_up_ensembles import made_up
 
 import wearsim
-from tests.report.drawn import page_of, plots_of
+from tests.report.drawn import page_of, plots_of, texts_of
 from wearsim.cli.app import app
 from wearsim.errors import WearsimError
 from wearsim.levelling import Measured
@@ -110,7 +110,7 @@ def test_page_states_question_answer_error_and_origin(result, page_of_run):
 def test_command_of_a_run_has_its_limit(until, written):
     rough = {**SHORT, "wear.roller.k_over_h": "1.1e-11 1/Pa"}
     found = wearsim.run(shipped_scenario("rig-450min", rough), until=until)
-    page = unescape(page_of([found]))
+    page = unescape(texts_of([found]))
     assert f"wearsim run rig-450min.toml --until {written}" in page
 
 
@@ -135,7 +135,7 @@ def test_cam_has_a_map_and_its_lift_error(cam):
     assert image.data["image"][0].max() == pytest.approx(1e6 * cam.final["depth_m"], rel=1e-3)
     (curve,) = data_of(titled(plots, "Lift error"), "shown")
     assert np.ptp(curve.data["shown"]) == pytest.approx(1e6 * cam.final["lift_error_m"], rel=0.02)
-    assert "How deep does the cam wear in 20,000 turns" in page_of([cam])
+    assert "How deep does the cam wear in 20,000 turns" in texts_of([cam])
 
 
 def first_screen(page):
@@ -159,7 +159,7 @@ def test_first_screen_of_a_cam_has_picture_loads_and_limits(cam):
 
 
 def test_first_screen_of_a_comparison_has_the_limits_of_each(cam):
-    text = first_screen(page_of([cam, cam]))
+    text = first_screen(texts_of([cam, cam]))
     assert "Loads" not in text  # they would be those of one cam
     assert re.search(r"Limits of 1: .* Limits of 2: ", text)
 
@@ -172,7 +172,7 @@ def with_limits(result, limits):
 def test_ensemble_shows_its_estimates():
     result = made_up()
     found = result.estimate("depth").mean
-    page = unescape(page_of([result]))
+    page = unescape(texts_of([result]))
     assert f"{1e6 * found.value:.2f} um [{1e6 * found.low:.2f}, {1e6 * found.high:.2f}]" in page
     plots = plots_of(result)
     (bars,) = data_of(titled(plots, "Depth at the end"), "value")
@@ -207,11 +207,11 @@ def test_several_results_are_compared(result):
 
 def test_one_contact_is_not_compared_with_tests(result):
     study = wearsim.dissipation(shipped_scenario("paper-monte-carlo"), 40)
-    assert "mean dissipated power" in page_of([study])
+    assert "mean dissipated power" in texts_of([study])
     with pytest.raises(WearsimError, match="only runs and ensembles can be compared"):
         comparison_of([result, study], ["run", "contact"])
     # a page has them one after the other
-    both = unescape(page_of([result, study]))
+    both = unescape(texts_of([result, study]))
     assert "How deep does the cylinder wear" in both
     assert "mean dissipated power" in both
     assert "at the end of these tests" not in both
@@ -249,7 +249,7 @@ def test_life_shows_its_quantiles_and_survival(life):
 
 
 def test_command_of_a_life_has_its_options(life, tmp_path):
-    options = repeated(page_of([life.with_settings(target=1_234_567.0)]), tmp_path)
+    options = repeated(texts_of([life.with_settings(target=1_234_567.0)]), tmp_path)
     assert options[:2] == ["life", "rig-life.toml"]
     given = dict(zip(options[2::2], options[3::2], strict=True))
     assert (given["-n"], given["--b"], given["--target"]) == ("24", "1,10,50", "1234567")
@@ -257,7 +257,7 @@ def test_command_of_a_life_has_its_options(life, tmp_path):
 
 
 def test_command_of_an_ensemble_has_its_precision(tmp_path):
-    options = repeated(page_of([made_up(until="depth.mean 1%")]), tmp_path)
+    options = repeated(texts_of([made_up(until="depth.mean 1%")]), tmp_path)
     assert options[-2:] == ["--precision", "depth.mean 1%"]
 
 
@@ -273,12 +273,12 @@ def test_two_lives_are_compared(life, tmp_path):
 def test_identification_shows_its_verdict_and_traces(tmp_path):
     scenario = shipped_scenario("rig-450min")
     truth = wearsim.run(scenario)
-    y = np.arange(-10e-3, 10e-3, 50e-6)
+    y = np.arange(-10e-3, 10e-3, 100e-6)
     noise = 1e-6 * np.random.default_rng(2).standard_normal(len(y))
     height = noise - np.interp(y, truth.y, truth.profiles[-1])
     rows = [f"{1e3 * place:.4f},{1e6 * value:.4f}" for place, value in zip(y, height, strict=True)]
     (tmp_path / "t1.csv").write_text("\n".join(["y [mm],height [um]", *rows]))
-    found = wearsim.identify(shipped_scenario("rig-identify"), [tmp_path / "t1.csv"], draws=32)
+    found = wearsim.identify(shipped_scenario("rig-identify"), [tmp_path / "t1.csv"], draws=16)
     page = unescape(page_of([found]))
     assert "is K/H random?" in page
     k = found.tests[0]["k_over_h_per_Pa"]["value"]
@@ -311,7 +311,7 @@ def test_identification_is_repeated_from_its_page(tmp_path, monkeypatch):
     tests = {"test": [depth, {**profile, **known, "shoulders": "8 mm"}]}
     (tmp_path / "tests.toml").write_text(tomlkit.dumps(tests))
     found = wearsim.identify(short, tmp_path / "tests.toml", draws=16, negligible=0.3)
-    page = page_of([found])
+    page = texts_of([found])
     assert "these files are needed too, beside rig-identify-tests.toml: t1.csv." in page
     folder = tmp_path / "again"
     folder.mkdir()
@@ -328,7 +328,7 @@ def test_identification_is_repeated_from_its_page(tmp_path, monkeypatch):
 def test_page_of_an_identification_without_its_measurements_claims_no_repetition():
     depths = [Measurement("a.csv", depth=48e-6, depth_std=1e-6)]
     found = wearsim.identify(shipped_scenario("rig-identify"), depths, draws=16)
-    page = unescape(page_of([replace(found, raw=replace(found.raw, measured=[]))]))
+    page = unescape(texts_of([replace(found, raw=replace(found.raw, measured=[]))]))
     assert "add the options of the study" in page
     assert "gives the same numbers" not in page
 

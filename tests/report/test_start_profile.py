@@ -84,7 +84,7 @@ def test_depth_below_nominal_states_an_error_that_holds(result, passes):
         changes = {name.replace("__", "."): value for name, value in changes.items()}
         return wearsim.run(result.scenario.changed({"operation.passes": passes, **changes}))
 
-    fine = run(contact__strips=801, evolution__tolerance=1e-5, evolution__strip_error=False)
+    fine = run(contact__strips=401, evolution__tolerance=1e-5, evolution__strip_error=False)
     for strips in (80, 81, 121):
         coarse = run(contact__strips=strips)
         below, error = coarse.depth_below_nominal[-1], coarse.depth_below_nominal_error

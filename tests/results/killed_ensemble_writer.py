@@ -49,10 +49,24 @@ def continue_writing(
         file.put([outcome(number, fails=False) for number in again])
 
 
-def finish_writing(path: Path, storage: Storage = DISK) -> None:
-    """Write the pending realisations, and merge the parts."""
-    continue_writing(path, storage=storage)
+def merge(path: Path, storage: Storage = DISK) -> None:
+    """Merge the parts of an ensemble."""
     with EnsembleFile.open(path, storage) as file:
+        finish(file)
+
+
+def finish_writing(path: Path) -> None:
+    """Write the pending realisations, and merge the parts."""
+    continue_writing(path)
+    merge(path)
+
+
+def complete(path: Path) -> None:
+    """Write what a killed process has left to do at once, and merge the parts."""
+    with EnsembleFile.open(path) as file:
+        missing = [number for number in range(COUNT) if file.status[number] != DONE]
+        file.clear(missing)
+        file.put([outcome(number, fails=False) for number in missing])
         finish(file)
 
 
@@ -109,6 +123,6 @@ if __name__ == "__main__":
     )
     create(written)
     continue_writing(written)
-    kill_at_stages("merge", written, finish_writing, every)
+    kill_at_stages("merge", written, merge, every)
     create(whole)
     finish_writing(whole)

@@ -16,7 +16,7 @@ from wearsim.results.io.files import write_results
 def stages_of_a_write(path: Path) -> list[str]:
     """Return all file operations, in order; one may occur more than once."""
     seen: list[str] = []
-    write_results(path, some_run(seed=2, strips=400, records=20), WatchedStorage(seen.append))
+    write_results(path, some_run(seed=2, strips=200, records=10), WatchedStorage(seen.append))
     return seen
 
 
@@ -31,7 +31,7 @@ def kill_while_writing(path: Path, at: int) -> int:
         if next(calls) == at:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    write_results(path, some_run(seed=2, strips=400, records=20), WatchedStorage(kill))
+    write_results(path, some_run(seed=2, strips=200, records=10), WatchedStorage(kill))
     os._exit(0)
 
 

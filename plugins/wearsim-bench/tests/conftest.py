@@ -8,9 +8,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 from typer.testing import CliRunner, Result
 
 from wearsim.cli.app import app
+from wearsim.report import figures
 
 FOLDER = Path(__file__).parent
 collect_ignore_glob = [] if find_spec("wearsim_bench") else ["*"]
@@ -24,7 +26,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
-    """Return a function that runs `wearsim` in this process and in an empty folder."""
+    """Return a function that runs `wearsim` in this process and in an empty folder.
+
+    Its figures are coarse and have no layout; see test_bench_figures.py for it.
+    """
+    monkeypatch.setattr(figures, "DPI", 60)
+    monkeypatch.setattr(Figure, "get_layout_engine", lambda figure: None)
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("WEARSIM_TRACEBACK", raising=False)
 

@@ -233,9 +233,10 @@ def test_depth_of_rigid_bodies_is_that_of_the_closed_forms():
 
 def test_wrong_depth_of_a_known_case_is_detected(monkeypatch):
     (known,) = (case for case in hard_cases(PASSES) if case.name == "load step x3")
-    assert evaluate(known, PLAN).criterion("truth").holds
+    plan = replace(PLAN, steps=1, doublings=0)
+    assert evaluate(known, plan).criterion("truth").holds
     monkeypatch.setattr(evaluation, "rigid_depth", lambda scenario: 1.01 * rigid_depth(scenario))
-    assert any("truth" in text for text in evaluate(known, PLAN).failures)
+    assert any("truth" in text for text in evaluate(known, plan).failures)
 
 
 def test_names_of_cases_are_unique():

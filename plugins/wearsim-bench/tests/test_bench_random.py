@@ -22,7 +22,7 @@ ROW = Measurement(TESTS, "1-0", "")
 
 
 def test_scenarios_repeat_and_span_the_language():
-    tests = [random_scenario(1, number)[0] for number in range(80)]
+    tests = [random_scenario(1, number)[0] for number in range(55)]
     assert [test.changes for test in tests[:5]] == [
         random_scenario(1, number)[0].changes for number in range(5)
     ]

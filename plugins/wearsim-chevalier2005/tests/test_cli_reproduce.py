@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.cli_examples import Command
+from wearsim.report import figures
 
 FEW = ("reproduce", "-n", "40", "--quiet")
 
@@ -62,7 +63,10 @@ def test_seed_option_sets_the_seed(command: Command) -> None:
     assert here[0] != here[1]
 
 
-def test_figure_is_overwritten_only_with_force(command: Command, tmp_path: Path) -> None:
+def test_figure_is_overwritten_only_with_force(
+    command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "DPI", 50)
     figure = tmp_path / "reproduce.png"
     figure.write_text("existing")
     result = command("reproduce", "-n", 2, "-o", figure, "-q")

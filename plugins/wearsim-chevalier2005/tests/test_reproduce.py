@@ -29,7 +29,7 @@ from wearsim_chevalier2005.study import (
 )
 
 ROOT = Path(__file__).parents[3]
-COUNT = 1000
+COUNT = 600
 GRID = 5e-4  # error of the grid of the paper in the power of full slip
 FindRow = Callable[[str], Row]
 

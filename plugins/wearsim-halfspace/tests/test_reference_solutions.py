@@ -266,7 +266,7 @@ SEVEN = [
 def test_linear_theory_has_the_coefficients_of_kalker(row):
     case = row["a_over_b"], row["nu"]
     coarse, fine = (creepage_coefficients(*case, n) for n in (30, 60))
-    exact = exact_coefficients(*case)
+    exact = exact_coefficients(*case, degree=30)  # within 2e-5
     for name, value in fine.items():
         further = value + FURTHER[2] * (value - coarse[name])
         known = row["rel_err"][name]  # of the reference

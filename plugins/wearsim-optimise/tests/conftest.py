@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from wearsim.cli.app import app
+from wearsim.report import figures
 
 FOLDER = Path(__file__).parent
 collect_ignore_glob = [] if find_spec("wearsim_optimise") else ["*"]
@@ -24,7 +25,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
-    """Return a function that runs `wearsim` in this process and in an empty folder."""
+    """Return a function that runs `wearsim` in an empty folder, and draws coarse figures."""
+    monkeypatch.setattr(figures, "DPI", 60)
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("WEARSIM_TRACEBACK", raising=False)
 

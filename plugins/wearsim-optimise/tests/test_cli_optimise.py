@@ -48,7 +48,7 @@ vary = ["cam.base_radius=25mm:45mm"]
 minimise = ["outer_radius"]
 subject_to = ["pressure_angle < 9 deg"]
 starts = 1
-evaluations = 10
+evaluations = 6
 """
     (tmp_path / "design.toml").write_text(text)
     done = command("optimise", "design.toml", "--scheduler", "serial", "-q", "--json")
@@ -98,14 +98,14 @@ def test_mistake_of_the_table_names_file_and_key(command, tmp_path):
 
 
 def test_designs_after_the_search_do_not_count_against_its_budget(command):
-    loud = ("--evaluations", 10, "--starts", 1, "--scheduler", "serial")
+    loud = ("--evaluations", 6, "--starts", 1, "--scheduler", "serial")
     done = command("optimise", CAM, *VARY, *GOAL, *loud)
     assert done.exit_code == 0, done.output
     shown = re.findall(r"(\d+) of (\d+), designs", done.stderr)
-    assert all(int(number) <= int(most) == 10 for number, most in shown)
-    (stated,) = re.findall(r"budget +(\d+) of at most 10 designs in the search", done.stdout)
-    assert int(stated) <= 10
-    assert f"\n{stated} of at most 10 designs in the search and " in done.stdout
+    assert all(int(number) <= int(most) == 6 for number, most in shown)
+    (stated,) = re.findall(r"budget +(\d+) of at most 6 designs in the search", done.stdout)
+    assert int(stated) <= 6
+    assert f"\n{stated} of at most 6 designs in the search and " in done.stdout
 
 
 def test_random_value_cannot_be_varied(command):
