@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -71,7 +71,7 @@ def show_with_figure(
     more: Mapping[str, Any] | None = None,
 ) -> None:
     """Draw the figure of a view, if a name is given, and write the view as `show_view`."""
-    draw_figure(view.panels(), figure)
+    draw_figure(view.panels, figure)
     named = {"figure": figure}
     show_view(view, json=json, files={**(files or {}), **named}, more={**(more or {}), **named})
 
@@ -92,13 +92,13 @@ def _write_tables(view: View, files: Mapping[str, object], stored: bool, brief: 
         title = ""
 
 
-def draw_figure(sheet: Sheet, path: Path | None) -> None:
-    """Write the figure of a view, if a name is given."""
+def draw_figure(compose: Callable[[], Sheet], path: Path | None) -> None:
+    """Write the figure of the panels that `compose` returns, if a name is given."""
     if path is None:
         return
     from wearsim.report.figures import figure_of, save_figure
 
-    save_figure(figure_of(sheet), path)
+    save_figure(figure_of(compose()), path)
 
 
 def write_table_file(columns: Columns, path: Path) -> None:

@@ -246,7 +246,7 @@ def cam(
     with watching(Display, loaded, kind="contacts"):
         study = wearsim.study_cam(loaded, angles)
     view = study.view
-    draw_figure(view.panels(), figure)
+    draw_figure(view.panels, figure)
     if table is not None:
         (columns,) = view.columns().values()
         write_table_file(columns, table)

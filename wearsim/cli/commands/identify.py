@@ -275,7 +275,7 @@ def _plan(
         designs = plan_tests(
             scenario, counts, stds, negligible=negligible, draws=draws, on_progress=counter
         )
-    draw_figure(power_sheet(designs, scenario.title), figure)
+    draw_figure(lambda: power_sheet(designs, scenario.title), figure)
     if json:
         write_json({**plan_data(designs), "figure": figure})
         return

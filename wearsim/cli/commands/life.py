@@ -393,7 +393,7 @@ def show_lives(
         return
     if len(results) > 1:
         views.append(comparison_of(results, labels))
-    draw_figure(views[-1].panels(), figure)
+    draw_figure(views[-1].panels, figure)
     # the comparison is the first part of a page
     files = use.write([views[-1], *views[:-1]])
     more = {"figure": figure, **({"page": use.page} if use.page else {})}

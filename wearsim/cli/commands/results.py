@@ -111,7 +111,8 @@ def plot(
         "--measured",
     )
     choice = profile_choice(columns, units, row, mean_rows, at)
-    draw_figure(view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path)
+    profiles = measured_profiles(measured or [], choice, [view], level, angle)
+    draw_figure(lambda: view.panels(profiles), path)
     note(f"figure: {path}")
 
 

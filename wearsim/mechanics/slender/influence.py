@@ -43,9 +43,15 @@ def _series_coefficient(m: int) -> float:
     return float(asinh * catalan / 4.0**m)
 
 
+@cache
+def _gauss_points() -> tuple[FloatArray, FloatArray]:
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    return nodes, weights
+
+
 def _near(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return f(t) and t f'(t) by Gauss quadrature; s = t sinh v makes the integrands smooth."""
-    nodes, weights = np.polynomial.legendre.leggauss(24)
+    nodes, weights = _gauss_points()
     angle = 0.25 * np.pi * (nodes + 1.0)
     reach = np.arcsinh(1.0 / t)[:, None]
     v = reach * np.sin(angle)

@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 _SMALL = 1 << 13  # largest variable or column that is kept once it has been read [bytes]
 
 
+def small_variables(file: StoredFile, names: Iterable[str]) -> Arrays:
+    """Read the small ones of some variables."""
+    return {name: file.array(name) for name in names if file.dataset(name).nbytes <= _SMALL}
+
+
 class StoredRows(Mapping[str, "Array"]):
     """Variables of an ensemble by name; there may be gigabytes.
 
@@ -43,10 +48,11 @@ class StoredRows(Mapping[str, "Array"]):
         Its schema.
     parts : list of Part
         Its parts, oldest first. A row in a later one counts.
+    small : dict of str to ndarray, optional
+        Variables that were read when the file was opened, see `small_variables`.
     is_unchanged : callable, optional
-        Returns whether the file is as it was when it was opened. Small variables are then read
-        together, and they and small columns are not read again, as estimates take the same ones
-        many times; without it all are.
+        Returns whether the file is as it was then. Those variables and small columns are not read
+        again, as estimates take the same ones many times; without it all are.
     """
 
     def __init__(
@@ -54,11 +60,11 @@ class StoredRows(Mapping[str, "Array"]):
         read: Callable[[Callable[[StoredFile], Arrays]], Arrays],
         schema: Schema,
         parts: list[Part],
+        small: Arrays | None = None,
         is_unchanged: Callable[[], bool] = lambda: False,
     ) -> None:
         self._read, self._schema, self.parts = read, schema, parts
-        self._is_unchanged = is_unchanged
-        self._small: Arrays | None = None  # variables, once they have been read
+        self._small, self._is_unchanged = small or {}, is_unchanged
         self._kept: dict[tuple[object, ...], Array] = {}  # columns of others
 
     def __len__(self) -> int:
@@ -103,8 +109,6 @@ class StoredRows(Mapping[str, "Array"]):
         """Return rows of the file without its parts."""
         if not self._is_unchanged():
             return self._of_file([name], places)[name]
-        if self._small is None:
-            self._small = self._read(self._small_variables)
         if name in self._small:
             return self._small[name][places].copy()
         key = (name, *((place.start, place.stop, place.step) for place in places))
@@ -114,10 +118,6 @@ class StoredRows(Mapping[str, "Array"]):
         if places[0] == slice(0, None) and values.nbytes <= _SMALL:
             self._kept[key] = values.copy()
         return values
-
-    def _small_variables(self, file: StoredFile) -> Arrays:
-        names = self._schema.variables
-        return {name: file.array(name) for name in names if file.dataset(name).nbytes <= _SMALL}
 
     def block(self, names: Iterable[str], start: int, stop: int | None) -> Arrays:
         """Return the same rows of several variables, for which each file is opened once.

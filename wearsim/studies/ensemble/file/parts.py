@@ -28,7 +28,12 @@ from wearsim.results.io.files import (
     read_file,
 )
 from wearsim.results.io.stored_file import StoredFile
-from wearsim.studies.ensemble.file.data import EnsembleData, Outcome, StoredRows
+from wearsim.studies.ensemble.file.data import (
+    EnsembleData,
+    Outcome,
+    StoredRows,
+    small_variables,
+)
 from wearsim.studies.ensemble.file.schema import (
     DONE,
     ENSEMBLE,
@@ -379,8 +384,9 @@ def _merged(path: Path, file: StoredFile) -> tuple[EnsembleData, StoredRows]:
     errors = _errors_of(file, status)
     # rows are read on access, perhaps after a change of the working directory
     state = path.absolute(), os.fstat(file.handle)
+    small = small_variables(file, schema.variables)
     stored = StoredRows(
-        partial(_read_unchanged, *state), schema, [], partial(_is_unchanged, *state)
+        partial(_read_unchanged, *state), schema, [], small, partial(_is_unchanged, *state)
     )
     return EnsembleData(**attributes, variables=stored, status=status, errors=errors), stored
 
