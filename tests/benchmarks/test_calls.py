@@ -3,7 +3,9 @@
 import wearsim
 from tests.benchmarks.calls import RIG, SCENARIOS, calls_per_step
 
-MOST, MOST_OWN = 315, 125  # 300 and 119; those in C depend on the versions of Python and numpy
+# 300 and 119; those in C depend on the versions of Python and numpy, and of several processes that
+# test each has a further call for every kernel
+MOST, MOST_OWN = 335, 125
 
 
 def test_a_step_takes_few_calls() -> None:

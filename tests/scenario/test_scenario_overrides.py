@@ -10,7 +10,7 @@ from scenario_examples import GOOD, Parse
 
 from wearsim.errors import ScenarioError
 from wearsim.scenario import parse_override
-from wearsim.scenario.parse.toml import apply_overrides
+from wearsim.scenario.parse.overrides import apply_overrides
 
 
 def test_override_changes_one_value_and_keeps_comments(parse: Parse) -> None:

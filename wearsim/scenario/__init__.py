@@ -1,7 +1,7 @@
 """Scenarios: TOML with units, validated as a whole, immutable and in SI once read."""
 
 from wearsim.scenario.parse.fields import Persistence, RandomInput
-from wearsim.scenario.parse.toml import parse_override
+from wearsim.scenario.parse.overrides import parse_override
 from wearsim.scenario.realise import realise
 from wearsim.scenario.scenario import (
     Drawn,

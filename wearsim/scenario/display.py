@@ -11,7 +11,7 @@ import numpy as np
 from wearsim.report.notebook import table_html
 from wearsim.report.panels import Axis, Line, Panel
 from wearsim.report.view import Row
-from wearsim.scenario.parse.toml import flat
+from wearsim.scenario.parse.overrides import flat
 
 if TYPE_CHECKING:
     from wearsim.scenario.scenario import Scenario

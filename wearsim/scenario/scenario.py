@@ -16,7 +16,8 @@ from wearsim.plugins import Options
 from wearsim.profiles import split_name
 from wearsim.scenario.axial_gap import AxialGap
 from wearsim.scenario.parse.fields import RandomInput
-from wearsim.scenario.parse.toml import flat, parse_fields, reader_in
+from wearsim.scenario.parse.overrides import flat
+from wearsim.scenario.parse.toml import parse_fields, reader_in
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.cam import Cam, LubricantTable
 from wearsim.scenario.tables.fatigue import FatigueChoice

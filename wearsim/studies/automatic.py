@@ -15,7 +15,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario import Scenario
-from wearsim.scenario.parse.toml import apply_overrides
+from wearsim.scenario.parse.overrides import apply_overrides
 from wearsim.scenario.tables.bodies import DUNDURS_LIMIT
 from wearsim.scenario.tables.plugin import AUTO, AutoTable, ChosenTable, ContactChoice
 from wearsim.studies.contact.comparison import INSTALL, REFERENCE, at_creepage

@@ -16,7 +16,7 @@ from wearsim.models.random.distributions import TableDistribution
 from wearsim.quantities import NUMBER, quantity
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import amount, can_be_random
-from wearsim.scenario.parse.toml import flat
+from wearsim.scenario.parse.overrides import flat
 from wearsim.studies.identify.measurements import Measurement, key_of
 from wearsim.units import QuantityError, as_written
 

@@ -13,7 +13,7 @@ from wearsim.errors import Mistake, ScenarioError, mistake_in
 from wearsim.profiles import ProfileChoice
 from wearsim.quantities import quantity
 from wearsim.scenario.parse.mistakes import nearest
-from wearsim.scenario.parse.toml import as_toml, flat
+from wearsim.scenario.parse.overrides import as_toml, flat
 from wearsim.units import QuantityError, as_written
 
 #: Short names of inputs.

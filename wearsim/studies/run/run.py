@@ -17,7 +17,7 @@ from wearsim.results.io.files import as_path
 from wearsim.results.io.outputs import output_lock
 from wearsim.results.kinds import kind_of
 from wearsim.scenario import Scenario, as_scenario
-from wearsim.scenario.parse.toml import apply_overrides
+from wearsim.scenario.parse.overrides import apply_overrides
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.preparation import check_plugins
 from wearsim.studies.progress import shown_progress

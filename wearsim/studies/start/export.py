@@ -11,7 +11,8 @@ import numpy as np
 from wearsim.errors import ResultsFileError
 from wearsim.report.csv_files import path_in_folder, write_files
 from wearsim.scenario import Scenario
-from wearsim.scenario.parse.toml import apply_overrides, flat, parse_toml
+from wearsim.scenario.parse.overrides import apply_overrides, flat
+from wearsim.scenario.parse.toml import parse_toml
 from wearsim.studies.run.assemble import merged_rollers
 from wearsim.studies.run.continuation import stored_scenario
 from wearsim.studies.run.draws import draw
