@@ -246,11 +246,20 @@ class Posterior:
         weight *= (self.m[:, 1] - self.m[:, 0])[:, None]
         centre = float((weight * self.m).sum())
         spread = float(np.sqrt((weight * ((self.m - centre) ** 2 + std[:, None] ** 2)).sum()))
-        grid = centre + spread * np.linspace(-8.0, 8.0, 801)
         step = self.m[:, 1] - self.m[:, 0]
-        below = np.zeros_like(grid)
-        for row, m in enumerate(self.m):
-            if weight[row].sum() > 1e-9:
-                width = max(float(std[row]), 0.3 * float(step[row]))
-                below += ndtr((grid[:, None] - m) / width) @ weight[row]
-        return [float(np.interp(p * below[-1], below, grid)) for p in probability]
+
+        def share_below(values: FloatArray) -> FloatArray:
+            below = np.zeros_like(values)
+            for row, m in enumerate(self.m):
+                if weight[row].sum() > 1e-9:
+                    width = max(float(std[row]), 0.3 * float(step[row]))
+                    below += ndtr((values[:, None] - m) / width) @ weight[row]
+            return below
+
+        coarse, quantiles = centre + spread * np.linspace(-8.0, 8.0, 41), []
+        below = share_below(coarse)
+        for wanted in below[-1] * np.asarray(probability):
+            place = int(np.clip(np.searchsorted(below, wanted), 1, coarse.size - 1))
+            fine = np.linspace(coarse[place - 1], coarse[place], 21)
+            quantiles.append(float(np.interp(wanted, share_below(fine), fine)))
+        return quantiles
