@@ -7,11 +7,14 @@ processes only, while the others wait for it.
 from __future__ import annotations
 
 import gc
+import os
 import re
+import shutil
+import tempfile
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Hashable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -26,6 +29,7 @@ settings.register_profile("wearsim", settings(), deadline=None)
 settings.load_profile("wearsim")
 
 STARTED = time.monotonic()
+MEMORY, LEAST_FREE = "/dev/shm", 4 << 30  # a file system in memory; tests need a tenth [bytes]
 LONG = {"test_site.py", "test_installs.py", "test_numba_cache.py", "test_run_kills.py"}
 #: tests.benchmarks imports wearsim_bench
 PLUGINS = r"wearsim_(?:bench|chevalier2005|explore|halfspace|optimise|validation)"
@@ -71,25 +75,39 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         pytest.skip(f"not begun within {longest:.0f} s")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
-    if hasattr(config, "workerinput"):  # one of several processes
-        Kernel.__call__ = compiled_once(Kernel.__call__, config.cache.mkdir("kernels"))
+    """Keep the files of the tests in memory where there is enough: they are flushed often."""
+    if hasattr(config, "workerinput"):  # one of several processes, whose folder is given
+        return
+    usable = os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > LEAST_FREE
+    if config.option.basetemp is None and usable:
+        config.option.basetemp = tempfile.mkdtemp(prefix="wearsim-tests-", dir=MEMORY)
+        config.add_cleanup(partial(shutil.rmtree, config.option.basetemp, ignore_errors=True))
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    if hasattr(session.config, "workerinput"):  # one of several processes
+        folder = session.config.cache.mkdir("kernels")
+        Kernel.__call__ = compiled_once(Kernel.__call__, folder)
 
 
 def compiled_once(call: Any, folder: Path) -> Any:
     """Return `call` of kernels, by which one process compiles a kernel and the next ones read it.
 
-    A kernel is compiled separately for arguments that are None.
+    A kernel is compiled separately for arguments that are None, which may be those of type Any.
     """
-    called = set()
+    called: set[Hashable] = set()
 
     def call_or_wait(kernel: Kernel, *arguments: Any) -> Any:
+        if kernel in called:
+            return call(kernel, *arguments)
         form = kernel, *[argument is None for argument in arguments]
         if form in called:
             return call(kernel, *arguments)
         with locked(folder / kernel.__name__):
             result = call(kernel, *arguments)
-        called.add(form)
+        called.add(form if "Any" in kernel.__annotations__.values() else kernel)
         return result
 
     return call_or_wait

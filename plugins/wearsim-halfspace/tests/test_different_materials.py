@@ -128,7 +128,7 @@ def test_contact_that_traction_moves_off_the_elements_is_an_error():
     ("material", "mx", "creepages"),
     [
         ("aluminium", 24, (2.98e-4, 3e-4, 3.02e-4)),
-        ("bronze", 50, (2.1203e-4, 2.1356e-4, 2.1509e-4)),
+        pytest.param(*("bronze", 50, (2.1203e-4, 2.1356e-4, 2.1509e-4)), marks=pytest.mark.slow),
     ],
 )
 def test_row_that_alternates_between_states_ends_the_iteration(material, mx, creepages):

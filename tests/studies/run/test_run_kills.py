@@ -67,7 +67,8 @@ def long_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Scenario, 
     return path, scenario, wearsim.run(scenario)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+# the shell is sent both signals too
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(15, marks=pytest.mark.slow)])
 def test_run_stopped_by_signal_resumes_bit_for_bit(
     number: signal.Signals,
     long_run: tuple[Path, Scenario, wearsim.Result],
