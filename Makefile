@@ -1,5 +1,5 @@
 # make demo            run the 450-minute wear test: summary, results and figure in out/
-# make test            lint, types, import contracts and the quick tests: 12 minutes on 2 cores
+# make test            lint, types, import contracts and the quick tests: 5 minutes on 2 cores
 # make test-slow       the other tests: kills of the writers, hard cases, installs, Dask, the site: 20 minutes;
 #                      BEGIN_WITHIN=600 skips those that have not begun after 600 s
 # make test-coverage   how often stated intervals hold the truth, by hundreds of data sets: 10 minutes, before a release

@@ -43,10 +43,7 @@ def _series_coefficient(m: int) -> float:
     return float(asinh * catalan / 4.0**m)
 
 
-@cache
-def _gauss_points() -> tuple[FloatArray, FloatArray]:
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    return nodes, weights
+_gauss_points = cache(lambda: np.polynomial.legendre.leggauss(24))
 
 
 def _near(t: FloatArray) -> tuple[FloatArray, FloatArray]:

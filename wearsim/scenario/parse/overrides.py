@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import PurePath
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -130,8 +130,7 @@ def apply_overrides(
 
 def tables_of(text: str) -> dict[str, Any]:
     """Return the tables of a text as dictionaries that may be changed."""
-    tables: dict[str, Any] = pickle.loads(_pickled_tables(text))
-    return tables
+    return cast("dict[str, Any]", pickle.loads(_pickled_tables(text)))
 
 
 # a study changes the same scenario for each design: reading a pickled object takes an eighth of the

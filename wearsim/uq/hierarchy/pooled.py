@@ -246,20 +246,16 @@ class Posterior:
         weight *= (self.m[:, 1] - self.m[:, 0])[:, None]
         centre = float((weight * self.m).sum())
         spread = float(np.sqrt((weight * ((self.m - centre) ** 2 + std[:, None] ** 2)).sum()))
-        step = self.m[:, 1] - self.m[:, 0]
+        widths = np.maximum(std, 0.3 * (self.m[:, 1] - self.m[:, 0]))
+        rows = np.flatnonzero(weight.sum(axis=1) > 1e-9)
 
         def share_below(values: FloatArray) -> FloatArray:
-            below = np.zeros_like(values)
-            for row, m in enumerate(self.m):
-                if weight[row].sum() > 1e-9:
-                    width = max(float(std[row]), 0.3 * float(step[row]))
-                    below += ndtr((values[:, None] - m) / width) @ weight[row]
-            return below
+            parts = [ndtr((values[:, None] - self.m[k]) / widths[k]) @ weight[k] for k in rows]
+            return np.asarray(np.sum(parts, axis=0))
 
-        coarse, quantiles = centre + spread * np.linspace(-8.0, 8.0, 41), []
+        coarse = centre + spread * np.linspace(-8.0, 8.0, 41)
         below = share_below(coarse)
-        for wanted in below[-1] * np.asarray(probability):
-            place = int(np.clip(np.searchsorted(below, wanted), 1, coarse.size - 1))
-            fine = np.linspace(coarse[place - 1], coarse[place], 21)
-            quantiles.append(float(np.interp(wanted, share_below(fine), fine)))
-        return quantiles
+        wanted = below[-1] * np.asarray(probability)
+        places = np.clip(np.searchsorted(below, wanted), 1, coarse.size - 1)
+        fine = np.linspace(coarse[places - 1], coarse[places], 21, axis=1)
+        return [float(np.interp(w, share_below(x), x)) for w, x in zip(wanted, fine, strict=True)]
