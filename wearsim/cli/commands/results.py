@@ -111,8 +111,9 @@ def plot(
         "--measured",
     )
     choice = profile_choice(columns, units, row, mean_rows, at)
-    profiles = measured_profiles(measured or [], choice, [view], level, angle)
-    draw_figure(lambda: view.panels(profiles), path)
+    draw_figure(
+        lambda: view.panels(measured_profiles(measured or [], choice, [view], level, angle)), path
+    )
     note(f"figure: {path}")
 
 

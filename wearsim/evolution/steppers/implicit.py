@@ -167,8 +167,9 @@ class ImplicitStepper(StepDoublingStepper):
             profile_error=estimates[2],
         )
         if others := end.auxiliary:
-            changed = {"order": order, "passes": passes}
-            end = end.replaced(**{n: other.replaced(**changed) for n, other in others.items()})
+            end = end.replaced(
+                **{n: other.replaced(order=order, passes=passes) for n, other in others.items()}
+            )
         return Attempt((end,), over, ratio)
 
     def _attempt_doubled(
@@ -301,9 +302,11 @@ def implicit_step(
     if state.past_spans is None:
         state = with_rates(problem, state)
     state = edges.at_start_of_step(problem, state)
-    here = problem
-    if problem.varying:
-        here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+    here = (
+        problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+        if problem.varying
+        else problem
+    )
     conditions = conditions_of(here, problem, state, passes)
     order = state.order
     assert order is not None

@@ -384,9 +384,12 @@ def _merged(path: Path, file: StoredFile) -> tuple[EnsembleData, StoredRows]:
     errors = _errors_of(file, status)
     # rows are read on access, perhaps after a change of the working directory
     state = path.absolute(), os.fstat(file.handle)
-    small = small_variables(file, schema.variables)
     stored = StoredRows(
-        partial(_read_unchanged, *state), schema, [], small, partial(_is_unchanged, *state)
+        partial(_read_unchanged, *state),
+        schema,
+        [],
+        small_variables(file, schema.variables),
+        partial(_is_unchanged, *state),
     )
     return EnsembleData(**attributes, variables=stored, status=status, errors=errors), stored
 
