@@ -77,11 +77,14 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Keep the files of the tests in memory where there is enough: they are flushed often."""
+    """Keep the files of the quick tests in memory where there is enough: they are flushed often.
+
+    The slow tests install whole environments.
+    """
     if hasattr(config, "workerinput"):  # one of several processes, whose folder is given
         return
     usable = os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > LEAST_FREE
-    if config.option.basetemp is None and usable:
+    if config.option.basetemp is None and usable and "not slow" in config.option.markexpr:
         config.option.basetemp = tempfile.mkdtemp(prefix="wearsim-tests-", dir=MEMORY)
         config.add_cleanup(partial(shutil.rmtree, config.option.basetemp, ignore_errors=True))
 
