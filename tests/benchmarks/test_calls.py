@@ -3,8 +3,8 @@
 import wearsim
 from tests.benchmarks.calls import RIG, SCENARIOS, calls_per_step
 
-# 300 and 119; those in C depend on the versions of Python and numpy, and of several processes that
-# test each has a further call for every kernel
+# measured: 300 and 119. Calls in C depend on the versions of Python and numpy, and the tests call
+# each kernel through one more function where they run in several processes
 MOST, MOST_OWN = 335, 125
 
 

@@ -25,7 +25,7 @@ def quick_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def unwritten_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compose figures without drawing them, for tests of what is printed beside them."""
+    """Write an empty file for each figure, for tests of the printed output only."""
     monkeypatch.setattr(figures, "save_figure", lambda figure, path: path.touch())
 
 

@@ -62,7 +62,7 @@ def finish_writing(path: Path) -> None:
 
 
 def complete(path: Path) -> None:
-    """Write what a killed process has left to do at once, and merge the parts."""
+    """Write all realisations that are not done in one batch, and merge the parts."""
     with EnsembleFile.open(path) as file:
         missing = [number for number in range(COUNT) if file.status[number] != DONE]
         file.clear(missing)

@@ -135,7 +135,7 @@ def _flip(path: Path, stored: bytes, at: int) -> None:
 
 @pytest.mark.parametrize("extent", ["one", pytest.param("all", marks=pytest.mark.slow)])
 def test_changed_byte_of_a_dataset_is_an_error(case, extent):
-    """Of each dataset, one byte is changed, in turn of the data and of its checksum, or all."""
+    """Change one byte of each dataset, of data and checksum alternately, or every chosen byte."""
     path, changed, content = case
     stored, places = changed.read_bytes(), _places_of_data(changed)
     assert len(places) > 10
@@ -151,7 +151,7 @@ def test_changed_byte_of_a_dataset_is_an_error(case, extent):
 
 
 def _of_each_object(places: dict[str, list[int]]) -> dict[str, list[int]]:
-    """Return the positions of the attributes of the file, and of one in turn of each dataset."""
+    """Return positions of all attributes of the file and of one attribute of each dataset."""
     of_objects: dict[str, list[str]] = {}
     for name in places:
         of_objects.setdefault(name.partition(" ")[0], []).append(name)
@@ -161,7 +161,7 @@ def _of_each_object(places: dict[str, list[int]]) -> dict[str, list[int]]:
 
 @pytest.mark.parametrize("extent", ["one", pytest.param("all", marks=pytest.mark.slow)])
 def test_changed_byte_of_an_attribute_is_an_error_or_changes_nothing(case, extent):
-    """All attributes of the file are changed, and one of each dataset, or all."""
+    """Change each attribute of the file, and one attribute or all attributes of each dataset."""
     path, changed, content = case
     stored, refused = changed.read_bytes(), 0
     places = _places_of_attributes(changed)

@@ -276,8 +276,7 @@ class WearState:
         past : Past
             Of the fields in `others`.
         """
-        stations = self.cylinder_depth.shape[0]
-        cylinder, roller = depths[:stations, None], depths[None, stations:]
+        cylinder, roller = separated(depths, self.cylinder_depth.shape[0])
         state = self.replaced(cylinder_depth=cylinder, roller_depth=roller, **others)
         state.__dict__.update(stacked=depths, past=past)
         return state

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,14 +12,11 @@ from typer.testing import CliRunner, Result
 from wearsim.cli.app import app
 from wearsim.report import figures
 
-FOLDER = Path(__file__).parent
 collect_ignore_glob = [] if find_spec("wearsim_optimise") else ["*"]
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for item in items:  # all tests of all folders: texts are compared faster than paths
-        if str(item.path).startswith(f"{FOLDER}{os.sep}"):
-            item.add_marker(pytest.mark.bench)
+def pytest_itemcollected(item: pytest.Item) -> None:  # called for this folder only
+    item.add_marker(pytest.mark.bench)
 
 
 @pytest.fixture

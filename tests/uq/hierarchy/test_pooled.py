@@ -76,7 +76,7 @@ def test_needed_tests_are_those_of_the_closed_form_for_normal_values():
     # the closed form has a power of 0.8 from 29 tests on
     assert normal_power(28, 0.417**2, 0.4) < 0.8 < normal_power(29, 0.417**2, 0.4)
     assert Power([normal(0.0, 0.417)], sets=500).needed(0.4) == pytest.approx(29, abs=3)
-    assert Power([normal(0.0, 1.0)], sets=200).needed(1e-3, most=32) is None
+    assert Power([normal(0.0, 1.0)], sets=200).needed(1e-3) is None
 
 
 def test_more_tests_repeat_the_given_ones():

@@ -24,9 +24,9 @@ _ZEROED = "{} has a block of zeros, which was not written"
 
 
 class StoredArray(NamedTuple):
-    """A stored array of which nothing is read: the open object, and what the file says of it.
+    """An open dataset of HDF5, with its shape, type and chunk shape.
 
-    An `h5py.Dataset` asks the file for its shape, type and chunks each time.
+    An `h5py.Dataset` reads these from the file at each access.
     """
 
     id: Any

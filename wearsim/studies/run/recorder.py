@@ -305,10 +305,10 @@ class Recorder:
 
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
-        stepper, end = self.stepper, advance.end
+        stepper, (before, *_, end) = self.stepper, advance.path
         for due in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
             self._record(advance, due)
-        self._history.add(advance.problem, end, advance.path[0])
+        self._history.add(advance.problem, end, before)
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end, advance.problem.grid
         self._thin(float(end.passes[0]))
