@@ -89,7 +89,6 @@ def test_code_of_a_mutant_has_its_change_alone(mutants: list[Mutant], tmp_path: 
     assert found["value < found", "value <= found"] == -1.0
 
 
-@pytest.mark.slow
 def test_listed_mutants_exist_and_have_a_reason() -> None:
     modules = [path for part in PARTS for path in modules_of(part)]
     for one in equivalent():
