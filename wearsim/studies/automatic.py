@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from wearsim.evolution.observables import present_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.plugins import ContactModelSpec, registry
-from wearsim.scenario import Scenario
+from wearsim.scenario import Scenario, as_scenario
 from wearsim.scenario.parse.overrides import apply_overrides
 from wearsim.scenario.tables.bodies import DUNDURS_LIMIT
 from wearsim.scenario.tables.plugin import AUTO, AutoTable, ChosenTable, ContactChoice
@@ -50,7 +51,7 @@ class _State:
     indicators: list[FloatArray]
 
 
-def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
+def with_chosen_model(scenario: Scenario | str | Path, test: bool) -> Scenario:
     """Return a scenario with the contact model that `contact.model = "auto"` takes.
 
     The cheapest installed model is taken whose estimated error of P_l(y) is at most
@@ -63,7 +64,7 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : Scenario or path
         Any; one that names a model, or has chosen before, is returned as it is.
     test : bool
         Whether the contacts of a wear test are looked at, instead of a single one.
@@ -73,7 +74,10 @@ def with_chosen_model(scenario: Scenario, test: bool) -> Scenario:
     CapabilityError
         If no installed model suffices, or a friction field is given. The exact theory is not taken
         for tests of more than eight contacts.
+    ScenarioError, PluginError, TypeError
+        As `as_scenario`.
     """
+    scenario = as_scenario(scenario)
     if scenario.contact.model != AUTO:
         return scenario
     options = scenario.contact.options

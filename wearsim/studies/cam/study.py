@@ -15,7 +15,7 @@ from wearsim.evolution.contacts import unworn_contacts
 from wearsim.mechanics.cam import Panel, extreme
 from wearsim.mechanics.film import minimum_film
 from wearsim.results.viewed import Viewed
-from wearsim.scenario import Scenario, as_scenario
+from wearsim.scenario import Scenario
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.checks import (
     Skid,
@@ -152,7 +152,7 @@ def study_cam(
     >>> print([f"{force:.6f} N" for force in study.point.normal_force])
     ['319.538258 N', '324.369394 N']
     """
-    scenario = with_chosen_model(as_scenario(scenario), test=False)
+    scenario = with_chosen_model(scenario, test=False)
     turn, chosen, weight = turn_of(scenario), None, None
     if angles is None:
         point, weight = turn.at_stations(turn.stations), turn.stations.weight

@@ -12,7 +12,7 @@ import numpy as np
 from wearsim.errors import Interrupted, ScenarioError, SolverError
 from wearsim.results.io.files import as_path, write_results
 from wearsim.results.io.outputs import output_lock
-from wearsim.scenario import Scenario, as_scenario
+from wearsim.scenario import Scenario
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.contact.batch import Realisations
 from wearsim.studies.dissipation.result import (
@@ -96,7 +96,7 @@ def dissipation(
     >>> wearsim.dissipation(scenario, 100)
     <DissipationResult 'a wear test': 100 realisations, power 0.07761 W, std 0.00744 W>
     """
-    scenario = with_chosen_model(as_scenario(scenario), test=False)
+    scenario = with_chosen_model(scenario, test=False)
     realisations = checked_count(scenario, realisations)
     path = as_path(output) if output is not None else None
     with (

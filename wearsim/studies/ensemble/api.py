@@ -18,7 +18,7 @@ from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import CapabilityError, ResultsFileError, ScenarioError
 from wearsim.results.io.files import as_path
 from wearsim.results.io.outputs import check_output
-from wearsim.scenario import Scenario, as_scenario, require_run
+from wearsim.scenario import Scenario, require_run
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.cam.observables import CURVE_ANGLES
 from wearsim.studies.ensemble.designs import (
@@ -134,7 +134,7 @@ def ensemble(
     >>> tests.count
     8
     """
-    scenario = with_chosen_model(as_scenario(scenario), test=True)
+    scenario = with_chosen_model(scenario, test=True)
     request = checked_request(scenario, realisations, plan, named_precision(precision, until))
     path = as_path(output)
     check_output(path, force, scenario.paths)

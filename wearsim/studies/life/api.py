@@ -15,7 +15,7 @@ from wearsim.atomic_write import DISK, Storage
 from wearsim.errors import Interrupted
 from wearsim.results.io.files import as_path
 from wearsim.results.io.outputs import check_output
-from wearsim.scenario import Scenario, as_scenario, realise
+from wearsim.scenario import Scenario, realise
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.ensemble.api import (
     Watcher,
@@ -116,7 +116,7 @@ def life(
     B10 8.51e+05 passes
     """
     scenario, settings, aim = checked_study(
-        with_chosen_model(as_scenario(scenario), test=True),
+        with_chosen_model(scenario, test=True),
         realisations,
         limits=limits,
         target=target,

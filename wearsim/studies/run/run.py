@@ -16,7 +16,7 @@ from wearsim.evolution.state import WearState
 from wearsim.results.io.files import as_path
 from wearsim.results.io.outputs import output_lock
 from wearsim.results.kinds import kind_of
-from wearsim.scenario import Scenario, as_scenario
+from wearsim.scenario import Scenario
 from wearsim.scenario.parse.overrides import apply_overrides
 from wearsim.studies.automatic import with_chosen_model
 from wearsim.studies.preparation import check_plugins
@@ -93,7 +93,7 @@ def run(
     48.1 um
     >>> kept = wearsim.run("rig.toml", "rig.h5")  # writes the file as well
     """
-    scenario = with_chosen_model(as_scenario(scenario), test=True)
+    scenario = with_chosen_model(scenario, test=True)
     path = as_path(output) if output is not None else None
     limit, warnings = None, []
     if until is not None:
