@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution, SharedWear
 from wearsim.errors import ContactError, PluginError
-from wearsim.plugins.checked import ROUNDING, built_plugin, described_value, is_numeric
+from wearsim.plugins.checked import ROUNDING, described_value, is_numeric
 from wearsim.plugins.contact_model import (
     ContactModel,
     PassLoop,
@@ -16,13 +14,10 @@ from wearsim.plugins.contact_model import (
     naming_contact,
     refuse_unclaimed,
 )
-from wearsim.plugins.specs import ContactModelSpec
 from wearsim.types import (
     ContactFields,
     ContactSolution,
     FloatArray,
-    Grid,
-    Material,
     OperatingPoint,
 )
 
@@ -31,25 +26,6 @@ _NUMBERS = (
     *("force_x", "force_y", "spin_moment", "approach", "peak_pressure"),
     *("adhesion_fraction", "power", "longitudinal_creepage", "iterations"),
 )
-
-
-def built_model(
-    spec: ContactModelSpec, options: Any, grid: Grid, materials: tuple[Material, Material]
-) -> ContactModel:
-    """Return a new contact model; the solutions of one that is not of wearsim are checked.
-
-    Parameters
-    ----------
-    spec : ContactModelSpec
-    options, grid, materials
-        Arguments of its factory.
-
-    Raises
-    ------
-    PluginError
-        If the factory returns no contact model.
-    """
-    return built_plugin(spec, ContactModel, CheckedModel, options, grid, materials)
 
 
 class CheckedModel(SingleContactModel):

@@ -27,7 +27,7 @@ from wearsim.plugins import (
 from wearsim.plugins.checked import built_plugin
 from wearsim.plugins.checked_laws import CheckedWearLaw
 from wearsim.plugins.checked_loads import CheckedLoad, CheckedLoadTerm
-from wearsim.plugins.checked_model import built_model
+from wearsim.plugins.checked_model import CheckedModel
 from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
 from wearsim.scenario.parse.random_inputs import choose, validate
@@ -131,7 +131,7 @@ class ContactChoice:
 
     def build(self, grid: Grid, materials: tuple[Material, Material]) -> ContactModel:
         """Return a new contact model for strips, and for the materials of cylinder and roller."""
-        return built_model(self.spec, self.options, grid, materials)
+        return built_plugin(self.spec, ContactModel, CheckedModel, self.options, grid, materials)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ import numpy as np
 from wearsim.contact_batch import ContactBatch
 from wearsim.errors import ContactError, PluginError, WearsimError
 from wearsim.plugins import ContactModel, ContactModelSpec, Options, registry
-from wearsim.plugins.checked_model import built_model
+from wearsim.plugins.checked import built_plugin
+from wearsim.plugins.checked_model import CheckedModel
 from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
 
 REFERENCE = "halfspace"  # the exact theory
@@ -166,7 +167,7 @@ def solve_reference(
 
     def solve(options: Options, on: Grid) -> FloatArray:
         heights = gap if on is grid else np.interp(on.y, grid.y, gap)
-        model = built_model(spec, options, on, materials)
+        model: ContactModel = built_plugin(spec, ContactModel, CheckedModel, options, on, materials)
         if creep_factor != 1.0:
             model = model.with_creep_factor(creep_factor)
         return _values(model.solve_one(heights, longitudinal_curvature, _on(point, grid, on)))
