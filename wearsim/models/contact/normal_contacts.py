@@ -94,13 +94,10 @@ class NormalContacts(NamedTuple):
             line_load[:] = start.line_load.reshape(wide)
             approach[:] = start.approach.reshape(shape)
         status, iterations = np.zeros((2, *shape), np.int64)
-        gap, curvature, loads = kernel_inputs(
-            batch.gap, batch.longitudinal_curvature, batch.normal_force
-        )
         return cls(
-            gap.reshape(wide),
-            curvature.reshape(shape),
-            loads.reshape(shape),
+            batch.gap.reshape(wide),
+            batch.longitudinal_curvature.reshape(shape),
+            batch.normal_force.reshape(shape),
             line_load,
             approach,
             half_length,
@@ -150,7 +147,7 @@ class NormalContacts(NamedTuple):
                 failed += systems._solve(
                     softness.reshape(systems.gap.shape), bodies, worn, constants
                 )
-                for array, solved in () if whole else zip(self, taken, strict=True):
+                for array, solved in () if whole else zip(self[3:], taken[3:], strict=True):
                     array[places] = solved
         return failed
 
@@ -166,13 +163,16 @@ class NormalContacts(NamedTuple):
         Contacts chosen from sets have arrays of another layout, for which numba would compile.
         """
         status, iterations = np.zeros((2, self.gap.shape[0]), np.int64)
+        gap, softness, loads, curvature = kernel_inputs(
+            self.gap, compliance, self.loads, self.longitudinal_curvature
+        )
         failed = kernels.solve_slender(
-            self.gap,
-            kernel_input(compliance),
+            gap,
+            softness,
             members,
             None if shared is None else kernel_input(shared),
-            self.loads,
-            self.longitudinal_curvature,
+            loads,
+            curvature,
             *constants,
             self.line_load,
             self.approach,
