@@ -309,7 +309,8 @@ class WearProblem:
     @cached_property
     def pauses(self) -> list[FloatArray]:
         """Start and end of the pauses of each realisation, shape (pauses, 2) [passes]."""
-        pauses = [load.pauses * self.kinematics.pass_rate for load in self.loads]
+        loads = self.loads if self.constant_load is None else ()  # a constant load has none
+        pauses = [load.pauses * self.kinematics.pass_rate for load in loads]
         return pauses if any(map(len, pauses)) else []
 
     @cached_property
@@ -335,7 +336,8 @@ class WearProblem:
 
     def at_stations(self, force: FloatArray) -> FloatArray:
         """Return the normal force at the stations under a load of each realisation, as `force`."""
-        return self.kinematics.track.normal_force(force)
+        track = self.kinematics.track
+        return force * track.load_factor + track.load_rest
 
     def at_time(self, start: FloatArray, stop: FloatArray) -> WearProblem:
         """Return the problem with every process at its mean between two times [s]."""

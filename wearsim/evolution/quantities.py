@@ -46,12 +46,6 @@ class ContactInputs:
         """Mean of `normal_force_offset` over the contacts, shape (realisations,) [N]."""
         return np.asarray(self.normal_force_offset.mean(axis=0))
 
-    @classmethod
-    def uniform(cls, contacts: int, realisations: int = 1, **values: float) -> ContactInputs:
-        """Return inputs that are equal for all contacts; zero where no value is given."""
-        shape = (contacts, realisations)
-        return cls(*(np.full(shape, values.get(item.name, 0.0)) for item in fields(cls)))
-
     def at(self, numbers: IntArray, axis: int = 0) -> ContactInputs:
         """Return the inputs of some contacts, or with axis 1 of some realisations, by number."""
         columns = (getattr(self, item.name) for item in fields(self))
@@ -105,6 +99,7 @@ class OneStation:
     rolling_speed: float
     track_radius: float
     load_factor: ClassVar[float] = 1.0
+    load_rest: ClassVar[float] = 0.0
     pressure_angle: ClassVar[float] = 0.0
     inertia: ClassVar[FloatArray] = np.zeros((0, 0))
     skids: ClassVar[FloatArray] = np.zeros((0, 2))
@@ -145,10 +140,6 @@ class OneStation:
     def mean_over_turn(self, values: FloatArray) -> FloatArray:
         """Return the value of the station; the first axis is kept."""
         return mean_along(values, axis=0)
-
-    def normal_force(self, load: FloatArray) -> FloatArray:
-        """Return the normal force under a load [N]."""
-        return load
 
     def springs(self, stiffness: FloatArray) -> FloatArray:
         """Return the loss of load per descent from those of the loads, (realisations,) [N/m]."""
@@ -313,10 +304,6 @@ class CamStations:
             "bearing_torque": np.where(skids, np.nan, inputs.bearing_torque + self.inertia_torque),
             "longitudinal": np.where(skids, self.skid, inputs.longitudinal),
         }
-
-    def normal_force(self, load: FloatArray) -> FloatArray:
-        """Return the normal force at the stations under a load of each realisation [N]."""
-        return load * self.load_factor + self.load_rest
 
     def springs(self, _stiffness: FloatArray) -> FloatArray:
         """Return the loss of load per descent, shape (stations, 1, 1) [N/m]."""

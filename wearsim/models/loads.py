@@ -187,6 +187,10 @@ class ConstantLoad(Load):
         """Return the mean of the load between two times [s] [N]."""
         return self._force
 
+    def extremes(self, start: float, stop: float) -> tuple[float, float]:
+        """Return the load twice [N]."""
+        return self._force, self._force
+
 
 @lru_cache(maxsize=4)  # a log may have millions of rows, and a study builds its load several times
 def _read_log(

@@ -347,7 +347,7 @@ def build_problem(
         Angles of a cam, instead of the stations of a run [rad].
     """
     scenario, creepage, turn = setup.scenario, setup.scenario.creepage, setup.turn
-    count, values = len(rollers), setup.inputs_of(rollers, drawn)
+    count, inputs = len(rollers), setup.inputs_of(rollers, drawn)
     kinematics = Kinematics(
         cylinder_radius=scenario.cylinder.radius,
         roller_radius=scenario.roller.radius,
@@ -356,7 +356,8 @@ def build_problem(
         track=turn.track if isinstance(turn, CylinderTurn) else cam_stations(turn, angles),
     )
     at = kinematics.track.angles
-    unworn = surfaces(scenario, rollers, values.pop("offset"), grid, at)
+    unworn = surfaces(scenario, rollers, inputs.pop("offset"), grid, at)
+    columns = {n: np.array(np.broadcast_to(a, (count, realisations))) for n, a in inputs.items()}
     return WearProblem(
         grid=grid,
         model=model,
@@ -370,7 +371,7 @@ def build_problem(
         from_apex=unworn.from_apex,
         roller_drop=unworn.roller_drop,
         crowned=scenario.axial_gap.is_crowned,
-        inputs=ContactInputs.uniform(count, realisations).with_values(values),
+        inputs=ContactInputs(**columns),
         roller=np.arange(count, dtype=np.int64),
         weight=np.ones(count),
         tilt_shifts=creepage.tilt_shifts_contact,

@@ -139,6 +139,7 @@ class Setup:
         scenario, creepage = self.scenario, self.scenario.creepage
         values: Mapping[str, float | tuple[float, ...]] = {
             "offset": scenario.roller.offset,
+            "normal_force_offset": 0.0,
             "yaw": creepage.yaw,
             "tilt": creepage.tilt,
             "friction": scenario.friction.coefficient,
@@ -183,12 +184,13 @@ class Setup:
         ScenarioError
             If the load is not defined for the whole test, or not positive.
         """
-        return (
-            self.load_range(self.scenario.total_time)[1] + self.range_of("normal_force_offset")[1]
-        )
+        offset = self.range_of("normal_force_offset")[1]
+        return self.load_range()[1] + offset
 
-    def load_range(self, stop: float) -> tuple[float, float]:
+    def load_range(self, stop: float | None = None) -> tuple[float, float]:
         """Return the least and greatest load up to `stop` [s], before any feedback [N].
+
+        By default it is that of the whole test.
 
         Raises
         ------
@@ -196,17 +198,19 @@ class Setup:
             If the load is not defined for the whole time, or is not positive outside of pauses.
         """
         scenario, load = self.scenario, self.scenario.load.built
-        if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
-            raise load_mistake(
-                scenario,
-                "the log does not cover the test",
-                f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min",
-                f"0 to {stop / 60.0:.6g} min: a longer log or a shorter operation.duration",
-            )
-        low, high = load.extremes(0.0, stop)
+        stop = scenario.total_time if stop is None else stop
         if isinstance(load, FollowerLoad):
             low, high = turn_of(scenario).normal_range
             return (low if low > 0.0 else high), high  # where N changes sign, the flank changes
+        span = None if load.constant else load.span
+        if span is not None and (span[0] > 0.0 or span[1] < stop * (1.0 - 1e-9)):
+            raise load_mistake(
+                scenario,
+                "the log does not cover the test",
+                f"{span[0] / 60.0:.6g} to {span[1] / 60.0:.6g} min",
+                f"0 to {stop / 60.0:.6g} min: a longer log or a shorter operation.duration",
+            )
+        low, high = load.extremes(0.0, stop)
         if scenario.load.terms:
             return low, high
         if high <= 0.0:
@@ -363,35 +367,44 @@ class Setup:
             ratio = min(float(np.hypot(longitudinal, yaw)) / saturated, 1.0)
             slipping = ratio * (2.0 - ratio)
         start = 0.0 if profile is None else profile.relief
-        half = patch.b
+        half, speed = patch.b, scenario.rolling_speed
+        share = turn.mean_radius / roller.radius / scenario.operation.rollers
+        of_cylinder, of_roller = (law.depth_per_dissipation(body, speed) for body in BODIES)
+        linear = None
+        if of_cylinder is not None and of_roller is not None:
+            linear = of_cylinder + share * of_roller
         for _ in range(20):  # the slip at the sides of the groove depends weakly on its width
             rise = half**2 / (2.0 * gap.radius_at(half))
             along = longitudinal + tilt / roller.radius * half + rise * curvature
-            line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
             sliding = slipping * friction * float(np.hypot(along, yaw))
-            per_load = self._wear_per_load(law, line_loads, sliding)
+            if linear is None:
+                line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
+                per_load = self._wear_per_load(law, share, line_loads, sliding)
+            else:
+                per_load = linear * sliding * speed
             depth = gap.depth_of(per_load * load * scenario.total_passes)
             before, half = half, float(gap.half_width(depth + start))
             if half == before:
                 break
         return half
 
-    def _wear_per_load(self, law: WearLaw, line_load: FloatArray, friction_slip: float) -> float:
+    def _wear_per_load(
+        self, law: WearLaw, share: float, line_load: FloatArray, friction_slip: float
+    ) -> float:
         """Return the greatest depth per pass and line load in full slip, of both bodies [m/(N/m)].
 
         Parameters
         ----------
         law : WearLaw
+            Not linear in the dissipation.
+        share : float
+            Overrollings of a point of a roller per pass.
         line_load : ndarray, shape (strips,)
             Line loads at which it is evaluated [N/m].
         friction_slip : float
             Friction coefficient times slip.
         """
         scenario, speed = self.scenario, self.scenario.rolling_speed
-        share = self.turn.mean_radius / scenario.roller.radius / scenario.operation.rollers
-        cylinder, roller = (law.depth_per_dissipation(body, speed) for body in BODIES)
-        if cylinder is not None and roller is not None:
-            return (cylinder + share * roller) * friction_slip * speed
         curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
         stiffness = np.pi * scenario.pair.contact_modulus * curvature
         half_length = np.sqrt(4.0 * line_load / stiffness)
