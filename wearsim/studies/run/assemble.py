@@ -199,14 +199,6 @@ def assemble_problem(
             table="evolution",
             key="stepper",
         )
-    stepper = build_stepper(scenario, name)
-    if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not setup.passes):
-        raise mistake_in(
-            scenario.file,
-            "has no meaning without an expectation over passes",
-            table="evolution",
-            key="nodes",
-        )
     place = {number: k for k, number in enumerate(first)}
     problem = replace(
         build_problem(
@@ -225,6 +217,14 @@ def assemble_problem(
         ),
         growth=growth,
     )
+    stepper = build_stepper(scenario, name)
+    if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not setup.passes):
+        raise mistake_in(
+            scenario.file,
+            "has no meaning without an expectation over passes",
+            table="evolution",
+            key="nodes",
+        )
     if setup.passes and stepper.pass_by_pass and scenario.fatigue is not None:
         raise mistake_in(
             scenario.file,

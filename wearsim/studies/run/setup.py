@@ -348,7 +348,7 @@ class Setup:
         scenario, creepage, turn = self.scenario, self.scenario.creepage, self.turn
         if scenario.wear is None:
             return 0.0
-        law, patch, roller = scenario.wear.built, self.fresh_patch(load), scenario.roller
+        patch, roller = self.fresh_patch(load), scenario.roller
         friction = self.greatest_mean("friction", scenario.friction.coefficient)
         longitudinal = self.greatest_mean("longitudinal", creepage.longitudinal or 0.0)
         saturation = friction * patch.a * turn.curvatures[-1] / scenario.friction.creep_factor
@@ -367,8 +367,8 @@ class Setup:
             ratio = min(float(np.hypot(longitudinal, yaw)) / saturated, 1.0)
             slipping = ratio * (2.0 - ratio)
         start = 0.0 if profile is None else profile.relief
-        half, speed = patch.b, scenario.rolling_speed
         share = turn.mean_radius / roller.radius / scenario.operation.rollers
+        half, speed, law = patch.b, scenario.rolling_speed, scenario.wear.built
         of_cylinder, of_roller = (law.depth_per_dissipation(body, speed) for body in BODIES)
         linear = None
         if of_cylinder is not None and of_roller is not None:
